@@ -59,7 +59,7 @@ def test_the_map_is_advance(names) -> None:
     flow = Stroboscope(system)
     wanted = advanced(system, flow)
     np.testing.assert_allclose(
-        flow.march(flow.coordinates(), PERIODS, save_every_period=True).every[0], wanted, atol=1e-12
+        flow.march(flow.coordinates(), PERIODS, every=True).every[0], wanted, atol=1e-12
     )
     here = flow.coordinates()
     for period in range(PERIODS):
@@ -101,7 +101,7 @@ def test_against_an_independent_solution(names) -> None:
     else:
         own = {name: motion for name, motion in (("base", base), ("load", load)) if name in names}
         truth = live(PaperBeam(2), Surroundings(**own), times).midspan_displacement
-    every = flow.march(flow.coordinates(), PERIODS, save_every_period=True).every[0] * flow.scales
+    every = flow.march(flow.coordinates(), PERIODS, every=True).every[0] * flow.scales
     found = every[:, :2] @ MODEL.midspan_shape / MODEL.length_scale
     np.testing.assert_allclose(found, truth[40::40], rtol=0.0, atol=2e-6)
 
@@ -132,10 +132,10 @@ def test_sections_orbits_and_diagrams_begin_at_the_phase() -> None:
 
 
 def test_the_phase_of_a_start_counts() -> None:
-    start = sb.State(amplitude=0.9 * MODEL.mirrored.equilibrium, phase=0.4)
+    start = sb.State(amplitude=0.9 * MODEL.mirrored.well_amplitude, phase=0.4)
     system = system_of(("base",)).replace(initial_state=start)
     flow = Stroboscope(system)
-    found = flow.march(flow.coordinates(), PERIODS, save_every_period=True).every[0]
+    found = flow.march(flow.coordinates(), PERIODS, every=True).every[0]
     np.testing.assert_allclose(found, advanced(system, flow), atol=1e-12)
 
 
@@ -146,8 +146,8 @@ def test_phases_that_would_be_ignored_are_refused() -> None:
     with pytest.raises(
         sb.InputError, match=r"state phase = .*: must be the phase at which the system is observed"
     ):
-        flow.coordinates(sb.State(amplitude=MODEL.equilibrium, phase=0.3))
-    flow.coordinates(sb.State(amplitude=MODEL.equilibrium, phase=1.0 + 6.0 * math.pi))
+        flow.coordinates(sb.State(amplitude=MODEL.well_amplitude, phase=0.3))
+    flow.coordinates(sb.State(amplitude=MODEL.well_amplitude, phase=1.0 + 6.0 * math.pi))
     with pytest.raises(sb.InputError, match="state phase"):
         sb.dynamics.bifurcation_diagram(
             system_of(("striker",)), "velocity_amplitude", [0.1, 0.2], sweeps=(),

@@ -31,7 +31,7 @@ def deepest(held, step):
 ROW = '''"""One row of the table of outcomes."""
 
 from own_function import deepest
-from snapbeam.engines.outcomes import Statistic, register
+from snapbeam.solver.statistics import Statistic, register
 
 ROW = Statistic(
     "max_penetration", "float64", "m", "greatest penetration at the end of a step",
@@ -43,7 +43,7 @@ LAW = '''"""A spring between tip and beam: a linear force, nothing lost."""
 
 from dataclasses import dataclass
 
-from snapbeam.model.contact import ContactLaw
+from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.quantity import RUN, quantity
 
 
@@ -115,9 +115,9 @@ def test_files_touched(own) -> None:
     assert len(list(law_folder.glob("*.py"))) == 1
     assert LAWS["linear"] is law
     assert "max_penetration" in STATISTICS
-    # the parameter of the law is in the table without a file more, beside another law's of the same name
-    assert lookup("contact.stiffness").quantity.unit == "N/m"
-    assert "linear" in parameters()["contact.stiffness"].kinds
+    # the parameter of the law is in the table without a file more, next to those of other laws
+    assert lookup("contact.spring").quantity.unit == "N/m"
+    assert "linear" in parameters()["contact.spring"].kinds
 
 
 @pytest.mark.slow
@@ -125,10 +125,10 @@ def test_impact_of_a_free_mass_on_a_spring(own) -> None:
     """Half a period: duration pi sqrt(m/k), greatest force v sqrt(k m), depth v sqrt(m/k), and nothing lost."""
     law, *_ = own
     springs = np.geomspace(1e5, 1e7, 5)
-    ds = sb.sweep(thrown(law, 1e6), {"contact.stiffness": springs}, sb.Integration(cycles=1))
+    ds = sb.sweep(thrown(law, 1e6), {"contact.spring": springs}, sb.Integration(cycles=1))
     assert (ds.status == sb.RunStatus.OK).all() and (ds.impacts == 1).all()
     assert ds.spring.attrs == {
-        "units": "N/m", "long_name": "stiffness of the contact", "parameter": "contact.stiffness",
+        "units": "N/m", "long_name": "stiffness of the contact", "parameter": "contact.spring",
     }  # fmt: skip
     root = np.sqrt(MASS / springs)
     np.testing.assert_allclose(ds.contact_time_fraction * (1.0 / 80.0), math.pi * root, rtol=1e-3)
@@ -146,7 +146,7 @@ def test_a_beam_struck_by_a_spring(own, tmp_path) -> None:
         sb.ReducedModel.from_beam(default_values.BEAM, modes=4, damping_ratio=0.0), law(2e6),
         sb.Shaker(frequency_ratio=1.4, velocity_amplitude=0.05),
     )  # fmt: skip
-    axes = {"contact.stiffness": [5e5, 2e6], "velocity_amplitude": [0.02, 0.3, 0.5]}
+    axes = {"contact.spring": [5e5, 2e6], "velocity_amplitude": [0.02, 0.3, 0.5]}
     ds = sb.sweep(system, axes, sb.Integration(cycles=8))
     assert (ds.status == sb.RunStatus.OK).all()
     # without damping nothing is dissipated, and the spring gives back what it takes

@@ -13,7 +13,7 @@ from snapbeam.solver.step_size import choose_base_step
 
 
 @pytest.mark.parametrize("modes", [1, 2, 5, 16, 32, 48, 64, 128])
-@pytest.mark.parametrize("accuracy", ["map", "reference"])
+@pytest.mark.parametrize("accuracy", ["standard", "reference"])
 def test_steps_in_contact_resolve_the_impact_and_the_fastest_mode(modes: int, accuracy: str) -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes)
     plan = choose_base_step(model, default_values.CONTACT, accuracy=accuracy)
@@ -39,7 +39,7 @@ def test_many_modes_are_as_good_as_few(modes: int) -> None:
             sb.Integration(cycles=5, accuracy=level),
             sample_times=times,
         ).dataset.displacement_at_striker
-        for level in ("reference", "map")
+        for level in ("reference", "standard")
     )
     error = np.abs(coarse - fine).max()
     assert float(error) < 1e-3

@@ -1,1 +1,1 @@
-"""solver"""
+"""The solver: step, events, statistics and the layouts that compile them."""

@@ -116,7 +116,7 @@ def _speed(drive: Drive, columns: Mapping[str, _Array], section: str, system: Sy
 
 
 # ----------------------------------------------------------------------------------------------------
-# What moves in every run of an ensemble, and as which drive kernels march it.
+# What moves in every run of an ensemble, and as which drive kernels integrate it.
 
 
 class Driven(NamedTuple):
@@ -294,7 +294,7 @@ _LOWEST = {"standard": 1e-9, "reference": 1e-13}
 _RESOLVED = 24.0
 """Flight steps, at least, in a period of a base's or an axial load's fastest part."""
 _TAPPED = {"standard": 0.35, "reference": 0.1}
-"""Longest step with a harvester, over the reciprocal of the greatest angular frequency with an open circuit. It
+"""Longest step with a harvester, over the reciprocal of the maximum angular frequency with an open circuit. It
 is in the kicks, and at 0.5 a run of one or three modes still loses up to 5e-3 of its gross work."""
 FAR_AWAY = -1e30
 """Penetration, m, of a tip that is not there."""
@@ -323,7 +323,7 @@ def make_ensemble(
     start : State, optional
         One start for all runs, or a batch with one for each; the system's by default.
     periods : float, optional
-        Cycles to march, a state handed out after each; by default the cycles of *integration*, in one go.
+        Cycles to integrate, a state handed out after each; by default the cycles of *integration*, in one go.
     step_factor : float
         Times the length of every step.
 
@@ -613,6 +613,6 @@ def _decisions(
         return
     table["decide_crossings"] = int(time.cycles / 20.0)
     table["decide_reach"] = np.maximum(highest, 0.0)
-    if structure.uneven is not None:
+    if structure.unequal_wells is not None:
         table["decide_reach"] = passed_heights(structure.model, location, highest)
     table["decide_energy"] = decidable_energy(structure.model, location, highest)

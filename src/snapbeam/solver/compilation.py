@@ -1,7 +1,7 @@
 """How kernels are compiled, and how the compiled code is kept between runs.
 
 Functions are compiled into the kernel that calls them, across files and with the law of contact and the drive that
-it marches; a kernel is what is kept on disk.  Numba alone would keep it until the file that it stands in changes.
+it integrates; a kernel is what is kept on disk.  Numba alone would keep it until the file that it stands in changes.
 Here it is kept under a fingerprint of everything that it bakes in (:mod:`~snapbeam.solver.compilation`), with a
 check sum (:mod:`~snapbeam.solver.compilation`).
 """

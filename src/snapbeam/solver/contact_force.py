@@ -186,10 +186,10 @@ def _contact_slope(law, penetration):
 
 
 def peak_force(law: Any, deepest: float) -> float:
-    """Greatest force of a contact, N, from what a book calls the deepest point of it.
+    """Greatest force of a contact, N, from what a record of accumulators calls the deepest point of it.
 
-    That is the greatest penetration, or, under a law whose impacts last no time or whose force is not greatest where
-    the penetration is, the greatest force while the bodies stay together.
+    That is the maximum penetration, or, under a law whose impacts last no time or whose force is not maximum where
+    the penetration is, the maximum force while the bodies stay together.
     """
     owner = type(law).owner
     return deepest if owner.impulsive or owner.rate_dependent else contact_force(law, deepest)
@@ -286,7 +286,7 @@ def _kick_force(law, penetration, rate, mobility, push, weight):
 
 
 def mark_of(law: Any, penetration: float, rate: float) -> float:
-    """What a book keeps the greatest of in a contact: the penetration, or the force of a law that loses energy."""
+    """What a record of accumulators keeps the maximum of in a contact: the penetration, or the force of a law that loses energy."""
     return max(penetration, 0.0) if not type(law).owner.rate_dependent else felt_force(law, penetration, rate)
 
 

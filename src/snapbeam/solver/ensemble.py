@@ -94,8 +94,8 @@ class Ensemble:
         """-1 for a run that starts in the well away from which the striker pushes, +1 for the other one."""
         moved = np.array([float(start[0] @ self.structure.center) for start in self.starts])
         center = self.runs["well_sign"] * self.runs["rest_center"] + moved[self.runs["start_row"]]
-        if self.structure.uneven is not None:
-            center = center - self.structure.uneven.level
+        if self.structure.unequal_wells is not None:
+            center = center - self.structure.unequal_wells.level
         side: _Integers = np.where(center > 0.0, 1, -1)
         return side
 
@@ -130,7 +130,7 @@ class Ensemble:
 
 _REALS = (
     "offset",  # penetration of the tip at mid-stroke into the beam at rest
-    "tip_speed",  # greatest speed of the tip, ever
+    "tip_speed",  # maximum speed of the tip, ever
     "phase",  # argument of the drive at the start, rad
     "rest_contact",  # displacement of the contact point and of the centre in the well that q is counted from
     "rest_center",

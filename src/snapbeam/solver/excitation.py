@@ -31,7 +31,7 @@ __all__ = [
 
 
 # ----------------------------------------------------------------------------------------------------
-# Motions of a tip, a base and an axial load that are marched as one drive: each by its own kind, from one argument.
+# Motions of a tip, a base and an axial load that are integrated as one drive: each by its own kind, from one argument.
 
 
 _TWO_PI = 2.0 * math.pi

@@ -1,7 +1,7 @@
 """A fingerprint of what the engine computes, to tell files apart that two of them made.
 
 A version number does not say by which steps a number was found.  The mark does: a few short, well-conditioned runs are
-marched at both levels of accuracy, with one to twelve modes, and how many steps they took and what came of them, to
+integrated at both levels of accuracy, with one to twelve modes, and how many steps they took and what came of them, to
 nine digits, is hashed.  Another text of the same engine has the same mark; other steps, or another engine, have not.
 """
 

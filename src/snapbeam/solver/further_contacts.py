@@ -74,7 +74,7 @@ def _law_reader(law: Any) -> Any:
 
 
 def _by_law(laws: tuple[Any, ...], function: Any) -> Any:
-    """*function* of the numbers of striker j and a penetration; the striker is chosen as the march goes."""
+    """*function* of the numbers of striker j and a penetration; the striker is chosen as the integration goes."""
     read, rest = _law_reader(laws[0]), _by_law(laws[1:], function) if len(laws) > 1 else None
 
     @inlined

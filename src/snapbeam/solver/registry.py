@@ -22,7 +22,7 @@ __all__ = ["Engine", "resolve"]
 
 
 _FEWEST_RUNS = 2000
-"""A device marches one run slower than a core does, but over a thousand at a time: fewer do not fill it."""
+"""A device integrates one run slower than a core does, but over a thousand at a time: fewer do not fill it."""
 _FEWEST_CYCLES = 2_000_000
 """Cycles of all runs, more than a minute of a core's work: with fewer, compiling the kernel costs more."""
 
@@ -35,7 +35,7 @@ class Engine(Protocol):
     def run_ensemble(
         self, ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None
     ) -> NDArray[Any]:
-        """March every run of an ensemble; a book a run."""
+        """Integrate every run of an ensemble; a record of accumulators a run."""
         ...
 
     def integrate_to_landing(
@@ -61,7 +61,7 @@ class Engine(Protocol):
         in_contact: bool,
         progress: Callable[[float], object] | None = None,
     ) -> Iterator[Recorded]:
-        """March one run and give what it wrote down, in pieces."""
+        """Integrate one run and give what it wrote down, in pieces."""
         ...
 
 
@@ -74,7 +74,7 @@ def resolve(
     law: type[ContactLaw] | None = None,
     drive: type[Drive] = Sine,
     body: bool = False,
-    uneven: bool = False,
+    unequal_wells: bool = False,
     around: bool = False,
     several: bool = False,
 ) -> tuple[str, Engine]:
@@ -87,7 +87,7 @@ def resolve(
     ----------
     name : {"auto", "cpu", "cuda"}
     runs : int
-        How many there are to march.
+        How many there are to integrate.
     cycles : float
         Of each.
     modes : int
@@ -116,7 +116,7 @@ def resolve(
         reason = cuda.refusal(modes, law, drive)
         if body:
             reason = "a striker with a mass is marched by the CPU engine alone"
-        if uneven:
+        if unequal_wells:
             reason = "a beam with unequal wells is marched by the CPU engine alone"
         if around:
             reason = (

@@ -1,6 +1,6 @@
 """Eight double-precision numbers side by side, as one value inside compiled code.
 
-The modes of a model are marched eight at a time.  Numba's automatic vectoriser gives no guarantee that
+The modes of a model are integrated eight at a time.  Numba's automatic vectoriser gives no guarantee that
 a loop over modes becomes vector instructions, and permitting it to reorder sums would make results
 depend on the processor.  Here both are explicit: a :class:`Lanes` value is one vector register
 (or two, or four, where the processor's registers are narrower), an addition of two of them is eight

@@ -67,7 +67,7 @@ class Passed(NamedTuple):
 # What every kernel keeps: name, kind, value at the start.
 _KEPT: tuple[tuple[str, type, float], ...] = (
     ("status", np.int64, int(RunStatus.NOT_RUN)),
-    ("time", np.int64, 0),  # ticks marched
+    ("time", np.int64, 0),  # ticks integrated
     ("touching", np.int64, 0),
     ("onset", np.int64, 0),  # tick at which the present contact began
     ("side", np.int64, 0),  # sign of the centre displacement, -1 in the well the run began in
@@ -94,17 +94,17 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
     ("total_impulse", np.float64, 0.0),
     ("work", np.float64, 0.0),
     ("gross_work", np.float64, 0.0),
-    ("dissipated", np.float64, 0.0),  # integrated, where a ledger is kept
+    ("dissipated", np.float64, 0.0),  # integrated, where a energy balance is kept
     ("lost", np.float64, 0.0),  # in contact
     ("base_work", np.float64, 0.0),  # of a moving base, on the beam in its frame
     ("circuit_energy", np.float64, 0.0),  # lost in a harvester's circuit, load included
-    ("peak_circuit", np.float64, 0.0),  # greatest voltage or current, as the circuit's coordinate
+    ("peak_circuit", np.float64, 0.0),  # maximum voltage or current, as the circuit's coordinate
     ("load_work", np.float64, 0.0),  # of what an axial load has beyond its mean
     ("first_energy", np.float64, 0.0),
     ("energy", np.float64, 0.0),  # at the end, contact included
     ("displacement", np.float64, 0.0),  # of contact point and centre, at the end
     ("center", np.float64, 0.0),
-    ("deepest", np.float64, 0.0),  # greatest penetration of the present contact
+    ("deepest", np.float64, 0.0),  # maximum penetration of the present contact
     ("impulse", np.float64, 0.0),  # of the present contact
     ("early_stop_time", np.float64, math.nan),
 )
@@ -154,7 +154,7 @@ def _seen(column: str, factor: Callable[[Reading], float] = lambda _: 1.0) -> Ca
 
 
 def _low_high(low: str, high: str, greatest: bool) -> Callable[[Reading], Values]:
-    """Least or greatest displacement over b, in the signs of space."""
+    """Least or maximum displacement over b, in the signs of space."""
 
     def value(reading: Reading) -> Values:
         upward = reading.sign > 0.0
@@ -436,7 +436,7 @@ def _of_one(name: str, number: int) -> Statistic:
 
 
 # ----------------------------------------------------------------------------------------------------
-# What engines answer: the books of many runs, read as statistics in the units and signs of a map.
+# What engines answer: the accumulators of many runs, read as statistics in the units and signs of a map.
 
 
 _MADE = 0.01
@@ -447,7 +447,7 @@ _ROUNDED = 1e-6
 
 @dataclass(frozen=True)
 class Reading:
-    """The books of an ensemble, and what it takes to read them."""
+    """The accumulators of an ensemble, and what it takes to read them."""
 
     ensemble: Ensemble
     accumulators: NDArray[Any]
@@ -496,7 +496,7 @@ class Reading:
 
     @cached_property
     def duration(self) -> NDArray[np.float64]:
-        """Time marched, s."""
+        """Time integrated, s."""
         return np.asarray(self.accumulators["time"] * self.ensemble.runs["tick"])
 
     def seen(self, column: str) -> NDArray[np.float64]:
@@ -524,7 +524,7 @@ class Reading:
 
     @property
     def peak_force(self) -> NDArray[np.float64]:
-        """Of the law's force, the greatest of any striker; NaN where an impact lasts no time."""
+        """Of the law's force, the maximum of any striker; NaN where an impact lasts no time."""
         force = self.seen("peak_force")
         if self.ensemble.others is not None:
             return np.maximum(force, self.others[:, :, OTHER_PEAK].max(axis=1))
@@ -548,8 +548,8 @@ class Reading:
         if not (ensemble.highest > -np.inf).any():
             return np.asarray(settled)
         reach, level = np.maximum(ensemble.highest, 0.0), 0.0
-        if ensemble.structure.uneven is not None:
-            level = ensemble.structure.uneven.level
+        if ensemble.structure.unequal_wells is not None:
+            level = ensemble.structure.unequal_wells.level
             reach = passed_heights(model, ensemble.location, ensemble.highest)
         away = settled & (accumulators["side"] > 0) & (accumulators["displacement"] > reach)
         away &= accumulators["center"] > level
@@ -581,7 +581,7 @@ def statistics_of(
 
 
 # ----------------------------------------------------------------------------------------------------
-# What engines hand over beside books: states at landings, and pieces of a recorded run.
+# What engines hand over beside accumulators: states at landings, and pieces of a recorded run.
 
 
 _Array = NDArray[np.float64]
@@ -623,5 +623,5 @@ class Recorded(NamedTuple):
     impacts: _Array
     """Onset, duration, peak force and impulse of each impact that ended, shape (impacts, 4)."""
     accumulators_of_runs: NDArray[Any]
-    """The run's book as it is at the end of the piece, shape (1,)."""
+    """The run's record of accumulators as it is at the end of the piece, shape (1,)."""
     last: Last

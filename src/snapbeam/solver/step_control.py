@@ -1,4 +1,4 @@
-"""What is decided between steps, and kept of them: scalar functions that every engine's march is made of."""
+"""What is decided between steps, and kept of them: scalar functions that every engine's integrate is made of."""
 
 from __future__ import annotations
 
@@ -201,9 +201,9 @@ def ticks_of(clock, level):
 
 
 @compiled
-def flight_level(clock, quiet, stretch, stretch_at_rest):
+def flight_level(clock, low_energy, stretch, stretch_at_rest):
     """Halvings of the flight step for a beam stretched far beyond its wells; -1 if it is quiet."""
-    if quiet:
+    if low_energy:
         return -1
     level = 0
     reach = STRETCHED * stretch_at_rest
@@ -214,10 +214,12 @@ def flight_level(clock, quiet, stretch, stretch_at_rest):
 
 
 @compiled
-def first_contact_onset(looked, pieces, piece):
+def first_contact_onset(inner_samples, pieces, piece):
     """When the penetration first becomes positive inside a step that was looked into; -1 if it does not."""
     for i in range(pieces):
-        rise = first_upcrossing(looked[i, 0], looked[i, 1], looked[i + 1, 0], looked[i + 1, 1], piece)
+        rise = first_upcrossing(
+            inner_samples[i, 0], inner_samples[i, 1], inner_samples[i + 1, 0], inner_samples[i + 1, 1], piece
+        )
         if rise >= 0.0:
             return (i + rise) * piece
     return -1.0
@@ -239,14 +241,14 @@ def refine_onset(clock, cut, whole, seen, least):
 
 @compiled
 def count_zero_crossings_in_step(
-    accumulators, clock, start, length, seen, seen1, looked, rest, pieces, piece
+    accumulators, clock, start, length, seen, seen1, inner_samples, rest, pieces, piece
 ):
     """Count zero crossings of the centre in a step, through what was seen when it was looked into."""
     left, left_rate, begun = seen.c, seen.cv, 0.0
     i = 1
     while True:
         if i < pieces and i * piece < length:
-            right, right_rate, ended = rest + looked[i, 2], looked[i, 3], i * piece
+            right, right_rate, ended = rest + inner_samples[i, 2], inner_samples[i, 3], i * piece
         else:
             right, right_rate, ended = seen1.c, seen1.cv, length
         found, last, side = count_zero_crossings(

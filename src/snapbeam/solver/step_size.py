@@ -38,7 +38,7 @@ __all__ = [
 #
 # How long a step may be follows from how the tension detunes the modes, from which of them come in step with the kicks,
 # and from how much energy there is; no formula holds from one mode to a hundred and from shallow beams to deep ones.  So
-# it is tried: the structure is struck at one point in its well, gently and hard, and marched for two periods of its first
+# it is tried: the structure is struck at one point in its well, gently and hard, and integrated for two periods of its first
 # mode with steps of many lengths.  What differs from the finest of them by less than a limit serves, where the error is
 # counted in the relative change of velocity at the start that would have done as much.
 
@@ -90,7 +90,7 @@ def flight_step(model: ReducedModel, order: int, limit: float) -> float:
     key = (structure.hash, order, limit)
     if key not in _KEPT:
         _KEPT[key] = period / _Bench(structure, order).fewest(limit)
-        if structure.uneven is not None:
+        if structure.unequal_wells is not None:
             _KEPT[key] = min(_KEPT[key], period / _Bench(structure, order, far=True).fewest(limit))
         while len(_KEPT) > _MOST_KEPT:
             _KEPT.popitem(last=False)
@@ -109,31 +109,31 @@ class _Bench:
         shapes = [model.shape_at(x) for x in _PLACES] if model.beam is not None else [model.midspan_shape]
         if model.contact_shape is not None:
             shapes.append(model.contact_shape)
-        kernel_output = slice(0, _MOST_MODES)
+        lowest = slice(0, _MOST_MODES)
         self.omega, self.damping = (
-            structure.omega[kernel_output],
-            (structure.damping_ratio * structure.omega)[kernel_output],
+            structure.omega[lowest],
+            (structure.damping_ratio * structure.omega)[lowest],
         )
-        self.columns = np.array(structure.coupling[kernel_output, kernel_output].T, order="C")
-        self.well = structure.well[kernel_output]
+        self.columns = np.array(structure.coupling[lowest, lowest].T, order="C")
+        self.well = structure.well[lowest]
         self.rest = self.force = np.zeros(self.omega.size)
         if (
-            far and structure.uneven is not None
+            far and structure.unequal_wells is not None
         ):  # about the mirror image of the first well, at rest in the second
             self.well = -self.well
             self.rest, self.force = (
-                structure.uneven.second[kernel_output],
-                structure.uneven.force[kernel_output],
+                structure.unequal_wells.second[lowest],
+                structure.unequal_wells.force[lowest],
             )
-        self.rows = (np.array(shapes) @ model.linear_modes)[:, kernel_output] / length
+        self.rows = (np.array(shapes) @ model.linear_modes)[:, lowest] / length
         if model.beam is not None:
             struck = model.shape_at(_STRUCK)
         else:
             struck = model.midspan_shape if model.contact_shape is None else model.contact_shape
-        blow = (struck @ model.linear_modes)[kernel_output]
+        blow = (struck @ model.linear_modes)[lowest]
         if not blow.any():
             blow = np.ones(self.omega.size)
-        if structure.uneven is not None and model.landscape is not None:
+        if structure.unequal_wells is not None and model.landscape is not None:
             barrier = model.saddle_energy - model.landscape.deepest.energy
         elif model.is_bistable:
             straight, well = np.zeros(model.modes), structure.equilibrium
@@ -410,7 +410,7 @@ def clocked(
 def _asked_cycles(
     drive: RecordedMotion, integration: Integration, periods: float | None, left: float
 ) -> float:
-    """Cycles to march, of a record of which a share *left* is still to come."""
+    """Cycles to integrate, of a record of which a share *left* is still to come."""
     held = drive.duration * drive.frequency * left
     kernel_input = integration.cycles if periods is None else periods
     if kernel_input is None and held > 0.0:

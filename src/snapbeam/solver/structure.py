@@ -17,14 +17,14 @@ from snapbeam.model.harvester import Harvester
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
 
-__all__ = ["Structure", "Uneven", "structure_of"]
+__all__ = ["Structure", "UnequalWells", "structure_of"]
 
 
 _Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Uneven:
+class UnequalWells:
     """What unequal wells add: about the mirror image of the first well the beam is the same, but for a constant force.
 
     With B the side force and a the first well, K0 a + gamma (a . a) a = B.  At alpha = -a + V q the same linear modes
@@ -74,9 +74,9 @@ class Structure:
     equilibrium: _Array
     """alpha in the well, as it is in space."""
     model: ReducedModel
-    uneven: Uneven | None = None
+    unequal_wells: UnequalWells | None = None
     """Of unequal wells."""
-    add_base_acceleration: _Array | None = None
+    base_load: _Array | None = None
     """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi)."""
     tapped: _Array | None = None
     """Of a harvester: its coupling, scaled so that half the square of the circuit's coordinate is its energy."""
@@ -159,12 +159,12 @@ class Structure:
         for part in (self.omega, self.damping_ratio, self.coupling, self.well, self.center, self.equilibrium):
             digest.update(np.ascontiguousarray(part).tobytes())
         digest.update(np.array([self.nonlinear_stiffness, self.sign]).tobytes())
-        if self.uneven is not None:
-            digest.update(np.ascontiguousarray(self.uneven.force).tobytes())
+        if self.unequal_wells is not None:
+            digest.update(np.ascontiguousarray(self.unequal_wells.force).tobytes())
         if self.tapped is not None:
             digest.update(np.ascontiguousarray(self.tapped).tobytes())
-        if self.add_base_acceleration is not None:
-            digest.update(np.ascontiguousarray(self.add_base_acceleration).tobytes())
+        if self.base_load is not None:
+            digest.update(np.ascontiguousarray(self.base_load).tobytes())
         if self.body_mass is not None:
             digest.update(np.array([self.body_mass]).tobytes())
         return digest.hexdigest()
@@ -199,21 +199,21 @@ def structure_of(
         sign=sign,
         equilibrium=equilibrium,
         model=model,
-        uneven=_uneven(model, sign),
-        add_base_acceleration=None if base is None else -(modes.T @ rigid_mass(model)),
+        unequal_wells=_uneven(model, sign),
+        base_load=None if base is None else -(modes.T @ rigid_mass(model)),
     )
     if striker is not None and striker.mass is not None:
-        struck = _with_body(struck, striker, integrate_sticking_run=base is not None and base.striker_on_base)
+        struck = _with_body(struck, striker, carried_by_base=base is not None and base.striker_on_base)
     return struck if harvester is None else _with_circuit(struck, harvester)
 
 
-def _uneven(model: ReducedModel, sign: float) -> Uneven | None:
+def _uneven(model: ReducedModel, sign: float) -> UnequalWells | None:
     """What unequal wells add, of a model that is seen from the striker's side."""
     if model.landscape is None or model.transverse_force is None or not model.is_bistable:
         return None
     lower, upper = model.landscape.lower, model.landscape.upper
     away = upper.amplitude + lower.amplitude
-    return Uneven(
+    return UnequalWells(
         force=sign * 2.0 * (model.linear_modes.T @ model.transverse_force),
         lift=2.0 * float(model.transverse_force @ lower.amplitude),
         second=sign * (model.linear_modes.T @ (model.mass @ away)),
@@ -222,10 +222,10 @@ def _uneven(model: ReducedModel, sign: float) -> Uneven | None:
     )
 
 
-def _with_body(structure: Structure, striker: Striker, integrate_sticking_run: bool = False) -> Structure:
+def _with_body(structure: Structure, striker: Striker, carried_by_base: bool = False) -> Structure:
     """The structure with the mode of a striker that is a body, which a base shakes too if it carries it."""
     assert striker.mass is not None
-    own = -structure.sign * math.sqrt(striker.mass) if integrate_sticking_run else 0.0
+    own = -structure.sign * math.sqrt(striker.mass) if carried_by_base else 0.0
     count = structure.omega.size + 1
     coupling = np.zeros((count, count))
     coupling[:-1, :-1] = structure.coupling
@@ -237,10 +237,8 @@ def _with_body(structure: Structure, striker: Striker, integrate_sticking_run: b
         well=np.append(structure.well, 0.0),
         center=np.append(structure.center, 0.0),
         shift=np.append(structure.shift, 0.0),
-        uneven=None if structure.uneven is None else _with_rest(structure.uneven),
-        add_base_acceleration=None
-        if structure.add_base_acceleration is None
-        else np.append(structure.add_base_acceleration, own),
+        unequal_wells=None if structure.unequal_wells is None else _with_rest(structure.unequal_wells),
+        base_load=None if structure.base_load is None else np.append(structure.base_load, own),
         body_mass=striker.mass,
     )
 
@@ -264,10 +262,8 @@ def _with_circuit(structure: Structure, harvester: Harvester) -> Structure:
         structure,
         **longer,
         coupling=tension,
-        uneven=None if structure.uneven is None else _with_rest(structure.uneven),
-        add_base_acceleration=None
-        if structure.add_base_acceleration is None
-        else np.append(structure.add_base_acceleration, 0.0),
+        unequal_wells=None if structure.unequal_wells is None else _with_rest(structure.unequal_wells),
+        base_load=None if structure.base_load is None else np.append(structure.base_load, 0.0),
         tapped=np.append(coupling, 0.0),
         circuit=True,
     )
@@ -276,7 +272,7 @@ def _with_circuit(structure: Structure, harvester: Harvester) -> Structure:
 _ROWS = ("omega", "damping_ratio", "well", "center", "shift")
 
 
-def _with_rest(uneven: Uneven) -> Uneven:
+def _with_rest(unequal_wells: UnequalWells) -> UnequalWells:
     return dataclasses.replace(
-        uneven, force=np.append(uneven.force, 0.0), second=np.append(uneven.second, 0.0)
+        unequal_wells, force=np.append(unequal_wells.force, 0.0), second=np.append(unequal_wells.second, 0.0)
     )

@@ -51,19 +51,9 @@ def changed(path: Path) -> str | None:
 def test_every_file_of_the_engines_and_the_codes_is_in_it(copy) -> None:
     """A status that is renumbered, a step that is rewritten, in whichever subfolder: another fingerprint."""
     first = mark()
-    files = [copy / "core" / "codes.py", *sorted((copy / "engines").rglob("*.py"))]
+    files = [copy / "util" / "status_codes.py", *sorted((copy / "solver").rglob("*.py"))]
     assert len(files) > 35
-    assert {path.parent.name for path in files} == {
-        "core",
-        "engines",
-        "cpu",
-        "few",
-        "settling",
-        "world",
-        "strikers",
-        "cuda",
-        "scalar",
-    }
+    assert {path.parent.name for path in files} == {"util", "solver", "cpu", "run_lanes", "terms", "cuda"}
     marks = {changed(path) for path in files}
     assert first not in marks
     assert len(marks) == len(files)
@@ -72,7 +62,7 @@ def test_every_file_of_the_engines_and_the_codes_is_in_it(copy) -> None:
 
 def test_a_file_more_is_another_fingerprint(copy) -> None:
     first = mark()
-    (copy / "engines" / "cpu" / "more.py").write_text("", encoding="utf-8")
+    (copy / "solver" / "cpu" / "more.py").write_text("", encoding="utf-8")
     assert mark() != first
 
 
@@ -80,11 +70,11 @@ def test_what_no_kernel_bakes_in_is_not_in_it(copy) -> None:
     """A change of a label costs nobody a compilation."""
     first = mark()
     for name in (
-        "core/diagnostics.py",
+        "util/diagnostics.py",
         "model/system.py",
-        "runs/simulate.py",
+        "simulation/simulate.py",
         "cli/app.py",
-        "figures/style.py",
+        "plot/style.py",
     ):
         assert changed(copy / name) == first
 
@@ -105,7 +95,7 @@ def test_laws_and_drives_have_their_own(copy) -> None:
 
 LAW = """
 from dataclasses import dataclass
-from snapbeam.model.contact import ContactLaw
+from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.quantity import RUN, quantity
 
 @dataclass(frozen=True)
@@ -159,7 +149,7 @@ def test_the_names_that_a_law_gives_are_part_of_it(tmp_path, monkeypatch) -> Non
     """As the times at which a drive jumps: kernels read numbers by them."""
     monkeypatch.syspath_prepend(str(tmp_path))
     marks = [
-        fingerprint((law_of(tmp_path, LAW.format(factor="1.0", more=f"edges = ({names})")), Sine))
+        fingerprint((law_of(tmp_path, LAW.format(factor="1.0", more=f"discontinuities = ({names})")), Sine))
         for names in ("", "'stiffness',", "'other',")
     ]
     assert None not in marks and len(set(marks)) == 3
@@ -182,7 +172,7 @@ def test_a_law_typed_at_a_prompt_is_never_kept() -> None:
     """Its source cannot be read, so nothing tells two of them apart."""
     code = LAW.format(factor="1.0", more="") + (
         "\nfrom snapbeam.solver.compilation import fingerprint\n"
-        "from snapbeam.model.drive import Sine\nprint(fingerprint((Spring, Sine)))\n"
+        "from snapbeam.model.drive.sine import Sine\nprint(fingerprint((Spring, Sine)))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "None\n"

@@ -24,7 +24,7 @@ for name in sys.argv[1:]:
     system, asked = sb.System(model, laws[name], shaker), sb.Integration(cycles=3)
     run = sb.simulate(system, asked, sample_times=[0.0])
     ds = sb.sweep(system, {"velocity_amplitude": [0.3]}, asked)
-    found[name] = [repr(dict(run.outcome)), repr({str(k): v.item() for k, v in ds.data_vars.items()})]
+    found[name] = [repr(dict(run.summary)), repr({str(k): v.item() for k, v in ds.data_vars.items()})]
 print(json.dumps(found))
 """
 

@@ -1,1 +1,1 @@
-"""cpu"""
+"""Mode-lane and run-lane layouts for the processor."""

@@ -10,10 +10,10 @@ from snapbeam.solver.compilation import INLINE_HERE
 from snapbeam.solver.cpu.events import accept_step
 from snapbeam.solver.cpu.restitution import accept_step_restitution
 
-__all__ = ["accept_any_step"]
+__all__ = ["accept_step_by_law"]
 
 
-def accept_any_step(
+def accept_step_by_law(
     memory: Any,
     blocks: Any,
     workspace: Any,
@@ -30,8 +30,8 @@ def accept_any_step(
     raise TypeError("accept_any_step runs in compiled code only")
 
 
-@overload(accept_any_step, jit_options=INLINE_HERE)
-def _accept_any_step(
+@overload(accept_step_by_law, jit_options=INLINE_HERE)
+def _accept_step_by_law(
     memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, outputs
 ):
     law = kernel_input.types[kernel_input.fields.index("law")]

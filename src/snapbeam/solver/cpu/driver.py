@@ -22,11 +22,11 @@ from snapbeam.solver.cpu.run_lanes.memory import lay_out_few, suits
 from snapbeam.solver.cpu.state import KernelInput, Scratch
 from snapbeam.solver.cpu.tangent import TANGENT_ROWS, integrate_tangent
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.events import PIECES
 from snapbeam.solver.further_contacts import several
 from snapbeam.solver.registered_statistics import extras_of_table
 from snapbeam.solver.simd import WIDTH
 from snapbeam.solver.statistics import Landings, Last, Recorded, empty_accumulators
+from snapbeam.solver.step_control import PIECES
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["integrate_tangents", "integrate_to_landing", "record", "run_ensemble", "usable_cores"]
@@ -112,10 +112,10 @@ def _chunks(work: _Array, threads: int) -> list[_Integers]:
 def run_ensemble(
     ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
 ) -> NDArray[Any]:
-    """March every run of an ensemble; returns a book a run.
+    """Integrate every run of an ensemble; returns a record of accumulators a run.
 
     Runs are handed out longest first, a chunk at a time; what a run gives does not depend on which thread
-    marched it or on what it was marched with.
+    integrated it or on what it was integrated with.
     """
     return _march(ensemble, threads, progress, landings=0).accumulators_of_runs
 
@@ -203,7 +203,7 @@ def _march(
 
 
 def _few_modes_pay(ensemble: Ensemble, packed: Packed) -> bool:
-    """Whether to march eight runs in a register: where that is faster and, once compiled, worth it.
+    """Whether to integrate eight runs in a register: where that is faster and, once compiled, worth it.
 
     Both layouts give the same bits, so that how much was asked for before may decide.
     """
@@ -218,7 +218,7 @@ def _few_modes_pay(ensemble: Ensemble, packed: Packed) -> bool:
 def _side_by_side(
     ensemble: Ensemble, packed: Packed
 ) -> tuple[Callable[..., None], Callable[[_Integers, KernelOutput], tuple[Any, ...]]]:
-    """The march of eight runs in a register, and its arguments."""
+    """Integration of eight runs in a register, and its arguments."""
     order = np.argsort(packed.rows)
     kernel_input = _asked(ensemble, packed, None)._replace(
         contact_rows=np.ascontiguousarray(ensemble.contact_rows[:, order]),
@@ -227,12 +227,12 @@ def _side_by_side(
 
     def arguments(which: _Integers, kernel_output: KernelOutput) -> tuple[Any, ...]:
         scratch = _room(ensemble)
-        memory = lay_out_few(ensemble, packed, scratch.looked.shape[0] - 1)
+        memory = lay_out_few(ensemble, packed, scratch.inner_samples.shape[0] - 1)
         return (
             memory.m,
             memory.n,
             memory.shape,
-            memory.world,
+            memory.lane_settings,
             kernel_input,
             which,
             scratch,
@@ -252,7 +252,7 @@ def _spread_over(
     progress: Callable[[int, int], object] | None,
     landings: int,
 ) -> Landings:
-    """Hand the runs to threads, in chunks; *arguments* are those of *march*, whose memory is a thread's own."""
+    """Hand the runs to threads, in chunks; *arguments* are those of *integrate*, whose memory is a thread's own."""
     size = packed.layout.size
     kernel_output = KernelOutput(
         empty_accumulators(ensemble.size, _beside(ensemble)),
@@ -281,12 +281,12 @@ def _spread_over(
                 if progress is not None and finished:
                     progress(done, ensemble.size)
         except BaseException:
-            kernel_output.pulse[0] = 1
+            kernel_output.stop_flag[0] = 1
             pool.shutdown(wait=True, cancel_futures=True)
             raise
     q, p = kernel_output.states[..., packed.rows], kernel_output.states[..., size + packed.rows]
     return Landings(
-        kernel_output.accumulators_of_runs, q, p, kernel_output.homes[..., 0], kernel_output.homes[..., 1]
+        kernel_output.accumulators_of_runs, q, p, kernel_output.wells[..., 0], kernel_output.wells[..., 1]
     )
 
 
@@ -333,7 +333,7 @@ def record(
     in_contact: bool,
     progress: Callable[[float], object] | None = None,
 ) -> Iterator[Recorded]:
-    """March the one run of an ensemble once, and give what it wrote down in pieces, in order.
+    """Integrate the one run of an ensemble once, and give what it wrote down in pieces, in order.
 
     Parameters
     ----------

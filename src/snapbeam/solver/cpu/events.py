@@ -51,19 +51,7 @@ from snapbeam.solver.cpu.terms.second_well import (
     above_own_well,
     add_potential_energy,
     at_center,
-    second_well,
-)
-from snapbeam.solver.events import (
-    TRUST,
-    ContactKinematics,
-    accumulate_displacement,
-    accumulate_energy,
-    close_impact,
-    count_zero_crossings_in_step,
-    first_contact_onset,
-    is_low_energy,
-    refine_onset,
-    safe_interval,
+    relative_to_nearest_well,
 )
 from snapbeam.solver.excitation import seen_from, turned_motion
 from snapbeam.solver.interpolation import (
@@ -76,13 +64,25 @@ from snapbeam.solver.interpolation import (
 from snapbeam.solver.physics import sincos, tension_energy
 from snapbeam.solver.registered_statistics import observe as observe_extras
 from snapbeam.solver.simd import WIDTH, lanes_sum, load
+from snapbeam.solver.step_control import (
+    TRUST,
+    ContactKinematics,
+    accumulate_displacement,
+    accumulate_energy,
+    close_impact,
+    count_zero_crossings_in_step,
+    first_contact_onset,
+    is_low_energy,
+    refine_onset,
+    safe_interval,
+)
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["accept_step", "locate_peak_force", "sample_inside_step"]
 
 
 # ----------------------------------------------------------------------------------------------------
-# The hardest moment of a contact: the deepest, or that of the greatest force where the rate counts too.
+# The hardest moment of a contact: the deepest, or that of the maximum force where the rate counts too.
 
 
 _PARTS = 24
@@ -103,7 +103,7 @@ def locate_peak_force(
     accumulators: Any,
     outputs: Any,
 ) -> Any:
-    """The greatest penetration of a contact so far, or the greatest force under a law that loses energy.
+    """The maximum penetration of a contact so far, or the maximum force under a law that loses energy.
 
     Returns that and how many samples there are: a moment inside the step is one where the run is recorded.
     """
@@ -121,7 +121,7 @@ def aside(step, run, length, size):
 
 @inlined
 def _deepest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs):
-    """The greatest penetration of a contact so far, its turning point within the step included.
+    """The maximum penetration of a contact so far, its turning point within the step included.
 
     Returns that and how many samples there are: the turning point is one where the run is recorded.
     """
@@ -133,9 +133,9 @@ def _deepest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, s
     ):
         part, size = turn * step.length, layout.size
         prepare(memory, layout, stages, run.struck.drive, part, cut_slot(run))
-        ledger = None if outputs is None else True
+        with_energy = None if outputs is None else True
         short = aside(step, run, part, size)
-        here = take_step(memory, blocks, layout, stages, tip, short, ledger)
+        here = take_step(memory, blocks, layout, stages, tip, short, with_energy)
         there = step.phase + tip.drive.omega * part
         about = observe(memory, layout, tip, there, run.spare, run.spare + size)
         if outputs is not None:
@@ -151,7 +151,7 @@ def _deepest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, s
 def _greatest_force(
     memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
 ):
-    """The greatest force of a contact so far: looked for on the cubic through the step, then stepped to."""
+    """The maximum force of a contact so far: looked for on the cubic through the step, then stepped to."""
     seen, law = now.seen, tip.law
     greatest = max(
         accumulators.deepest, max(felt_force(law, seen.d, seen.dv), felt_force(law, seen1.d, seen1.dv))
@@ -167,9 +167,9 @@ def _greatest_force(
     if at > 0.0:
         part, size = at * step.length, layout.size
         prepare(memory, layout, stages, run.struck.drive, part, cut_slot(run))
-        ledger = None if outputs is None else True
+        with_energy = None if outputs is None else True
         short = aside(step, run, part, size)
-        here = take_step(memory, blocks, layout, stages, tip, short, ledger)
+        here = take_step(memory, blocks, layout, stages, tip, short, with_energy)
         there = step.phase + tip.drive.omega * part
         about = observe(memory, layout, tip, there, run.spare, run.spare + size)
         if outputs is not None:
@@ -207,10 +207,10 @@ def sample_inside_step(memory, layout, tip, flow, pieces, piece, step, with_cent
     """Follow a free step in *pieces* short ones, each one exact linear flow, and note what is seen.
 
     The tension's acceleration, known at both ends of the step, is taken as linear in between: exact
-    enough for signals whose fastest mode the pieces resolve.  Row i of ``room.looked`` becomes the penetration, its
+    enough for signals whose fastest mode the pieces resolve.  Row i of ``scratch.inner_samples`` becomes the penetration, its
     rate, and, if *with_center*, the displacement of the centre from rest and its rate.
     """
-    looked, parts = scratch.looked, scratch.parts
+    inner_samples, parts = scratch.inner_samples, scratch.parts
     q, p, k, k1 = step.q, step.p, step.k, step.k1
     propagate_free(memory, layout, layout.contact, flow, pieces, piece, q, p, k, k1, with_center, parts)
     size, drive = layout.size, tip.drive
@@ -231,10 +231,10 @@ def sample_inside_step(memory, layout, tip, flow, pieces, piece, step, with_cent
                 c, c_rate = lanes_sum(load(parts, at + 2 * WIDTH)), lanes_sum(load(parts, at + 3 * WIDTH))
         argument = step.phase + i * piece * drive.omega
         motion, velocity = turned_motion(drive, memory, argument, sine, cosine)
-        looked[i, 0] = tip.offset + motion - w
-        looked[i, 1] = velocity - rate - owed * ((1.0 - done) * contact0 + done * contact1)
-        looked[i, 2] = c
-        looked[i, 3] = c_rate + owed * ((1.0 - done) * center0 + done * center1)
+        inner_samples[i, 0] = tip.offset + motion - w
+        inner_samples[i, 1] = velocity - rate - owed * ((1.0 - done) * contact0 + done * contact1)
+        inner_samples[i, 2] = c
+        inner_samples[i, 3] = c_rate + owed * ((1.0 - done) * center0 + done * center1)
         sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine
 
 
@@ -305,7 +305,7 @@ def detect_contact_event(memory, layout, run, now, tip, step, seen1, scratch):
         bound += extra_speed(layout.forced, memory, size, tip.drive, layout.center, TRUST * run.step_time)
         push = dot(memory, size, layout.center, step.k)
         safe_center = now.t + int(
-            safe_interval(abs(at_center(layout.uneven, seen.c)), bound, 0.0, push, known) / tick
+            safe_interval(abs(at_center(layout.unequal_wells, seen.c)), bound, 0.0, push, known) / tick
         )
     safe_gap = trusted(memory, layout.others, now.t, safe_gap)
     safe_center = trusted(memory, layout.others, now.t, safe_center)
@@ -321,7 +321,7 @@ def detect_contact_event(memory, layout, run, now, tip, step, seen1, scratch):
         free = with_circuit_acceleration(memory, layout, run.spare, step)
         sample_inside_step(memory, layout, tip, look, pieces, piece, free, after > safe_center, scratch)
         if after > safe_gap:
-            entry = first_contact_onset(scratch.looked, pieces, piece)
+            entry = first_contact_onset(scratch.inner_samples, pieces, piece)
             if entry >= 0.0:
                 event, cut = True, min(step.ticks, int(entry / tick))
     if missed_onset(layout.circuit, event, seen.d, seen1.d):
@@ -344,12 +344,19 @@ def monitor_energy(
 
     *state* is where q and p stand, and g.q and q.Gq.  Returns what is kept in mind, and the status.
     """
-    clock, beat, quiet, last = run.clock, control.beat, control.quiet, control.energy_tick
+    clock, steps_since_start, low_energy, last = (
+        run.clock,
+        control.steps_since_start,
+        control.low_energy,
+        control.energy_tick,
+    )
     released = event and not control.touching
-    if released or (beat & 7) == 0:
+    if released or (steps_since_start & 7) == 0:
         q, p, gq, qr = state
         high = 0.0
-        near = second_well(memory, layout.size, layout.uneven, now.well_sign, q, run.spare)
+        near = relative_to_nearest_well(
+            memory, layout.size, layout.unequal_wells, now.well_sign, q, run.spare
+        )
         if kernel_input.high:
             linear, high = modal_energies(memory, layout, near, p)
         else:
@@ -360,21 +367,28 @@ def monitor_energy(
         last = t
         if not control.touching:
             energy = linear + tension_energy(layout.gamma, gq, qr)
-            if layout.uneven is not None:
+            if layout.unequal_wells is not None:
                 energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
-            energy = add_potential_energy(memory, layout.size, layout.uneven, q, energy)
-            quiet = is_low_energy(
-                above_own_well(layout.uneven, now.well_sign, energy), layout.gamma, layout.stretch
+            energy = add_potential_energy(memory, layout.size, layout.unequal_wells, q, energy)
+            low_energy = is_low_energy(
+                above_own_well(layout.unequal_wells, now.well_sign, energy), layout.gamma, layout.stretch
             )
-            quiet = disable_long_steps(layout.circuit, quiet)
-            if not event and now.well_sign < 0.0 and (beat & 15) == 0 and seen1.w > clock.decide_reach:
-                if at_center(layout.uneven, seen1.c) > 0.0 and energy < clock.decide_energy:
+            low_energy = disable_long_steps(layout.circuit, low_energy)
+            if (
+                not event
+                and now.well_sign < 0.0
+                and (steps_since_start & 15) == 0
+                and seen1.w > clock.decide_reach
+            ):
+                if at_center(layout.unequal_wells, seen1.c) > 0.0 and energy < clock.decide_energy:
                     status = _EARLY_STOP
     if clock.decide_crossings >= 0 and accumulators.zero_crossings_last_quarter > clock.decide_crossings:
         status = _EARLY_STOP
     if status == _RUNNING and accumulators.steps >= clock.max_steps:
         status = _STEP_LIMIT
-    return StepControl(control.touching, quiet, control.safe_gap, control.safe_center, last, beat), status
+    return StepControl(
+        control.touching, low_energy, control.safe_gap, control.safe_center, last, steps_since_start
+    ), status
 
 
 @inlined
@@ -386,7 +400,7 @@ def accept_step(
     Returns that and the step that was taken.  *outputs* are what is recorded, or None.
     """
     layout, stages, clock, tick = workspace.layout, workspace.stages, run.clock, run.clock.tick
-    ledger = None if outputs is None else True
+    with_energy = None if outputs is None else True
     tip = seen_from(run.struck, now.well_sign, run.rest_contact)
     rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center
     t, seen, touching = now.t, now.seen, now.control.touching
@@ -422,11 +436,11 @@ def accept_step(
         status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
         control = StepControl(
             touching or contact_event.event,
-            now.control.quiet,
+            now.control.low_energy,
             contact_event.safe_gap,
             contact_event.safe_center,
             now.control.energy_tick,
-            now.control.beat,
+            now.control.steps_since_start,
         )
         return IntegratorState(
             t, now.well_sign, now.stretch, now.rows, seen, control, now.sample, now.landed, status
@@ -437,7 +451,7 @@ def accept_step(
     while cut != step.ticks:
         step = cut_step(step, run, cut, cut * tick)
         prepare(memory, layout, stages, run.struck.drive, step.length, step.at)
-        done = take_step(memory, blocks, layout, stages, tip, step, ledger)
+        done = take_step(memory, blocks, layout, stages, tip, step, with_energy)
         there = step.phase + omega * step.length
         about = observe(memory, layout, tip, there, step.q1, step.p1)
         observe_further_contacts(memory, layout.size, layout.others, tip.drive, there, step.q1, step.p1)
@@ -472,15 +486,19 @@ def accept_step(
     accumulate_displacement(accumulators, seen, seen1, step.length)
     if touching or t + step.ticks > contact_event.safe_center:
         count_zero_crossings_in_step(
-            accumulators, clock, t, step.length, about_level(layout.uneven, seen), about_level(layout.uneven, seen1),
-            scratch.looked, at_center(layout.uneven, rest_center), contact_event.pieces, contact_event.piece,
+            accumulators, clock, t, step.length, about_level(layout.unequal_wells, seen), about_level(layout.unequal_wells, seen1),
+            scratch.inner_samples, at_center(layout.unequal_wells, rest_center), contact_event.pieces, contact_event.piece,
         )  # fmt: skip
     observe_extras(kernel_input.extras, accumulators, t * tick, step.length, seen, seen1, touching)
 
     # accept
     t += step.ticks
     status = _RUNNING if t < clock.end else _OK
-    quiet, safe_gap, safe_center = now.control.quiet, contact_event.safe_gap, contact_event.safe_center
+    low_energy, safe_gap, safe_center = (
+        now.control.low_energy,
+        contact_event.safe_gap,
+        contact_event.safe_center,
+    )
     if contact_event.event:
         safe_gap, safe_center = t, t
         if touching:
@@ -495,7 +513,9 @@ def accept_step(
         memory, layout.others, contact_event.cut, t, step.length, tick, accumulators, outputs
     )
     touching = touching != contact_event.event
-    control = StepControl(touching, quiet, safe_gap, safe_center, now.control.energy_tick, now.control.beat)
+    control = StepControl(
+        touching, low_energy, safe_gap, safe_center, now.control.energy_tick, now.control.steps_since_start
+    )
     state = step.q1, step.p1, done.gq, done.qr
     control, status = monitor_energy(
         memory,

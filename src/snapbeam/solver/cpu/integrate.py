@@ -1,4 +1,4 @@
-"""The CPU engine's march: two trajectories at a time, each with steps that its own contacts decide.
+"""The CPU engine's integrate: two trajectories at a time, each with steps that its own contacts decide.
 
 In free flight a trajectory takes steps of a fixed length, or of twice that while its energy is low, as many as
 a bound on the speed of the gap says are safe; near the tip it looks inside each step with a resolution finer
@@ -7,7 +7,7 @@ from the onset and shrink towards the release, which is located too, so that the
 between steps.  Time is an integer number of ticks; the argument of the drive comes from that integer alone.
 
 A kick waits for the sums of the one before, so that one trajectory alone leaves a core waiting.  Two are
-marched side by side, a step of each at a time; when one ends, the next run takes its place.  They share nothing
+integrated side by side, a step of each at a time; when one ends, the next run takes its place.  They share nothing
 but the structure: results do not depend on batch, order or threads.
 """
 
@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import compiled, inlined
 from snapbeam.solver.contact_force import released_at
-from snapbeam.solver.cpu.control import accept_any_step
+from snapbeam.solver.cpu.contact_dispatch import accept_step_by_law
 from snapbeam.solver.cpu.recording import has_room, restore_state, save_state
 from snapbeam.solver.cpu.state import (
     IntegratorState,
@@ -41,8 +41,8 @@ from snapbeam.solver.cpu.terms.further_contact_events import (
 )
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, mirror_further_contacts
 from snapbeam.solver.cpu.terms.second_well import has_crossed_to_other_well
-from snapbeam.solver.events import contact_level, flight_level, ticks_of
 from snapbeam.solver.excitation import seen_from
+from snapbeam.solver.step_control import contact_level, flight_level, ticks_of
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["KernelOutput", "integrate_ensemble", "integrate_recorded", "propose_step"]
@@ -56,15 +56,15 @@ _NOTHING_DONE = StepIncrement(
 
 
 class KernelOutput(NamedTuple):
-    """Where a march of many puts what it finds."""
+    """Where a integrate of many puts what it finds."""
 
     accumulators_of_runs: Any
     """A record a run."""
     states: Any
     """States at landings, q and p about the well at hand, shape (runs, landings, 2 rows); none if of length 0."""
-    homes: Any
+    wells: Any
     """That well, and the ticks since the present contact began (-1: apart), shape (runs, landings, 2)."""
-    pulse: Any
+    stop_flag: Any
     """Not 0: stop."""
 
 
@@ -74,7 +74,9 @@ def propose_step(memory, blocks, workspace, run, now, accumulators):
     layout, clock, well_sign, stretch, t = workspace.layout, run.clock, now.well_sign, now.stretch, now.t
     rows, seen, control = now.rows, now.seen, now.control
     r = layout.work + 9 * layout.size
-    if layout.stretch > 0.0 and has_crossed_to_other_well(layout.uneven, seen.c, well_sign, run.rest_center):
+    if layout.stretch > 0.0 and has_crossed_to_other_well(
+        layout.unequal_wells, seen.c, well_sign, run.rest_center
+    ):
         there = phase_at(run, t)
         enter_forces(layout.forced, memory, run.struck.drive, there)
         evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, there, rows.q, 0.0, False)
@@ -82,7 +84,7 @@ def propose_step(memory, blocks, workspace, run, now, accumulators):
         stretch = change_origin(memory, blocks, layout, well_sign, rows.q, rows.k, r)
         well_sign = -well_sign
     accumulators.steps += 1
-    level = flight_level(clock, control.quiet, stretch, layout.stretch)
+    level = flight_level(clock, control.low_energy, stretch, layout.stretch)
     if control.touching:
         left = released_at(run.struck.law, seen.d, seen.dv)
         level = max(level, contact_level(clock, (t - accumulators.onset) * clock.tick, left, seen.dv))
@@ -99,20 +101,20 @@ def propose_step(memory, blocks, workspace, run, now, accumulators):
         ticks, at, length, phase, control.touching, rows.q, rows.p, rows.k, rows.q1, rows.p1, rows.k1, r
     )
     return IntegratorState(
-        t, well_sign, stretch, rows, seen, _beaten(control), now.sample, now.landed, now.status
+        t, well_sign, stretch, rows, seen, _with_one_more_step(control), now.sample, now.landed, now.status
     ), step
 
 
 @inlined
-def _beaten(control):
+def _with_one_more_step(control):
     """One step more."""
     return StepControl(
         control.touching,
-        control.quiet,
+        control.low_energy,
         control.safe_gap,
         control.safe_center,
         control.energy_tick,
-        control.beat + 1,
+        control.steps_since_start + 1,
     )
 
 
@@ -125,8 +127,8 @@ def store_state(memory, blocks, layout, run, now, accumulators, i, kernel_output
     for row in range(size):
         kernel_output.states[i, landed, row] = memory[rows.q + row]
         kernel_output.states[i, landed, size + row] = memory[rows.p + row]
-    kernel_output.homes[i, landed, 0] = int(now.well_sign)
-    kernel_output.homes[i, landed, 1] = now.t - accumulators.onset if now.control.touching else -1
+    kernel_output.wells[i, landed, 0] = int(now.well_sign)
+    kernel_output.wells[i, landed, 1] = now.t - accumulators.onset if now.control.touching else -1
     if now.status != _RUNNING:
         return now
     again, _ = restart_from_state(
@@ -137,7 +139,7 @@ def store_state(memory, blocks, layout, run, now, accumulators, i, kernel_output
 
 @compiled
 def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scratch, kernel_output):
-    """March the runs *which*, two at a time; *memory* and *room* belong to the caller's thread.
+    """Integrate the runs *which*, two at a time; *memory* and *scratch* belong to the caller's thread.
 
     *layouts* are two places in memory that share the rows of the structure.
     """
@@ -152,7 +154,7 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
     run_b, now_b = run_a, now_a
     step_a, step_b, done_a, done_b = _NO_STEP, _NO_STEP, _NOTHING_DONE, _NOTHING_DONE
     while live_a or live_b or following < which.size:
-        if kernel_output.pulse[0] != 0:
+        if kernel_output.stop_flag[0] != 0:
             break
         if not live_a and following < which.size:
             i_a = which[following]
@@ -179,7 +181,7 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
         else:
             done_b = take_step(memory, blocks, layouts[1], stages, tip_b, step_b, None)
         if live_a:
-            now_a, _ = accept_any_step(
+            now_a, _ = accept_step_by_law(
                 memory, blocks, place_a, run_a, now_a, step_a, done_a, scratch, book_a, kernel_input, None
             )
             now_a = store_state(memory, blocks, layouts[0], run_a, now_a, book_a, i_a, kernel_output)
@@ -189,7 +191,7 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
                 finish(memory, blocks, layouts[0], run_a, now_a, book_a, None, 0, goes_on)
                 live_a = False
         if live_b:
-            now_b, _ = accept_any_step(
+            now_b, _ = accept_step_by_law(
                 memory, blocks, place_b, run_b, now_b, step_b, done_b, scratch, book_b, kernel_input, None
             )
             now_b = store_state(memory, blocks, layouts[1], run_b, now_b, book_b, i_b, kernel_output)
@@ -205,14 +207,14 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
 
 
 # ----------------------------------------------------------------------------------------------------
-# The CPU engine's march of one run that is recorded: in slices, so that it can be watched, stopped and drained.
+# The CPU engine's integrate of one run that is recorded: in slices, so that it can be watched, stopped and drained.
 
 
 @compiled
 def integrate_recorded(
     memory, blocks, layout, stages, kernel_input, scratch, accumulators, outputs, aside, budget
 ):
-    """March the first run until it ends, *outputs* are full or *budget* steps are taken.
+    """Integrate the first run until it ends, *outputs* are full or *budget* steps are taken.
 
     *aside* is a pair of arrays in which the run is laid aside; the first integer there, if negative, says that
     it has not begun.
@@ -229,7 +231,7 @@ def integrate_recorded(
         now, step = propose_step(memory, blocks, workspace, run, now, accumulators)
         tip = seen_from(run.struck, now.well_sign, run.rest_contact)
         done = take_step(memory, blocks, layout, stages, tip, step, True)
-        now, _ = accept_any_step(
+        now, _ = accept_step_by_law(
             memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, outputs
         )
     if now.status != _RUNNING:

@@ -1,4 +1,4 @@
-"""The CPU engine's layout: a structure in padded rows, eight modes a register, and room to march in."""
+"""The CPU engine's layout: a structure in padded rows, eight modes a register, and room to integrate in."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from snapbeam.solver.cpu.mode_lanes import Layout
 from snapbeam.solver.cpu.terms.base_and_load import TimeDependentForces
 from snapbeam.solver.cpu.terms.circuit import Circuit
 from snapbeam.solver.cpu.terms.further_contacts import FurtherContacts
-from snapbeam.solver.cpu.terms.second_well import Uneven
+from snapbeam.solver.cpu.terms.second_well import UnequalWells
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.further_contacts import NUMBERS, Several
 from snapbeam.solver.simd import WIDTH
@@ -29,7 +29,7 @@ _SLOWEST = 1e-12
 """Stands for no damping, 1/s."""
 _ALIGNMENT = 64
 WORK_ROWS = 10
-"""Rows that a march works in: q, p, k at both ends of a step and of a look ahead, and G q."""
+"""Rows that a integrate works in: q, p, k at both ends of a step and of a look ahead, and G q."""
 
 
 class Packed(NamedTuple):
@@ -55,7 +55,7 @@ def _blocks_of(coupled: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Number of the block of each mode, in the order of their first modes: every mode takes the least of those that
     it is coupled to, until none changes.
 
-    It is five lines of scipy.sparse.csgraph, which takes longer to load than many a run to march.
+    It is five lines of scipy.sparse.csgraph, which takes longer to load than many a run to integrate.
     """
     among = coupled | coupled.T | np.eye(len(coupled), dtype=bool)
     label = np.arange(len(coupled))
@@ -119,14 +119,12 @@ def pack(
         "high": padded(structure.high_modes(high_omega).astype(np.float64)),
         "tension": np.concatenate(strips),
     }
-    away = structure.uneven
+    away = structure.unequal_wells
     if away is not None:
         pieces |= {"far": padded(away.force), "second": padded(away.second), "here": np.zeros(size + WIDTH)}
     if forced:
         pieces["shaken"] = padded(
-            np.zeros(omega.size)
-            if structure.add_base_acceleration is None
-            else structure.add_base_acceleration
+            np.zeros(omega.size) if structure.base_load is None else structure.base_load
         )
         pieces["now"] = np.zeros(WIDTH)
     if structure.tapped is not None:
@@ -138,7 +136,7 @@ def pack(
         pieces["strikers"] = np.zeros(len(several.laws) * NUMBERS)
     starts = np.concatenate(([0], np.cumsum([piece.size for piece in pieces.values()])))
     placed = dict(zip(pieces, map(int, starts), strict=False))
-    uneven, forces, circuit, others = None, None, None, None
+    unequal_wells, forces, circuit, others = None, None, None, None
     kick = placed.pop("kick", 0)
     if forced:
         forces = TimeDependentForces(placed.pop("shaken"), placed.pop("now"), kick)
@@ -149,7 +147,7 @@ def pack(
         others = FurtherContacts(placed.pop("striker_rows"), placed.pop("strikers"), several.numbers_type()())
     if away is not None:
         own = placed.pop("far"), placed.pop("second"), placed.pop("here")
-        uneven = Uneven(*own, away.lift, away.depth, away.level)
+        unequal_wells = UnequalWells(*own, away.lift, away.depth, away.level)
     moving = bool(np.all(omega * np.sqrt(1.0 - zeta * zeta) > 0.0))
     gentle = _LONGEST_DECAY / max(float((zeta * omega).max()), _SLOWEST) if moving else 0.0
     layout = Layout(
@@ -159,7 +157,7 @@ def pack(
         gamma=structure.nonlinear_stiffness,
         stretch=structure.stretch,
         gentle=gentle,
-        uneven=uneven,
+        unequal_wells=unequal_wells,
         forced=forces,
         circuit=circuit,
         others=others,
@@ -171,7 +169,7 @@ def pack(
 
 
 class Memory(NamedTuple):
-    """Everything that one thread needs to march runs of an ensemble, in one flat array."""
+    """Everything that one thread needs to integrate runs of an ensemble, in one flat array."""
 
     memory: _Array
     blocks: NDArray[np.int64]
@@ -193,9 +191,9 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
     second = first._replace(
         g=first.work + work, contact=first.work + work + size, work=first.work + work + 2 * size
     )
-    if first.uneven is not None:
+    if first.unequal_wells is not None:
         second = second._replace(
-            work=second.work + size + WIDTH, uneven=first.uneven._replace(here=second.work)
+            work=second.work + size + WIDTH, unequal_wells=first.unequal_wells._replace(here=second.work)
         )
     if first.forced is not None or first.circuit is not None:
         now = second.work

@@ -1,6 +1,6 @@
 """Operations on rows of modes, eight at a time: what the CPU engine's steps are made of.
 
-Everything a march needs stands in one flat array, *memory*; a row is the index at which it begins, a
+Everything a integrate needs stands in one flat array, *memory*; a row is the index at which it begins, a
 multiple of eight long, and holds the modes of one structure, each block of coupled modes padded with
 zeros.  The tension matrix G is stored block by block in strips of sixteen (last: eight) rows, each strip
 column by column, so that the product G q streams through it once.
@@ -70,15 +70,15 @@ class Layout(NamedTuple):
     tension: int
     """G, packed in strips."""
     work: int
-    """First of the rows that the march works in."""
+    """First of the rows that the integration works in."""
     gamma: float
     """Tension stiffness, Eq. (15)."""
     stretch: float
     """Squared slopes of the beam in a well, alpha_eq . alpha_eq; 0 if there is one well only."""
     gentle: float
     """Longest flow, s, that polynomials serve; 0 if there is an overdamped or a still mode."""
-    uneven: Any
-    """Of unequal wells, an :class:`~snapbeam.solver.cpu.terms.second_well.Uneven`; else None."""
+    unequal_wells: Any
+    """Of unequal wells, an :class:`~snapbeam.solver.cpu.terms.second_well.UnequalWells`; else None."""
     forced: Any
     """Of a moving base or a changing load, a :class:`~snapbeam.solver.cpu.terms.base_and_load.TimeDependentForces`; else None."""
     circuit: Any
@@ -220,7 +220,7 @@ def acceleration_rows(memory, layout, along_g, along_r, r, k):
     for row in range(0, layout.size, WIDTH):
         g_row = load(memory, layout.g + row)
         tension = tension_acceleration(along_g, along_r, g_row, load(memory, r + row))
-        tension = add_static_load(memory, layout.uneven, row, tension)
+        tension = add_static_load(memory, layout.unequal_wells, row, tension)
         tension = struck(memory, layout.size, layout.others, row, tension)
         store(memory, k + row, add_base_acceleration(memory, layout.forced, row, tension))
 
@@ -239,7 +239,7 @@ def kick_and_flow(memory, layout, flow, weight, along_g, along_r, r, force, q, p
     size = layout.size
     for row in range(0, size, WIDTH):
         k = tension_acceleration(along_g, along_r, load(memory, layout.g + row), load(memory, r + row))
-        k = add_static_load(memory, layout.uneven, row, k)
+        k = add_static_load(memory, layout.unequal_wells, row, k)
         k = struck(memory, size, layout.others, row, k)
         k = add_base_acceleration(memory, layout.forced, row, k)
         k = fma(force, load(memory, layout.contact + row), k)

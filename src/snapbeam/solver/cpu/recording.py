@@ -13,8 +13,8 @@ from snapbeam.solver.cpu.step import Step, observe, prepare, take_step
 from snapbeam.solver.cpu.sticking import held_for, hold
 from snapbeam.solver.cpu.terms.further_contact_events import any_touches
 from snapbeam.solver.cpu.terms.second_well import add_potential_energy
-from snapbeam.solver.events import ContactKinematics
 from snapbeam.solver.physics import tension_energy
+from snapbeam.solver.step_control import ContactKinematics
 
 __all__ = [
     "MARKS",
@@ -42,7 +42,7 @@ _MOST_IN_CONTACT = 96
 
 
 class Outputs(NamedTuple):
-    """Where a march writes what is asked of it, until it is full."""
+    """Where a integrate writes what is asked of it, until it is full."""
 
     times: Any
     """Instants to record, s, ascending."""
@@ -96,7 +96,7 @@ class _Sums(NamedTuple):
 
 @inlined
 def _sums(accumulators):
-    """As a run's book has them."""
+    """As a run's record of accumulators has them."""
     return _Sums(
         accumulators.work,
         accumulators.dissipated,
@@ -156,7 +156,7 @@ def record_instants(memory, blocks, layout, stages, run, tip, now, step, accumul
         here = take_step(memory, blocks, layout, stages, tip, short, True)
         about = observe(memory, layout, tip, step.phase + tip.drive.omega * part, q2, p2)
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, here.gq, here.qr)
-        energy = add_potential_energy(memory, size, layout.uneven, q2, energy)
+        energy = add_potential_energy(memory, size, layout.unequal_wells, q2, energy)
         instant = _Instant(times[done], q2, p2, about, energy)
         _write(
             memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums_with(accumulators, here)
@@ -182,7 +182,7 @@ def record_held(memory, blocks, layout, run, tip, now, step, accumulators, outpu
         _, work, _, dissipated, _ = held_for(memory, blocks, layout, run, tip, step.phase, part)
         force, gq, qr = hold(memory, blocks, layout, tip, phase, q2, p2, run.spare + 2 * size)
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, gq, qr)
-        energy = add_potential_energy(memory, size, layout.uneven, q2, energy)
+        energy = add_potential_energy(memory, size, layout.unequal_wells, q2, energy)
         so_far = _sums(accumulators)
         sums = _Sums(
             so_far.work + work,
@@ -206,7 +206,7 @@ def record_aside(memory, layout, tip, now, short, here, when, about, sample, acc
     if not outputs.in_contact:
         return sample
     energy = modal_energy(memory, layout, short.q1, short.p1) + tension_energy(layout.gamma, here.gq, here.qr)
-    energy = add_potential_energy(memory, layout.size, layout.uneven, short.q1, energy)
+    energy = add_potential_energy(memory, layout.size, layout.unequal_wells, short.q1, energy)
     instant = _Instant(when, short.q1, short.p1, about, energy)
     _write(memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums_with(accumulators, here))
     return sample + 1
@@ -225,7 +225,7 @@ def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, acc
         return sample
     outputs.marks[2] += 1
     energy = modal_energy(memory, layout, step.q1, step.p1) + tension_energy(layout.gamma, done.gq, done.qr)
-    energy = add_potential_energy(memory, layout.size, layout.uneven, step.q1, energy)
+    energy = add_potential_energy(memory, layout.size, layout.unequal_wells, step.q1, energy)
     instant = _Instant(when, step.q1, step.p1, seen1, energy)
     _write(memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums(accumulators))
     return sample + 1
@@ -238,12 +238,12 @@ def save_state(now, marks, reals):
     marks[0], marks[1], marks[2], marks[3] = now.t, now.sample, now.landed, now.status
     marks[4], marks[5], marks[6] = rows.q, rows.p, rows.k
     marks[7], marks[8], marks[9] = rows.q1, rows.p1, rows.k1
-    marks[10], marks[11] = int(control.touching), int(control.quiet)
+    marks[10], marks[11] = int(control.touching), int(control.low_energy)
     marks[12], marks[13], marks[14], marks[15] = (
         control.safe_gap,
         control.safe_center,
         control.energy_tick,
-        control.beat,
+        control.steps_since_start,
     )
     reals[0], reals[1] = now.well_sign, now.stretch
     reals[2], reals[3], reals[4] = seen.w, seen.wv, seen.d

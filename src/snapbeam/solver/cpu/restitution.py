@@ -20,7 +20,10 @@ from snapbeam.solver.cpu.state import IntegratorState, StepControl, cut_slot, ph
 from snapbeam.solver.cpu.step import Step, observe, prepare, take_step
 from snapbeam.solver.cpu.sticking import PANELS, constraint_force, held_for, hold
 from snapbeam.solver.cpu.terms.second_well import about_level, at_center
-from snapbeam.solver.events import (
+from snapbeam.solver.excitation import seen_from
+from snapbeam.solver.interpolation import cubic, first_upcrossing, root
+from snapbeam.solver.registered_statistics import observe as observe_extras
+from snapbeam.solver.step_control import (
     ContactKinematics,
     accumulate_displacement,
     close_impact,
@@ -28,9 +31,6 @@ from snapbeam.solver.events import (
     count_zero_crossings_in_step,
     ticks_of,
 )
-from snapbeam.solver.excitation import seen_from
-from snapbeam.solver.interpolation import cubic, first_upcrossing, root
-from snapbeam.solver.registered_statistics import observe as observe_extras
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["accept_step_restitution", "carry"]
@@ -122,8 +122,8 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
     accumulate_displacement(accumulators, seen, seen1, length)
     # a carried centre moves as the tip does, slowly enough for one cubic
     count_zero_crossings_in_step(
-        accumulators, clock, t, length, about_level(layout.uneven, seen), about_level(layout.uneven, seen1), scratch.looked,
-        at_center(layout.uneven, rest_center), 0, 0.0,
+        accumulators, clock, t, length, about_level(layout.unequal_wells, seen), about_level(layout.unequal_wells, seen1), scratch.inner_samples,
+        at_center(layout.unequal_wells, rest_center), 0, 0.0,
     )  # fmt: skip
     observe_extras(kernel_input.extras, accumulators, t * tick, length, seen, seen1, True)
     t += ticks
@@ -149,13 +149,15 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
         seen1 = ContactKinematics(
             about.w + rest_contact, about.wv, d, about.dv, about.c + rest_center, about.cv
         )
-    kernel_output = StepControl(touching, control.quiet, t, t, control.energy_tick, control.beat)
+    next_control = StepControl(
+        touching, control.low_energy, t, t, control.energy_tick, control.steps_since_start
+    )
     state = rows.q, rows.p, gq, qr
-    kernel_output, status = monitor_energy(
-        memory, layout, run, now, t, state, seen1, kernel_output, released, status, accumulators, kernel_input
+    next_control, status = monitor_energy(
+        memory, layout, run, now, t, state, seen1, next_control, released, status, accumulators, kernel_input
     )
     return IntegratorState(
-        t, now.well_sign, 2.0 * gq + qr, rows, seen1, kernel_output, sample, now.landed, status
+        t, now.well_sign, 2.0 * gq + qr, rows, seen1, next_control, sample, now.landed, status
     ), step
 
 
@@ -220,7 +222,7 @@ def apply_impact_law(memory, blocks, workspace, run, tip, p, seen, when, phase, 
 
 @inlined
 def _stuck(memory, workspace, run, seen, p, accumulators):
-    """What is left of the relative velocity after the last hit of a chatter is lost; begins the book of a contact."""
+    """What is left of the relative velocity after the last hit of a chatter is lost; begins the record of accumulators of a contact."""
     c = memory[workspace.layout.contact]
     away = run.struck.law.coefficient * seen.dv
     accumulators.impulse = -away / (c * c)
@@ -233,20 +235,26 @@ def _stuck(memory, workspace, run, seen, p, accumulators):
 
 
 @compiled
-def _rises(looked, pieces, piece, still, still_speed):
+def _rises(inner_samples, pieces, piece, still, still_speed):
     """When the penetration first becomes positive in a step that begins in touch; -1 if it does not.
 
     As long as the gap is rounding (*still*) nothing has happened yet: the bodies part more slowly than can be seen.
     """
     i = 0
-    if abs(looked[0, 1]) <= still_speed:
-        while i < pieces and abs(looked[i + 1, 0]) <= still:
+    if abs(inner_samples[0, 1]) <= still_speed:
+        while i < pieces and abs(inner_samples[i + 1, 0]) <= still:
             i += 1
-        if i < pieces and looked[i + 1, 0] > still:
+        if i < pieces and inner_samples[i + 1, 0] > still:
             return i * piece
         i += 1
     while i < pieces:
-        rise = _rise(min(looked[i, 0], 0.0), looked[i, 1], looked[i + 1, 0], looked[i + 1, 1], piece)
+        rise = _rise(
+            min(inner_samples[i, 0], 0.0),
+            inner_samples[i, 1],
+            inner_samples[i + 1, 0],
+            inner_samples[i + 1, 1],
+            piece,
+        )
         if rise >= 0.0:
             return (i + rise) * piece
         i += 1
@@ -254,22 +262,22 @@ def _rises(looked, pieces, piece, still, still_speed):
 
 
 @inlined
-def _mend(looked, pieces, length, about):
+def _mend(inner_samples, pieces, length, about):
     """Bend what was seen inside a step to what is seen at its end.
 
     It was seen by linear modes under a tension that changes evenly, and a hit of a beam that passes the tip by a
     billionth of b is one all the same.  The bend is the cubic that begins with neither value nor slope.
     """
-    off, slope = about.d - looked[pieces, 0], (about.dv - looked[pieces, 1]) * length
+    off, slope = about.d - inner_samples[pieces, 0], (about.dv - inner_samples[pieces, 1]) * length
     for i in range(1, pieces + 1):
         u = i / pieces
-        looked[i, 0] += u * u * (off * (3.0 - 2.0 * u) + slope * (u - 1.0))
-        looked[i, 1] += u * (off * 6.0 * (1.0 - u) + slope * (3.0 * u - 2.0)) / length
+        inner_samples[i, 0] += u * u * (off * (3.0 - 2.0 * u) + slope * (u - 1.0))
+        inner_samples[i, 1] += u * (off * 6.0 * (1.0 - u) + slope * (3.0 * u - 2.0)) / length
 
 
 @inlined
 def _turns(u0, v0, u1, v1, h):
-    """Where in [0, 1] the cubic has its least and its greatest value between two falls; -1 and -1 if it only falls."""
+    """Where in [0, 1] the cubic has its least and its maximum value between two falls; -1 and -1 if it only falls."""
     _, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
     inside = c2 * c2 - 3.0 * c1 * c3
     if not (c3 < 0.0 and inside > 0.0):
@@ -296,24 +304,26 @@ def _rise(u0, v0, u1, v1, h):
 
 
 @compiled
-def _entry(looked, pieces, piece):
+def _entry(inner_samples, pieces, piece):
     """When the penetration first becomes positive; -1 if it does not."""
     for i in range(pieces):
-        rise = _rise(looked[i, 0], looked[i, 1], looked[i + 1, 0], looked[i + 1, 1], piece)
+        rise = _rise(
+            inner_samples[i, 0], inner_samples[i, 1], inner_samples[i + 1, 0], inner_samples[i + 1, 1], piece
+        )
         if rise >= 0.0:
             return (i + rise) * piece
     return -1.0
 
 
 @compiled
-def _top(looked, pieces, piece, entry):
-    """When the penetration is greatest first after *entry*; the end of the step if it only grows."""
+def _top(inner_samples, pieces, piece, entry):
+    """When the penetration is maximum first after *entry*; the end of the step if it only grows."""
     for i in range(min(int(entry / piece), pieces - 1), pieces):
-        v0, v1 = looked[i, 1], looked[i + 1, 1]
+        v0, v1 = inner_samples[i, 1], inner_samples[i + 1, 1]
         if v1 < 0.0:
             if v0 > 0.0:
                 return (i + v0 / (v0 - v1)) * piece
-            _, top = _turns(looked[i, 0], v0, looked[i + 1, 0], v1, piece)
+            _, top = _turns(inner_samples[i, 0], v0, inner_samples[i + 1, 0], v1, piece)
             if (i + top) * piece > entry:
                 return (i + top) * piece
     return pieces * piece
@@ -333,7 +343,7 @@ def _cut_at(memory, blocks, workspace, run, tip, step, length):
 def _located(memory, blocks, workspace, run, tip, step, entry, top, at_end, still_speed):
     """The step cut at the hit itself, by Newton's method on the trajectory; what it gave, and what is seen there.
 
-    *top* is where the penetration is greatest if it falls again within the step, *at_end* that at the end of the
+    *top* is where the penetration is maximum if it falls again within the step, *at_end* that at the end of the
     whole step.  The last value says whether there is a hit at all: whether the bodies meet within the step, and do not
     merely graze.
     """
@@ -408,10 +418,10 @@ def accept_step_restitution(
         status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
         away = 0.0 if together else tip.law.coefficient * seen.dv
         wv = seen.wv + seen.dv + away
-        kernel_output = StepControl(together, False, t, t, control.energy_tick, control.beat)
+        next_control = StepControl(together, False, t, t, control.energy_tick, control.steps_since_start)
         after = ContactKinematics(seen.w, wv, 0.0, -away, seen.c, memory_rate(memory, layout, p))
         return IntegratorState(
-            t, now.well_sign, now.stretch, now.rows, after, kernel_output, now.sample, now.landed, status
+            t, now.well_sign, now.stretch, now.rows, after, next_control, now.sample, now.landed, status
         ), step
 
     about = observe(memory, layout, tip, step.phase + tip.drive.omega * step.length, step.q1, step.p1)
@@ -425,15 +435,15 @@ def accept_step_restitution(
     contact_event = detect_contact_event(memory, layout, run, now, tip, step, about, scratch)
     entry = contact_event.entry
     if contact_event.pieces > 0:
-        _mend(scratch.looked, contact_event.pieces, step.length, about)
+        _mend(scratch.inner_samples, contact_event.pieces, step.length, about)
         if t + step.ticks > contact_event.safe_gap:
-            entry = _entry(scratch.looked, contact_event.pieces, contact_event.piece)
+            entry = _entry(scratch.inner_samples, contact_event.pieces, contact_event.piece)
     if seen.d > -still_speed * run.step_time and contact_event.pieces > 0:
         still = still_speed * run.step_time
-        entry = _rises(scratch.looked, contact_event.pieces, contact_event.piece, still, still_speed)
+        entry = _rises(scratch.inner_samples, contact_event.pieces, contact_event.piece, still, still_speed)
     hit, ticks = False, step.ticks
     if entry >= 0.0:
-        top = _top(scratch.looked, contact_event.pieces, contact_event.piece, entry)
+        top = _top(scratch.inner_samples, contact_event.pieces, contact_event.piece, entry)
         located, done, about, hit = _located(
             memory, blocks, workspace, run, tip, step, entry, top, about.d, still_speed
         )
@@ -460,8 +470,8 @@ def accept_step_restitution(
     accumulate_displacement(accumulators, seen, seen1, step.length)
     if hit or t + step.ticks > contact_event.safe_center:
         count_zero_crossings_in_step(
-            accumulators, clock, t, step.length, about_level(layout.uneven, seen), about_level(layout.uneven, seen1),
-            scratch.looked, at_center(layout.uneven, rest_center), contact_event.pieces, contact_event.piece,
+            accumulators, clock, t, step.length, about_level(layout.unequal_wells, seen), about_level(layout.unequal_wells, seen1),
+            scratch.inner_samples, at_center(layout.unequal_wells, rest_center), contact_event.pieces, contact_event.piece,
         )  # fmt: skip
     observe_extras(kernel_input.extras, accumulators, t * tick, step.length, seen, seen1, False)
 
@@ -485,15 +495,15 @@ def accept_step_restitution(
         d, dv = (0.0, 0.0) if together else (min(about.d, 0.0), about.dv)
         seen1 = ContactKinematics(about.w + rest_contact, about.wv, d, dv, about.c + rest_center, about.cv)
     safe_gap, safe_center = (t, t) if entry >= 0.0 else (contact_event.safe_gap, contact_event.safe_center)
-    kernel_output = StepControl(
-        together, control.quiet, safe_gap, safe_center, control.energy_tick, control.beat
+    next_control = StepControl(
+        together, control.low_energy, safe_gap, safe_center, control.energy_tick, control.steps_since_start
     )
     state = rows.q, rows.p, gq, qr
-    kernel_output, status = monitor_energy(
-        memory, layout, run, now, t, state, seen1, kernel_output, hit, status, accumulators, kernel_input
+    next_control, status = monitor_energy(
+        memory, layout, run, now, t, state, seen1, next_control, hit, status, accumulators, kernel_input
     )
     return IntegratorState(
-        t, now.well_sign, 2.0 * gq + qr, rows, seen1, kernel_output, sample, now.landed, status
+        t, now.well_sign, 2.0 * gq + qr, rows, seen1, next_control, sample, now.landed, status
     ), step
 
 

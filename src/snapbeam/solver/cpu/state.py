@@ -20,7 +20,10 @@ from snapbeam.solver.cpu.terms.circuit import disable_long_steps, put_rate
 from snapbeam.solver.cpu.terms.further_contact_events import begin_further_contacts
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, with_further_contact_energy
 from snapbeam.solver.cpu.terms.second_well import about_level, above_own_well, add_potential_energy, put
-from snapbeam.solver.events import (
+from snapbeam.solver.excitation import Tip, drive_rate, numbers_of, seen_from
+from snapbeam.solver.physics import tension_energy, tension_factors
+from snapbeam.solver.splitting import TURNS, Stages
+from snapbeam.solver.step_control import (
     PIECES,
     Clock,
     ContactKinematics,
@@ -30,9 +33,6 @@ from snapbeam.solver.events import (
     close_impact,
     is_low_energy,
 )
-from snapbeam.solver.excitation import Tip, drive_rate, numbers_of, seen_from
-from snapbeam.solver.physics import tension_energy, tension_factors
-from snapbeam.solver.splitting import TURNS, Stages
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = [
@@ -77,7 +77,7 @@ class KernelInput(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Where in memory a run is marched."""
+    """Where in memory a run is integrated."""
 
     layout: Layout
     stages: Stages
@@ -86,7 +86,7 @@ class Workspace(NamedTuple):
 class Scratch(NamedTuple):
     """What a thread works in beside memory: what a look inside a step saw, and partial sums."""
 
-    looked: Any
+    inner_samples: Any
     parts: Any
 
 
@@ -102,10 +102,10 @@ class Rows(NamedTuple):
 
 
 class StepControl(NamedTuple):
-    """What a march keeps in mind from step to step."""
+    """What a integrate keeps in mind from step to step."""
 
     touching: bool
-    quiet: bool
+    low_energy: bool
     """Whether the energy is so low that longer steps serve."""
     safe_gap: int
     """Until this tick the gap cannot close."""
@@ -113,7 +113,7 @@ class StepControl(NamedTuple):
     """Until this tick the centre cannot cross."""
     energy_tick: int
     """Tick at which the energy was last looked at."""
-    beat: int
+    steps_since_start: int
     """Steps since the run began or landed."""
 
 
@@ -239,10 +239,12 @@ def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching
         about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv
     )
     energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
-    energy = add_potential_energy(memory, layout.size, layout.uneven, q, energy)
-    quiet = is_low_energy(above_own_well(layout.uneven, well_sign, energy), layout.gamma, layout.stretch)
+    energy = add_potential_energy(memory, layout.size, layout.unequal_wells, q, energy)
+    low_energy = is_low_energy(
+        above_own_well(layout.unequal_wells, well_sign, energy), layout.gamma, layout.stretch
+    )
     status = _RUNNING if t < run.clock.end else _OK
-    control = StepControl(touching, disable_long_steps(layout.circuit, quiet), t, t, t, 0)
+    control = StepControl(touching, disable_long_steps(layout.circuit, low_energy), t, t, t, 0)
     return IntegratorState(t, well_sign, 2.0 * gq + qr, rows, seen, control, sample, landed, status), energy
 
 
@@ -260,7 +262,7 @@ def begin(memory, blocks, workspace, kernel_input, i, accumulators):
     if record.well_sign < 0.0:
         for row in range(size):
             memory[layout.g + row] = -memory[layout.g + row]
-    put(memory, size, layout.uneven, record.well_sign)
+    put(memory, size, layout.unequal_wells, record.well_sign)
     put_rate(memory, layout.circuit, record.circuit_rate)
     begin_further_contacts(
         memory,
@@ -285,12 +287,12 @@ def begin(memory, blocks, workspace, kernel_input, i, accumulators):
         accumulators.onset = -int(since / run.clock.tick + 0.5)
     begin_statistics(
         accumulators,
-        about_level(layout.uneven, seen).c,
+        about_level(layout.unequal_wells, seen).c,
         seen,
         run.struck.law,
         with_further_contact_energy(memory, layout.others, energy + contact_energy(run.struck.law, seen.d)),
     )
-    control = StepControl(touching, now.control.quiet, 0, 0, 0, 0)
+    control = StepControl(touching, now.control.low_energy, 0, 0, 0, 0)
     return run, IntegratorState(0, now.well_sign, now.stretch, rows, seen, control, 0, 0, now.status)
 
 
@@ -305,7 +307,7 @@ def change_origin(memory, blocks, layout, well_sign, q, k, r):
     for row in range(layout.size):
         memory[q + row] -= well_sign * memory[layout.shift + row]
         memory[layout.g + row] = -memory[layout.g + row]
-    put(memory, layout.size, layout.uneven, -well_sign)
+    put(memory, layout.size, layout.unequal_wells, -well_sign)
     gq, qr = tension_rows(memory, blocks, layout, q, r)
     along_g, along_r = tension_factors(layout.gamma, gq, qr)
     along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
@@ -315,7 +317,7 @@ def change_origin(memory, blocks, layout, well_sign, q, k, r):
 
 @compiled
 def finish(memory, blocks, layout, run, now, accumulators, impacts, before, goes_on):
-    """Close a run's book; its last contact too, unless the run is to go on from here."""
+    """Close a run's record of accumulators; its last contact too, unless the run is to go on from here."""
     q, p, tick = now.rows.q, now.rows.p, run.clock.tick
     if now.control.touching:
         if goes_on:
@@ -326,7 +328,7 @@ def finish(memory, blocks, layout, run, now, accumulators, impacts, before, goes
         accumulators.early_stop_time = now.t * tick
     gq, qr = tension_rows(memory, blocks, layout, q, layout.work + 9 * layout.size)
     stored = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
-    stored = add_potential_energy(memory, layout.size, layout.uneven, q, stored)
+    stored = add_potential_energy(memory, layout.size, layout.unequal_wells, q, stored)
     stored = stored + contact_energy(run.struck.law, now.seen.d)
     accumulators.energy = with_further_contact_energy(memory, layout.others, stored)
     accumulators.displacement, accumulators.center = now.seen.w, now.seen.c

@@ -45,11 +45,11 @@ from snapbeam.solver.cpu.terms.further_contacts import (
     with_further_contact_work,
 )
 from snapbeam.solver.cpu.terms.second_well import pushed_along
-from snapbeam.solver.events import ContactKinematics
 from snapbeam.solver.excitation import tip_motion, turned_motion
 from snapbeam.solver.physics import sincos, tension_factors
 from snapbeam.solver.simd import WIDTH, fma, load, store
 from snapbeam.solver.splitting import TURNS
+from snapbeam.solver.step_control import ContactKinematics
 
 __all__ = [
     "ContactIncrement",
@@ -120,7 +120,7 @@ def _damped(memory, layout, tip, step, stage, weight, along_g, along_r, push):
     else:
         rate = dot(memory, size, contact, step.p1)
         along = along_g * dot(memory, size, contact, layout.g) + along_r * dot(memory, size, contact, step.r)
-        along = pushed_along(memory, size, layout.uneven, contact, along)
+        along = pushed_along(memory, size, layout.unequal_wells, contact, along)
         along = struck_along(memory, size, layout.others, contact, along)
         along = shaken_along(memory, size, layout.forced, contact, along)
     mobility = dot(memory, size, contact, contact)
@@ -351,10 +351,10 @@ def _push(memory, layout, stages, tip, step, drive0, stage, weight, push):
 
 
 @inlined
-def _first(memory, layout, step, weight, force, ledger):
+def _first(memory, layout, step, weight, force, with_energy):
     """The kick that begins a step, with the acceleration known from the last one, and the flow after it."""
     kick_rows(memory, layout, weight, step.k, force, kick_source(layout.circuit, step), step.p1)
-    if ledger is None:
+    if with_energy is None:
         flow_rows(memory, layout.size, step.at, step.q, step.p1, step.q1, step.p1)
         return 0.0
     before = modal_energy(memory, layout, step.q, step.p1)
@@ -363,7 +363,7 @@ def _first(memory, layout, step, weight, force, ledger):
 
 
 @inlined
-def _kick(memory, layout, stages, step, stage, weight, along_g, along_r, force, ledger):
+def _kick(memory, layout, stages, step, stage, weight, along_g, along_r, force, with_energy):
     """The kick of a stage after the first, and the flow after it unless it is the last."""
     q1, p1, k1, r = step.q1, step.p1, step.k1, step.r
     if stage == stages.flows:
@@ -372,7 +372,7 @@ def _kick(memory, layout, stages, step, stage, weight, along_g, along_r, force, 
         kick_rows(memory, layout, weight, k1, force, p1, p1)
         return 0.0
     flow = step.at + min(stage, stages.flows - 1 - stage) * 4 * layout.size
-    if ledger is None:
+    if with_energy is None:
         kick_and_flow(memory, layout, flow, weight, along_g, along_r, r, force, q1, p1)
         return 0.0
     acceleration_rows(memory, layout, along_g, along_r, r, k1)
@@ -410,10 +410,10 @@ def with_circuit_acceleration(memory, layout, spare, step):
 
 
 @called
-def take_step(memory, blocks, layout, stages, tip, step, ledger):
+def take_step(memory, blocks, layout, stages, tip, step, with_energy):
     """Advance (q, p) with tension acceleration k by a step into (q1, p1, k1).
 
-    Dissipation is added up unless *ledger* is None; nothing else depends on it, to the last bit.
+    Dissipation is added up unless *energy balance* is None; nothing else depends on it, to the last bit.
     """
     drive0 = _begin_push(step, stages, layout.size)
     push, gq, qr, dissipated, given = (
@@ -432,7 +432,7 @@ def take_step(memory, blocks, layout, stages, tip, step, ledger):
             given = around_kick(
                 memory, blocks, layout, tip, step, stage, weight, (0.0, 0.0, push.force), given
             )
-            dissipated += _first(memory, layout, step, weight, push.force, ledger)
+            dissipated += _first(memory, layout, step, weight, push.force, with_energy)
             continue
         gq, qr = tension_rows(memory, blocks, layout, step.q1, step.r)
         along_g, along_r = tension_factors(layout.gamma, gq, qr)
@@ -441,7 +441,9 @@ def take_step(memory, blocks, layout, stages, tip, step, ledger):
         given = around_kick(
             memory, blocks, layout, tip, step, stage, weight, (along_g, along_r, push.force), given
         )
-        dissipated += _kick(memory, layout, stages, step, stage, weight, along_g, along_r, push.force, ledger)
+        dissipated += _kick(
+            memory, layout, stages, step, stage, weight, along_g, along_r, push.force, with_energy
+        )
     return _done(memory, layout, gq, qr, push, dissipated, given)
 
 

@@ -46,7 +46,7 @@ def constraint_force(memory, blocks, layout, run, tip, phase):
 
 @compiled
 def held_for(memory, blocks, layout, run, tip, phase, length):
-    """What the force does over *length*: impulse, work, gross work, dissipation and its greatest value."""
+    """What the force does over *length*: impulse, work, gross work, dissipation and its maximum value."""
     omega, p, damping = tip.drive.omega, run.spare + layout.size, memory[layout.damping]
     c = memory[layout.contact]
     impulse, work, gross, dissipated, peak = 0.0, 0.0, 0.0, 0.0, 0.0

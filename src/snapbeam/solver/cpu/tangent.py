@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from snapbeam.solver.compilation import compiled
 from snapbeam.solver.contact_force import contact_force, contact_slope
-from snapbeam.solver.cpu.control import accept_any_step
+from snapbeam.solver.cpu.contact_dispatch import accept_step_by_law
 from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.integrate import propose_step, store_state
 from snapbeam.solver.cpu.mode_lanes import acceleration_rows, flow_rows, kick_rows, tension_rows
@@ -90,7 +90,7 @@ def carry_tangents(memory, blocks, workspace, run, tip, step, first, count):
 def integrate_tangent(
     memory, blocks, layout, stages, kernel_input, which, scratch, kernel_output, tangents, first
 ):
-    """March the runs *which* one after the other, with their tangents, shape (runs, k, 2 rows), from row *first* on.
+    """Integrate the runs *which* one after the other, with their tangents, shape (runs, k, 2 rows), from row *first* on.
 
     Tangents are handed out as they are at the end of a run.
     """
@@ -102,7 +102,7 @@ def integrate_tangent(
             for row in range(2 * size):
                 memory[first + 2 * j * size + row] = tangents[i, j, row]
         while now.status == _RUNNING:
-            if kernel_output.pulse[0] != 0:
+            if kernel_output.stop_flag[0] != 0:
                 accumulators.time, accumulators.status = now.t, _RUNNING
                 return
             before = now.t
@@ -110,7 +110,7 @@ def integrate_tangent(
             well_sign = now.well_sign
             tip = seen_from(run.struck, well_sign, run.rest_contact)
             done = take_step(memory, blocks, layout, stages, tip, step, None)
-            now, step = accept_any_step(
+            now, step = accept_step_by_law(
                 memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, None
             )
             if now.t > before:

@@ -1,1 +1,1 @@
-"""cuda"""
+"""CUDA layout: one block of threads per run."""

@@ -8,7 +8,10 @@ from typing import Any, NamedTuple
 from snapbeam.solver.cuda.layout import device, shared
 from snapbeam.solver.cuda.state import Held, Standing
 from snapbeam.solver.cuda.step import Functions
-from snapbeam.solver.events import (
+from snapbeam.solver.excitation import seen_from
+from snapbeam.solver.interpolation import first_downcrossing, turning_point, update_extrema
+from snapbeam.solver.physics import mode_energy, tension_acceleration, tension_energy, tension_factors
+from snapbeam.solver.step_control import (
     ContactKinematics,
     accumulate_displacement,
     accumulate_energy,
@@ -22,9 +25,6 @@ from snapbeam.solver.events import (
     safe_interval,
     ticks_of,
 )
-from snapbeam.solver.excitation import seen_from
-from snapbeam.solver.interpolation import first_downcrossing, turning_point, update_extrema
-from snapbeam.solver.physics import mode_energy, tension_acceleration, tension_energy, tension_factors
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["step_function"]
@@ -115,7 +115,7 @@ def _watching(functions: Functions) -> tuple[Any, Any, Any]:
         return safe_gap, safe_center
 
     @device
-    def looked(block, fixed, tip, own, k1, phase, span, length):
+    def inner_samples(block, fixed, tip, own, k1, phase, span, length):
         """Look inside a free step; in how many pieces of which length."""
         look, pieces, step = fixed.whole_look, fixed.step_pieces, fixed.clock.step
         if span == 2 * step:
@@ -128,10 +128,10 @@ def _watching(functions: Functions) -> tuple[Any, Any, Any]:
         sample_inside_step(block, fixed.mode, tip, look, pieces, piece, phase, own.q, own.p, own.k, k1)
         return pieces, piece
 
-    return home_again, safe_until, looked
+    return home_again, safe_until, inner_samples
 
 
-def _taking(functions: Functions, safe_until: Any, looked: Any) -> Any:
+def _taking(functions: Functions, safe_until: Any, inner_samples: Any) -> Any:
     """The device function that takes a step and cuts it short."""
     observe, take_step, prepare = functions.observe, functions.take_step, functions.prepare
 
@@ -178,7 +178,7 @@ def _taking(functions: Functions, safe_until: Any, looked: Any) -> Any:
                     after = held.t + span
                     safe_gap, safe_center = safe_until(block, fixed, held, own, after)
                     if after > min(safe_gap, safe_center):
-                        pieces, piece = looked(block, fixed, tip, own, k2, phase, span, length)
+                        pieces, piece = inner_samples(block, fixed, tip, own, k2, phase, span, length)
                         if after > safe_gap:
                             entry = _first_entry(block.seen, pieces, piece)
                             if entry >= 0.0:
@@ -222,7 +222,7 @@ def _keeping(functions: Functions) -> tuple[Any, Any]:
 
     @device
     def keep(block, fixed, held, well_sign, step, counted, accumulators):
-        """Enter a step in the statistics; the first thread keeps the book."""
+        """Enter a step in the statistics; the first thread keeps the record of accumulators."""
         if block.lane == 0:
             if held.touching:
                 accumulators.impulse += step.impulse
@@ -239,28 +239,28 @@ def _keeping(functions: Functions) -> tuple[Any, Any]:
     @device
     def weigh(block, fixed, held, step, t, well_sign, touching, released, status, accumulators):
         """After some steps, or a release, the energy is looked at."""
-        quiet, monitor_energy, own = held.quiet, held.energy_tick, step.own
+        low_energy, energy_tick, own = held.low_energy, held.energy_tick, step.own
         if released or (held.steps & 7) == 0:
             energy = mode_energy(fixed.mode.omega, own.q, own.p)
             linear, high, _, _ = sum_four(block, energy, fixed.mode.high * energy, 0.0, 0.0)
             if block.lane == 0:
-                _track_energy(accumulators, linear, high, (t - monitor_energy) * fixed.clock.tick)
-            monitor_energy = t
+                _track_energy(accumulators, linear, high, (t - energy_tick) * fixed.clock.tick)
+            energy_tick = t
             if not touching:
                 energy = linear + tension_energy(fixed.gamma, own.gq, own.qr)
-                quiet = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
+                low_energy = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
                 far = well_sign < 0.0 and step.seen.w > fixed.clock.decide_reach and step.seen.c > 0.0
                 if not step.event and far and (held.steps & 15) == 0 and energy < fixed.clock.decide_energy:
                     status = _EARLY_STOP
-        return quiet, monitor_energy, status
+        return low_energy, energy_tick, status
 
     return keep, weigh
 
 
 def step_function(functions: Functions) -> Any:
     """The device function that takes a run one step further."""
-    home_again, safe_until, looked = _watching(functions)
-    taken = _taking(functions, safe_until, looked)
+    home_again, safe_until, inner_samples = _watching(functions)
+    taken = _taking(functions, safe_until, inner_samples)
     keep, weigh = _keeping(functions)
     synchronise = functions.synchronise
 
@@ -270,7 +270,7 @@ def step_function(functions: Functions) -> Any:
         clock = fixed.clock
         own, well_sign = home_again(block, fixed, held)
         steps = held.steps + 1
-        level = _flight_level(clock, held.quiet, 2.0 * own.gq + own.qr, fixed.rest_stretch)
+        level = _flight_level(clock, held.low_energy, 2.0 * own.gq + own.qr, fixed.rest_stretch)
         if held.touching:
             elapsed = (held.t - held.onset) * clock.tick
             level = max(level, _contact_level(clock, elapsed, held.seen.d, held.seen.dv))
@@ -285,7 +285,7 @@ def step_function(functions: Functions) -> Any:
             if block.lane == 0 and step.entered:
                 accumulators.touching, accumulators.onset = 1, held.t
             return Held(
-                held.t, well_sign, own, held.seen, held.touching or step.entered, held.quiet, step.safe_gap,
+                held.t, well_sign, own, held.seen, held.touching or step.entered, held.low_energy, step.safe_gap,
                 step.safe_center, onset, held.deepest, held.energy_tick, steps, status,
             )  # fmt: skip
         counted = held.touching or held.t + step.span > step.safe_center
@@ -307,10 +307,10 @@ def step_function(functions: Functions) -> Any:
                 if block.lane == 0:
                     accumulators.touching, accumulators.onset = 1, t
         counting = Held(
-            held.t, held.well_sign, held.own, held.seen, held.touching, held.quiet, held.safe_gap, held.safe_center,
+            held.t, held.well_sign, held.own, held.seen, held.touching, held.low_energy, held.safe_gap, held.safe_center,
             held.onset, held.deepest, held.energy_tick, steps, held.status,
         )  # fmt: skip
-        quiet, monitor_energy, status = weigh(
+        low_energy, energy_tick, status = weigh(
             block, fixed, counting, step, t, well_sign, touching, released, status, accumulators
         )
         if counted and clock.decide_crossings >= 0:
@@ -325,12 +325,12 @@ def step_function(functions: Functions) -> Any:
             step.own,
             seen,
             touching,
-            quiet,
+            low_energy,
             safe_gap,
             safe_center,
             onset,
             deepest,
-            monitor_energy,
+            energy_tick,
             steps,
             status,
         )

@@ -25,9 +25,9 @@ from snapbeam.solver.cuda.layout import (
     device_structure,
 )
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.events import PIECES
 from snapbeam.solver.splitting import COMPOSITIONS, TURNS
 from snapbeam.solver.statistics import Landings, Recorded, empty_accumulators, updated
+from snapbeam.solver.step_control import PIECES
 from snapbeam.util.validation import InputError
 
 __all__ = [
@@ -74,7 +74,7 @@ def simulated() -> bool:
 
 
 def refusal(modes: int, law: type[ContactLaw] | None = None, drive: type[Drive] = Sine) -> str | None:
-    """Why such runs cannot be marched on a device here, or None if they can."""
+    """Why such runs cannot be integrated on a device here, or None if they can."""
     if law is not None and law.impulsive:
         return (
             f"the law of contact {law.name!r}, whose impacts last no time, is marched by the CPU engine alone"
@@ -100,7 +100,7 @@ class Options(NamedTuple):
     """What a benchmark or a test may set; only *fewest_threads* touches results, in their last bits."""
 
     most_blocks: int | None = None
-    """Runs marched at a time; as many as the device holds by default."""
+    """Runs integrated at a time; as many as the device holds by default."""
     first_budget: int = 1000
     """Steps of the first slice; later ones last about 0.4 s."""
     fewest_threads: int | None = None
@@ -110,7 +110,7 @@ class Options(NamedTuple):
 
 
 class _Launch:
-    """The kernel, the structure on the device, and room for the runs that are marched at a time."""
+    """The kernel, the structure on the device, and room for the runs that are integrated at a time."""
 
     def __init__(self, ensemble: Ensemble, options: Options) -> None:
         from numba import cuda
@@ -136,7 +136,7 @@ class _Launch:
         self.pieces = _most_pieces(ensemble)
         self.blocks = 1
         self.kernel_output, self.work = self._room()
-        # a march of no steps: the kernel is compiled, and the driver knows how many blocks fit
+        # a integrate of no steps: the kernel is compiled, and the driver knows how many blocks fit
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NumbaPerformanceWarning)
             self._call(self._runs(np.zeros(1, dtype=np.int64), empty_accumulators(1)), 0)
@@ -198,7 +198,7 @@ class _Launch:
         )
 
     def _call(self, runs: tuple[Any, ...], budget: int) -> _Integers:
-        """March every block for *budget* steps; returns how many runs were drawn and how many ended."""
+        """Integrate every block for *budget* steps; returns how many runs were drawn and how many ended."""
         kernel_input, order, queue, accumulators_of_runs = runs
         self.kernel[self.blocks, self.structure.threads](
             *self.fixed,
@@ -220,7 +220,7 @@ class _Launch:
         ended: Callable[[int], object],
         budget: int,
     ) -> int:
-        """March the runs *which*, in this order, into *books*; returns the last budget."""
+        """Integrate the runs *which*, in this order, into *accumulators*; returns the last budget."""
         runs = self._runs(which, accumulators_of_runs[which])
         done = 0
         while done < which.size:
@@ -241,10 +241,10 @@ def run_ensemble(
     progress: Callable[[int, int], object] | None = None,
     options: Options | None = None,
 ) -> NDArray[Any]:
-    """March every run of an ensemble on the CUDA device.
+    """Integrate every run of an ensemble on the CUDA device.
 
     Runs go to the device longest first, a bounded number at a time; what a run gives does not depend on
-    which block marched it, beside which others, or in how many slices.
+    which block integrated it, beside which others, or in how many slices.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def run_ensemble(
 
     Returns
     -------
-    array of books, shape (runs,)
+    array of accumulators, shape (runs,)
 
     Raises
     ------

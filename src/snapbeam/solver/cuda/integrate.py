@@ -1,11 +1,11 @@
-"""The CUDA engine's kernel: the march of :mod:`snapbeam.engines.cpu`, a block of threads a trajectory.
+"""The CUDA engine's kernel: the integration of :mod:`snapbeam.solver.cpu`, a block of threads a trajectory.
 
-A block takes a run from the queue, marches it to its end, enters what it found and takes the next.  After a
+A block takes a run from the queue, integrates it to its end, enters what it found and takes the next.  After a
 *budget* of steps every block lays down its run, wherever it is, and the kernel returns; the next call
 goes on from the same bits.  So a call is short, whatever the runs are: the host can show progress, be
 interrupted, and share the device with a display.
 
-The first thread keeps the book of a run; all threads make the same decisions.
+The first thread keeps the record of accumulators of a run; all threads make the same decisions.
 """
 
 from __future__ import annotations

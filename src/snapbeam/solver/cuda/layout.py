@@ -48,7 +48,7 @@ STRUCTURE = ("omega", "omega_squared", "omega_damped", "damping", "g", "center",
 MARKS = 6
 """Integers, and"""
 KEPT = 9
-"""floats that a run laid down keeps beside its book."""
+"""floats that a run laid down keeps beside its record of accumulators."""
 
 RESIDENT_WARPS = 12
 """Warps of a multiprocessor that the kernel's use of registers leaves room for: 168 registers a thread, with
@@ -137,7 +137,7 @@ def device_structure(ensemble: Ensemble, fewest_threads: int = FEWEST_THREADS) -
 
 
 # ----------------------------------------------------------------------------------------------------
-# A block of threads that marches one trajectory: what it shares, its barrier and its sums.
+# A block of threads that integrates one trajectory: what it shares, its barrier and its sums.
 #
 # A sum has one order, fixed by the number of threads, and every thread reads the same bits back.
 
@@ -155,7 +155,7 @@ def device(function: Callable[..., Any]) -> Any:
 
 
 def shared(function: Any) -> Any:
-    """A function that the CPU engine compiled, for use on the device, where it is compiled anew.
+    """A function that the CPU engine compiled, for use on the device, where it is compiled again.
 
     The simulator's arrays are none that compiled code takes: there the function runs as plain Python.
     """

@@ -8,7 +8,9 @@ from typing import Any, NamedTuple
 from snapbeam.solver.contact_force import contact_energy
 from snapbeam.solver.cuda.layout import device, shared
 from snapbeam.solver.cuda.step import Functions, Mode
-from snapbeam.solver.events import (
+from snapbeam.solver.excitation import Tip, numbers_of, seen_from
+from snapbeam.solver.physics import mode_energy, tension_acceleration, tension_energy, tension_factors
+from snapbeam.solver.step_control import (
     PIECES,
     Clock,
     ContactKinematics,
@@ -17,8 +19,6 @@ from snapbeam.solver.events import (
     close_impact,
     is_low_energy,
 )
-from snapbeam.solver.excitation import Tip, numbers_of, seen_from
-from snapbeam.solver.physics import mode_energy, tension_acceleration, tension_energy, tension_factors
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["Fixed", "Held", "Standing", "run_functions"]
@@ -71,12 +71,12 @@ class Held(NamedTuple):
     own: Standing
     seen: ContactKinematics
     touching: bool
-    quiet: bool
+    low_energy: bool
     safe_gap: int
     safe_center: int
     onset: int
     deepest: float
-    monitor_energy: int
+    energy_tick: int
     steps: int
     status: int
 
@@ -156,7 +156,7 @@ def _ends(functions: Functions) -> tuple[Any, Any]:
         energy = sum_one(block, mode_energy(fixed.mode.omega, q, p)) + tension_energy(
             fixed.gamma, own.gq, own.qr
         )
-        quiet = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
+        low_energy = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
         touching = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
         if lane == 0:
             accumulators.status, accumulators.touching, accumulators.onset = _RUNNING, int(touching), 0
@@ -167,7 +167,7 @@ def _ends(functions: Functions) -> tuple[Any, Any]:
                 fixed.struck.law,
                 energy + contact_energy(fixed.struck.law, seen.d),
             )
-        return Held(0, well_sign, own, seen, touching, quiet, 0, 0, 0, max(seen.d, 0.0), 0, 0, _RUNNING)
+        return Held(0, well_sign, own, seen, touching, low_energy, 0, 0, 0, max(seen.d, 0.0), 0, 0, _RUNNING)
 
     @device
     def finish(block, fixed, held, accumulators):
@@ -236,7 +236,7 @@ def _pauses() -> tuple[Any, Any]:
                 held.safe_center,
                 int(held.well_sign),
             )
-            marks[index, 3], marks[index, 4] = int(held.quiet), held.energy_tick
+            marks[index, 3], marks[index, 4] = int(held.low_energy), held.energy_tick
             reals[index, 0], reals[index, 1], reals[index, 2] = seen.w, seen.wv, seen.d
             reals[index, 3], reals[index, 4], reals[index, 5] = seen.dv, seen.c, seen.cv
             reals[index, 6], reals[index, 7], reals[index, 8] = own.gq, own.qr, held.deepest

@@ -16,7 +16,6 @@ from numba import cuda
 
 from snapbeam.solver.contact_force import contact_force
 from snapbeam.solver.cuda.layout import device, sums, synchroniser
-from snapbeam.solver.events import ContactKinematics
 from snapbeam.solver.physics import (
     decay_less_one,
     rotation,
@@ -29,6 +28,7 @@ from snapbeam.solver.physics import (
 )
 from snapbeam.solver.simd import fma
 from snapbeam.solver.splitting import COMPOSITIONS
+from snapbeam.solver.step_control import ContactKinematics
 
 __all__ = ["Functions", "Mode", "functions"]
 

@@ -79,7 +79,7 @@ def test_a_gap_and_a_striker_above(monkeypatch):
 
 def test_a_striker_with_mass(monkeypatch):
     """Extremes and the share of high modes are those of the beam in both layouts, as recorded runs have them."""
-    body = {"mass": 0.02, "spring": 700.0, "damper": 0.1}
+    body = {"mass": 0.02, "suspension_stiffness": 700.0, "suspension_damping": 0.1}
     made = ensemble(2, runs=16, cycles=8, striker=body, high_frequency_ratio=1.2)
     found = statistics_of(made, assert_same(monkeypatch, made))
     assert (found["impacts"] > 0).all() and (found["high_frequency_energy_fraction"] > 0.0).any()

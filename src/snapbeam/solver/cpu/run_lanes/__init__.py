@@ -1,1 +1,1 @@
-"""run_lanes"""
+"""Run-lane layout: eight runs in one register."""

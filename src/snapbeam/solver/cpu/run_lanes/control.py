@@ -16,19 +16,6 @@ from snapbeam.solver.cpu.run_lanes.step import (
     propagate_free,
     tension,
 )
-from snapbeam.solver.events import (
-    GRADING,
-    RELEASE,
-    STRETCHED,
-    ContactKinematics,
-    clock_of,
-    close_impact,
-    count_zero_crossings_in_step,
-    first_contact_onset,
-    low_energy_limit,
-    refine_onset,
-    safe_interval,
-)
 from snapbeam.solver.excitation import numbers_of
 from snapbeam.solver.interpolation import (
     first_downcrossing,
@@ -56,6 +43,19 @@ from snapbeam.solver.simd import (
     vmin,
     vtrunc,
 )
+from snapbeam.solver.step_control import (
+    GRADING,
+    RELEASE,
+    STRETCHED,
+    ContactKinematics,
+    clock_of,
+    close_impact,
+    count_zero_crossings_in_step,
+    first_contact_onset,
+    low_energy_limit,
+    refine_onset,
+    safe_interval,
+)
 
 __all__ = ["About", "accept", "cut_again", "end_contact", "fetch", "look_at", "meet", "probe", "propose_step"]
 
@@ -65,7 +65,7 @@ _CUSTOM = -99.0
 
 
 @compiled
-def _change_wells(m, shape, world, which):
+def _change_wells(m, shape, lane_settings, which):
     """Take the other well as the origin, in some lanes."""
     well_sign, mask = load(m, at.HOME), mask_of(which)
     for i in range(modes_of(shape)):
@@ -74,16 +74,16 @@ def _change_wells(m, shape, world, which):
         store(m, mode + at.Q, pick(mask, q - well_sign * broadcast_load(m, mode + at.SHIFT), q))
         store(m, mode + at.SEEN_WELL, pick(mask, 0.0 - well, well))
     store(m, at.HOME, pick(mask, 0.0 - well_sign, well_sign))
-    gq, qr = tension(m, shape, world.gamma, mask, at.Q)
+    gq, qr = tension(m, shape, lane_settings.gamma, mask, at.Q)
     store(m, at.STRETCH, pick(mask, 2.0 * gq + qr, load(m, at.STRETCH)))
 
 
 @inlined
-def _flight(m, n, world):
+def _flight(m, n, lane_settings):
     """Halvings of the flight step in free flight, or -1."""
     level = splat(0.0)
-    if world.stretch > 0.0:
-        far = halvings(vabs(load(m, at.STRETCH)), splat(STRETCHED * world.stretch))
+    if lane_settings.stretch > 0.0:
+        far = halvings(vabs(load(m, at.STRETCH)), splat(STRETCHED * lane_settings.stretch))
         level = vmin(vmax(far, level), load(m, at.FINEST))
     return pick(mask_of(n[at.QUIET]), splat(-1.0), level)
 
@@ -100,19 +100,19 @@ def _in_contact(m, level, touching):
 
 
 @inlined
-def propose_step(m, n, shape, world):
+def propose_step(m, n, shape, lane_settings):
     """The length of the next step of every lane that begins one; returns those."""
     fresh = n[at.LIVE] & ~(n[at.CUTTING] | n[at.ASIDE] | n[at.PROBED])
-    if world.stretch > 0.0:
+    if lane_settings.stretch > 0.0:
         across = load(m, at.C) * (load(m, at.HOME) * load(m, at.REST_CENTER))
         crossed = bits(less(across, 0.0)) & fresh
         if crossed:
-            _change_wells(m, shape, world, crossed)
+            _change_wells(m, shape, lane_settings, crossed)
     which = mask_of(fresh)
     one = pick(which, splat(1.0), splat(0.0))
     store(m, at.STEPS, load(m, at.STEPS) + one)
     store(m, at.BEAT, load(m, at.BEAT) + one)
-    level = _flight(m, n, world)
+    level = _flight(m, n, lane_settings)
     if n[at.TOUCHING] & fresh:
         level = _in_contact(m, level, n[at.TOUCHING] & fresh)
     ticks = load(m, at.STEP) * power_of_two(0.0 - level)
@@ -133,19 +133,19 @@ def propose_step(m, n, shape, world):
 
 
 @compiled
-def _make(m, shape, world, odd):
+def _make(m, shape, lane_settings, odd):
     """Prepare steps of any length, and have them at hand."""
     while odd:
         lane = lowest(odd)
         odd &= odd - 1
-        place = slot_of(world, lane, at.LEVELS - 1)
-        prepare(m, shape, world, place, m[at.LENGTH + lane], m[at.OMEGA + lane])
+        place = slot_of(lane_settings, lane, at.LEVELS - 1)
+        prepare(m, shape, lane_settings, place, m[at.LENGTH + lane], m[at.OMEGA + lane])
         at_hand(m, shape, place, lane)
         m[at.KEY + lane] = _CUSTOM
 
 
 @inlined
-def fetch(m, n, shape, world):
+def fetch(m, n, shape, lane_settings):
     """Have the flows of every lane's step at hand."""
     odd = (n[at.ODD] | n[at.ASIDE]) & n[at.LIVE]
     level, key = load(m, at.LEVEL), load(m, at.KEY)
@@ -153,10 +153,10 @@ def fetch(m, n, shape, world):
     while other:
         lane = lowest(other)
         other &= other - 1
-        at_hand(m, shape, slot_of(world, lane, int(m[at.LEVEL + lane])), lane)
+        at_hand(m, shape, slot_of(lane_settings, lane, int(m[at.LEVEL + lane])), lane)
         m[at.KEY + lane] = m[at.LEVEL + lane]
     if odd:
-        _make(m, shape, world, odd)
+        _make(m, shape, lane_settings, odd)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -175,12 +175,12 @@ class About(NamedTuple):
 
 
 @compiled
-def look_at(m, look, lane, looked):
+def look_at(m, look, lane, inner_samples):
     """What was seen inside the step of a lane, as the scalar functions have it; returns how many pieces."""
     pieces = int(m[at.LOOK_PIECES + lane])
     for i in range(pieces + 1):
         for j in range(4):
-            looked[i, j] = m[look + (4 * i + j) * WIDTH + lane]
+            inner_samples[i, j] = m[look + (4 * i + j) * WIDTH + lane]
     return pieces
 
 
@@ -197,7 +197,7 @@ def _safe(m, shape, late, early_center):
 
 
 @inlined
-def _look(m, shape, world, lookers, with_center):
+def _look(m, shape, lane_settings, lookers, with_center):
     """Look into the free steps of some lanes; returns where the penetration may have been positive."""
     which, ticks, step = mask_of(lookers), load(m, at.TICKS), load(m, at.STEP)
     length, pieces = load(m, at.LENGTH), load(m, at.PIECES)
@@ -218,7 +218,7 @@ def _look(m, shape, world, lookers, with_center):
     while left:
         most = max(most, int(m[at.LOOK_PIECES + lowest(left)]))
         left &= left - 1
-    return bits(less(0.0, propagate_free(m, shape, world.look, which, with_center, most)))
+    return bits(less(0.0, propagate_free(m, shape, lane_settings.look, which, with_center, most)))
 
 
 @inlined
@@ -256,15 +256,15 @@ def _leave(m, n, about_d, about_dv, leaving):
 
 
 @compiled
-def _enter(m, n, look, rising, looked):
+def _enter(m, n, look, rising, inner_samples):
     """Cut the steps in which the gap closes; returns those that end as they are, and those that touch at once."""
     on, at_once = 0, 0
     while rising:
         lane = lowest(rising)
         rising &= rising - 1
         bit = 1 << lane
-        pieces = look_at(m, look, lane, looked)
-        entry = first_contact_onset(looked, pieces, m[at.LOOK_PIECE + lane])
+        pieces = look_at(m, look, lane, inner_samples)
+        entry = first_contact_onset(inner_samples, pieces, m[at.LOOK_PIECE + lane])
         if entry < 0.0:
             on |= bit
             continue
@@ -283,7 +283,7 @@ def _enter(m, n, look, rising, looked):
 
 
 @inlined
-def meet(m, n, shape, world, about, whole, looked):
+def meet(m, n, shape, lane_settings, about, whole, inner_samples):
     """What the steps of the lanes *whole* meet; returns those that end as they are, and those that touch at once."""
     if whole == 0:
         return 0, 0
@@ -302,9 +302,9 @@ def meet(m, n, shape, world, about, whole, looked):
             late = bits(less(load(m, at.SAFE_GAP), after)) & free
             early = bits(less(load(m, at.SAFE_CENTER), after)) & free
             if late | early:
-                rising = _look(m, shape, world, late | early, early != 0) & late
+                rising = _look(m, shape, lane_settings, late | early, early != 0) & late
                 if rising:
-                    on, at_once = _enter(m, n, world.look, rising, looked)
+                    on, at_once = _enter(m, n, lane_settings.look, rising, inner_samples)
                     ends = (ends & ~rising) | on
     return ends, at_once
 
@@ -390,7 +390,7 @@ def _add(m, row, which, more):
 
 @inlined
 def _track(m, seen1, length, which):
-    """Extremes and mean squares, as :func:`~snapbeam.solver.events.accumulate_displacement` keeps them."""
+    """Extremes and mean squares, as :func:`~snapbeam.solver.step_control.accumulate_displacement` keeps them."""
     _extremes(m, at.MIN_W, at.MAX_W, at.W, at.WV, seen1.w, seen1.wv, length, which)
     _extremes(m, at.MIN_C, at.MAX_C, at.C, at.CV, seen1.c, seen1.cv, length, which)
     mask, half = mask_of(which), 0.5 * length
@@ -405,7 +405,7 @@ def _track(m, seen1, length, which):
 
 
 @compiled
-def _count(m, n, world, kernel_input, accumulators_of_runs, c1, cv1, which, looked):
+def _count(m, n, lane_settings, kernel_input, accumulators_of_runs, c1, cv1, which, inner_samples):
     """Count the crossings of the centre in the steps of some lanes."""
     store(m, at.TEMP, c1)
     store(m, at.TEMP1, cv1)
@@ -416,19 +416,21 @@ def _count(m, n, world, kernel_input, accumulators_of_runs, c1, cv1, which, look
         accumulators, clock = accumulators_of_runs[i], clock_of(kernel_input.runs[i], kernel_input.max_steps)
         pieces = 0
         if not n[at.TOUCHING] & (1 << lane):
-            pieces = look_at(m, world.look, lane, looked)
+            pieces = look_at(m, lane_settings.look, lane, inner_samples)
         seen = ContactKinematics(0.0, 0.0, 0.0, 0.0, m[at.C + lane], m[at.CV + lane])
         seen1 = ContactKinematics(0.0, 0.0, 0.0, 0.0, m[at.TEMP + lane], m[at.TEMP1 + lane])
         rest = m[at.HOME + lane] * m[at.REST_CENTER + lane]
         start, length, piece = int(m[at.T + lane]), m[at.LENGTH + lane], m[at.LOOK_PIECE + lane]
         count_zero_crossings_in_step(
-            accumulators, clock, start, length, seen, seen1, looked, rest, pieces, piece
+            accumulators, clock, start, length, seen, seen1, inner_samples, rest, pieces, piece
         )
         m[at.SIDE + lane], m[at.LATE + lane] = accumulators.side, accumulators.zero_crossings_last_quarter
 
 
 @inlined
-def _crossings(m, n, world, kernel_input, accumulators_of_runs, seen1, length, after, which, looked):
+def _crossings(
+    m, n, lane_settings, kernel_input, accumulators_of_runs, seen1, length, after, which, inner_samples
+):
     """Where the centre may have crossed, have it counted."""
     touching = which & n[at.TOUCHING]
     near = bits(less(load(m, at.SAFE_CENTER), after)) & which & ~touching
@@ -437,12 +439,14 @@ def _crossings(m, n, world, kernel_input, accumulators_of_runs, seen1, length, a
         clear = vmin(side * load(m, at.C), side * seen1.c)
         near |= touching & ~bits(less(hermite_overshoot_bound(load(m, at.CV), seen1.cv, length), clear))
     if near:
-        _count(m, n, world, kernel_input, accumulators_of_runs, seen1.c, seen1.cv, near, looked)
+        _count(
+            m, n, lane_settings, kernel_input, accumulators_of_runs, seen1.c, seen1.cv, near, inner_samples
+        )
 
 
 @inlined
 def end_contact(m, kernel_input, i, lane, accumulators, end):
-    """Enter the contact that ends at tick *end* in the book."""
+    """Enter the contact that ends at tick *end* in the record of accumulators."""
     law = numbers_of(kernel_input.law, kernel_input.law_numbers, i)
     accumulators.deepest, accumulators.impulse = m[at.DEEPEST + lane], m[at.IMPULSE + lane]
     close_impact(accumulators, None, 0, law, end, m[at.TICK + lane])
@@ -467,10 +471,10 @@ def _events(m, n, kernel_input, accumulators_of_runs, which):
 
 
 @inlined
-def _weigh(m, n, shape, world, seen1, released, events, which):
+def _weigh(m, n, shape, lane_settings, seen1, released, events, which):
     """After some steps, or a release, look at the energy; returns the lanes whose future is certain."""
-    beat = load(m, at.BEAT)
-    eighth = bits(less(beat - 8.0 * vfloor(0.125 * beat), 0.5))
+    steps_since_start = load(m, at.BEAT)
+    eighth = bits(less(steps_since_start - 8.0 * vfloor(0.125 * steps_since_start), 0.5))
     due = (released | eighth) & which
     if due == 0:
         return 0
@@ -481,10 +485,10 @@ def _weigh(m, n, shape, world, seen1, released, events, which):
     _add(m, at.HIGH_TIME, mask, high * span)
     store(m, at.WEIGHED, pick(mask, t, load(m, at.WEIGHED)))
     apart = due & ~n[at.TOUCHING]
-    energy = linear + tension_energy(world.gamma, load(m, at.GQ), load(m, at.QR))
-    quiet = bits(less(energy, low_energy_limit(world.gamma, world.stretch)))
-    n[at.QUIET] = (n[at.QUIET] & ~apart) | (quiet & apart)
-    sixteenth = bits(less(beat - 16.0 * vfloor(0.0625 * beat), 0.5))
+    energy = linear + tension_energy(lane_settings.gamma, load(m, at.GQ), load(m, at.QR))
+    low_energy = bits(less(energy, low_energy_limit(lane_settings.gamma, lane_settings.stretch)))
+    n[at.QUIET] = (n[at.QUIET] & ~apart) | (low_energy & apart)
+    sixteenth = bits(less(steps_since_start - 16.0 * vfloor(0.0625 * steps_since_start), 0.5))
     sure = apart & ~events & sixteenth & bits(less(load(m, at.HOME), 0.0))
     if sure:
         sure &= bits(less(load(m, at.DECIDE_REACH), seen1.w)) & bits(less(0.0, seen1.c))
@@ -493,7 +497,9 @@ def _weigh(m, n, shape, world, seen1, released, events, which):
 
 
 @inlined
-def accept(m, n, shape, world, kernel_input, accumulators_of_runs, about, given, which, looked):
+def accept(
+    m, n, shape, lane_settings, kernel_input, accumulators_of_runs, about, given, which, inner_samples
+):
     """Take the steps of the lanes *which*; returns those that are decided."""
     mask, length = mask_of(which), load(m, at.LENGTH)
     well_sign = load(m, at.HOME)
@@ -513,7 +519,9 @@ def accept(m, n, shape, world, kernel_input, accumulators_of_runs, about, given,
     _track(m, seen1, length, which)
     ticks, period = load(m, at.TICKS), load(m, at.PERIOD)
     after = load(m, at.T) + ticks
-    _crossings(m, n, world, kernel_input, accumulators_of_runs, seen1, length, after, which, looked)
+    _crossings(
+        m, n, lane_settings, kernel_input, accumulators_of_runs, seen1, length, after, which, inner_samples
+    )
     store(m, at.T, pick(mask, after, load(m, at.T)))
     within = load(m, at.WITHIN)
     turned = within + ticks
@@ -525,7 +533,7 @@ def accept(m, n, shape, world, kernel_input, accumulators_of_runs, about, given,
         _events(m, n, kernel_input, accumulators_of_runs, events)
     for bit in (at.CUTTING, at.EVENT, at.LOOKS, at.PROBED):
         n[bit] &= ~which
-    sure = _weigh(m, n, shape, world, seen1, released, events, which)
+    sure = _weigh(m, n, shape, lane_settings, seen1, released, events, which)
     many = load(m, at.DECIDE_CROSSINGS)
     sure |= bits(less(-0.5, many)) & bits(less(many, load(m, at.LATE))) & which
     for i in range(modes_of(shape)):

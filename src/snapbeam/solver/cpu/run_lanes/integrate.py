@@ -1,9 +1,9 @@
-"""The march of few modes: eight runs in a register, each with its own time, step, contact and well.
+"""The integrate of few modes: eight runs in a register, each with its own time, step, contact and well.
 
 In every pass each lane takes a step of its own.  One that is to be cut where the contact begins or ends takes that
 step in the next pass, while the others go on; so does one that has to be looked into for the deepest point of a
 contact.  A lane whose run has ended takes the next one.  Nothing passes from lane to lane, and every sum is taken in
-the order in which the other layout takes it: results are the same to the bit, whatever a run is marched with.
+the order in which the other layout takes it: results are the same to the bit, whatever a run is integrated with.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from snapbeam.solver.cpu.run_lanes.control import (
 )
 from snapbeam.solver.cpu.run_lanes.state import seat
 from snapbeam.solver.cpu.run_lanes.step import beam_signals, modal_energy, signals, take, tension
-from snapbeam.solver.events import accumulate_open_contact
 from snapbeam.solver.excitation import numbers_of
 from snapbeam.solver.physics import shaker_motion, sincos, tension_energy
 from snapbeam.solver.simd import (
@@ -41,6 +40,7 @@ from snapbeam.solver.simd import (
     vabs,
     vmax,
 )
+from snapbeam.solver.step_control import accumulate_open_contact
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["integrate_run_lanes"]
@@ -64,8 +64,8 @@ def _observe(m, shape):
 
 
 @compiled
-def _finish(m, n, shape, world, kernel_input, lane, accumulators, status, goes_on):
-    """Close the book of a lane; its last contact too, unless the run is to go on from here."""
+def _finish(m, n, shape, lane_settings, kernel_input, lane, accumulators, status, goes_on):
+    """Close the record of accumulators of a lane; its last contact too, unless the run is to go on from here."""
     i, t, tick = n[at.RUNS + lane], int(m[at.T + lane]), m[at.TICK + lane]
     law = numbers_of(kernel_input.law, kernel_input.law_numbers, i)
     accumulators.deepest, accumulators.impulse = m[at.DEEPEST + lane], m[at.IMPULSE + lane]
@@ -76,9 +76,9 @@ def _finish(m, n, shape, world, kernel_input, lane, accumulators, status, goes_o
             end_contact(m, kernel_input, i, lane, accumulators, t)
     if status == _EARLY_STOP:
         accumulators.early_stop_time = t * tick
-    gq, qr = tension(m, shape, world.gamma, mask_of(0), at.Q)
+    gq, qr = tension(m, shape, lane_settings.gamma, mask_of(0), at.Q)
     linear, _ = modal_energy(m, shape, at.Q, at.P)
-    store(m, at.TEMP, linear + tension_energy(world.gamma, gq, qr))
+    store(m, at.TEMP, linear + tension_energy(lane_settings.gamma, gq, qr))
     accumulators.energy = m[at.TEMP + lane] + contact_energy(law, m[at.D + lane])
     accumulators.displacement, accumulators.center = m[at.W + lane], m[at.C + lane]
     accumulators.min_displacement, accumulators.max_displacement = m[at.MIN_W + lane], m[at.MAX_W + lane]
@@ -115,14 +115,14 @@ def _begin_at_once(m, n, accumulators_of_runs, which):
 
 
 @inlined
-def _pass(m, n, shape, world, kernel_input, accumulators_of_runs, looked):
+def _pass(m, n, shape, lane_settings, kernel_input, accumulators_of_runs, inner_samples):
     """A step of every lane; returns the lanes that are not finite, decided, over, and at their limit of steps."""
-    fresh = propose_step(m, n, shape, world)
-    fetch(m, n, shape, world)
+    fresh = propose_step(m, n, shape, lane_settings)
+    fetch(m, n, shape, lane_settings)
     live = n[at.LIVE]
     touching = n[at.TOUCHING] & live
     law = lanes_tuple(kernel_input.law, m, at.LAW)
-    given = take(m, shape, world.stages, world.gamma, touching != 0, mask_of(touching), law)
+    given = take(m, shape, lane_settings.stages, lane_settings.gamma, touching != 0, mask_of(touching), law)
     about = _observe(m, shape)
     going = live
     aside = n[at.ASIDE] & live
@@ -135,7 +135,7 @@ def _pass(m, n, shape, world, kernel_input, accumulators_of_runs, looked):
     failed = going & ~bits(less(vabs(about.d + about.dv), math.inf))
     going &= ~failed
     looks = n[at.LOOKS] & n[at.CUTTING] & going
-    ends, at_once = meet(m, n, shape, world, about, fresh & going, looked)
+    ends, at_once = meet(m, n, shape, lane_settings, about, fresh & going, inner_samples)
     going = (going & ~fresh) | ends
     if looks:
         going &= ~cut_again(m, n, kernel_input, about.d, about.dv, looks)
@@ -148,35 +148,39 @@ def _pass(m, n, shape, world, kernel_input, accumulators_of_runs, looked):
             going &= ~probe(m, n, about.d, about.dv, turning)
     sure, over = 0, 0
     if going:
-        sure = accept(m, n, shape, world, kernel_input, accumulators_of_runs, about, given, going, looked)
+        sure = accept(
+            m, n, shape, lane_settings, kernel_input, accumulators_of_runs, about, given, going, inner_samples
+        )
         over = going & ~bits(less(load(m, at.T), load(m, at.END)))
     spent = (going | at_once) & ~bits(less(load(m, at.STEPS), load(m, at.MAX_STEPS)))
     return failed, sure, over, spent
 
 
 @compiled
-def integrate_run_lanes(m, n, shape, world, kernel_input, which, scratch, kernel_output, spare):
-    """March the runs *which*, eight at a time; *m* and *n* are the calling thread's own, *spare* is nobody's book."""
-    accumulators_of_runs, looked, following, goes_on = (
+def integrate_run_lanes(m, n, shape, lane_settings, kernel_input, which, scratch, kernel_output, spare):
+    """Integrate the runs *which*, eight at a time; *m* and *n* are the calling thread's own, *spare* is nobody's record of accumulators."""
+    accumulators_of_runs, inner_samples, following, goes_on = (
         kernel_output.accumulators_of_runs,
-        scratch.looked,
+        scratch.inner_samples,
         0,
         False,
     )
     n[at.LIVE] = 0
     for lane in range(WIDTH):
-        # lanes that stay empty march what the first run begins with, unseen
+        # lanes that stay empty integrate what the first run begins with, unseen
         i = which[min(lane, which.size - 1)]
         if lane < which.size:
-            seat(m, n, shape, world, kernel_input, lane, i, accumulators_of_runs[i])
+            seat(m, n, shape, lane_settings, kernel_input, lane, i, accumulators_of_runs[i])
             following += 1
         else:
-            seat(m, n, shape, world, kernel_input, lane, i, spare[0])
+            seat(m, n, shape, lane_settings, kernel_input, lane, i, spare[0])
             n[at.LIVE] &= ~(1 << lane)
     while n[at.LIVE]:
-        if kernel_output.pulse[0] != 0:
+        if kernel_output.stop_flag[0] != 0:
             break
-        failed, sure, over, spent = _pass(m, n, shape, world, kernel_input, accumulators_of_runs, looked)
+        failed, sure, over, spent = _pass(
+            m, n, shape, lane_settings, kernel_input, accumulators_of_runs, inner_samples
+        )
         ended = failed | sure | over | spent
         while ended:
             lane = lowest(ended)
@@ -190,11 +194,11 @@ def integrate_run_lanes(m, n, shape, world, kernel_input, which, scratch, kernel
             elif over & bit:
                 status = _OK
             accumulators = accumulators_of_runs[n[at.RUNS + lane]]
-            _finish(m, n, shape, world, kernel_input, lane, accumulators, status, goes_on)
+            _finish(m, n, shape, lane_settings, kernel_input, lane, accumulators, status, goes_on)
             if following < which.size:
                 i = which[following]
                 following += 1
-                seat(m, n, shape, world, kernel_input, lane, i, accumulators_of_runs[i])
+                seat(m, n, shape, lane_settings, kernel_input, lane, i, accumulators_of_runs[i])
     live = n[at.LIVE]
     while live:
         lane = lowest(live)

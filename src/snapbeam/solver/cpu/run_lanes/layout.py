@@ -1,4 +1,4 @@
-"""Where in memory things stand: a row is eight numbers, one of each of the eight runs that are marched side by side.
+"""Where in memory things stand: a row is eight numbers, one of each of the eight runs that are integrated side by side.
 
 Addresses are the same for every number of modes, so that compiled code has them as constants.
 """

@@ -1,4 +1,4 @@
-"""What the layout for few modes serves, and the memory of a thread that marches them."""
+"""What the layout for few modes serves, and the memory of a thread that integrates them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from snapbeam.solver.cpu.memory import Packed
 from snapbeam.solver.cpu.run_lanes import layout as at
 from snapbeam.solver.cpu.run_lanes.layout import shape_of
-from snapbeam.solver.cpu.run_lanes.state import World
+from snapbeam.solver.cpu.run_lanes.state import LaneSettings
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.registered_statistics import extras_of_table
 from snapbeam.solver.simd import WIDTH
@@ -27,12 +27,12 @@ _LAW_NUMBERS = 8
 
 
 class FewMemory(NamedTuple):
-    """Everything that one thread needs to march eight runs at a time."""
+    """Everything that one thread needs to integrate eight runs at a time."""
 
     m: _Array
     n: NDArray[np.int64]
     shape: Any
-    world: World
+    lane_settings: LaneSettings
 
 
 def suits(ensemble: Ensemble, packed: Packed, most: int = at.MOST) -> bool:
@@ -45,7 +45,7 @@ def suits(ensemble: Ensemble, packed: Packed, most: int = at.MOST) -> bool:
     flow = float(np.abs(COMPOSITIONS[ensemble.order].flow).max())
     return (
         packed.rows.size <= most
-        and ensemble.structure.uneven is None
+        and ensemble.structure.unequal_wells is None
         and ensemble.structure.tapped is None
         and ensemble.others is None
         and ensemble.size > 1
@@ -98,8 +98,10 @@ def lay_out_few(ensemble: Ensemble, packed: Packed, pieces: int) -> FewMemory:
     body = None
     if structure.body_mass is not None:
         body = int(np.flatnonzero(order == structure.equilibrium.size)[0])
-    world = World(stages, structure.nonlinear_stiffness, structure.stretch, slot, look)
-    return FewMemory(m, np.zeros(at.RUNS + 8, dtype=np.int64), shape_of(blocks, stages.flows, body), world)
+    lane_settings = LaneSettings(stages, structure.nonlinear_stiffness, structure.stretch, slot, look)
+    return FewMemory(
+        m, np.zeros(at.RUNS + 8, dtype=np.int64), shape_of(blocks, stages.flows, body), lane_settings
+    )
 
 
 def _enter_pairs(m: _Array, of_modes: list[_Array], flow: int, distinct: int) -> None:

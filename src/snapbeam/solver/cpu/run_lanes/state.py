@@ -16,7 +16,6 @@ from snapbeam.solver.cpu.run_lanes.step import (
     signals,
     tension,
 )
-from snapbeam.solver.events import PIECES, ContactKinematics, begin_statistics, is_low_energy
 from snapbeam.solver.excitation import drive_rate, numbers_of
 from snapbeam.solver.physics import (
     decay_less_one,
@@ -28,16 +27,17 @@ from snapbeam.solver.physics import (
 )
 from snapbeam.solver.simd import WIDTH, broadcast_load, load, mask_of, pick, store
 from snapbeam.solver.splitting import TURNS, Stages
+from snapbeam.solver.step_control import PIECES, ContactKinematics, begin_statistics, is_low_energy
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = ["TWO_PI", "World", "flows_over", "prepare", "seat", "slot_of", "stand"]
+__all__ = ["TWO_PI", "LaneSettings", "flows_over", "prepare", "seat", "slot_of", "stand"]
 
 
 TWO_PI = 2.0 * math.pi
 _OK, _RUNNING = int(RunStatus.OK), int(RunStatus.INTERRUPTED)
 
 
-class World(NamedTuple):
+class LaneSettings(NamedTuple):
     """What all runs share beside the modes."""
 
     stages: Stages
@@ -71,7 +71,7 @@ def flows_over(m, shape, length, place, which):
 
 
 @called
-def prepare(m, shape, world, place, length, omega):
+def prepare(m, shape, lane_settings, place, length, omega):
     """What a step of *length* needs, from *place* on: all modes' flows, and the turns of a drive of rate *omega*."""
     for group in range(groups_of(shape)):
         pairs = at.PAIRS + 4 * WIDTH * group
@@ -91,30 +91,37 @@ def prepare(m, shape, world, place, length, omega):
         store(m, place + 3 * WIDTH, a22)
         place += 4 * WIDTH
     for i in range(0, TURNS, WIDTH):
-        sine, cosine = sincos(load(m, world.stages.elapsed + i) * (length * omega))
+        sine, cosine = sincos(load(m, lane_settings.stages.elapsed + i) * (length * omega))
         store(m, place + i, sine)
         store(m, place + TURNS + i, cosine)
 
 
 @inlined
-def slot_of(world, lane, level):
+def slot_of(lane_settings, lane, level):
     """Where the prepared step of a level stands."""
-    return at.TABLES + (lane * (at.LEVELS + 1) + level + 1) * world.slot
+    return at.TABLES + (lane * (at.LEVELS + 1) + level + 1) * lane_settings.slot
 
 
 @compiled
-def _prepare_all(m, shape, world, lane, levels):
+def _prepare_all(m, shape, lane_settings, lane, levels):
     """The steps of a lane at every level."""
     step_time, omega = m[at.STEP_TIME + lane], m[at.OMEGA + lane]
     for level in range(levels):
-        prepare(m, shape, world, slot_of(world, lane, level - 1), 2.0 * step_time / (1 << level), omega)
+        prepare(
+            m,
+            shape,
+            lane_settings,
+            slot_of(lane_settings, lane, level - 1),
+            2.0 * step_time / (1 << level),
+            omega,
+        )
 
 
 @compiled
-def stand(m, shape, world, lane):
+def stand(m, shape, lane_settings, lane):
     """What is seen of a lane that stands where Q and P say, and its tension; returns its energy without the contact."""
     which = mask_of(1 << lane)
-    gq, qr = tension(m, shape, world.gamma, which, at.Q)
+    gq, qr = tension(m, shape, lane_settings.gamma, which, at.Q)
     w, wv, c, cv = signals(m, shape, at.Q, at.P)
     linear, _ = modal_energy(m, shape, at.Q, at.P)
     phase = load(m, at.PHASE0) + TWO_PI * (load(m, at.WITHIN) / load(m, at.PERIOD))
@@ -130,7 +137,7 @@ def stand(m, shape, world, lane):
     store(m, at.C, pick(which, c + well_sign * load(m, at.REST_CENTER), load(m, at.C)))
     store(m, at.CV, pick(which, cv, load(m, at.CV)))
     store(m, at.STRETCH, pick(which, 2.0 * gq + qr, load(m, at.STRETCH)))
-    store(m, at.TEMP, linear + tension_energy(world.gamma, gq, qr))
+    store(m, at.TEMP, linear + tension_energy(lane_settings.gamma, gq, qr))
     return m[at.TEMP + lane]
 
 
@@ -171,15 +178,15 @@ def _constants(m, shape, kernel_input, lane, i):
 
 
 @compiled
-def seat(m, n, shape, world, kernel_input, lane, i, accumulators):
+def seat(m, n, shape, lane_settings, kernel_input, lane, i, accumulators):
     """Put run *i* into a lane; its status."""
     record, bit = kernel_input.runs[i], 1 << lane
     n[at.RUNS + lane] = i
     _constants(m, shape, kernel_input, lane, i)
-    _prepare_all(m, shape, world, lane, record.finest + 2)
+    _prepare_all(m, shape, lane_settings, lane, record.finest + 2)
     m[at.KEY + lane], m[at.LOOK_KEY + lane], m[at.LOOK_PIECES + lane] = -99.0, -1.0, 0.0
     m[at.T + lane] = m[at.WITHIN + lane] = 0.0
-    energy = stand(m, shape, world, lane)
+    energy = stand(m, shape, lane_settings, lane)
     seen = ContactKinematics(
         m[at.W + lane], m[at.WV + lane], m[at.D + lane], m[at.DV + lane], m[at.C + lane], m[at.CV + lane]
     )
@@ -209,6 +216,6 @@ def seat(m, n, shape, world, kernel_input, lane, i, accumulators):
     n[at.LIVE] |= bit
     if touching:
         n[at.TOUCHING] |= bit
-    if is_low_energy(energy, world.gamma, world.stretch):
+    if is_low_energy(energy, lane_settings.gamma, lane_settings.stretch):
         n[at.QUIET] |= bit
     return _RUNNING if record.end > 0 else _OK

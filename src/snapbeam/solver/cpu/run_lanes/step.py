@@ -261,7 +261,7 @@ def _glide(modes: Modes) -> list[str]:
     """A free step in short pieces, as the other layout's :func:`~snapbeam.solver.cpu.events.sample_inside_step`.
 
     Row i of a look is the penetration, its rate, the displacement of the centre and its rate; only lanes of *which*
-    that have so many pieces are written.  Returns, for each lane, the greatest value that the penetration may have
+    that have so many pieces are written.  Returns, for each lane, the maximum value that the penetration may have
     had: its cubics stay below.
     """
     head = ["def glide(m, shape, look, which, with_center, most):"]

@@ -1,1 +1,1 @@
-"""terms"""
+"""Forces and couplings beside tension and the first contact."""

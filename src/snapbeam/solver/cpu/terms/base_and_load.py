@@ -1,4 +1,4 @@
-"""What a moving base and a changing axial load add to a march: forces on every mode that follow from time.
+"""What a moving base and a changing axial load add to a integrate: forces on every mode that follow from time.
 
 In the frame of the ends an acceleration a(t) of the base is the modal acceleration a(t) b; a change dP(t) of the axial
 load is dP(t) (g + G q), that is dP more of both that the tension pulls with.  Both depend on position and time alone,
@@ -33,7 +33,7 @@ __all__ = [
 class TimeDependentForces(NamedTuple):
     """Where in memory the forces stand."""
 
-    add_base_acceleration: int
+    base_load: int
     """What an acceleration of the base does to p, a row of the structure."""
     now: int
     """Acceleration of the base (m/s^2) and change of the axial load (N) at hand."""
@@ -86,7 +86,7 @@ def add_base_acceleration(memory, forced, row, k):
     """An acceleration with what the base adds."""
     if forced is None:
         return k
-    return fma(broadcast_load(memory, forced.now), load(memory, forced.add_base_acceleration + row), k)
+    return fma(broadcast_load(memory, forced.now), load(memory, forced.base_load + row), k)
 
 
 @inlined
@@ -96,7 +96,7 @@ def shaken_along(memory, size, forced, contact, along):
         return along
     total = splat(0.0)
     for row in range(0, size, WIDTH):
-        total = fma(load(memory, forced.add_base_acceleration + row), load(memory, contact + row), total)
+        total = fma(load(memory, forced.base_load + row), load(memory, contact + row), total)
     return along + memory[forced.now] * lanes_sum(total)
 
 
@@ -113,7 +113,7 @@ def _extra_speed(forced, memory, size, drive, along, horizon):
     def implementation(forced, memory, size, drive, along, horizon):
         total = 0.0
         for row in range(size):
-            total += abs(memory[forced.add_base_acceleration + row] * memory[along + row])
+            total += abs(memory[forced.base_load + row] * memory[along + row])
         return total * drive.base_hardest * horizon
 
     return implementation
@@ -129,7 +129,7 @@ def worked(memory, size, forced, weight, g, r, kick, p, given):
     base, load_work, half = splat(0.0), splat(0.0), 0.5 * weight
     for row in range(0, size, WIDTH):
         middle = fma(half, load(memory, kick + row), load(memory, p + row))
-        base = fma(load(memory, forced.add_base_acceleration + row), middle, base)
+        base = fma(load(memory, forced.base_load + row), middle, base)
         load_work = fma(load(memory, g + row) + load(memory, r + row), middle, load_work)
     of_base, of_load = weight * shaking * lanes_sum(base), weight * change * lanes_sum(load_work)
     return ExternalWork(given.base + of_base, given.load + of_load, given.gross + abs(of_base) + abs(of_load))

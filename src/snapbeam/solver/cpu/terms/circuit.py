@@ -1,4 +1,4 @@
-"""A harvester's circuit in a march: one number beside the modes, exact within each kick.
+"""A harvester's circuit in a integrate: one number beside the modes, exact within each kick.
 
 With t the coupling's row scaled so that y^2/2 is the energy in the circuit, lam its rate of loss and K the acceleration
 of a kick, at a fixed place
@@ -80,10 +80,10 @@ def put_rate(memory, circuit, rate):
 
 
 @inlined
-def disable_long_steps(circuit, quiet):
+def disable_long_steps(circuit, low_energy):
     """Whether steps may be longer: never with a circuit, which couples all modes at any energy."""
     if circuit is None:
-        return quiet
+        return low_energy
     return False
 
 
@@ -266,7 +266,7 @@ def missed_onset(circuit, event, depth, depth1):
 
 @inlined
 def accumulate_circuit(memory, layout, circuit, p, accumulators, tap):
-    """Enter what a step lost in the circuit in the statistics, and its greatest y."""
+    """Enter what a step lost in the circuit in the statistics, and its maximum y."""
     if circuit is None:
         return
     accumulators.circuit_energy += tap.energy

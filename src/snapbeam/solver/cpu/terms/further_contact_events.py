@@ -15,7 +15,6 @@ from snapbeam.solver.cpu.step import with_circuit_acceleration
 from snapbeam.solver.cpu.terms.base_and_load import extra_speed
 from snapbeam.solver.cpu.terms.circuit import circuit_speed_bound, validity_horizon
 from snapbeam.solver.cpu.terms.further_contacts import block, mirror_further_contacts, penetration_of
-from snapbeam.solver.events import TRUST, ContactKinematics, contact_level, refine_onset, safe_interval
 from snapbeam.solver.further_contacts import (
     CUT,
     DEEPEST,
@@ -43,6 +42,7 @@ from snapbeam.solver.further_contacts import (
 from snapbeam.solver.interpolation import first_downcrossing, first_upcrossing, update_extrema
 from snapbeam.solver.simd import WIDTH, lanes_sum, load
 from snapbeam.solver.statistics import OTHER_IMPACTS, OTHER_IMPULSE, OTHER_PEAK, OTHER_WORK
+from snapbeam.solver.step_control import TRUST, ContactKinematics, contact_level, refine_onset, safe_interval
 
 __all__ = [
     "accumulate_further_contacts",

@@ -1,6 +1,6 @@
-"""What unequal wells add to a march: a constant force on the far side of the mirror, and energies to go with it.
+"""What unequal wells add to a integrate: a constant force on the far side of the mirror, and energies to go with it.
 
-*uneven* is an :class:`Uneven` or None, by type: of a beam with equal wells nothing of this is compiled.
+*uneven* is an :class:`UnequalWells` or None, by type: of a beam with equal wells nothing of this is compiled.
 """
 
 from __future__ import annotations
@@ -8,11 +8,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from snapbeam.solver.compilation import inlined
-from snapbeam.solver.events import ContactKinematics
 from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, splat, store
+from snapbeam.solver.step_control import ContactKinematics
 
 __all__ = [
-    "Uneven",
+    "UnequalWells",
     "about_level",
     "above_own_well",
     "add_potential_energy",
@@ -21,12 +21,12 @@ __all__ = [
     "has_crossed_to_other_well",
     "pushed_along",
     "put",
-    "second_well",
+    "relative_to_nearest_well",
 ]
 
 
-class Uneven(NamedTuple):
-    """Where in memory the numbers of unequal wells are; see :class:`snapbeam.solver.structure.Uneven`."""
+class UnequalWells(NamedTuple):
+    """Where in memory the numbers of unequal wells are; see :class:`snapbeam.solver.structure.UnequalWells`."""
 
     force: int
     """The force on the far side, a row of the structure."""
@@ -40,85 +40,85 @@ class Uneven(NamedTuple):
 
 
 @inlined
-def add_static_load(memory, uneven, row, k):
+def add_static_load(memory, unequal_wells, row, k):
     """An acceleration with the force at hand."""
-    if uneven is None:
+    if unequal_wells is None:
         return k
-    return k + load(memory, uneven.here + row)
+    return k + load(memory, unequal_wells.here + row)
 
 
 @inlined
-def pushed_along(memory, size, uneven, contact, along):
+def pushed_along(memory, size, unequal_wells, contact, along):
     """The same along the contact's row."""
-    if uneven is None:
+    if unequal_wells is None:
         return along
     total = splat(0.0)
     for row in range(0, size, WIDTH):
-        total = fma(load(memory, uneven.here + row), load(memory, contact + row), total)
+        total = fma(load(memory, unequal_wells.here + row), load(memory, contact + row), total)
     return along + lanes_sum(total)
 
 
 @inlined
-def put(memory, size, uneven, well_sign):
+def put(memory, size, unequal_wells, well_sign):
     """The force at hand, for the origin of q."""
-    if uneven is None:
+    if unequal_wells is None:
         return
     far = 1.0 if well_sign < 0.0 else 0.0
     for row in range(0, size, WIDTH):
-        store(memory, uneven.here + row, far * load(memory, uneven.force + row))
-    memory[uneven.here + size] = far * uneven.lift
+        store(memory, unequal_wells.here + row, far * load(memory, unequal_wells.force + row))
+    memory[unequal_wells.here + size] = far * unequal_wells.lift
 
 
 @inlined
-def add_potential_energy(memory, size, uneven, q, energy):
+def add_potential_energy(memory, size, unequal_wells, q, energy):
     """The energy above the first well, of that which linear modes and tension have about the origin at hand."""
-    if uneven is None:
+    if unequal_wells is None:
         return energy
     total = splat(0.0)
     for row in range(0, size, WIDTH):
-        total = fma(load(memory, uneven.here + row), load(memory, q + row), total)
-    return energy + (memory[uneven.here + size] - lanes_sum(total))
+        total = fma(load(memory, unequal_wells.here + row), load(memory, q + row), total)
+    return energy + (memory[unequal_wells.here + size] - lanes_sum(total))
 
 
 @inlined
-def above_own_well(uneven, well_sign, energy):
+def above_own_well(unequal_wells, well_sign, energy):
     """The energy above the well that the beam is near."""
-    if uneven is None:
+    if unequal_wells is None:
         return energy
-    return energy - uneven.depth if well_sign < 0.0 else energy
+    return energy - unequal_wells.depth if well_sign < 0.0 else energy
 
 
 @inlined
-def second_well(memory, size, uneven, well_sign, q, spare):
+def relative_to_nearest_well(memory, size, unequal_wells, well_sign, q, spare):
     """Where q is measured from the well that the beam is near: *q* itself, or *spare*."""
-    if uneven is None:
+    if unequal_wells is None:
         return q
     if well_sign > 0.0:
         return q
     for row in range(0, size, WIDTH):
-        store(memory, spare + row, load(memory, q + row) - load(memory, uneven.second + row))
+        store(memory, spare + row, load(memory, q + row) - load(memory, unequal_wells.second + row))
     return spare
 
 
 @inlined
-def about_level(uneven, seen):
+def about_level(unequal_wells, seen):
     """What is seen, the centre from the height that divides the wells."""
-    if uneven is None:
+    if unequal_wells is None:
         return seen
-    return ContactKinematics(seen.w, seen.wv, seen.d, seen.dv, seen.c - uneven.level, seen.cv)
+    return ContactKinematics(seen.w, seen.wv, seen.d, seen.dv, seen.c - unequal_wells.level, seen.cv)
 
 
 @inlined
-def at_center(uneven, center):
+def at_center(unequal_wells, center):
     """The displacement of the centre from the height that divides the wells."""
-    if uneven is None:
+    if unequal_wells is None:
         return center
-    return center - uneven.level
+    return center - unequal_wells.level
 
 
 @inlined
-def has_crossed_to_other_well(uneven, center, well_sign, rest_center):
+def has_crossed_to_other_well(unequal_wells, center, well_sign, rest_center):
     """Whether the centre has come to the other side."""
-    if uneven is None:
+    if unequal_wells is None:
         return center * (well_sign * rest_center) < 0.0
-    return (center - uneven.level) * well_sign > 0.0
+    return (center - unequal_wells.level) * well_sign > 0.0
