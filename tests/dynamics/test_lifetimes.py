@@ -22,7 +22,7 @@ def system_of(modes: int, ratio: float = 1.625, velocity: float = 0.3) -> sb.Sys
 
 AXES = {"frequency_ratio": [1.2, 1.625], "velocity_amplitude": [0.01, 0.2, 0.3]}
 SHORT = sb.Integration(cycles=120)
-TELL = {"settings": sb.dynamics.LifetimeSettings(settling_cycles=20.0), "starts": 6}
+TELL = {"settings": sb.dynamics.LifetimeSettings(settling_cycles=20.0), "initial_conditions": 6}
 
 
 def test_nothing_depends_on_threads_order_or_the_other_points(tmp_path) -> None:
@@ -63,7 +63,7 @@ def test_a_store_is_resumed_and_refuses_other_starts(tmp_path) -> None:
             AXES,
             SHORT,
             checkpoint=tmp_path / "s",
-            **(TELL | {"starts": sb.dynamics.InitialConditions(count=6, seed=1)}),
+            **(TELL | {"initial_conditions": sb.dynamics.InitialConditions(count=6, seed=1)}),
         )
 
 
