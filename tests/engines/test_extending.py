@@ -49,24 +49,24 @@ from snapbeam.model.quantity import RUN, quantity
 
 @dataclass(frozen=True)
 class LinearContact(ContactLaw):
-    spring: float = quantity("N/m", "stiffness of the contact", low=0.0, scope=RUN, symbol="k")
+    linear_stiffness: float = quantity("N/m", "stiffness of the contact", low=0.0, scope=RUN, symbol="k")
 
     name = "linear"
 
     @staticmethod
     def force(law, penetration):
-        return law.spring * penetration
+        return law.linear_stiffness * penetration
 
     @staticmethod
     def energy(law, penetration):
-        return 0.5 * law.spring * penetration * penetration
+        return 0.5 * law.linear_stiffness * penetration * penetration
 
     @staticmethod
     def slope(law, penetration):
-        return law.spring
+        return law.linear_stiffness
 
     def impact_duration(self, mass, velocity):
-        return 3.141592653589793 * (mass / self.spring) ** 0.5
+        return 3.141592653589793 * (mass / self.linear_stiffness) ** 0.5
 '''
 MASS, SPEED = 2e-3, 0.05
 
@@ -115,9 +115,9 @@ def test_files_touched(own) -> None:
     assert len(list(law_folder.glob("*.py"))) == 1
     assert LAWS["linear"] is law
     assert "max_penetration" in STATISTICS
-    # the parameter of the law is in the table without a file more, next to those of other laws
-    assert lookup("contact.spring").quantity.unit == "N/m"
-    assert "linear" in parameters()["contact.spring"].kinds
+    # the parameter of the law is in the table without a file more, next to another law's of the same name
+    assert lookup("contact.linear_stiffness").quantity.unit == "N/m"
+    assert "linear" in parameters()["contact.linear_stiffness"].kinds
 
 
 @pytest.mark.slow
@@ -125,10 +125,10 @@ def test_impact_of_a_free_mass_on_a_spring(own) -> None:
     """Half a period: duration pi sqrt(m/k), greatest force v sqrt(k m), depth v sqrt(m/k), and nothing lost."""
     law, *_ = own
     springs = np.geomspace(1e5, 1e7, 5)
-    ds = sb.sweep(thrown(law, 1e6), {"contact.spring": springs}, sb.Integration(cycles=1))
+    ds = sb.sweep(thrown(law, 1e6), {"contact.linear_stiffness": springs}, sb.Integration(cycles=1))
     assert (ds.status == sb.RunStatus.OK).all() and (ds.impacts == 1).all()
-    assert ds.spring.attrs == {
-        "units": "N/m", "long_name": "stiffness of the contact", "parameter": "contact.spring",
+    assert ds.linear_stiffness.attrs == {
+        "units": "N/m", "long_name": "stiffness of the contact", "parameter": "contact.linear_stiffness",
     }  # fmt: skip
     root = np.sqrt(MASS / springs)
     np.testing.assert_allclose(ds.contact_time_fraction * (1.0 / 80.0), math.pi * root, rtol=1e-3)
@@ -146,7 +146,7 @@ def test_a_beam_struck_by_a_spring(own, tmp_path) -> None:
         sb.ReducedModel.from_beam(default_values.BEAM, modes=4, damping_ratio=0.0), law(2e6),
         sb.Shaker(frequency_ratio=1.4, velocity_amplitude=0.05),
     )  # fmt: skip
-    axes = {"contact.spring": [5e5, 2e6], "velocity_amplitude": [0.02, 0.3, 0.5]}
+    axes = {"contact.linear_stiffness": [5e5, 2e6], "velocity_amplitude": [0.02, 0.3, 0.5]}
     ds = sb.sweep(system, axes, sb.Integration(cycles=8))
     assert (ds.status == sb.RunStatus.OK).all()
     # without damping nothing is dissipated, and the spring gives back what it takes
@@ -162,5 +162,5 @@ def test_a_parameter_that_the_law_does_not_have_is_refused(own) -> None:
     law, *_ = own
     with pytest.raises(InputError, match=r"contact\.stiffness: no parameter of this system"):
         sb.sweep(thrown(law, 1e6), {"contact.stiffness": [1e8, 2e8]}, sb.Integration(cycles=1))
-    with pytest.raises(InputError, match="spring = 0: must be a finite number greater than 0 N/m"):
+    with pytest.raises(InputError, match="linear_stiffness = 0: must be a finite number greater than 0 N/m"):
         law(0)

@@ -54,7 +54,10 @@ def test_peaks(runs) -> None:
     ):
         assert outcome[f"peak_{name}"] == pytest.approx(float(abs(values).max()), abs=2e-3)
         assert outcome[f"peak_{name}"] == max(abs(outcome[f"min_{name}"]), abs(outcome[f"max_{name}"]))
-    for name, values in (("velocity", shown.velocity_at_striker), ("midspan_velocity", shown.midspan_velocity)):
+    for name, values in (
+        ("velocity", shown.velocity_at_striker),
+        ("midspan_velocity", shown.midspan_velocity),
+    ):
         peak = float(abs(values).max())
         # taken at the ends of steps
         assert 0.9 * peak < outcome[f"peak_{name}"] < 1.0001 * peak
