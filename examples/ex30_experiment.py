@@ -291,7 +291,9 @@ for ratio, amplitude in (
     ).dataset
     error = scatter * camera.pixel_size / 0.3306e-3 * rng.standard_normal(times.size)
     found = lab.measure_response(
-        test[["displacement"]].assign(displacement=test.displacement + error),
+        test[["displacement_at_striker"]].assign(
+            displacement_at_striker=test.displacement_at_striker + error
+        ),
         ratio * first,
         cycles=cycles,
     )
@@ -318,7 +320,7 @@ dots = MeasuredPoints(
         ]
     ),
     np.full(len(omega) + 1, paper.LOCATION),
-    np.array([*classes, seen.response], dtype=np.int8),
+    np.array([*classes, seen.response_class], dtype=np.int8),
 )
 
 # %%
