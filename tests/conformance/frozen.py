@@ -43,7 +43,7 @@ def cases() -> list[dict[str, Any]]:
         found.append(
             {
                 "modes": 1,
-                "type": "restitution",
+                "kind": "restitution",
                 "coefficient": float(rng.uniform(0.5, 1.0)),
                 "frequency_ratio": float(rng.uniform(0.8, 4.0)),
                 "velocity_amplitude": float(rng.uniform(0.05, 0.65)),
@@ -102,7 +102,7 @@ def plan_0_1(
         flight = min(flight, impact * 32)
         impact = min(impact, math.pi / fastest)
     coarsest = max(0, math.ceil(math.log2(flight / impact)))
-    order = 4 if accuracy == "map" else 6
+    order = 4 if accuracy == "standard" else 6
     if accuracy == "reference":
         flight /= 6.0
         while fastest * flight > 4.0:
@@ -112,7 +112,7 @@ def plan_0_1(
 
 def answer(case: dict[str, Any]) -> sb.Run:
     """The run of a case, with the steps of version 0.1."""
-    with mock.patch("snapbeam.solver.assemble.plan_steps", plan_0_1):
+    with mock.patch("snapbeam.solver.assemble.choose_base_step", plan_0_1):
         return answer_with_own_steps(case)
 
 

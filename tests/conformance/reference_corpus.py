@@ -327,7 +327,9 @@ def run_cases() -> Iterator[Case]:
         for at, (modes, order, cycles, early) in enumerate(settings):
             how = sb.Integration(cycles=cycles, accuracy=ACCURACY[order], early_termination=early)
 
-            def system(entry: ExtendedSystem = entry, modes: int = modes, seed: int = 10 * number + at) -> sb.System:
+            def system(
+                entry: ExtendedSystem = entry, modes: int = modes, seed: int = 10 * number + at
+            ) -> sb.System:
                 return entry.system(modes) if seed % 10 == 0 else moved(entry, modes, seed)
 
             title = f"run {at}: {name}, {modes} modes, {order}{', early' if early else ''}"

@@ -184,7 +184,11 @@ def mixture(seed: int, modes: int) -> Mixture:
         body: tuple[float, float, float] | None = None
         if j == 0 and striker_on_base and rng.random() < 0.4:
             body = (rng.uniform(5e-3, 5e-2), rng.uniform(200.0, 900.0), rng.uniform(0.0, 1.0))
-        of_body = {} if body is None else dict(zip(("mass", "spring", "damper"), body, strict=True))
+        of_body = (
+            {}
+            if body is None
+            else dict(zip(("mass", "suspension_stiffness", "suspension_damping"), body, strict=True))
+        )
         below = "below" if side > 0.0 else "above"
         strikers.append(sb.Striker(drive=drive, location=place, side=below, gap=gap, **of_body))
         laws.append(law)
@@ -194,9 +198,7 @@ def mixture(seed: int, modes: int) -> Mixture:
         breaks += corners
         words.append(f"{name} through {law.name}" + (" by a body" if body else ""))
     system = sb.System(model, laws, strikers, base_excitation=base, axial_load=axial, harvester=harvester)
-    around = Around(
-        base_row, striker_on_base, load, coupling, inertia, loss, tuple(sorted(breaks))
-    )
+    around = Around(base_row, striker_on_base, load, coupling, inertia, loss, tuple(sorted(breaks)))
     return Mixture(system, beam, tips, around, words)
 
 
@@ -238,7 +240,7 @@ def test_a_mixture(seed: int, modes: int) -> None:
     found, mixed = compared(seed, modes)
     print(seed, modes, found, ", ".join(mixed.words))
     allowed = max(1.0, found["response_class"] / 5e-12)
-    assert found["map"] < 1e-3 * allowed, mixed.words
+    assert found["standard"] < 1e-3 * allowed, mixed.words
     assert found["reference"] < 1e-7 * allowed, mixed.words
     assert found["ledger"] < 1e-4, mixed.words
 

@@ -45,9 +45,7 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
         s, c = math.sin(omega * t), math.cos(omega * t)
         return hardest / omega**2 * s, hardest / omega * c, -hardest * s
 
-    around = Surroundings(
-        base, gap=None if stop == "none" else gap, striker_on_base=stop != "in space"
-    )
+    around = Surroundings(base, gap=None if stop == "none" else gap, striker_on_base=stop != "in space")
     times = np.linspace(0.0, cycles * 2.0 * math.pi / omega, 801) * (1.0 - 1e-13)
     truth = live(PaperBeam(modes), around, times)
     motion = sb.AccelerationSine(frequency_ratio=ratio, acceleration_amplitude=strength)
@@ -58,7 +56,7 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
             "striker": sb.Striker(drive=sb.FixedStop(), gap=gap, location=LOCATION),
         }
     system = sb.System(model(modes), **own)
-    for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
+    for accuracy, bound in (("standard", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
         data = run.dataset
         name = "displacement" if stop != "none" else "midspan_displacement"
@@ -138,11 +136,11 @@ def test_never_decided_by_energy() -> None:
         for decided in (True, False)
     )
     assert not early.final_well_proven.any() and not whole.final_well_proven.any()
-    np.testing.assert_array_equal(early.response_class, whole.response)
+    np.testing.assert_array_equal(early.response_class, whole.response_class)
     assert (
         early.early_stop_time.notnull() <= (early.response_class == int(sb.ResponseClass.CONTINUOUS))
     ).all()
-    assert len(np.unique(whole.response)) > 1
+    assert len(np.unique(whole.response_class)) > 1
 
 
 def test_refusals_and_the_way_there_and_back() -> None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg
+from extended_oracle import Tip
 from numpy.typing import NDArray
 from oracle import DAMPING_RATIO, LENGTH, PaperBeam
 from scipy.optimize import minimize
-from extended_oracle import Tip
 
 Array = NDArray[np.float64]
 

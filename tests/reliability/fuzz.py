@@ -43,7 +43,7 @@ LONGEST = 10.0
 PACKAGE = str(Path(sb.__file__).parent)
 _NOT_WALKED = ("cli", "explorer", "__main__", "paper")
 """Commands are taken from the program itself; a server and the making of the paper take as long as they should."""
-_LONG_COMMANDS = ("paper", "explore")
+_LONG_COMMANDS = ("reproduce", "explore")
 
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
 SHAKER = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3)
@@ -89,11 +89,10 @@ def _valid(name: str, draw: random.Random) -> Any:
     pool = {
         "model": MODEL, "contact": default_values.CONTACT, "striker": SHAKER, "shaker": SHAKER, "system": SYSTEM,
         "integration": SHORT, "beam": default_values.BEAM, "modes": 1, "cycles": 1, "periods": 1.0, "count": 2,
-        "sweep": {"drive.velocity_amplitude": [0.1, 0.2]}, "frequency_ratio": [0.8, 1.0],
+        "axes": {"drive.velocity_amplitude": [0.1, 0.2]}, "frequency_ratio": [0.8, 1.0],
         "velocity_amplitude": [0.1, 0.2], "location": 0.4, "length": 0.161, "thickness": 0.4e-3, "width": 15e-3,
         "density": 7800.0, "young_modulus": 200e9, "buckling_level": 0.335e-3, "stiffness": 4e8, "mass": [[1.0]],
-        "contact_shape": [1.0], "damping_ratio": 0.01, "along": {"drive.frequency_ratio": [0.8, 1.0]},
-        "over": {"drive.frequency_ratio": [0.8, 1.0]}, "parameter": "drive.velocity_amplitude",
+        "contact_shape": [1.0], "damping_ratio": 0.01, "parameter": "drive.velocity_amplitude",
         "values": [0.1, 0.3, 0.5], "coefficient": 0.5, "amplitude": [0.1], "velocity": [0.0],
         "drive": sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.3),
     }  # fmt: skip
@@ -154,10 +153,6 @@ def arguments(function: Any, draw: random.Random) -> tuple[list[Any], dict[str, 
     named: dict[str, Any] = {}
     spoilt = {draw.randrange(len(parameters) or 1) for _ in range(draw.choice((1, 1, 1, 2, 3)))}
     for at, each in enumerate(parameters):
-        if each.kind is each.VAR_KEYWORD and getattr(function, "__name__", "") == "long_map":
-            named |= {
-                name: _valid(name, draw) for name in ("frequency_ratio", "velocity_amplitude", "cycles")
-            }
         if each.kind is each.VAR_POSITIONAL or each.kind is each.VAR_KEYWORD:
             continue
         needed = each.default is each.empty

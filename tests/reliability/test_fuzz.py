@@ -84,7 +84,7 @@ PARTS = (
     "Integration",
     "Replicates",
     "State",
-    "Keeping",
+    "CheckpointOptions",
 )
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.model.contact.base import LAWS
-from snapbeam.sweeps.checkpoint.records import TaskLog, Record
+from snapbeam.sweeps.checkpoint.records import Record, TaskLog
 from snapbeam.sweeps.tasks import differences, provenance_of
 from snapbeam.util.provenance import arithmetic_hash, code_hash
 from snapbeam.util.validation import InputError
@@ -47,7 +47,9 @@ def test_a_store_gives_back_no_other_structures_numbers(tmp_path):
     store, how = tmp_path / "store", sb.Integration(cycles=2)
     first = sb.sweep(system(), AXES, how, checkpoint=sb.CheckpointOptions(store))
     for name, value in OTHERS.items():
-        with pytest.raises(InputError, match=rf"(?s)holds a map of other parameters.*system\.model\.{name}"):
+        with pytest.raises(
+            InputError, match=rf"(?s)contains a sweep with other parameters.*system\.model\.{name}"
+        ):
             sb.sweep(system(**{name: value}), AXES, how, checkpoint=sb.CheckpointOptions(store))
     again = sb.sweep(system(), AXES, how, checkpoint=sb.CheckpointOptions(store))
     np.testing.assert_array_equal(first["peak_force"], again["peak_force"])
@@ -83,7 +85,7 @@ def test_what_computed_stands_in_the_store(tmp_path):
     (record,) = TaskLog(tmp_path / "store" / "tasks.jsonl").records.values()
     assert record.code == code_hash() and record.arithmetic == arithmetic_hash()
     assert f"numpy {np.__version__}" in record.libraries and "numba" in record.libraries
-    assert found.attrs["reproducible"].startswith("bit for bit")
+    assert found.attrs["reproducible"].startswith("bitwise identical")
     for text in (record.libraries, record.code, record.arithmetic, record.processor):
         assert text in found.attrs["computed_by"]
 
@@ -97,7 +99,7 @@ def test_what_computed_stands_in_the_store(tmp_path):
             r"to rounding.*version of NumPy, Numba or Python",
         ),
         ("arithmetic", "0" * 16, "to rounding.*kind of rounding in NumPy"),
-        ("code", "f" * 16, "as far as the code does.*state of its code"),
+        ("code", "f" * 16, "as far as the code agrees.*state of its code"),
         ("model", "e" * 64, "to rounding.*reduction of the model"),
     ],
 )
@@ -112,7 +114,7 @@ def test_parts_that_something_else_computed_are_told(tmp_path, name, value, word
     ledger.write_text("".join(f"{record.line()}\n" for record in (changed, records[1])), encoding="utf-8")
     with pytest.warns(UserWarning, match=words):
         found = sb.sweep(system(), axes, how, checkpoint=sb.CheckpointOptions(store))
-    assert not found.attrs["reproducible"].startswith("bit for bit")
+    assert not found.attrs["reproducible"].startswith("bitwise identical")
 
 
 ROUNDING = "from snapbeam.util.provenance import arithmetic_hash as a; print(a())"

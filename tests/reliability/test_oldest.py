@@ -17,9 +17,7 @@ def test_every_dependency_has_a_lower_bound_that_can_be_installed():
     assert "typer==0.17.5" in oldest([])
 
 
-@pytest.mark.parametrize(
-    "text", ["numpy", "numpy<3", "numpy~=2.0", "numpy>=2.0; python_version < '3.12'"]
-)
+@pytest.mark.parametrize("text", ["numpy", "numpy<3", "numpy~=2.0", "numpy>=2.0; python_version < '3.12'"])
 def test_other_bounds_are_refused(tmp_path, text):
     file = tmp_path / "pyproject.toml"
     file.write_text(f'[project]\ndependencies = ["{text}"]\n', encoding="utf-8")

@@ -35,8 +35,9 @@ def client():
 def computed(path, work, client, **options):
     stage, report, said = Stage("base", work.setup.points, CHUNK), SweepReport(), []
     with Checkpoint(path, work, CHUNK) as store:
-        options = CheckpointOptions(path, note=said.append, report=report)
-        results = CheckpointRunner(store, ClusterWorkers(client, said.append, **options), options).complete(stage)
+        cluster = ClusterWorkers(client, said.append, **options)
+        kept = CheckpointOptions(path, note=said.append, report=report)
+        results = CheckpointRunner(store, cluster, kept).complete(stage)
         return results.read(0, stage.size), report, said
 
 

@@ -120,7 +120,7 @@ def test_a_whole_store_is_read_where_nothing_can_be_written(
     result = swept(**small, path=disk / "whole", output=tmp_path / "map.nc")
     assert (result["response_class"].values.ravel() == work.values("response_class", whole)).all()
     result.close()
-    with pytest.raises(CheckpointError, match="is read-only, and 2 of 4 tasks are to be computed"):
+    with pytest.raises(CheckpointError, match="is read-only, and 2 of 4 tasks are not finished"):
         swept(**small, path=disk / "half")
     with pytest.raises(CheckpointError, match="cannot be written, Read-only file system"):
         swept(**small, path=disk / "none")

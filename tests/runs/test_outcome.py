@@ -103,7 +103,9 @@ def test_outcome_says_what_it_is() -> None:
     assert lines[0].split() == ["response_class", "intrawell", "response", "class"]
     (force,) = [line for line in lines if line.startswith("peak_force")]
     assert force.split() == ["peak_force", "0", "N", "peak", "contact", "force"]
-    with pytest.raises(AttributeError, match="RunSummary has no 'crossing'; it has response_class, status, zero_crossings"):
+    with pytest.raises(
+        AttributeError, match="RunSummary has no 'crossing'; it has response_class, status, zero_crossings"
+    ):
         _ = outcome.crossing
     with pytest.raises(KeyError):
         outcome["crossing"]

@@ -103,7 +103,10 @@ def test_the_file_says_what_it_is(tmp_path) -> None:
     assert len(outcome.status.attrs["flag_meanings"].split()) == len(outcome.status.attrs["flag_values"])
     impacts = xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf", group="impacts")
     assert impacts.peak_force.attrs["units"] == "N"
-    assert root.displacement_at_striker.encoding["zlib"] or root.displacement_at_striker.encoding.get("compression") == "gzip"
+    assert (
+        root.displacement_at_striker.encoding["zlib"]
+        or root.displacement_at_striker.encoding.get("compression") == "gzip"
+    )
     text = str(root.attrs)
     assert str(tmp_path) not in text
 

@@ -30,7 +30,10 @@ def test_labels():
 @pytest.mark.parametrize(
     ("variables", "message"),
     [
-        ({"displacement_at_striker": TIME[:3]}, "displacement_at_striker of shape (3,): must have dimensions ('time',)"),
+        (
+            {"displacement_at_striker": TIME[:3]},
+            "displacement_at_striker of shape (3,): must have dimensions ('time',)",
+        ),
         ({"modal_amplitude": TIME}, "modal_amplitude of shape (5,)"),
         ({"displacment": TIME}, "displacment: not a variable of a run"),
         ({"mode": TIME}, "mode: not a variable of a run"),
@@ -55,7 +58,9 @@ def test_times_increase():
 
 def test_dropouts_of_a_measured_run():
     measured = np.array([0.0, np.nan, 0.2, 0.3, 0.4])
-    run = trajectory_dataset(TIME, displacement_at_striker=measured, valid=np.array([1, 0, 1, 1, 1], dtype=np.int8))
+    run = trajectory_dataset(
+        TIME, displacement_at_striker=measured, valid=np.array([1, 0, 1, 1, 1], dtype=np.int8)
+    )
     assert check_trajectory(run) is run
     with pytest.raises(InputError, match=r"displacement_at_striker\[1\] = nan"):
         trajectory_dataset(TIME, displacement_at_striker=measured, valid=np.ones(5, dtype=np.int8))
@@ -71,4 +76,6 @@ def test_check_says_what_is_wrong():
     with pytest.raises(InputError, match=r"must be an xarray\.Dataset, not dict"):
         check_trajectory({})
     with pytest.raises(InputError, match=r"with dimensions \('t',\)"):
-        check_trajectory(trajectory_dataset(TIME, displacement_at_striker=TIME).assign(penetration_normalised=("t", TIME)))
+        check_trajectory(
+            trajectory_dataset(TIME, displacement_at_striker=TIME).assign(penetration_normalised=("t", TIME))
+        )

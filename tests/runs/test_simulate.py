@@ -50,7 +50,9 @@ def assert_same(a: sb.Run, b: sb.Run) -> None:
 
 def test_dataset() -> None:
     run = simulate(3, 1.21, 0.18, 4)
-    data = check_trajectory(run.dataset, require=("displacement_at_striker", "contact_force", "modal_amplitude"))
+    data = check_trajectory(
+        run.dataset, require=("displacement_at_striker", "contact_force", "modal_amplitude")
+    )
     assert dict(data.sizes)["mode"] == 3
     assert data.mode.values.tolist() == [1, 2, 3]
     period = 1.0 / (1.21 * model_of(3).reference_frequency)
@@ -68,7 +70,9 @@ def test_dataset() -> None:
     stroke = 0.18 / 1.21
     tip = float(data.displacement_at_striker[0]) + stroke * np.sin(2.0 * np.pi * data.cycle.values)
     np.testing.assert_allclose(data.striker_displacement, tip, atol=1e-12)
-    np.testing.assert_allclose(data.penetration_normalised, data.striker_displacement - data.displacement_at_striker, atol=1e-14)
+    np.testing.assert_allclose(
+        data.penetration_normalised, data.striker_displacement - data.displacement_at_striker, atol=1e-14
+    )
     depth = np.maximum(data.penetration_normalised.values * scale, 0.0)
     np.testing.assert_allclose(data.contact_force, 4e8 * depth**1.5, rtol=1e-13)
     np.testing.assert_allclose(data.energy_contact, 0.4 * 4e8 * depth**2.5, rtol=1e-12, atol=1e-30)

@@ -40,7 +40,9 @@ def test_instants_asked_for(tmp_path) -> None:
     found = sb.load(tmp_path / "run.nc").dataset
     kernel_input = sb.simulate(system, integration, sample_times=times).dataset
     np.testing.assert_array_equal(found.time, times)
-    np.testing.assert_allclose(found.displacement_at_striker, kernel_input.displacement_at_striker, rtol=1e-13)
+    np.testing.assert_allclose(
+        found.displacement_at_striker, kernel_input.displacement_at_striker, rtol=1e-13
+    )
 
 
 def same(found: sb.Run, kernel_input: sb.Run, outcome: sb.RunSummary) -> None:

@@ -208,7 +208,7 @@ def test_slurm(tmp_path):
         (SLURM.replace('interface = "lo"\n', ""), "interface is missing: the network that the workers reach"),
         (SLURM.replace("cores = 16", 'cores = "16"'), r"cores = '16': must be of type int"),
         (SLURM + "nodes = 3\n", "nodes: unknown key; must be one of account, cores"),
-        ("cores = 3\n", r"must hold one section, \[slurm\]"),
+        ("cores = 3\n", r"must contain one section, \[slurm\]"),
         ("[slurm\n", "is not TOML"),
     ],
 )

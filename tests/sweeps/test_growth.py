@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -143,11 +142,13 @@ def test_what_cannot_grow_is_refused_with_what_to_do(tmp_path, small):
     swept(**small, path=path)
     before = {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}
     with pytest.raises(
-        sb.InputError, match=r"cannot be continued.*Request the 3 cycles of the checkpoint, or give another folder for 6"
+        sb.InputError,
+        match=r"cannot be continued.*Request the 3 cycles of the checkpoint, or give another folder for 6",
     ):
         swept(**(small | {"cycles": 6}), path=path)
     with pytest.raises(
-        sb.InputError, match=r"2 of its 4 values of drive.velocity_amplitude are not among the requested values"
+        sb.InputError,
+        match=r"2 of its 4 values of drive.velocity_amplitude are not among the requested values",
     ):
         swept(**(small | {"velocity_amplitude": np.array([0.05, 0.1, 0.6])}), path=path)
     with pytest.raises(sb.InputError, match="location"):

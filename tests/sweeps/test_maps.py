@@ -69,7 +69,9 @@ def test_numbers_are_no_dimensions() -> None:
     assert ds.attrs["location"] == 0.4
     point = make(frequency_ratio=1.21, velocity_amplitude=0.3)
     assert point.response_class.dims == ()
-    np.testing.assert_array_equal(make(frequency_ratio=[1.21]).response.dims, make().response.dims)
+    np.testing.assert_array_equal(
+        make(frequency_ratio=[1.21]).response_class.dims, make().response_class.dims
+    )
 
 
 @pytest.mark.parametrize("modes", [1, 8])
@@ -153,14 +155,22 @@ def test_progress_and_interruption() -> None:
             r"frequency_ratio\[0\] = 1.2, .* must be strictly increasing",
         ),
         ({"frequency_ratio": [1.0, 1.0]}, sb.InputError, "must be strictly increasing"),
-        ({"frequency_ratio": 0.0}, sb.InputError, r"frequency_ratio = 0.0: must be a finite number greater than 0"),
+        (
+            {"frequency_ratio": 0.0},
+            sb.InputError,
+            r"frequency_ratio = 0.0: must be a finite number greater than 0",
+        ),
         ({"frequency_ratio": [-1.0, 1.0]}, sb.InputError, "frequency_ratio = -1.0: must be a number in"),
         (
             {"frequency_ratio": [1.0, math.nan]},
             sb.InputError,
             r"frequency_ratio\[1\] = .*nan.*: must be finite",
         ),
-        ({"frequency_ratio": math.inf}, sb.InputError, r"frequency_ratio = inf: must be a finite number greater than 0"),
+        (
+            {"frequency_ratio": math.inf},
+            sb.InputError,
+            r"frequency_ratio = inf: must be a finite number greater than 0",
+        ),
         (
             {"frequency_ratio": "1.2"},
             sb.InputTypeError,
@@ -200,10 +210,10 @@ def test_refusals(changes: dict[str, Any], error: type[Exception], message: str)
 def test_refuses_what_is_no_system() -> None:
     axes = {"frequency_ratio": 1.0, "velocity_amplitude": 0.1, "cycles": 1}
     with pytest.raises(sb.InputError, match="needs a buckled beam: axial_load = 0 N must exceed"):
-        swept(
-            sb.ReducedModel.from_beam(default_values.STRAIGHT_BEAM, 2), default_values.CONTACT, **axes
-        )
-    with pytest.raises(sb.InputError, match="contact = None: a striker needs a law of contact, such as HertzContact"):
+        swept(sb.ReducedModel.from_beam(default_values.STRAIGHT_BEAM, 2), default_values.CONTACT, **axes)
+    with pytest.raises(
+        sb.InputError, match="contact = None: a striker needs a law of contact, such as HertzContact"
+    ):
         swept(model_of(1), None, **axes)  # type: ignore[arg-type]
     with pytest.raises(sb.InputTypeError, match="model = 'beam': must be a ReducedModel"):
         swept("beam", default_values.CONTACT, **axes)  # type: ignore[arg-type]

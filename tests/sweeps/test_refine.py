@@ -151,9 +151,7 @@ def test_whole_numbers_and_words_have_nothing_between_them():
     found = results.columns.integers[:, 0].reshape(grid.shape)
     np.testing.assert_array_equal(found, truth(grid, by_structure))
     assert results.computed.mean() < 0.3
-    with pytest.raises(
-        InputError, match="needs an axis of at least two real numbers"
-    ):
+    with pytest.raises(InputError, match="needs an axis of at least two real numbers"):
         refine(DrawnRunner(Grid({"model.modes": np.array([1, 8])}), by_structure), 1)
 
 
@@ -183,9 +181,7 @@ def test_computed_points_are_those_of_a_full_map(tmp_path, small):
     print(f"{wrong} of {int(inferred.sum())} inferred points differ from the full map")
     swept(**small, path=tmp_path / "store", points_per_task=7)
     report = SweepReport()
-    stored = swept(
-        **small, path=tmp_path / "store", refine_levels=2, output=tmp_path / "m.nc", report=report
-    )
+    stored = swept(**small, path=tmp_path / "store", refine_levels=2, output=tmp_path / "m.nc", report=report)
     xr.testing.assert_equal(stored.load(), refined)
     assert report.resumed == 3 and report.computed > 1
     again = SweepReport()

@@ -118,7 +118,7 @@ def test_interrupt_keeps_what_is_finished(tmp_path):
     process.send_signal(signal.SIGINT)
     _, messages = process.communicate(timeout=120)
     assert process.returncode == 130
-    assert "the same command goes on from there" in messages and "Traceback" not in messages
+    assert "run the same command to resume" in messages and "Traceback" not in messages
     assert sorted(file.name for file in tmp_path.iterdir()) == ["store"]
 
 
@@ -143,7 +143,9 @@ def test_the_file_is_the_map(tmp_path, small):
     """Written a block at a time, the file is what xarray would write of the map in memory."""
     whole = swept(**small)
     report = SweepReport()
-    stored = swept(**small, path=tmp_path / "store", points_per_task=6, output=tmp_path / "a.nc", report=report)
+    stored = swept(
+        **small, path=tmp_path / "store", points_per_task=6, output=tmp_path / "a.nc", report=report
+    )
     assert (report.tasks, report.resumed, report.computed, report.runs) == (4, 0, 4, 20)
     whole.to_netcdf(tmp_path / "b.nc", engine="h5netcdf")
     expected = xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf")

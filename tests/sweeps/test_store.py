@@ -22,7 +22,7 @@ from snapbeam.cli.app import app
 from snapbeam.sweeps.checkpoint import records as durable
 from snapbeam.sweeps.checkpoint import records as ledger
 from snapbeam.sweeps.checkpoint import store as tables
-from snapbeam.sweeps.checkpoint.records import CheckpointError, TaskLog, Record, CheckpointLock, append_line
+from snapbeam.sweeps.checkpoint.records import CheckpointError, CheckpointLock, Record, TaskLog, append_line
 from snapbeam.sweeps.checkpoint.store import Checkpoint
 from snapbeam.sweeps.checkpointed_sweep import SweepReport
 from snapbeam.sweeps.tasks import PointWork, Stage
@@ -231,7 +231,9 @@ def test_a_second_writer_is_refused_until_the_first_is_gone(stored, work):
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout.readline() == "held\n"
-            with pytest.raises(CheckpointError, match=f"another process is writing it .process {process.pid}."):
+            with pytest.raises(
+                CheckpointError, match=f"another process is writing it .process {process.pid}."
+            ):
                 Checkpoint(path, work)
         finally:
             process.send_signal(signal.SIGKILL)

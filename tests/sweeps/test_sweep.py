@@ -92,7 +92,9 @@ def test_axes_in_another_order_are_the_same_points(whole, system) -> None:
     other = sb.sweep(system, {name: AXES[name] for name in names}, ASKED)
     assert other.response_class.dims == ("frequency_ratio", "modes", "beam_buckling_level", "damping_ratio")
     for name in STATISTICS:
-        np.testing.assert_array_equal(other[name].transpose(*whole.response_class.dims), whole[name], err_msg=name)
+        np.testing.assert_array_equal(
+            other[name].transpose(*whole.response_class.dims), whole[name], err_msg=name
+        )
 
 
 def test_parts_stores_and_threads(whole, system, tmp_path) -> None:
@@ -109,7 +111,9 @@ def test_parts_stores_and_threads(whole, system, tmp_path) -> None:
     again = sb.sweep(system, AXES, ASKED, checkpoint=sb.CheckpointOptions(tmp_path / "store", report=report))
     xr.testing.assert_equal(again, whole)
     assert (report.tasks, report.resumed, report.computed) == (7, 7, 0)
-    with pytest.raises(InputError, match=r"points\.model\.modes: \[1, 4\] in the checkpoint, \[1, 3\] requested"):
+    with pytest.raises(
+        InputError, match=r"points\.model\.modes: \[1, 4\] in the checkpoint, \[1, 3\] requested"
+    ):
         sb.sweep(system, AXES | {"modes": [1, 3]}, ASKED, checkpoint=tmp_path / "store")
     with pytest.raises(
         InputError, match=r"system\.beam\.thickness: 0\.0004 in the checkpoint, 0\.00041 requested"
@@ -204,7 +208,9 @@ def test_an_axis_over(name: str, system) -> None:
     (dim,) = ds.response_class.dims
     for i, value in enumerate(SINGLE[name]):
         if name.startswith("integration."):
-            assert_point_is_run(ds.isel({dim: i}), system, ASKED.replace(**{name.removeprefix("integration."): value}))
+            assert_point_is_run(
+                ds.isel({dim: i}), system, ASKED.replace(**{name.removeprefix("integration."): value})
+            )
         else:
             assert_point_is_run(ds.isel({dim: i}), system.replace(**{name: value}))
 
@@ -357,7 +363,9 @@ def test_a_structure_that_is_none_is_refused_before_any_run(system, monkeypatch)
         InputError, match=r"at beam\.thickness = 0\.0005: a run needs a buckled beam: axial_load = 30 N"
     ):
         sb.sweep(loaded, {"beam.thickness": [4e-4, 5e-4], "frequency_ratio": [1.0, 1.2]}, ASKED)
-    with pytest.raises(InputError, match=r"initial_state\.amplitude\[2\]: mode = 2: must be an integer in \[1, 1\]"):
+    with pytest.raises(
+        InputError, match=r"initial_state\.amplitude\[2\]: mode = 2: must be an integer in \[1, 1\]"
+    ):
         sb.sweep(system, pd.DataFrame({"modes": [2, 1], "initial_state.amplitude[2]": [0.1, 0.1]}), ASKED)
 
 
@@ -418,13 +426,21 @@ def test_parameters_that_are_only_in_order_together(system) -> None:
             InputError,
             r"mode = 9: must be an integer in \[1, 2\]",
         ),
-        (lambda s: sb.sweep(s, {"location": [0.3]}, replicates="many"), InputTypeError, "replicates = 'many'"),
+        (
+            lambda s: sb.sweep(s, {"location": [0.3]}, replicates="many"),
+            InputTypeError,
+            "replicates = 'many'",
+        ),
         (
             lambda s: sb.sweep(s, {"location": [0.3]}, checkpoint=3),
             InputTypeError,
             "checkpoint = 3: must be a folder",
         ),
-        (lambda s: sb.sweep(s, {"location": [0.3]}, cluster="local:2"), InputError, "cluster: needs a checkpoint"),
+        (
+            lambda s: sb.sweep(s, {"location": [0.3]}, cluster="local:2"),
+            InputError,
+            "cluster: needs a checkpoint",
+        ),
         (lambda s: sb.sweep(s, {"location": [0.3]}, refine_levels=-1), InputError, "refine_levels = -1"),
         (lambda s: sb.sweep(s, {"location": [0.3]}, output="map.csv"), InputError, r"must end in \.nc"),
         (

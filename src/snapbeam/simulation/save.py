@@ -25,7 +25,7 @@ from snapbeam.util.validation import InputError, file_path
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["compressed", "description", "load", "summary_dataset", "save_run"]
+__all__ = ["compressed", "description", "load", "save_run", "summary_dataset"]
 
 
 _FORMAT = "snapbeam run 3"
@@ -84,7 +84,9 @@ def load(path: str | os.PathLike[str]) -> Run:
             if "snapbeam_accuracy" in attrs
             else None
         )
-        end = _state(json.loads(attrs.pop("snapbeam_final_state"))) if "snapbeam_final_state" in attrs else None
+        end = (
+            _state(json.loads(attrs.pop("snapbeam_final_state"))) if "snapbeam_final_state" in attrs else None
+        )
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise InputError(f"path = {str(path)!r}: its description is damaged ({error})") from None
     dataset = check_trajectory(dataset.drop_attrs(deep=False).assign_attrs(attrs))

@@ -396,10 +396,10 @@ def _read_slurm(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise InputError(f"cluster = {str(path)!r}: cannot be read, {error.strerror or error}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"cluster = {str(path)!r}: is no TOML, {error}") from error
+        raise InputError(f"cluster = {str(path)!r}: is not TOML, {error}; correct the file") from error
     given = sections.pop("slurm", None)
     if sections or not isinstance(given, dict):
-        raise InputError(f"cluster = {str(path)!r}: must hold one section, [slurm]")
+        raise InputError(f"cluster = {str(path)!r}: must contain one section, [slurm]")
     for name, value in given.items():
         if name not in _SLURM:
             raise InputError(f"{path.name}: [slurm] {name}: unknown key; must be one of {', '.join(_SLURM)}")
