@@ -1,4 +1,4 @@
-"""Pictures of the bench, in the house style."""
+"""Figures of the benchmarks."""
 
 from __future__ import annotations
 

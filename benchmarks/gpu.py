@@ -81,7 +81,7 @@ def timed(function: Callable[[], Any]) -> tuple[float, Any]:
 
 
 def march(ensemble: Ensemble, warps: int | None = None) -> tuple[float, dict[str, Any]]:
-    """Seconds and statistics of a march on the device; the kernel must have been compiled before."""
+    """Seconds and statistics of an integration on the device; the kernel must have been compiled before."""
     simulated = cuda_engine.simulated()
     options = Options(warps=warps) if not simulated else Options(most_blocks=1, fewest_threads=1)
     seconds, accumulators_of_runs = timed(lambda: cuda_engine.run_ensemble(ensemble, options=options))

@@ -24,7 +24,7 @@ __all__ = ["Way", "ways"]
 _Array = NDArray[np.float64]
 RESTITUTION = 0.6
 PHASE = math.pi
-"""Of the wall when a march begins."""
+"""Of the wall at the start of a run."""
 _TOLERANCE = 1e-10
 _LOOKS = 200
 """At the gap of a flight in a period, between which an impact is bracketed."""

@@ -26,7 +26,7 @@ def test_single_run(benchmark: Any, modes: int) -> None:
 
 
 def test_recorded_run(benchmark: Any) -> None:
-    """20 cycles with 200 samples each and the energy ledger."""
+    """20 cycles with 200 samples each and the energy balance."""
     case = Case(32, 1.21, 0.18)
     ensemble = case.ensemble(case.default_plan(), 20)
     times = np.linspace(0.0, float(ensemble.runs["tick"][0] * ensemble.runs["end"][0]), 4001)

@@ -1,4 +1,4 @@
-"""What each world costs: a run and a step of it over the paper's, which is timed before and after each."""
+"""Cost of each extended model: a run and a step over those of the paper's model, which is timed before and after."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ WORLDS: dict[str, Parts] = {
         "drive": sb.TwoTone(frequency_ratio=1.0, velocity_amplitude=0.2, second_ratio=2.0, second_amplitude=0.1)
     },
     "`noise`": {"drive": sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2)},
-    "a body of 20 g": {"striker": {"mass": 0.02, "spring": 700.0, "damper": 0.7}},
+    "a body of 20 g": {"striker": {"mass": 0.02, "suspension_stiffness": 700.0, "suspension_damping": 0.7}},
     "a stop above, too": {"striker": [{}, {"drive": sb.FixedStop(), "location": 0.3, "side": "above", "gap": 4e-5}]},
     "unequal wells": {"imperfection": sb.Imperfection(midspan_amplitude=4e-6)},
     "other ends": {"beam": default_values.BEAM.replace(boundary=sb.BoundaryConditions(left_rotational_stiffness=40.0, right_rotational_stiffness=40.0))},

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from snapbeam.dynamics.lifetimes import proportion
-from snapbeam.paper.claims.finding import Check, ClaimResult, Quantity, above, below, found
+from snapbeam.paper.claims.claim_result import Check, ClaimResult, Quantity, above, below, found
 
 __all__ = ["Row", "claims", "table"]
 
@@ -26,7 +26,7 @@ class Row(NamedTuple):
     measured: str
     rule: str
     fails: str
-    diagnostic: ClaimResult
+    result: ClaimResult
 
 
 def _all(*checks: Check) -> Check:
@@ -171,6 +171,6 @@ def table(rows: list[Row]) -> list[str]:
         "|---|---|---|---|---|---|",
     ]
     for number, row in enumerate(rows, start=1):
-        verdict = f"**{row.diagnostic.verdict}**" + (" †" if row.diagnostic.close else "")
+        verdict = f"**{row.result.verdict}**" + (" †" if row.result.close else "")
         lines.append(f"| T{number} | {row.says} | {row.measured} | {row.rule} | {row.fails} | {verdict} |")
     return lines

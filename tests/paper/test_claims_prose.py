@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from snapbeam.paper.claims import TOPICS, measurements
-from snapbeam.paper.claims.finding import Quantity, above, found
+from snapbeam.paper.claims.claim_result import Quantity, above, found
 from snapbeam.paper.claims.prose import Entry, fill, read_topic
 
 TOPIC_FILES = Path(__file__).parents[2] / "src" / "snapbeam" / "paper" / "claims" / "topics"
@@ -51,7 +51,7 @@ def test_every_row_says_what_it_must(topic):
 
 
 @pytest.fixture
-def diagnostic():
+def result():
     return found(
         above(1.0, 0.0), notch=Quantity(1.4859, 0.05), share=Quantity(0.9388, 0.02), tiny=3.2e-9, count=7,
         listed=(1.0, 2.5), rows=((1, 0.5), (32, 0.4166)), nothing=(), none=float("nan"), zero=0,
@@ -73,11 +73,11 @@ def diagnostic():
         ("$a < b$ and $x > 0$", "$a < b$ and $x > 0$"),
     ],
 )
-def test_placeholders(diagnostic, text, filled):
-    assert fill(text, diagnostic) == filled
+def test_placeholders(result, text, filled):
+    assert fill(text, result) == filled
 
 
 @pytest.mark.parametrize("text", ["<unknown>", "<count.u>"])
-def test_what_was_not_measured_is_not_told(diagnostic, text):
+def test_what_was_not_measured_is_not_told(result, text):
     with pytest.raises(KeyError):
-        fill(text, diagnostic)
+        fill(text, result)

@@ -9,6 +9,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
+from snapbeam.paper.system import paper_map
 
 
 @cache
@@ -18,11 +19,14 @@ def model_of(modes: int) -> sb.ReducedModel:
 
 def threshold(modes: int, ratio: float, velocity: np.ndarray, cycles: int = 200) -> float:
     """Least velocity amplitude of the row that snaps the beam through."""
-    row = sb.response_map(
-        model_of(modes), paper.CONTACT, frequency_ratio=ratio, velocity_amplitude=velocity, cycles=cycles,
+    row = paper_map(
+        model_of(modes),
+        frequency_ratio=ratio,
+        velocity_amplitude=velocity,
+        cycles=cycles,
         early_termination=True,
-    )  # fmt: skip
-    snapped = row.response.values > sb.ResponseClass.INTRAWELL
+    )
+    snapped = row.response_class.values > sb.ResponseClass.INTRAWELL
     assert snapped[-1] and not snapped[0]
     return float(velocity[np.argmax(snapped)])
 

@@ -33,9 +33,9 @@ def notched(at: float, wide: float = 0.4, depth: float = 0.1) -> np.ndarray:
 )
 def test_notch_of_one_mode(at, wide, verdict):
     """2a: at the printed place, near enough for a step of V, elsewhere."""
-    diagnostic = thresholds.notch_of_one_mode(two_maps(notched(at, wide), notched(1.2)))
-    assert diagnostic.verdict == verdict
-    position = diagnostic.quantities["position"]
+    result = thresholds.notch_of_one_mode(two_maps(notched(at, wide), notched(1.2)))
+    assert result.verdict == verdict
+    position = result.quantities["position"]
     assert abs(position.value - at) <= position.uncertainty
 
 
@@ -51,21 +51,19 @@ def test_universally_higher(lower, verdict):
     """3a: nowhere, at few and at many frequencies lower."""
     one, many = np.full(RATIO.size, 0.1), np.full(RATIO.size, 0.2)
     many[30 : 30 + lower] = 0.05
-    diagnostic = thresholds.universally_higher(two_maps(one, many))
-    assert diagnostic.verdict == verdict
-    assert diagnostic.numbers["own_count"] == lower
-    assert diagnostic.quantities["own"].value == pytest.approx(lower / RATIO.size)
+    result = thresholds.universally_higher(two_maps(one, many))
+    assert result.verdict == verdict
+    assert result.numbers["own_count"] == lower
+    assert result.quantities["own"].value == pytest.approx(lower / RATIO.size)
 
 
 def test_the_axes_matter_for_what_is_lower():
     """3a: a threshold that rises steeply is lower only where the frequency is the same in Hz."""
     one = np.round(0.02 + 0.12 * RATIO, 2)
     many = np.round(one + 0.005, 2)  # never below by half a step on its own axes
-    diagnostic = thresholds.universally_higher(two_maps(one, many))
-    assert diagnostic.numbers["own_count"] == 0
-    assert (
-        diagnostic.numbers["hertz_count"] > diagnostic.numbers["own_count"] or diagnostic.verdict == "holds"
-    )
+    result = thresholds.universally_higher(two_maps(one, many))
+    assert result.numbers["own_count"] == 0
+    assert result.numbers["hertz_count"] > result.numbers["own_count"] or result.verdict == "holds"
 
 
 def test_high_frequency():
@@ -108,9 +106,9 @@ def test_entirely_settled_depends_on_the_cut():
     kinds = settled()
     slow = np.broadcast_to(RATIO[:, None] < 0.13, kinds.shape)
     kinds[slow & (kinds > 0)] = ResponseClass.CONTINUOUS
-    diagnostic = classes.settled(long_maps(settled(), kinds, 32))
-    assert diagnostic.quantities["fourth"].value < diagnostic.quantities["share"].value
-    assert diagnostic.verdict == "fails"
+    result = classes.settled(long_maps(settled(), kinds, 32))
+    assert result.quantities["fourth"].value < result.quantities["share"].value
+    assert result.verdict == "fails"
 
 
 @pytest.mark.parametrize(
@@ -215,9 +213,9 @@ def test_one_mode_is_adequate():
     for scale, verdict in ((1.0, "holds"), (0.93, "in part"), (0.8, "fails")):
         # in Hz one mode is 2.5 % higher at the same Omega
         peaks = (1.8 * 83.93 / 81.85 * scale, 1.0), (3.6 * 83.93 / 81.85 * scale, 0.8)
-        diagnostic = resonances.one_mode_is_adequate(resonance_data(PAIR, swept(*peaks)))
-        assert diagnostic.verdict == verdict
-        assert diagnostic.quantities["first"].value == pytest.approx(1.0 / scale - 1.0, abs=0.02)
+        result = resonances.one_mode_is_adequate(resonance_data(PAIR, swept(*peaks)))
+        assert result.verdict == verdict
+        assert result.quantities["first"].value == pytest.approx(1.0 / scale - 1.0, abs=0.02)
 
 
 def test_printed_maxima():
@@ -289,10 +287,10 @@ def dominance_data(until: float) -> Given:
 
 @pytest.mark.parametrize(("until", "verdict"), [(0.4, "holds"), (0.15, "in part"), (0.05, "fails")])
 def test_dominance_needs_more_than_a_narrow_band(until, verdict):
-    """10b: that modes other than the first lead where the first is near zero is no diagnostic."""
-    diagnostic = waveforms.higher_modes_dominate(dominance_data(until))
-    assert diagnostic.verdict == verdict
-    assert diagnostic.quantities["twentieth"].value == 1.0
+    """10b: that modes other than the first lead where the first is near zero is no result."""
+    result = waveforms.higher_modes_dominate(dominance_data(until))
+    assert result.verdict == verdict
+    assert result.quantities["twentieth"].value == 1.0
 
 
 def disturbed(startup: float, alone: float) -> Given:
@@ -329,6 +327,6 @@ def test_a_question_is_held_against_its_own_model():
     data["perturbed"] = response_map(wild, 32)
     assert questions.reference_frequency(Given(sensitivity=data)).numbers["matters"] == 1
     data["one_mode_perturbed"] = response_map(wild, 1)
-    diagnostic = questions.reference_frequency(Given(sensitivity=data))
-    assert diagnostic.numbers["matters"] == 0
-    assert diagnostic.quantities["alone"].value == pytest.approx(float((calm != wild).mean()))
+    result = questions.reference_frequency(Given(sensitivity=data))
+    assert result.numbers["matters"] == 0
+    assert result.quantities["alone"].value == pytest.approx(float((calm != wild).mean()))

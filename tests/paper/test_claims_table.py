@@ -14,7 +14,7 @@ import pytest
 
 from snapbeam import paper
 from snapbeam.paper.claims import TOPICS, measure_claims, write_claims
-from snapbeam.paper.claims.finding import VERDICTS
+from snapbeam.paper.claims.claim_result import VERDICTS
 from snapbeam.paper.claims.prose import read_topic
 from snapbeam.paper.claims.table import Claim, summary
 from snapbeam.util.validation import InputError

@@ -56,8 +56,8 @@ def test_stored_whole_or_not_at_all(tmp_path, results):
         paper.fig6(data=tmp_path)
     with pytest.raises(InputError, match="must be an existing folder"):
         paper.fig6.write(tmp_path / "none", results=results)
-    with pytest.raises(InputError, match="is no option of fig2; its options are none"):
-        paper.fig2(results=results, dots="a.csv")
+    with pytest.raises(InputError, match="is not an option of fig2; its options are none"):
+        paper.fig2(results=results, measurements="a.csv")
     with pytest.raises(InputError, match="size = 'huge'"):
         paper.fig2("huge")
 
@@ -75,9 +75,10 @@ def test_recipes_of_one_size_share_a_grid(results):
 def test_dots_lie_where_they_were_measured(tmp_path, results):
     table = tmp_path / "dots.csv"
     table.write_text(
-        "frequency_ratio,velocity_amplitude,location,response\n1.625,0.3,0.3,intrawell\n", encoding="utf-8"
+        "frequency_ratio,velocity_amplitude,location,response_class\n1.625,0.3,0.3,intrawell\n",
+        encoding="utf-8",
     )
-    figure = paper.fig8(results=results, dots=table)
+    figure = paper.fig8(results=results, measurements=table)
     found = [c for ax in figure.axes for c in ax.collections if isinstance(c, PathCollection)]
     assert len(found) == 2  # both panels at that frequency
     np.testing.assert_allclose(found[0].get_offsets()[0], [0.3, 0.3])
@@ -100,10 +101,10 @@ def test_three_kinds_are_what_they_say(results):
         w = data[kind].midspan_displacement.values
         crossings[kind] = int((np.sign(w[1:]) != np.sign(w[:-1])).sum())
         recorded = data[f"{kind}_recorded"]
-        seen = np.interp(recorded.cycle, data[kind].cycle, data[kind].displacement)
+        seen = np.interp(recorded.cycle, data[kind].cycle, data[kind].displacement_at_striker)
         inside = (recorded.cycle.values > 0.0) & (recorded.valid.values == 1)
         # half a frame of exposure, 12 um pixels: the camera sees the run to some hundredths of b
-        assert np.sqrt(np.mean((recorded.displacement.values - seen)[inside] ** 2)) < 0.03
+        assert np.sqrt(np.mean((recorded.displacement_at_striker.values - seen)[inside] ** 2)) < 0.03
     assert crossings["intrawell"] == 0 and crossings["single"] == 1 and crossings["several"] >= 3
     with pytest.raises(InputError, match="must be three files"):
         paper.fig4(results=results, measured=["a.nc"])

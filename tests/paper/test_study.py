@@ -44,8 +44,8 @@ def test_claims_hold_by_rules_that_could_fail() -> None:
     claims = study.rows()
     assert len(claims) >= 6
     for row in claims:
-        assert row.diagnostic.verdict in ("holds", "in part"), row.says
-        assert all(quantity.uncertainty > 0.0 for quantity in row.diagnostic.quantities.values())
+        assert row.result.verdict in ("holds", "in part"), row.says
+        assert all(quantity.uncertainty > 0.0 for quantity in row.result.quantities.values())
     data = study.stored("lifetimes")
     shares = {modes: (0.4, 0.01) for modes in study.MODES}
     odd = [(1, "Fig. 6", 200, 0.5, 0.9, 8.0)]
@@ -56,7 +56,6 @@ def test_claims_hold_by_rules_that_could_fail() -> None:
     for ds in endless.values():
         ds["last_snap"][:] = 10_000.0
     verdicts = [
-        row.diagnostic.verdict
-        for row in study_claims.claims({"points": points} | endless, shares, odd, apart)
+        row.result.verdict for row in study_claims.claims({"points": points} | endless, shares, odd, apart)
     ]
     assert verdicts == ["fails"] * 6

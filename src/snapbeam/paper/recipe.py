@@ -153,7 +153,7 @@ class Recipe:
         results : Results, optional
             Results to share with other recipes; *size* and *data* are theirs then.
         **options
-            What the recipe takes beside: ``dots`` (fig6, fig7, fig8: a CSV table of measured responses, see
+            Options of the recipe: ``measurements`` (fig6, fig7, fig8: a CSV table of measured responses, see
             :func:`snapbeam.sweeps.measured_points.read_measured_points`), ``measured`` (fig4: three files of measured runs).
         """
         return self._draw(Results(size, read=data) if results is None else results, options)
@@ -198,7 +198,7 @@ class Recipe:
         for name in options:
             if name not in allowed:
                 known = ", ".join(allowed) or "none"
-                raise InputError(f"{name}: is no option of {self.name}; its options are {known}")
+                raise InputError(f"{name}: is not an option of {self.name}; its options are {known}")
         figure: Figure = module.draw(results, **options)
         return figure
 

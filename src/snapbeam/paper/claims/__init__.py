@@ -1,6 +1,6 @@
-"""What the paper says, measured: each claim a function with a rule and a few words, all of them a table.
+"""Claims of the source paper, measured: each claim is a function with a rule; all claims form a table.
 
-``topics`` holds the claims: a module of functions that return numbers, and a file of words beside it.
+``topics`` contains the claims: modules of functions that return numbers, and a file with the texts of each module.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from snapbeam.paper.claims.finding import VERDICTS, ClaimResult
+from snapbeam.paper.claims.claim_result import VERDICTS, ClaimResult
 from snapbeam.paper.claims.prose import fill, read_topic
 from snapbeam.paper.claims.table import Claim, summary, write_table
 from snapbeam.paper.recipe import MissingResults
@@ -65,14 +65,14 @@ def measure_claims(results: Results, sketch: Results | None = None) -> list[Clai
         for number, entry in topic.entries.items():
             used = results
             try:
-                diagnostic = functions[number](results)
+                result = functions[number](results)
             except MissingResults:
                 if sketch is None:
                     raise
                 used = sketch
-                diagnostic = functions[number](sketch)
+                result = functions[number](sketch)
             filled = {
-                part: fill(getattr(entry, part), diagnostic)
+                part: fill(getattr(entry, part), result)
                 for part in ("measured", "uncertainty", "rule", "fails", "note")
             }
             rows.append(
@@ -83,9 +83,9 @@ def measure_claims(results: Results, sketch: Results | None = None) -> list[Clai
                     paper=entry.paper,
                     source=entry.source,
                     figure=entry.figure,
-                    verdict=diagnostic.verdict,
-                    close=diagnostic.close,
-                    quantities=diagnostic.quantities,
+                    verdict=result.verdict,
+                    close=result.close,
+                    quantities=result.quantities,
                     size=used.size,
                     **filled,
                 )

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from importlib.resources import files
 
-from snapbeam.paper.claims.finding import ClaimResult, Number, Quantity
+from snapbeam.paper.claims.claim_result import ClaimResult, Number, Quantity
 
 __all__ = ["Entry", "Topic", "fill", "read_topic"]
 
@@ -66,13 +66,13 @@ def read_topic(name: str) -> Topic:
     return Topic(title, is_open, entries)
 
 
-def fill(text: str, diagnostic: ClaimResult) -> str:
+def fill(text: str, result: ClaimResult) -> str:
     """A text with its placeholders filled; KeyError for a name that was not measured."""
 
     def value(match: re.Match[str]) -> str:
         name, uncertainty, spec, yes, no = match.groups()
         given: Quantity | Number = (
-            diagnostic.quantities[name] if name in diagnostic.quantities else diagnostic.numbers[name]
+            result.quantities[name] if name in result.quantities else result.numbers[name]
         )
         if isinstance(given, Quantity):
             given = given.uncertainty if uncertainty else given.value

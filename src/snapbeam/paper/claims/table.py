@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field
 from itertools import groupby
 from pathlib import Path
 
-from snapbeam.paper.claims.finding import VERDICTS, Quantity
+from snapbeam.paper.claims.claim_result import VERDICTS, Quantity
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.provenance import made_by
 from snapbeam.util.validation import choice

@@ -97,9 +97,7 @@ def draw(results: Results) -> Figure:
 
 
 def _instants(cycle: _Array, w: _Array, zeros: _Array) -> _Array:
-    """Instants of the snapshots: the centre leaves half way up the first well, passes zero for the first and the last
-    time, and comes half way down the other well.
-    """
+    """Instants of the snapshots, from half way out of the first well to half way into the other well."""
     before = np.flatnonzero((cycle < zeros[0]) & (w < -_HALF_WAY))
     after = np.flatnonzero((cycle > zeros[-1]) & (w > _HALF_WAY))
     begin = cycle[before[-1]] if before.size else max(zeros[0] - 0.15, cycle[0])

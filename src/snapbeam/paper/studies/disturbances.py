@@ -75,7 +75,7 @@ def _variants(model: sb.ReducedModel, omega: float, drive: float, cycles: int) -
     return {
         "base": {"striker": steady},
         "perturbed": {"striker": _record(model, omega, drive * (1.0 + 1e-9), cycles)},
-        "offset": {"striker": steady, "start": sb.State(amplitude=rest * (1.0 - OFFSET))},
+        "offset": {"striker": steady, "initial_state": sb.State(amplitude=rest * (1.0 - OFFSET))},
         "startup": {"striker": _record(model, omega, drive, cycles, EXCESS)},
     }
 

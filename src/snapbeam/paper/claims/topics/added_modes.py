@@ -13,9 +13,9 @@ from scipy.stats import spearmanr
 
 import snapbeam as sb
 from snapbeam.model.default_values import MODES
-from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found, near
-from snapbeam.paper.claims.spread import combined, median_of, part, resampled, share
+from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.claims.topics.locations import grid_step, relative_threshold
+from snapbeam.paper.claims.uncertainty import combined, median_of, part, resampled, share
 from snapbeam.paper.system import paper_model
 from snapbeam.sweeps.threshold import interwell_threshold, is_interwell
 
@@ -75,7 +75,9 @@ def half_the_modes(results: Results) -> ClaimResult:
     first, second = maps[last // 2], maps[last]
     apart = _apart(first, second)
     a, b = first.response_class.values, second.response_class.values
-    base, nudged = (part(results, "sensitivity", name).response.values for name in ("base", "perturbed"))
+    base, nudged = (
+        part(results, "sensitivity", name).response_class.values for name in ("base", "perturbed")
+    )
     changed, floor = share(a != b), share(base != nudged)
     snapped = share(is_interwell(a) != is_interwell(b))
     return found(
@@ -174,8 +176,10 @@ def twice_the_modes(results: Results) -> ClaimResult:
     off = off[np.isfinite(off)]
     step = float(np.diff(base.velocity_amplitude.values).max()) / float(np.nanmedian(curves[0]))
     apart = median_of(np.abs(off), 0.5 * step)
-    changed = share(base.response_class.values != double.response.values)
-    floor = share(base.response_class.values != part(results, "sensitivity", "perturbed").response.values)
+    changed = share(base.response_class.values != double.response_class.values)
+    floor = share(
+        base.response_class.values != part(results, "sensitivity", "perturbed").response_class.values
+    )
     return found(
         below(apart, 0.05) & below(changed, floor.value + floor.uncertainty), below(apart, 0.1), apart=apart,
         changed=changed, floor=floor, mean=float(off.mean()), modes=int(base.attrs["modes"]),

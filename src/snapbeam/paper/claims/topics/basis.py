@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import snapbeam as sb
 from snapbeam.model.buckling_modes import BucklingModes
 from snapbeam.model.default_values import BEAM, MODES
-from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found
+from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, below, found
 from snapbeam.paper.system import paper_model
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import snapbeam as sb
 from snapbeam.model.default_values import BEAM, MODES, STRAIGHT_BEAM
-from snapbeam.paper.claims.finding import Check, ClaimResult, Quantity, above, below, found, near
+from snapbeam.paper.claims.claim_result import Check, ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.system import paper_model
 
 if TYPE_CHECKING:

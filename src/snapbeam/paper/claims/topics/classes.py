@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam.model.default_values import LOCATION
-from snapbeam.paper.claims.finding import Check, ClaimResult, Quantity, above, below, found
-from snapbeam.paper.claims.spread import chaos, chaos_of_pairs, share
+from snapbeam.paper.claims.claim_result import Check, ClaimResult, Quantity, above, below, found
+from snapbeam.paper.claims.uncertainty import chaos, chaos_of_pairs, share
 from snapbeam.sweeps.threshold import is_interwell
 from snapbeam.util.status_codes import ResponseClass
 
@@ -57,6 +57,7 @@ def share_of(
 
 
 def is_kind(kind: ResponseClass) -> Callable[[xr.Dataset], _Mask]:
+    """Return a function that marks the points of a response class."""
     return lambda ds: np.asarray(ds.response_class.values == kind)
 
 
@@ -65,6 +66,7 @@ def _interwell(ds: xr.Dataset) -> _Mask:
 
 
 def transient(ds: xr.Dataset) -> _Mask:
+    """Mark the points with a transient response."""
     return is_transient(ds.response_class.values)
 
 
@@ -132,7 +134,7 @@ def changes(results: Results) -> ClaimResult:
     for which in (0, 1):
         pair = [_map(results, name, which) for name in ("fig6", "fig7")]
         moved = chaos_of_pairs(results, _changed, int(pair[0].attrs["modes"]))
-        values.append(share(pair[0].response.values != pair[1].response.values, moved))
+        values.append(share(pair[0].response_class.values != pair[1].response_class.values, moved))
     one, many = values
     return found(above(one, 0.1) & above(many, 0.1), above(one, 0.1) | above(many, 0.1), many=many, one=one)
 

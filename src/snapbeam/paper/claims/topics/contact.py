@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from snapbeam.model.default_values import BEAM, CONTACT, LOCATION
-from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found, near
-from snapbeam.paper.claims.spread import part, resampled
+from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, below, found, near
+from snapbeam.paper.claims.uncertainty import part, resampled
 from snapbeam.paper.studies.sensitivity import tip_contact
 from snapbeam.paper.system import paper_model, paper_run
 

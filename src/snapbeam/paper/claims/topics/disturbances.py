@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, found
-from snapbeam.paper.claims.spread import combined, median_of, part, share
+from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, found
+from snapbeam.paper.claims.uncertainty import combined, median_of, part, share
 from snapbeam.paper.studies.disturbances import EXCESS, OFFSET
 from snapbeam.sweeps.threshold import is_interwell
 from snapbeam.util.status_codes import ResponseClass

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found
-from snapbeam.paper.claims.spread import combined, mean_of, part
+from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, below, found
 from snapbeam.paper.claims.topics.classes import transient
 from snapbeam.paper.claims.topics.locations import along
+from snapbeam.paper.claims.uncertainty import combined, mean_of, part
 from snapbeam.paper.studies.windows import CENTRE, END, longest_window
 
 if TYPE_CHECKING:

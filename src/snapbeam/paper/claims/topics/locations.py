@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 import snapbeam as sb
-from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found, near
-from snapbeam.paper.claims.spread import combined, mean_of, median_of, share
+from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, below, found, near
+from snapbeam.paper.claims.uncertainty import combined, mean_of, median_of, share
 from snapbeam.sweeps.threshold import interwell_threshold
 
 if TYPE_CHECKING:

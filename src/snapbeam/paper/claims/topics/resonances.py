@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found, near
-from snapbeam.paper.claims.spread import combined
+from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.claims.topics.thresholds import notch_of
+from snapbeam.paper.claims.uncertainty import combined
 from snapbeam.paper.recipes.figB10 import maxima
 from snapbeam.paper.studies.resonance import ridge
 from snapbeam.paper.system import paper_model

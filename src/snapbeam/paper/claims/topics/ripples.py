@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found
-from snapbeam.paper.claims.spread import mean_of, part, resampled
+from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, below, found
 from snapbeam.paper.claims.topics.waveforms import amplitudes
+from snapbeam.paper.claims.uncertainty import mean_of, part, resampled
 from snapbeam.paper.system import paper_model, paper_run
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found, near
-from snapbeam.paper.claims.spread import chaos, combined, median_of, part, share
+from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, below, found, near
+from snapbeam.paper.claims.uncertainty import chaos, combined, median_of, part, share
 from snapbeam.sweeps.threshold import Notch, interwell_threshold, threshold_notch
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, found
-from snapbeam.paper.claims.spread import combined, share
+from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, found
 from snapbeam.paper.claims.topics.classes import is_kind, share_of, transient
+from snapbeam.paper.claims.uncertainty import combined, share
 from snapbeam.sweeps.threshold import interwell_threshold, is_interwell
 from snapbeam.util.status_codes import ResponseClass
 

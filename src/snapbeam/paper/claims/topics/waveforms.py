@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam.model.default_values import BEAM, LOCATION
-from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found
-from snapbeam.paper.claims.spread import median_of, part, resampled, share
+from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, below, found
+from snapbeam.paper.claims.uncertainty import median_of, part, resampled, share
 from snapbeam.paper.recipe import MissingResults
 from snapbeam.paper.recipes.fig5 import snap_times
 from snapbeam.paper.system import TOLERANCE

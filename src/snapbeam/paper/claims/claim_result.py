@@ -1,4 +1,4 @@
-"""What a claim's measurement returns: numbers with their uncertainty, and a verdict that a rule computes."""
+"""Result of the measurement of a claim: numbers with their uncertainty, and a verdict that follows from a rule."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def near(value: Quantity | float, target: float, allowed: float) -> Check:
 
 @dataclass(frozen=True)
 class ClaimResult:
-    """What was measured of one claim.
+    """Result of the measurement of one claim.
 
     ``close``: whether the verdict would be another somewhere within the uncertainties.  The first of the
     ``quantities`` is the one the claim is about.
@@ -88,24 +88,24 @@ class ClaimResult:
 
 
 def found(holds: Check, in_part: Check = FAIL, /, **named: Quantity | Number) -> ClaimResult:
-    """The diagnostic on a claim that *holds* by one condition and, where it does not, *in part* by another."""
+    """Return the result of a claim that *holds* by one condition and, where it does not, *in part* by another."""
 
     def verdict(reading: int) -> str:
         return "holds" if holds[reading] else "in part" if in_part[reading] else "fails"
 
     worst, now, best = (verdict(reading) for reading in range(3))
-    return _finding(now, worst != best, named)
+    return _claim_result(now, worst != best, named)
 
 
 def measured(matters: Check, /, **named: Quantity | Number) -> ClaimResult:
-    """The diagnostic on an open question, whose influence is measured.
+    """Return the result of an open question, whose influence is measured.
 
     ``matters`` is 1 where it shows, beyond the uncertainty.
     """
-    return _finding("open", matters.must != matters.does, {**named, "matters": int(matters.must)})
+    return _claim_result("open", matters.must != matters.does, {**named, "matters": int(matters.must)})
 
 
-def _finding(verdict: str, close: bool, named: Mapping[str, Quantity | Number]) -> ClaimResult:
+def _claim_result(verdict: str, close: bool, named: Mapping[str, Quantity | Number]) -> ClaimResult:
     quantities = {name: value for name, value in named.items() if isinstance(value, Quantity)}
     for name, quantity in quantities.items():
         if not (quantity.uncertainty >= 0.0 or math.isnan(quantity.value)):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from claims_data import Given
 
-from snapbeam.paper.claims.finding import VERDICTS, Quantity, above, below, found, measured, near
-from snapbeam.paper.claims.spread import combined, mean_of, median_of, part, resampled, share
+from snapbeam.paper.claims.claim_result import VERDICTS, Quantity, above, below, found, measured, near
+from snapbeam.paper.claims.uncertainty import combined, mean_of, median_of, part, resampled, share
 from snapbeam.paper.recipe import MissingResults
 
 
@@ -19,9 +19,9 @@ from snapbeam.paper.recipe import MissingResults
 def test_verdict_of_one_number(value, verdict, close):
     """Holds above 1, in part above 0.5, with an uncertainty of 0.1."""
     number = Quantity(value, 0.1)
-    diagnostic = found(above(number, 1.0), above(number, 0.5), number=number)
-    assert (diagnostic.verdict, diagnostic.close) == (verdict, close)
-    assert diagnostic.verdict in VERDICTS
+    result = found(above(number, 1.0), above(number, 0.5), number=number)
+    assert (result.verdict, result.close) == (verdict, close)
+    assert result.verdict in VERDICTS
 
 
 def test_conditions_are_joined():
@@ -40,8 +40,8 @@ def test_on_a_limit():
 
 
 def test_an_open_question_matters_beyond_its_uncertainty():
-    diagnostic = measured(above(Quantity(0.2, 0.1), 0.0), moved=Quantity(0.2, 0.1))
-    assert diagnostic.verdict == "open" and diagnostic.numbers["matters"] == 1
+    result = measured(above(Quantity(0.2, 0.1), 0.0), moved=Quantity(0.2, 0.1))
+    assert result.verdict == "open" and result.numbers["matters"] == 1
     assert measured(above(Quantity(0.05, 0.1), 0.0), moved=Quantity(0.05, 0.1)).numbers["matters"] == 0
 
 

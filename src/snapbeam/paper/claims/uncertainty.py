@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.paper.claims.finding import Quantity
+from snapbeam.paper.claims.claim_result import Quantity
 from snapbeam.paper.recipe import MissingResults
 
 if TYPE_CHECKING:
