@@ -58,3 +58,4 @@ figure.axes[0].axis("off")
 print(
     shell("simulate", "--from", "OUT/run.nc", "--location", "0.3", "--cycles", "40")
 )
+folder.cleanup()
