@@ -16,7 +16,7 @@ from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.cpu import driver as cpu_engine
 from snapbeam.solver.ensemble import Ensemble
 
-__all__ = ["WORLDS", "run"]
+__all__ = ["MODELS", "run"]
 
 _SEED = 20240118
 _MODES = 8
@@ -46,7 +46,7 @@ def _system(parts: Parts) -> sb.System:
     )
 
 
-WORLDS: dict[str, Parts] = {
+MODELS: dict[str, Parts] = {
     "`power`": {"contact": sb.PowerLaw.from_stiffness(4e11, 2.0)},
     "`hunt_crossley`": {"contact": sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)},
     "`kelvin_voigt`": {"contact": sb.KelvinVoigt(2e6, 20.0)},
@@ -56,15 +56,15 @@ WORLDS: dict[str, Parts] = {
     "`two_tone`": {
         "drive": sb.TwoTone(frequency_ratio=1.0, velocity_amplitude=0.2, second_ratio=2.0, second_amplitude=0.1)
     },
-    "`noise`": {"drive": sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2)},
+    "`band_limited_noise`": {"drive": sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2)},
     "a body of 20 g": {"striker": {"mass": 0.02, "suspension_stiffness": 700.0, "suspension_damping": 0.7}},
     "a stop above, too": {"striker": [{}, {"drive": sb.FixedStop(), "location": 0.3, "side": "above", "gap": 4e-5}]},
     "unequal wells": {"imperfection": sb.Imperfection(midspan_amplitude=4e-6)},
     "other ends": {"beam": default_values.BEAM.replace(boundary=sb.BoundaryConditions(left_rotational_stiffness=40.0, right_rotational_stiffness=40.0))},
     "a moving base": {
-        "base": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1))
+        "base_excitation": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1))
     },
-    "a changing load": {"axial": sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))},
+    "a changing load": {"axial_load": sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))},
     "a piezo": {"harvester": PIEZO},
     "a coil": {"harvester": COIL},
 }  # fmt: skip
@@ -107,18 +107,18 @@ def run(folder: Path, quick: bool) -> None:
     plain = _ensemble({}, size, cycles)
     records: list[dict[str, Any]] = []
     before = _time(plain, repeats)
-    for name, parts in WORLDS.items():
+    for name, parts in MODELS.items():
         own = _time(_ensemble(parts, size, cycles), repeats)
         after = _time(plain, repeats)
         base = [0.5 * (before[i] + after[i]) for i in range(2)]
         drift = abs(after[0] / before[0] - 1.0)
-        records.append({"world": name, "time": own[0] / base[0], "step": own[1] / base[1], "drift": drift})
+        records.append({"model": name, "time": own[0] / base[0], "step": own[1] / base[1], "drift": drift})
         before = after
     rows = [
-        [r["world"], f"{r['time']:.2f}", f"{r['step']:.2f}", f"{100.0 * r['drift']:.0f} %"] for r in records
+        [r["model"], f"{r['time']:.2f}", f"{r['step']:.2f}", f"{100.0 * r['drift']:.0f} %"] for r in records
     ]
     head = (
-        "world",
+        "model",
         "time per simulated second over the paper's",
         "time per step over the paper's",
         "the paper's, after over before",
