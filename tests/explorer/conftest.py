@@ -70,17 +70,19 @@ class Served:
         )  # fmt: skip
         self.lines: list[str] = []
         self.url = ""
-        threading.Thread(target=self._listen, daemon=True).start()
+        self.listener = threading.Thread(target=self._listen, daemon=True)
+        self.listener.start()
         limit = time.monotonic() + PATIENCE / 1000
         while not self.url and self.process.poll() is None and time.monotonic() < limit:
             time.sleep(0.05)
         assert self.url, self.text
 
     def _listen(self) -> None:
-        for line in self.process.stdout:
-            self.lines.append(line)
-            if line.startswith("Explorer at"):
-                self.url = line.split()[-1]
+        with self.process.stdout as lines:
+            for line in lines:
+                self.lines.append(line)
+                if line.startswith("Explorer at"):
+                    self.url = line.split()[-1]
 
     @property
     def text(self) -> str:
@@ -95,6 +97,7 @@ class Served:
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait()
+        self.listener.join()
 
 
 @pytest.fixture(scope="session")

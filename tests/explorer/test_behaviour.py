@@ -1,4 +1,4 @@
-"""What else happens to a page: a changed system, two tabs, files that go, stores that grow, and bad guests."""
+"""What else happens to a page: a changed system, two tabs, files that go, checkpoints that grow, and bad guests."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import pytest
 import xarray as xr
 
 import snapbeam as sb
+from snapbeam.explorer.maps import opened
 
 
 def _turn(page, title):
@@ -166,11 +167,11 @@ def test_a_file_that_goes_is_told_and_runs_go_on(tab, serve, small_map, tmp_path
     assert "zero_crossings" in page.head()
 
 
-def test_a_store_fills_in_as_it_grows(tab, serve, system, tmp_path):
+def test_a_checkpoint_fills_in_as_it_grows(tab, serve, system, tmp_path):
     pytest.importorskip("zarr")
     few = system.replace(**{"model.modes": 1})
     axes = {"frequency_ratio": np.linspace(0.5, 2.0, 20), "velocity_amplitude": np.linspace(0.05, 0.4, 10)}
-    path = tmp_path / "growing.store"
+    path = tmp_path / "growing.map"
 
     class Enough(Exception):
         pass
@@ -182,7 +183,7 @@ def test_a_store_fills_in_as_it_grows(tab, serve, system, tmp_path):
     keeping = sb.CheckpointOptions(path, points_per_task=16)
     with pytest.raises(Enough):
         sb.sweep(few, axes, sb.Integration(cycles=5), checkpoint=keeping, progress=stop)
-    page = tab(serve("growing.store", where=tmp_path).url)
+    page = tab(serve("growing.map", where=tmp_path).url)
     clear = "() => { const m = Bokeh.documents[0].get_model_by_name('map-base'); return Array.from(m.data.image[0]); }"
     before = page.js(clear)
     unknown = 0xFF858585
@@ -190,6 +191,26 @@ def test_a_store_fills_in_as_it_grows(tab, serve, system, tmp_path):
     sb.sweep(few, axes, sb.Integration(cycles=5), checkpoint=sb.CheckpointOptions(path, points_per_task=16))
     page.wait(lambda: "200 of 200 points" in page.state(), "all of it")
     assert page.js(clear).count(unknown) == 0
+
+
+def test_a_checkpoint_is_read_again_only_when_it_has_grown(system, tmp_path):
+    pytest.importorskip("zarr")
+    few = system.replace(**{"model.modes": 1})
+    axes = {"frequency_ratio": np.linspace(0.5, 2.0, 8), "velocity_amplitude": np.linspace(0.05, 0.4, 8)}
+    path = tmp_path / "growing.map"
+
+    def stop(done, total):
+        if done >= 40:
+            raise RuntimeError("enough")
+
+    options = sb.CheckpointOptions(path, points_per_task=16)
+    with pytest.raises(RuntimeError, match="enough"):
+        sb.sweep(few, axes, sb.Integration(cycles=5), checkpoint=options, progress=stop)
+    source = opened(path)
+    assert not source.refresh() and 0 < source.attrs["points_done"] < 64
+    sb.sweep(few, axes, sb.Integration(cycles=5), checkpoint=options)
+    assert source.refresh() and source.attrs["points_done"] == 64
+    assert not source.refresh()
 
 
 @pytest.mark.slow

@@ -60,7 +60,7 @@ __all__ = ["MapCard", "SystemCard", "TakeCard", "WindowControl", "changed_parame
 
 
 # ----------------------------------------------------------------------------------------------------
-# When a part of the map is computed anew, and what is told of it meanwhile.
+# When a part of the map is computed again, and what the page shows meanwhile.
 
 
 _REST = 350
@@ -68,7 +68,7 @@ _REST = 350
 _PUSH = 0.2
 """Seconds between two pictures of a window that fills."""
 _COARSE = 9.0
-"""Pixels of a cell above which a view is worth computing anew."""
+"""Pixels of a cell above which a view is worth computing again."""
 
 
 class WindowControl:
@@ -347,7 +347,7 @@ class MapCard:
     # ------------------------------------------------------------------ the cut
 
     def rebuild(self, view: tuple[float, ...] | None) -> None:
-        """Make the figure anew, of other axes."""
+        """Make the figure again, for other axes."""
         self.control.cancel("")
         self.plane = (
             Scatter.of(self.source, self.x.value, self.y.value)
@@ -398,7 +398,7 @@ class MapCard:
     # ------------------------------------------------------------------ drawing
 
     def redraw(self) -> None:
-        """Show everything anew."""
+        """Show everything again."""
         name, layers = self.show.value, self.layers.value
         words: list[str] = []
         try:

@@ -20,7 +20,9 @@ COMMANDS = {"explore": "snapbeam.explorer.cli:explore"}
 def explore(
     file: Annotated[
         Path | None,
-        typer.Argument(help="NetCDF file or store of a map; the paper's beam if left out.", metavar="[MAP]"),
+        typer.Argument(
+            help="NetCDF file or checkpoint of a map; the paper's beam if left out.", metavar="[MAP]"
+        ),
     ] = None,
     config: Annotated[
         Path | None,

@@ -1,4 +1,4 @@
-"""Work that a page asks for, beside the page: newest first, cancelled when it is asked for anew.
+"""Work that a page asks for, beside the page: newest first, cancelled when it is asked for again.
 
 Kernels let go of Python's lock, so that threads are enough.  A job hears that it is cancelled where it reports its
 progress; a window's next batch waits while a run, which a person waits for, is computed.
@@ -290,7 +290,7 @@ class Waiting:
         self._asked: dict[int, object] = {}
 
     def begin(self, which: int, tell: Callable[[float, str], None]) -> object:
-        """Call ``tell(seconds, words)`` every second until *which* ends, or begins anew; returns what stands for it."""
+        """Call ``tell(seconds, words)`` every second until *which* ends, or begins again; returns what stands for it."""
         begun, mark = time.monotonic(), object()
         self._asked[which] = mark
 

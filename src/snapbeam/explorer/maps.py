@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 __all__ = [
     "POINT",
     "Axis",
+    "CheckpointSource",
     "DatasetSource",
     "FileSource",
     "Layer",
@@ -47,7 +48,6 @@ __all__ = [
     "Point",
     "Scatter",
     "Source",
-    "StoreSource",
     "SystemSource",
     "Window",
     "chances",
@@ -500,7 +500,7 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
     Parameters
     ----------
     what : path, xarray.Dataset, System or None
-        A NetCDF file or a store; a map; a system; nothing, for the paper's beam or *system*.
+        A NetCDF file or a checkpoint; a map; a system; nothing, for the paper's beam or *system*.
     system, integration : optional
         What a map is computed of, where there is none.
 
@@ -528,12 +528,12 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
         except (OSError, ValueError) as error:  # a name that no file can have
             raise InputError(f"file: is no path ({error})") from None
         if folder:
-            return StoreSource(path)
+            return CheckpointSource(path)
         if not path.exists():
-            raise InputError(f"map = {str(path)!r}: there is no such file or store")
+            raise InputError(f"map = {str(path)!r}: there is no such file or checkpoint")
         return FileSource(path)
     raise InputTypeError(
-        f"map is a {type(what).__name__}: must be a map, a file, a store, a System, or nothing"
+        f"map is a {type(what).__name__}: must be a map, a file, a checkpoint, a System, or None"
     )
 
 
@@ -1056,11 +1056,11 @@ class Scatter:
 
 
 # ----------------------------------------------------------------------------------------------------
-# A store of a map, also one that is still growing.
+# A checkpoint of a map, also one that is still growing.
 
 
-class StoreSource(DatasetSource):
-    """A store, read without disturbing who writes it; points that are not done are unknown."""
+class CheckpointSource(DatasetSource):
+    """A checkpoint that may still grow; points that are not done are unknown."""
 
     growing = True
 
@@ -1072,15 +1072,15 @@ class StoreSource(DatasetSource):
 
     def _stamped(self) -> tuple[int, int]:
         try:
-            found = (self._path / "ledger.jsonl").stat()
+            found = (self._path / "tasks.jsonl").stat()
         except OSError:
             return 0, 0
         return found.st_mtime_ns, found.st_size
 
     def refresh(self) -> bool:
-        """Read it again if more is done."""
+        """Read the checkpoint again if more tasks are done."""
         if not self._path.is_dir():
-            raise sb.InputError(f"{self._path.name}: there is no such store any more")
+            raise sb.InputError(f"{self._path.name}: the checkpoint is gone; open another file")
         stamp = self._stamped()
         if stamp == self._stamp:
             return False
@@ -1091,7 +1091,7 @@ class StoreSource(DatasetSource):
 
 
 # ----------------------------------------------------------------------------------------------------
-# Parts of a map computed anew, from coarse to fine, while the page lives on.
+# Parts of a map computed again, from coarse to fine, while the page lives on.
 
 
 _STRIDES = (27, 9, 3, 1)

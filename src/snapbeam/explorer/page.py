@@ -94,7 +94,7 @@ def _even_times(system: Any, integration: Any, count: int) -> NDArray[np.float64
 
 
 _GROWTH = 1500
-"""Milliseconds between two looks at a store that may be growing."""
+"""Milliseconds between two looks at a checkpoint that may grow."""
 _AFTER = 700
 """Milliseconds from the first picture of the page to the building of views that are not seen yet."""
 _PATIENT = 150
@@ -255,7 +255,7 @@ class Page:
             self.post(lambda: self.ask(Point({name: at[name] for name in at if name in names})))
 
     def _look_for_more(self) -> None:
-        """Show what was added to a store since the last look."""
+        """Show what was added to a checkpoint since the last look."""
         source = self.shared.source
 
         def done(_: Any, error: str) -> None:
@@ -266,7 +266,9 @@ class Page:
                     self._version = source.version
                     self.card.redraw()
                     attrs = source.attrs
-                    self.card.tell(f"store: {attrs.get('points_done')} of {attrs.get('points_total')} points")
+                    self.card.tell(
+                        f"checkpoint: {attrs.get('points_done')} of {attrs.get('points_total')} points"
+                    )
 
             self.post(tell)
 

@@ -397,7 +397,7 @@ def round_trip(value: float) -> str:
 
 
 # ----------------------------------------------------------------------------------------------------
-# The energy ledger: what the striker put in, where it is, what was lost.
+# The energy balance: work of the striker, energy of the beam, energy lost.
 
 
 _CURVES = {

@@ -196,7 +196,7 @@ def _own_addresses() -> tuple[str, ...]:
 
 
 # ----------------------------------------------------------------------------------------------------
-# The doors of the explorer: from a notebook or a script, and from the command line.
+# How the explorer is started: from a notebook or a script, and from the command line.
 
 
 _MISSING = "the explorer needs Panel: pip install 'snapbeam[explorer]'"
@@ -247,7 +247,7 @@ def explore(what: Any = None, *, integration: Integration | None = None, height:
     Parameters
     ----------
     what : xarray.Dataset, path, System, optional
-        A map as :func:`snapbeam.sweep` gives it, a file or a store of one, or a system, of which a map over frequency
+        A map as :func:`snapbeam.sweep` gives it, a file or a checkpoint of one, or a system, of which a map over frequency
         ratio and velocity amplitude is computed while one looks at it; the paper's beam by default.
     integration : Integration, optional
         Of a system.

@@ -27,7 +27,7 @@ class Shared:
     source : Source
         What is explored.
     command : str
-        What begins it again: its file's or store's name, empty if it has none.
+        What begins it again: the name of its file or checkpoint, empty if it has none.
     """
 
     def __init__(self, source: Source, file: Path | None = None) -> None:

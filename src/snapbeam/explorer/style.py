@@ -124,7 +124,7 @@ def styled(item: Any, look: Look) -> None:
 
 
 def figure(look: Look, **options: Any) -> Any:
-    """An empty Bokeh figure in the house's look."""
+    """An empty Bokeh figure in the style of the page."""
     settings: dict[str, Any] = {
         "sizing_mode": "stretch_width",
         "toolbar_location": "right",
@@ -299,7 +299,7 @@ if (!document.getElementById('gone')) {
   const note = document.createElement('div');
   note.id = 'gone'; note.setAttribute('role', 'alert');
   note.textContent = 'The server of this page has stopped or cannot be reached. What is shown stays; '
-    + 'nothing new can be computed. Start snapbeam explore again, then load the page anew.';
+    + 'nothing new can be computed. Start snapbeam explore again, then load the page again.';
   document.body.appendChild(note);
 }
 """

@@ -488,7 +488,7 @@ def run_campaign(
     """Measure every test of a folder.
 
     Each test's tracked run (NetCDF) and result (JSON) are kept in ``output/tests`` as soon as they are there,
-    and ``output/tests.csv`` is written anew after each; a test whose files and settings have not changed since
+    and ``output/tests.csv`` is written again after each; a test whose files and settings have not changed since
     is not measured again, so an interrupted campaign goes on where it was.
 
     Parameters
