@@ -42,7 +42,7 @@ __all__ = [
     "CheckpointSource",
     "DatasetSource",
     "FileSource",
-    "Layer",
+    "MapLayer",
     "Picture",
     "Plane",
     "Point",
@@ -84,7 +84,7 @@ _OF_0_1 = ("frequency_ratio", "velocity_amplitude", "location")
 
 
 @dataclass(frozen=True)
-class Layer:
+class MapLayer:
     """One number a point: a variable, or one entry of it.
 
     Attributes
@@ -123,10 +123,10 @@ def parameter_dims(skeleton: xr.Dataset) -> list[str]:
     return [name for name in names if name == POINT or parameter_name(skeleton, name) is not None]
 
 
-def layers_of(skeleton: xr.Dataset) -> dict[str, Layer]:
+def layers_of(skeleton: xr.Dataset) -> dict[str, MapLayer]:
     """All that is known of a point, by name, the class first."""
     over = set(parameter_dims(skeleton))
-    found: dict[str, Layer] = {}
+    found: dict[str, MapLayer] = {}
     names = set(map(str, skeleton.data_vars))
     for name, item in skeleton.data_vars.items():
         if item.dtype.kind not in "biuf" or not over <= set(item.dims):
@@ -135,11 +135,13 @@ def layers_of(skeleton: xr.Dataset) -> dict[str, Layer]:
         words, unit = str(item.attrs.get("long_name", name)), str(item.attrs.get("units", "1"))
         limit = str(name).endswith(("_low", "_high")) and str(name).rpartition("_")[0] in names
         if not further:
-            found[str(name)] = Layer(str(name), {}, words, unit, shown=not limit and str(name) not in _HIDDEN)
+            found[str(name)] = MapLayer(
+                str(name), {}, words, unit, shown=not limit and str(name) not in _HIDDEN
+            )
         elif len(further) == 1 and further[0] in skeleton.coords and item.sizes[further[0]] <= _ENTRIES:
             for at, entry in enumerate(skeleton[further[0]].values.tolist()):
                 label = _entry(further[0], entry)
-                found[f"{name}_{label.replace(' ', '_')}"] = Layer(
+                found[f"{name}_{label.replace(' ', '_')}"] = MapLayer(
                     str(name), {further[0]: at}, f"{words}: {label}", unit, shown=not limit
                 )
     order = list(STATISTICS)
@@ -162,7 +164,7 @@ def _entry(dimension: str, value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def chances(layers: dict[str, Layer], held: dict[str, Any]) -> str:
+def chances(layers: dict[str, MapLayer], held: dict[str, Any]) -> str:
     """Lifetimes and probabilities of a point in words, each with its interval; empty if there are none."""
     parts = []
     for name, layer in layers.items():
@@ -186,7 +188,7 @@ def chances(layers: dict[str, Layer], held: dict[str, Any]) -> str:
     return "; ".join(parts)
 
 
-def _partner(layers: dict[str, Layer], layer: Layer, variable: str, held: dict[str, Any]) -> Any:
+def _partner(layers: dict[str, MapLayer], layer: MapLayer, variable: str, held: dict[str, Any]) -> Any:
     for name, each in layers.items():
         if each.variable == variable and each.where == layer.where:
             return held.get(name)
@@ -224,9 +226,9 @@ class Source:
         return dict(self.skeleton.attrs)
 
     @property
-    def layers(self) -> dict[str, Layer]:
+    def layers(self) -> dict[str, MapLayer]:
         """All that is known of a point, by name."""
-        found: dict[str, Layer] = self._of_skeleton("layers", layers_of)
+        found: dict[str, MapLayer] = self._of_skeleton("layers", layers_of)
         return found
 
     def _of_skeleton(self, what: str, make: Callable[[xr.Dataset], Any]) -> Any:

@@ -44,16 +44,16 @@ if TYPE_CHECKING:
     from snapbeam import ReducedModel, Run
 
 __all__ = [
-    "BeamView",
+    "BeamPanel",
     "Energy",
     "Impacts",
     "Modal",
     "Numbers",
-    "Part",
     "Phase",
+    "RunPanel",
     "RunView",
     "Spectrum",
-    "Waveform",
+    "WaveformPanel",
     "across",
     "amplitude_spectrum",
     "envelope",
@@ -69,7 +69,7 @@ __all__ = [
 _ROUNDED = 1e-9
 
 
-class Part:
+class RunPanel:
     """One view of a run.
 
     Attributes
@@ -207,7 +207,7 @@ def _shapes(model: ReducedModel, positions: int) -> NDArray[np.float64]:
     return found
 
 
-class BeamView(Part):
+class BeamPanel(RunPanel):
     """Played slowly or fast, scrubbed, slowed at impacts, in true proportions or exaggerated."""
 
     title = "Beam"
@@ -408,7 +408,7 @@ _CURVES = {
 }
 
 
-class Energy(Part):
+class Energy(RunPanel):
     """Work, what became of it, and whether the books balance."""
 
     title = "Energy"
@@ -472,7 +472,7 @@ _TABLE = """
 """
 
 
-class Impacts(Part):
+class Impacts(RunPanel):
     """A row an impact; a click on one shows it closer."""
 
     title = "Impacts"
@@ -528,7 +528,7 @@ class Impacts(Part):
             self.closer(float(self.source.data["cycle"][at]), float(self.source.data["duration"][at]) * 1e-6)
 
 
-class Numbers(Part):
+class Numbers(RunPanel):
     """Every statistic with its unit and its meaning."""
 
     title = "Numbers"
@@ -569,7 +569,7 @@ _SHOWN = 6
 _COLORS = ("", "#E69F00", "#56B4E9", "#009E73", "#D55E00", "#CC79A7")
 
 
-class Modal(Part):
+class Modal(RunPanel):
     """What each buckling mode does."""
 
     title = "Modes"
@@ -638,7 +638,7 @@ dot.data = {w: [source.data.w[a]], v: [source.data.v[a]]};
 """
 
 
-class Phase(Part):
+class Phase(RunPanel):
     """Displacement against velocity, all of it and once a cycle."""
 
     title = "Phase"
@@ -730,7 +730,7 @@ def amplitude_spectrum(time: _Array, values: _Array) -> tuple[_Array, _Array]:
     return np.fft.rfftfreq(count, even[1] - even[0]), amplitudes
 
 
-class Spectrum(Part):
+class Spectrum(RunPanel):
     """Which frequencies the beam moves at."""
 
     title = "Spectrum"
@@ -788,7 +788,7 @@ class Spectrum(Part):
 _CURVES_WAVEFORM = ("midspan_displacement", "displacement_at_striker", "striker_displacement")
 
 
-class Waveform(Part):
+class WaveformPanel(RunPanel):
     """Who is where, and how hard they push."""
 
     title = "Waveform"
@@ -880,9 +880,9 @@ class RunView:
         self.run: Run | None = None
         self.cursor = Cursor(look, "" if name == "A" else f"-{name}", later)
         self.parts = [
-            Waveform(look, self.cursor), Phase(look, self.cursor), Spectrum(look, self.cursor),
+            WaveformPanel(look, self.cursor), Phase(look, self.cursor), Spectrum(look, self.cursor),
             Modal(look, self.cursor), Energy(look, self.cursor), Impacts(look, self.cursor, self._closer),
-            BeamView(look, self.cursor), Numbers(look, self.cursor),
+            BeamPanel(look, self.cursor), Numbers(look, self.cursor),
         ]  # fmt: skip
         self.head = pn.pane.HTML(
             "", sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-head"]

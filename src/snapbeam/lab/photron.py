@@ -24,7 +24,7 @@ from snapbeam.util.validation import InputError, shown
 __all__ = [
     "NAMES",
     "CameraHeader",
-    "Fields",
+    "HeaderFields",
     "Timing",
     "check_pixels",
     "frame_bytes",
@@ -66,7 +66,7 @@ NAMES: dict[str, tuple[tuple[str, ...], str]] = {
 }
 
 
-class Fields:
+class HeaderFields:
     """The fields of one header, asked for by the names of :data:`NAMES`."""
 
     def __init__(self, path: Path, values: Mapping[str, str], xml: bool) -> None:
@@ -130,7 +130,7 @@ class Fields:
         return int(value)
 
 
-def read_fields(path: Path) -> Fields:
+def read_fields(path: Path) -> HeaderFields:
     """Read the fields of a header.
 
     Raises
@@ -148,8 +148,8 @@ def read_fields(path: Path) -> Fields:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
     if kind == ".cih":
-        return Fields(path, _lines(path, raw), xml=False)
-    return Fields(path, _tags(path, raw), xml=True)
+        return HeaderFields(path, _lines(path, raw), xml=False)
+    return HeaderFields(path, _tags(path, raw), xml=True)
 
 
 def _lines(path: Path, raw: bytes) -> dict[str, str]:
@@ -202,7 +202,7 @@ class Timing:
     diagnostics: tuple[Diagnostic, ...]
 
 
-def read_timing(fields: Fields, frames: int) -> Timing:
+def read_timing(fields: HeaderFields, frames: int) -> Timing:
     """The timing of a recording that holds *frames* frames.
 
     A step between saved frames must agree with how many were recorded and how many are left: every
@@ -235,7 +235,7 @@ def read_timing(fields: Fields, frames: int) -> Timing:
     return Timing(rate, skip, frame_rate, question, exposure, diagnostics)
 
 
-def _exposure(fields: Fields, rate: float | None) -> tuple[float | None, tuple[Diagnostic, ...]]:
+def _exposure(fields: HeaderFields, rate: float | None) -> tuple[float | None, tuple[Diagnostic, ...]]:
     stated = fields.positive("shutter")
     longest = math.inf if rate is None else 1.01 / rate
     diagnostics: list[Diagnostic] = []
@@ -366,7 +366,7 @@ def read_header(path: str | Path) -> CameraHeader:
     return header
 
 
-def _bits(fields: Fields, images: str) -> tuple[int, int, str]:
+def _bits(fields: HeaderFields, images: str) -> tuple[int, int, str]:
     """Stored bits, effective bits and their side.
 
     A camera of 12 bits saved in 8 keeps the upper ones, and says so: all 8 are effective.
@@ -387,7 +387,7 @@ def _bits(fields: Fields, images: str) -> tuple[int, int, str]:
     return stored, min(depth, stored), side
 
 
-def _pixel_size(fields: Fields) -> float | None:
+def _pixel_size(fields: HeaderFields) -> float | None:
     """Metres per pixel from the calibration block, where its unit is a length."""
     unit = fields.text("unit", "").lower() if fields.xml else ""
     if unit not in _LENGTH_UNITS:
@@ -396,7 +396,7 @@ def _pixel_size(fields: Fields) -> float | None:
     return None if size is None else size * _LENGTH_UNITS[unit]
 
 
-def _scale_hint(fields: Fields) -> str:
+def _scale_hint(fields: HeaderFields) -> str:
     """What a .cih header holds of the scale: a number whose unit it gives as a code that is not documented."""
     size = None if fields.xml else fields.number("scale")
     if size is None or size in (0.0, 1.0):
@@ -404,7 +404,7 @@ def _scale_hint(fields: Fields) -> str:
     return f"its field 'Scale Pixel Size' is {size:g} in a unit that it does not name ({size:g}e-6 if um)"
 
 
-def _curve(fields: Fields) -> tuple[Diagnostic, ...]:
+def _curve(fields: HeaderFields) -> tuple[Diagnostic, ...]:
     gamma, enhance = fields.number("gamma"), fields.number("edge_enhance")
     if (gamma is None or gamma == 1.0) and not enhance:
         return ()

@@ -17,7 +17,7 @@ __all__ = [
     "MAX_MODES",
     "BucklingModes",
     "SpringModes",
-    "Structure",
+    "StructureMatrices",
     "checked_structure",
     "damping_ratios",
     "spring_wavenumbers",
@@ -328,7 +328,7 @@ _BALANCE = 1e-8  # largest residual force at an equilibrium, relative to its two
 
 
 @dataclass(frozen=True, kw_only=True)
-class Structure:
+class StructureMatrices:
     """What a user gives for a structure, as given; see ``ReducedModel.from_matrices``."""
 
     mass: ArrayLike
@@ -355,7 +355,7 @@ def damping_ratios(value: ArrayLike, count: int) -> _Array:
     return np.array(np.broadcast_to(array, (count,)))
 
 
-def checked_structure(given: Structure) -> dict[str, Any]:
+def checked_structure(given: StructureMatrices) -> dict[str, Any]:
     """The fields of a reduced model for a structure, or an ``InputError`` that says what is wrong."""
     mass = finite_array("mass", given.mass)
     if mass.ndim != 2 or mass.shape[0] != mass.shape[1] or mass.size == 0:

@@ -16,7 +16,7 @@ from snapbeam.model.boundary_conditions import Modes
 from snapbeam.model.buckling_modes import (
     MAX_MODES,
     BucklingModes,
-    Structure,
+    StructureMatrices,
     checked_structure,
     damping_ratios,
 )
@@ -404,13 +404,15 @@ _LEAST_COMPLIANCE = 1e-300
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class ReducedModel(Wells):
-    """N modal amplitudes alpha with a mass, a stiffness and one tension term: the left side of Eq. (11),
+    """Reduced model of N modal amplitudes alpha with a mass, a stiffness and one tension term.
+
+    The equation of motion is Eq. (11),
 
         m alpha'' + K0 alpha + gamma (alpha . alpha) alpha = phi(x_s) f,
 
-    whose potential energy is U = alpha . K0 alpha / 2 + gamma (alpha . alpha)^2 / 4, and less B . alpha, with B on
-    the right, where a constant side force B makes the wells unequal.  Made by :meth:`from_beam` or
-    :meth:`from_matrices`; arrays are read-only.
+    and the potential energy is U = alpha . K0 alpha / 2 + gamma (alpha . alpha)^2 / 4.  A constant transverse force B
+    makes the wells unequal: it adds B to the right side and -B . alpha to U.  Use :meth:`from_beam` or
+    :meth:`from_matrices` to create a model; its arrays are read-only.
 
     Attributes
     ----------
@@ -600,7 +602,7 @@ class ReducedModel(Wells):
             finite or out of range, or an equilibrium that is none or is unstable.
         """
         given = checked_structure(
-            Structure(
+            StructureMatrices(
                 mass=mass,
                 stiffness=stiffness,
                 contact_shape=contact_shape,

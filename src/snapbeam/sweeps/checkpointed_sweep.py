@@ -27,7 +27,7 @@ from snapbeam.sweeps.points import Points
 from snapbeam.sweeps.refine import MAX_LEVELS, RefinedRows, refine
 from snapbeam.sweeps.replicates import Replicates
 from snapbeam.sweeps.setup import Progress, SweepSetup
-from snapbeam.sweeps.tasks import MemoryRunner, PointWork, ResultTable, Rows, Stage, StageRunner
+from snapbeam.sweeps.tasks import MemoryRunner, PointWork, ResultRows, ResultTable, Stage, StageRunner
 from snapbeam.util.files import check_writable
 from snapbeam.util.netcdf import write_netcdf
 from snapbeam.util.validation import InputError, InputTypeError, flag, integer, shown
@@ -128,7 +128,7 @@ class CheckpointRunner:
         self.note: Note = options.note if options.note is not None else (lambda _: None)
         self.only_damaged = options.check_checkpoint
 
-    def complete(self, stage: Stage, progress: Progress | None = None) -> Rows:
+    def complete(self, stage: Stage, progress: Progress | None = None) -> ResultRows:
         """Compute and store the tasks of a stage that are not finished; of an extended checkpoint, those of each layer."""
         layers = [layer.stage for layer in self.store.layers] if stage.name == BASE else []
         stages = layers or [stage]
@@ -225,7 +225,7 @@ def _require_room(points: int, options: CheckpointOptions) -> None:
         raise InputError(f"{points} points: must be at most {_MOST_POINTS}")
 
 
-def _computed(runner: StageRunner, levels: int, progress: Progress | None) -> tuple[Points, Rows]:
+def _computed(runner: StageRunner, levels: int, progress: Progress | None) -> tuple[Points, ResultRows]:
     points = runner.work.setup.points
     base = Stage(BASE, points, runner.chunk)
     try:
@@ -252,7 +252,7 @@ def _runner(work: PointWork, options: CheckpointOptions, cluster: Cluster | None
 
 
 def _result(
-    work: PointWork, points: Points, rows: Rows, more: dict[str, Any], target: Path | None
+    work: PointWork, points: Points, rows: ResultRows, more: dict[str, Any], target: Path | None
 ) -> xr.Dataset:
     import xarray as xr
 

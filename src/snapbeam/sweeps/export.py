@@ -10,7 +10,7 @@ import numpy as np
 
 from snapbeam.simulation.save import code_flags
 from snapbeam.sweeps.points import PointList, Points
-from snapbeam.sweeps.tasks import CLASSES, PointWork, Rows
+from snapbeam.sweeps.tasks import CLASSES, PointWork, ResultRows
 from snapbeam.util.netcdf import netcdf_file
 from snapbeam.util.status_codes import ResponseClass
 
@@ -31,7 +31,7 @@ def class_coordinate() -> tuple[tuple[str], Any, dict[str, Any]]:
     return (_CLASS_DIM,), values, {"units": "1", "long_name": "response class"} | code_flags(ResponseClass)
 
 
-def to_dataset(work: PointWork, points: Points, rows: Rows, attrs: dict[str, Any]) -> xr.Dataset:
+def to_dataset(work: PointWork, points: Points, rows: ResultRows, attrs: dict[str, Any]) -> xr.Dataset:
     """Return the dataset of a sweep."""
     import xarray as xr
 
@@ -50,7 +50,7 @@ def _coordinates(work: PointWork, points: Points) -> dict[str, Any]:
     return coords
 
 
-def to_netcdf(work: PointWork, points: Points, rows: Rows, attrs: dict[str, Any], path: Path) -> None:
+def to_netcdf(work: PointWork, points: Points, rows: ResultRows, attrs: dict[str, Any], path: Path) -> None:
     """Write the dataset of a sweep to a NetCDF file atomically, block by block.
 
     The file is equal to the file that xarray writes from the result of :func:`to_dataset`.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from snapbeam.sweeps.points import Grid
 from snapbeam.sweeps.setup import Progress
-from snapbeam.sweeps.tasks import ResultTable, Rows, Stage, StageRunner
+from snapbeam.sweeps.tasks import ResultRows, ResultTable, Stage, StageRunner
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError
 
@@ -79,7 +79,7 @@ def refine(runner: StageRunner, levels: int, progress: Progress | None = None) -
             "refine_levels: needs an axis of at least two real numbers; add one, or set refine_levels = 0"
         )
     base = Stage("base", grid, runner.chunk)
-    parts: list[tuple[_Index, Rows]] = [(np.arange(grid.size), runner.complete(base, progress))]
+    parts: list[tuple[_Index, ResultRows]] = [(np.arange(grid.size), runner.complete(base, progress))]
     classes = _classes(runner, parts[0][1], grid.size).reshape(grid.shape)
     computed = np.ones(grid.shape, dtype=bool)
     for level in range(1, levels + 1):
@@ -108,7 +108,7 @@ def refine(runner: StageRunner, levels: int, progress: Progress | None = None) -
     return grid, _assemble(runner, grid, parts, classes, computed)
 
 
-def _classes(runner: StageRunner, results: Rows, size: int) -> _Classes:
+def _classes(runner: StageRunner, results: ResultRows, size: int) -> _Classes:
     blocks = [
         runner.work.values("response_class", results.read(start, min(start + _BLOCK, size)))
         for start in range(0, size, _BLOCK)
@@ -190,7 +190,11 @@ def _fill(corners: _Classes, fine: _Classes, computed: _Mask, active: _Mask, spl
 
 
 def _assemble(
-    runner: StageRunner, grid: Grid, parts: list[tuple[_Index, Rows]], classes: _Classes, computed: _Mask
+    runner: StageRunner,
+    grid: Grid,
+    parts: list[tuple[_Index, ResultRows]],
+    classes: _Classes,
+    computed: _Mask,
 ) -> RefinedRows:
     work = runner.work
     columns = work.unfinished(grid.size, RunStatus.FILLED)

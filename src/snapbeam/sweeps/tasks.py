@@ -37,8 +37,8 @@ __all__ = [
     "MemoryRunner",
     "PointWork",
     "Provenance",
+    "ResultRows",
     "ResultTable",
-    "Rows",
     "Stage",
     "StageRunner",
     "chunk_size",
@@ -241,7 +241,7 @@ class Stage:
         return self.points.take(np.arange(start, stop) if self.which is None else self.which[start:stop])
 
 
-class Rows(Protocol):
+class ResultRows(Protocol):
     """Rows of results of a stage, in the order of its points."""
 
     def read(self, start: int, stop: int) -> ResultTable:
@@ -255,7 +255,7 @@ class StageRunner(Protocol):
     work: PointWork
     chunk: int
 
-    def complete(self, stage: Stage, progress: Progress | None = None) -> Rows:
+    def complete(self, stage: Stage, progress: Progress | None = None) -> ResultRows:
         """Compute the missing tasks of a stage and return its results."""
         ...
 
@@ -285,7 +285,7 @@ class MemoryRunner:
         self.threads = threads
         self.chunk = max(work.setup.points.size, 1)
 
-    def complete(self, stage: Stage, progress: Progress | None = None) -> Rows:
+    def complete(self, stage: Stage, progress: Progress | None = None) -> ResultRows:
         """Compute all points of the stage."""
         points = stage.points.take(np.arange(stage.size) if stage.which is None else stage.which)
         return _Rows(self.work.compute(points, self.threads, progress))

@@ -31,10 +31,10 @@ from snapbeam.util.validation import InputError, finite
 __all__ = [
     "CLOSE",
     "ENERGY",
+    "AmplitudeJump",
     "Ceiling",
     "Centres",
     "Decay",
-    "Jump",
     "NoiseFall",
     "dominant",
     "find_ceiling",
@@ -64,7 +64,7 @@ class Ceiling(NamedTuple):
     until: int
 
 
-class Jump(NamedTuple):
+class AmplitudeJump(NamedTuple):
     """A cycle at which a decay jumps: its time [s], and by what share of the amplitude."""
 
     time: float
@@ -141,7 +141,7 @@ def _plateau(values: _Array, width: int) -> int:
     return last * width if falls and wide else 0
 
 
-def find_jump(cycles: Cycles) -> Jump | None:
+def find_jump(cycles: Cycles) -> AmplitudeJump | None:
     """The cycle at which amplitude or phase of a mode jumps; None if neither does.
 
     Straight lines through the logarithm of the amplitude and through the phase of six cycles on either side
@@ -174,7 +174,7 @@ def find_jump(cycles: Cycles) -> Jump | None:
     at = int(np.argmax(size))
     if size[at] < max(8.0 * errors[at], 0.08, 6.0 * usual):
         return None
-    return Jump(float(cycles.time[at]), float(size[at]))
+    return AmplitudeJump(float(cycles.time[at]), float(size[at]))
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -8,7 +8,14 @@ import numpy as np
 
 from snapbeam.lab.diagnostics import Kind, table
 from snapbeam.lab.tracking.measure import Rest, Touch, TrackedRows
-from snapbeam.lab.tracking.settings import BeamView, EdgeShape, Fields, FrameFlag, Scene, TrackingSettings
+from snapbeam.lab.tracking.settings import (
+    BeamView,
+    EdgeShape,
+    FrameFlag,
+    Scene,
+    TrackingSettings,
+    VideoFields,
+)
 from snapbeam.lab.tracking.survey import CLIPPED
 from snapbeam.util.diagnostics import Diagnostic, Severity
 
@@ -193,7 +200,7 @@ class SeenMotion:
     touch: Touch
     scale: float
     drift: float
-    fields: Fields
+    fields: VideoFields
 
 
 def tracking_diagnostics(
@@ -281,7 +288,7 @@ def _of_the_edges(shape: EdgeShape, settings: TrackingSettings) -> list[Diagnost
     return []
 
 
-def _of_the_pixels(scene: Scene, fields: Fields) -> list[Diagnostic]:
+def _of_the_pixels(scene: Scene, fields: VideoFields) -> list[Diagnostic]:
     told = []
     if fields.apart > 0.0:
         told.append(KINDS["interlaced"].found(share=fields.apart))

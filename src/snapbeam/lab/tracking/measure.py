@@ -17,12 +17,12 @@ from snapbeam.lab.tracking.settings import (
     HALF,
     HOT,
     BeamView,
-    Fields,
     FrameFlag,
     Scene,
     ShakerView,
     Sticker,
     TipOutline,
+    VideoFields,
     gather,
 )
 
@@ -778,12 +778,12 @@ def seen_fields(
     view: BeamView,
     rows: TrackedRows,
     along_rows: bool,
-) -> Fields:
+) -> VideoFields:
     """What a tracked recording shows of fields; *along_rows* if the beam lies along the picture's rows.
 
     *prepare* turns frames as they were tracked.
     """
-    return Fields(fields_apart(recording, prepare, view, rows, along_rows), alternation(rows.row))
+    return VideoFields(fields_apart(recording, prepare, view, rows, along_rows), alternation(rows.row))
 
 
 def fields_apart(

@@ -32,7 +32,6 @@ __all__ = [
     "SIDES",
     "BeamView",
     "EdgeShape",
-    "Fields",
     "FrameFlag",
     "NoiseShape",
     "Orientation",
@@ -41,6 +40,7 @@ __all__ = [
     "Sticker",
     "TipOutline",
     "TrackingSettings",
+    "VideoFields",
     "gather",
     "spread_columns",
 ]
@@ -436,7 +436,7 @@ class NoiseShape:
 
 
 @dataclass(frozen=True)
-class Fields:
+class VideoFields:
     """Signs of interlaced video: differences between odd and even rows.
 
     The rows lie ``apart`` by a share of the step from frame to frame; ``shift`` [px] is that of every other frame.

@@ -30,7 +30,14 @@ from snapbeam.lab.tracking.measure import (
     seen_fields,
     touching,
 )
-from snapbeam.lab.tracking.settings import Fields, FrameFlag, NoiseShape, Orientation, Scene, TrackingSettings
+from snapbeam.lab.tracking.settings import (
+    FrameFlag,
+    NoiseShape,
+    Orientation,
+    Scene,
+    TrackingSettings,
+    VideoFields,
+)
 from snapbeam.lab.tracking.survey import CLIPPED, pixel_noise, saturation_level, survey
 from snapbeam.simulation.dataset import trajectory_dataset
 from snapbeam.util.diagnostics import Diagnostic, diagnostics_of, to_json
@@ -55,7 +62,7 @@ def tracked_dataset(
     scene: Scene,
     settings: TrackingSettings,
     drift: float,
-    fields: Fields,
+    fields: VideoFields,
 ) -> xr.Dataset:
     """The dataset of a tracked recording; see :func:`snapbeam.lab.track` for its variables.
 
@@ -127,7 +134,7 @@ def tracked_dataset(
     return dataset
 
 
-def _as_filtered(rows: TrackedRows, noise: NoiseShape, fields: Fields) -> TrackedRows:
+def _as_filtered(rows: TrackedRows, noise: NoiseShape, fields: VideoFields) -> TrackedRows:
     """The rows with errors of pictures that were averaged over frames, smoothed or interlaced, where that is seen."""
     lag = noise.lag + fields.lag
 

@@ -43,8 +43,8 @@ from snapbeam.sweeps.setup import SweepSetup
 from snapbeam.sweeps.tasks import (
     PointWork,
     Provenance,
+    ResultRows,
     ResultTable,
-    Rows,
     Stage,
     chunk_size,
     differences,
@@ -62,7 +62,7 @@ __all__ = [
     "Checkpoint",
     "CheckpointRows",
     "JoinedRows",
-    "Layer",
+    "RefinementLayer",
     "axes_apart",
     "checkpoint_folder",
     "grown",
@@ -239,7 +239,7 @@ _Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Layer:
+class RefinementLayer:
     """Points that a checkpoint got when its sweep was first requested, or in one extension."""
 
     work: PointWork
@@ -253,8 +253,8 @@ class Layer:
 class JoinedRows:
     """Rows of the layers of a checkpoint, in the order of the present grid."""
 
-    layers: Sequence[Layer]
-    rows: Sequence[Rows]
+    layers: Sequence[RefinementLayer]
+    rows: Sequence[ResultRows]
 
     def read(self, start: int, stop: int) -> ResultTable:
         """Return the rows *start* to *stop*."""
@@ -292,11 +292,11 @@ def grown(description: Mapping[str, Any], wanted: Mapping[str, Any], names: Sequ
     }
 
 
-def layers_of(work: PointWork, earlier: Sequence[Mapping[str, Any]], chunk: int) -> list[Layer]:
+def layers_of(work: PointWork, earlier: Sequence[Mapping[str, Any]], chunk: int) -> list[RefinementLayer]:
     """Return the layers of a checkpoint: those of its *earlier* sweeps, as :func:`grown` stores them, and of *work*."""
     now = work.setup.points
     if not isinstance(now, Grid):  # a list of points cannot be extended
-        return [Layer(work, Stage(BASE, now, chunk), np.arange(now.size))]
+        return [RefinementLayer(work, Stage(BASE, now, chunk), np.arange(now.size))]
     grids = [
         Grid({name: np.array(each["points"][name], now.axes[name].dtype) for name in each["axes"]})
         for each in earlier
@@ -307,7 +307,7 @@ def layers_of(work: PointWork, earlier: Sequence[Mapping[str, Any]], chunk: int)
         which = None if number == 0 else _beyond(grid, grids[number - 1])
         stage = Stage(BASE if number == 0 else f"more-{number}", grid, chunk, which)
         rows = np.arange(grid.size) if which is None else which
-        found.append(Layer(own, stage, _places(grid, now, rows)))
+        found.append(RefinementLayer(own, stage, _places(grid, now, rows)))
     return found
 
 
@@ -420,7 +420,7 @@ class Checkpoint:
             self._take_lock()
             refuse_links(self.path, sweep=not self.read_only)
             self.task_log = TaskLog(self.path / "tasks.jsonl")
-            self.layers: list[Layer] = []
+            self.layers: list[RefinementLayer] = []
             """Layers of an extended checkpoint; empty for any other."""
             self.chunk = self._describe(chunk, config, grow)
         except BaseException:
@@ -612,7 +612,7 @@ class Checkpoint:
             return None
         return columns if columns.content_hash() == self.task_log.records[stage.name, task].content else None
 
-    def reader(self, stage: Stage) -> Rows:
+    def reader(self, stage: Stage) -> ResultRows:
         """Return the results of a stage, which are read when they are needed."""
         if self.layers and stage.name == BASE:
             return JoinedRows(self.layers, [CheckpointRows(self, layer.stage) for layer in self.layers])
