@@ -77,7 +77,7 @@ def bounced(of: Drawn) -> Bounced:
         assert not impulse.size or np.nanmin(impulse) >= 0.0, words
     change = sb.perturbation_growth(system, sb.Integration(cycles=cycles))
     ends = np.searchsorted(change.cycle.values, np.arange(1, cycles + 1) - 1e-6)
-    return Bounced(change.separation.values[boundary], error, words)
+    return Bounced(change.separation.values[ends], error, words)
 
 
 def judge(runs: list[Bounced]) -> None:

@@ -91,7 +91,7 @@ def main(folder, races, seed):
         for each in said:
             seen[each["ended"]] += 1
             if each["ended"] == "refused":
-                holder = re.search(r"by another process \(process (\d+)\)", each["text"])
+                holder = re.search(r"another process is writing it \(process (\d+)\)", each["text"])
                 seen["unnamed"] += holder is None or int(holder[1]) not in children
             elif each["ended"] == "died":
                 seen["texts"].append(each["text"])

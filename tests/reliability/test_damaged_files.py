@@ -73,10 +73,10 @@ def test_an_interrupt_while_it_loads_is_no_traceback():
         "import builtins, sys\n"
         "from snapbeam.__main__ import main\n"
         "real = builtins.__import__\n"
-        "def stop(name, *rest):\n"
-        "    if name == 'snapbeam.cli':\n"
+        "def stop(name, *rest, **more):\n"
+        "    if name.startswith('snapbeam.cli'):\n"
         "        raise KeyboardInterrupt\n"
-        "    return real(name, *rest)\n"
+        "    return real(name, *rest, **more)\n"
         "builtins.__import__ = stop\n"
         "main()\n"
     )

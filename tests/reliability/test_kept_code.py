@@ -16,12 +16,12 @@ from snapbeam.model import default_values
 system = sb.System(sb.ReducedModel.from_beam(default_values.BEAM, modes=1), contact=default_values.CONTACT,
                    striker=sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))
 run = sb.simulate(system, sb.Integration(cycles=1))
-print(run.outcome.status.name, float(run.dataset.displacement_at_striker[-1]).hex())
+print(run.summary.status.name, float(run.dataset.displacement_at_striker[-1]).hex())
 """
 """A run, whose kernel is compiled."""
 SMALL = """
 from numba import njit
-from snapbeam.engines.scalar.kept_code import keep_code
+from snapbeam.solver.compilation import keep_code
 
 @njit
 def twice(x):
@@ -164,7 +164,7 @@ def test_a_run_from_read_only_package_and_home(python, copied, mounted, read_onl
 ARRAYS = """
 import numpy as np
 from numba import njit
-from snapbeam.engines.scalar.kept_code import keep_code
+from snapbeam.solver.compilation import keep_code
 
 @njit
 def total(values):
