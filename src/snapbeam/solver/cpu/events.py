@@ -340,9 +340,10 @@ def swap_rows(rows):
 def monitor_energy(
     memory, layout, run, now, t, state, seen1, control, event, status, accumulators, kernel_input
 ):
-    """After some steps, or a release, the energy is looked at: is the beam quiet, is its future certain?
+    """Evaluate the energy every eighth step and after a release; update the step control and the status.
 
-    *state* is where q and p stand, and g.q and q.Gq.  Returns what is kept in mind, and the status.
+    *state* contains the locations of q and p, and the values of g.q and q.Gq.  The energy decides whether long steps
+    are permitted and whether early termination is possible.  Returns the step control and the status.
     """
     clock, steps_since_start, low_energy, last = (
         run.clock,

@@ -52,9 +52,9 @@ class Packed(NamedTuple):
 
 
 def _blocks_of(coupled: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Number of the block of each mode, in the order of their first modes: every mode takes the least of those that
-    it is coupled to, until none changes.
+    """Return the block number of each mode, in the order of the first modes of the blocks.
 
+    Every mode takes the minimum label of the modes that it is coupled to, until no label changes.
     It is five lines of scipy.sparse.csgraph, which takes longer to load than many a run to integrate.
     """
     among = coupled | coupled.T | np.eye(len(coupled), dtype=bool)

@@ -298,8 +298,10 @@ def begin(memory, blocks, workspace, kernel_input, i, accumulators):
 
 @compiled
 def change_origin(memory, blocks, layout, well_sign, q, k, r):
-    """Take the other well, or where it would be if the two were equal, as the origin: exact, since the structure is the
-    same about both, but for a constant force if they are not.
+    """Take the other well as the origin of the coordinates.
+
+    If the wells are unequal, the origin is where the other well would be if they were equal.  The change is exact,
+    since the structure is the same about both wells, except for a constant force if the wells are unequal.
 
     About the well that the beam is in, the linear flow holds most of the motion of every mode; about
     the far one, modes faster than the step would be held in place by kicks alone.

@@ -134,7 +134,7 @@ def _ends(functions: Functions) -> tuple[Any, Any]:
 
     @device
     def tensioned(block, fixed, well_sign, q, p):
-        """This thread's part of a state, with the tension's sums."""
+        """Return the part of a state that belongs to this thread, with the sums of the tension."""
         g = well_sign * fixed.g
         r = tension(block, q)
         gq, qr, _, _ = sum_four(block, g * q, r * q, 0.0, 0.0)

@@ -111,7 +111,7 @@ def functions(order: int, threads: int, columns: int) -> Functions:
 
     @device
     def tension(block, q):
-        """This mode's part of G q; a sum over the block must follow before the next."""
+        """Return the row of G q of one mode; a sum over the block must follow before the next call."""
         block.values[0] = q
         synchronise()
         a, b, c, d = 0.0, 0.0, 0.0, 0.0

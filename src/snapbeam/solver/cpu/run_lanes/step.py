@@ -82,9 +82,11 @@ class Modes:
             first, padded = first + size, padded + -(-size // WIDTH) * WIDTH
 
     def each(self) -> range:
+        """Return the indices of the modes."""
         return range(self.count)
 
     def place(self, i: int, field: int) -> int:
+        """Return the row in memory of *field* of mode *i*."""
         return at.MODE + i * at.MODE_ROWS + field
 
     def row(self, i: int, field: int | str) -> str:
@@ -96,6 +98,7 @@ class Modes:
         )
 
     def number(self, i: int, which: int) -> str:
+        """Return the expression that loads one number of mode *i* into all lanes."""
         return f"broadcast_load(m, {self.place(i, which)})"
 
     def total(self, term: Callable[[int], tuple[str, str]]) -> str:
@@ -148,6 +151,7 @@ def _tree(columns: list[str | None]) -> str:
 
 
 def made(name: str, lines: list[str]) -> Any:
+    """Compile source lines that define the function *name*, and return it."""
     found: dict[str, Any] = dict(_KNOWN)
     exec(compile("\n".join(lines), f"<{name}>", "exec"), found)
     return found[name]
