@@ -58,7 +58,6 @@ def share_of(
 
 def is_kind(kind: ResponseClass) -> Callable[[xr.Dataset], _Mask]:
     """Return a function that selects the points of the response type *kind*."""
-    """Return a function that marks the points of a response class."""
     return lambda ds: np.asarray(ds.response_class.values == kind)
 
 
@@ -68,7 +67,6 @@ def _interwell(ds: xr.Dataset) -> _Mask:
 
 def transient(ds: xr.Dataset) -> _Mask:
     """Select the points with a transient response."""
-    """Mark the points with a transient response."""
     return is_transient(ds.response_class.values)
 
 
