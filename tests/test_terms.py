@@ -113,7 +113,7 @@ KEYS = {
 OPTIONS = set(
     """
     --store --verify --axis --along --share --refine --chunk --halve-step --velocity --restitution-coefficient --contact-restitution
-    --restitution-speed --drive --kick --threshold-line --dots --replicas --replica-size --fit --plan --early-decision --contact-loss
+    --restitution-speed --drive --kick --threshold-line --dots --replicas --replica-size --plan --early-decision --contact-loss
     --striker-spring --striker-damper --ends-left --ends-right --ends-axial --quiet-cycles --reference-freq
     """.split()
 )

@@ -101,7 +101,7 @@ class Run:
 
         Options are those of the function ``plot_...`` of :mod:`snapbeam.plot`; returns the axes.
         """
-        choice("type", kind, _KINDS)
+        choice("kind", kind, _KINDS)
         return plotter(f"plot_{kind}")(self, ax=ax, **options)
 
     def _repr_html_(self) -> str:
