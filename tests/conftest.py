@@ -1,4 +1,4 @@
-"""Shared ground: results made by formula, so that pictures and files are tested without any mechanics."""
+"""Fixtures and options of all tests: results that a formula gives, so that plots and files need no simulation."""
 
 from __future__ import annotations
 
