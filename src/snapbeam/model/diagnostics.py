@@ -1,4 +1,4 @@
-"""What is doubtful about a system: assumptions left behind, and numbers that look like another unit."""
+"""Diagnostics of a system: assumptions that do not hold, and values that look like another unit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every equilibrium of a structure with one tension term under a constant side force, and none missed."""
+"""Every equilibrium of a structure with one tension term under a constant transverse force, and none missed."""
 
 from __future__ import annotations
 
@@ -181,8 +181,9 @@ def _bracketed(
 
 
 def _distance(function: Callable[[float], float], reach: float, pole: bool) -> float:
-    """The root in (0, *reach*] of a function that is negative near 0 and positive at *reach*, by its logarithm if
-    0 is a pole of it.
+    """Return the root in (0, *reach*] of a function that is negative near 0 and positive at *reach*.
+
+    If 0 is a pole of the function, the search is in the logarithm of the distance.
     """
     from scipy.optimize import brentq
 
@@ -207,7 +208,7 @@ _SMALL = 1e-6
 
 
 def _branches(kappa: _Array, force: _Array, gamma: float) -> list[tuple[_Array, int]]:
-    """The pairs that branch off in a mode without a side force of its own."""
+    """The pairs that branch off in a mode without a transverse force of its own."""
     found = []
     for i in np.flatnonzero((force == 0.0) & (kappa < 0.0)):
         alpha = np.zeros_like(force)
@@ -226,7 +227,7 @@ def _branches(kappa: _Array, force: _Array, gamma: float) -> list[tuple[_Array, 
 
 
 # ----------------------------------------------------------------------------------------------------
-# The wells of a structure under a side force, the saddle between them and what it takes to cross.
+# The wells of a structure under a transverse force, the saddle between them and what it takes to cross.
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +261,7 @@ def tangent_stiffness(stiffness: _Array, gamma: float, alpha: _Array) -> _Array:
 
 
 def landscape_of(stiffness: _Array, gamma: float, force: _Array, midspan_shape: _Array) -> Landscape:
-    """All equilibria under the side force B, told apart.
+    """All equilibria under the transverse force B, told apart.
 
     At most two of them are stable: beyond the second eigenvalue of K0 + gamma s the term 2 gamma alpha alpha^T, of rank
     one, cannot make up for two negative ones.
@@ -293,7 +294,7 @@ def landscape_of(stiffness: _Array, gamma: float, force: _Array, midspan_shape: 
 
 
 # ----------------------------------------------------------------------------------------------------
-# What it takes a structure with unequal wells to pass a height: the bound behind early decision, with a side force.
+# What it takes a structure with unequal wells to pass a height: the bound behind early termination, with a transverse force.
 
 
 _HALVINGS = 120
@@ -372,8 +373,9 @@ def least_energy_through(
 
 
 def pinned_load(square: _Array, k0: _Array) -> float:
-    """Load, less that at hand, that buckles the structure pinned at a point: S_cc's first zero, or an untouched
-    mode.
+    """Return the buckling load of the structure pinned at a point, less the present load.
+
+    It is the lower of the first zero of S_cc and the load of the first mode with a node at the point.
     """
     touched = square > 1e-20 * square.max()
     free = np.sort(k0[~touched])

@@ -75,7 +75,9 @@ class Harvester:
 
 @dataclass(frozen=True, kw_only=True)
 class PiezoelectricHarvester(Harvester):
-    """Piezoelectric layers on both faces of the beam, from one place to another, on a load resistor,
+    """Piezoelectric layers on both faces of the beam, between two locations, with a load resistor.
+
+    The coupling of mode i and the equation of the voltage v are
 
         theta_i = Theta [phi_i'(x_2) - phi_i'(x_1)],     C v' = -v/R - theta . alpha',
 
@@ -137,8 +139,9 @@ class PiezoelectricHarvester(Harvester):
         patch_end: float = 0.25,
         wiring: str = "parallel",
     ) -> PiezoelectricHarvester:
-        """Two equal layers, one on each face, by their material (Erturk and Inman, Piezoelectric Energy Harvesting,
-        Wiley 2011, ch. 3).
+        """Return the harvester of two equal layers, one on each face, from their material constants.
+
+        The formulas are those of Erturk and Inman, Piezoelectric Energy Harvesting, Wiley 2011, ch. 3.
 
         Parameters
         ----------
@@ -205,11 +208,13 @@ class PiezoelectricHarvester(Harvester):
 
 @dataclass(frozen=True, kw_only=True)
 class ElectromagneticHarvester(Harvester):
-    """A magnet on the beam and a coil on the frame, on a load resistor,
+    """Magnet on the beam and coil on the frame, with a load resistor.
+
+    The current i and the force f_c on the beam at x_c satisfy
 
         L_c i' = K w'(x_c) - (R + R_c) i,     f_c = -K i,
 
-    w' in the frame of the ends and f_c the force on the beam at x_c.  The magnet's mass is left out.
+    with the velocity w' relative to the ends.  The magnet's mass is left out.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""An initial shape and a constant side load: what a real beam has and the ideal one has not."""
+"""An initial shape and a constant transverse load: what a real beam has and the ideal one has not."""
 
 from __future__ import annotations
 
@@ -71,14 +71,14 @@ FORMS = ("mode", "sine")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Imperfection:
-    """The shape w0(x) that a beam has before it is loaded, and a side load that never changes.
+    """The shape w0(x) that a beam has before it is loaded, and a transverse load that never changes.
 
     With alpha0 and F, their projections on the buckling modes, the potential energy is
 
         U = sum E I k_i^2 (alpha_i - alpha0_i)^2/2 - P (s - s0)/2 + gamma (s - s0)^2/4 - F . alpha,
 
     s = alpha . alpha and s0 = alpha0 . alpha0: that of a perfect beam under the load P + gamma s0 with the constant
-    side force E I k_i^2 alpha0_i + F_i.  Parts that are given add up.  Displacements, loads and forces count
+    transverse force E I k_i^2 alpha0_i + F_i.  Parts that are given add up.  Displacements, loads and forces count
     positive towards the upper well.
 
     Parameters
@@ -191,7 +191,7 @@ class Imperfection:
         return found
 
     def transverse_load(self, modes: Modes, beam: Beam) -> _Array:
-        """F_i, the integrals of the side load times phi_i, N m^0.5, shape (N,)."""
+        """F_i, the integrals of the transverse load times phi_i, N m^0.5, shape (N,)."""
         found = np.zeros(modes.count)
         if self.point_load != 0.0:
             found += self.point_load * modes.shape(self.point_location * modes.length)

@@ -234,7 +234,7 @@ def _only(values: Mapping[str, Any], section: str, known: list[str]) -> None:
 
 
 # ----------------------------------------------------------------------------------------------------
-# A system's neighbours: parts made anew with parameters changed by dotted name.
+# Systems with some parameters replaced, by dotted name.
 
 
 _OF_MODEL = ("modes", "damping_ratio", "reference_frequency")

@@ -116,7 +116,7 @@ def _finite(name: str, text: str, value: float) -> float:
 
 
 # ----------------------------------------------------------------------------------------------------
-# Frequencies in Hz, velocities in m/s and places in m, where a person thinks so: made into ratios at the door.
+# Values in physical units: frequencies in Hz, velocities in m/s and locations in m are converted to ratios on input.
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ class Parameter:
         Dotted name, ``section.name``.
     short : str
         Name of the dimension or the attribute that holds it in a dataset.
-    quantity : Quantity
+    quantity : ParameterField
         Unit, limits, words, symbol and scope.
     default : object
         What it is if nothing is given; None if it follows from others, is needed or has none.

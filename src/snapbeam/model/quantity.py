@@ -95,7 +95,7 @@ class ParameterField:
 
 
 def quantity(unit: str, words: str, *, default: Any = dataclasses.MISSING, **more: Any) -> Any:
-    """A dataclass field that is a :class:`Quantity`."""
+    """A dataclass field that is a :class:`ParameterField`."""
     return dataclasses.field(default=default, metadata={"quantity": ParameterField(unit, words, **more)})
 
 

@@ -271,7 +271,7 @@ class Wells:
 
     @cached_property
     def landscape(self) -> Landscape | None:
-        """The wells and the saddle of a structure with a side force; None without one."""
+        """The wells and the saddle of a structure with a transverse force; None without one."""
         if self.transverse_force is None:
             return None
         return landscape_of(
@@ -406,7 +406,7 @@ _LEAST_COMPLIANCE = 1e-300
 class ReducedModel(Wells):
     """Reduced model of N modal amplitudes alpha with a mass, a stiffness and one tension term.
 
-    The equation of motion is Eq. (11),
+    The equation of motion, with the left side of Eq. (11), is
 
         m alpha'' + K0 alpha + gamma (alpha . alpha) alpha = phi(x_s) f,
 
@@ -531,7 +531,7 @@ class ReducedModel(Wells):
         if imperfection is not None:
             initial = imperfection.initial_shape(shapes)
             force = beam.bending_stiffness * k**2 * initial + imperfection.transverse_load(shapes, beam)
-            # an initial shape acts as a side force, and as a load of gamma s0 more
+            # an initial shape acts as a transverse force, and as a load of gamma s0 more
             stiffness = stiffness - gamma * float(initial @ initial)
             found = landscape_of(stiffness, gamma, force, shapes.shape(0.5 * beam.length))
             equilibrium = found.lower.amplitude

@@ -235,8 +235,10 @@ START_NAME = re.compile(r"(amplitude|velocity)\[([1-9][0-9]{0,3})\]")
 
 
 def amplitude_scale(model: ReducedModel) -> float:
-    """What amplitudes of a start are counted in, m^0.5: the first amplitude in a well, or, of a structure
-    with one well, what moves the centre by the length scale.
+    """Return the unit of the amplitudes of an initial condition, m^0.5.
+
+    It is the norm of the amplitudes in the well.  If these are zero, it is the amplitude that moves the centre by the
+    length scale, or by 1 m if there is none.
     """
     well = float(np.sqrt(model.well_amplitude @ model.well_amplitude))
     if well > 0.0:

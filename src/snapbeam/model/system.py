@@ -271,7 +271,7 @@ class System:
         return self.moving[0] if self.moving else None
 
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """What is doubtful about it: sizes that look like another unit, assumptions of the model left behind."""
+        """Diagnostics: values that look like another unit, and assumptions of the model that do not hold."""
         return doubts_of(self.model, self.striker)
 
     # ------------------------------------------------------------------ identity and files

@@ -1,1 +1,1 @@
-"""util"""
+"""Validation, diagnostics, files and provenance."""

@@ -263,7 +263,7 @@ def instance(name: str, value: Any, kind: type, words: str) -> Any:
 
 
 # ----------------------------------------------------------------------------------------------------
-# The kinds of arguments at a public function's door, read off its annotations.
+# Types of the arguments of public functions, checked against their annotations.
 
 
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -372,7 +372,7 @@ def checked(function: _F) -> _F:
     known: dict[str, list[Any]] = {}
 
     @functools.wraps(function)
-    def door(*args: Any, **named: Any) -> Any:
+    def checked(*args: Any, **named: Any) -> Any:
         if not known:
             known.update({name: _members(kind) for name, kind in _kinds(function).items()})
         try:
@@ -391,7 +391,7 @@ def checked(function: _F) -> _F:
                 )
         return function(*args, **named)
 
-    return typing.cast(_F, door)
+    return typing.cast(_F, checked)
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -21,7 +21,9 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 
 @dataclass(frozen=True)
 class LayeredHertz(ContactLaw):
-    """Hertz's contact through a layer, elastic: both carry the force f, their penetrations add up,
+    """Elastic Hertz contact in series with a layer.
+
+    Both carry the force f, and their penetrations add up:
 
         d = d_c + d_l,    f = k_c d_c^(3/2) = k_l d_l^2.
 

@@ -54,10 +54,10 @@ class Drive:
     is_periodic: ClassVar[bool] = True
     """Whether the motion repeats after a turn of its argument; if not, that turn is longer than any run."""
     integrated_as: ClassVar[type[Drive] | None] = None
-    """The drive whose kernels march it, where that is another one."""
+    """The drive whose kernels integrate it, if they are those of another drive."""
     number_names: ClassVar[tuple[str, ...]] = ("omega",)
     parts: ClassVar[tuple[tuple[str, type[Drive]], ...]] = ()
-    """What moves, by name, of several motions that are marched as one: :mod:`snapbeam.model.drive.combined`."""
+    """The moving parts by name, if several motions are integrated as one: :mod:`snapbeam.model.drive.combined`."""
     terms: ClassVar[tuple[type[Drive], ...]] = ()
     """The kinds that it is a sum of."""
     amplitudes: ClassVar[tuple[str, ...]] = ("amplitude",)

@@ -26,11 +26,13 @@ _SHARPEST = 5.7736
 
 @dataclass(frozen=True, kw_only=True)
 class Burst(Timed):
-    """A sine under an envelope that rises from nothing, stays, and falls to nothing,
+    """Sine burst: the envelope rises from 0 to 1, stays at 1, and falls to 0.
+
+    The displacement of the tip is
 
         w_s(t) = w_0 + E(t) (V b omega_1/omega) sin(omega t),
 
-    with E = x^3 (10 - 15 x + 6 x^2) of the share x of the rise or of the fall: displacement, velocity and
+    with E = x^3 (10 - 15 x + 6 x^2) of the fraction x of the rise or of the fall: displacement, velocity and
     acceleration have no jump.  Afterwards the tip stays at its mid-position or, with *retraction*, leaves the beam.
     A burst longer than the run is a start-up.
 

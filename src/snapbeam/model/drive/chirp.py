@@ -1,4 +1,4 @@
-"""A sine whose frequency wanders from one value to another."""
+"""A sine whose frequency is swept from one value to another."""
 
 from __future__ import annotations
 
@@ -21,12 +21,14 @@ _Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Chirp(Timed):
-    """A sweep of the excitation frequency from one ratio to another at one velocity amplitude,
+    """Sweep of the excitation frequency from one ratio to another at constant velocity amplitude.
 
-        w_s(t) = w_0 + (V b omega_1/omega(t)) sin(integral of omega),
+    The displacement of the tip is
 
-    linear in time or in its logarithm; afterwards the frequency stays where it came to (the velocity, not the
-    displacement, has a small jump there).
+        w_s(t) = w_0 + (V b omega_1/omega(t)) sin(integral of omega).
+
+    The frequency or its logarithm is linear in time.  After the sweep the frequency stays at its last value; the
+    velocity, not the displacement, has a small jump there.
 
     Parameters
     ----------

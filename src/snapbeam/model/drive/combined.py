@@ -1,4 +1,4 @@
-"""Several motions that kernels march as one drive: that of the tip, of the base, and of the axial load.
+"""Several motions that kernels integrate as one drive: those of the tip, the base and the axial load.
 
 A run has one clock, whose argument belongs to one drive.  If one thing alone moves, the argument is its own, and what
 repeats goes on repeating; of several each has its argument from the time since they began.

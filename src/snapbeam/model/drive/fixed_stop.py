@@ -46,7 +46,7 @@ class FixedStop(Drive):
 
 @dataclass(frozen=True, kw_only=True)
 class _OwnAmplitude(Drive):
-    """A sine whose amplitude is given otherwise; it is marched as a :class:`Sine`."""
+    """A sine whose amplitude is given otherwise; it is integrated as a :class:`Sine`."""
 
     frequency_ratio: float = quantity(
         "1", "excitation frequency over the first natural frequency", low=0.0, scope=RUN, symbol=r"\Omega"

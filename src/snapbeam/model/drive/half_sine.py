@@ -21,7 +21,9 @@ _Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class HalfSine(Timed):
-    """A shock: the tip goes out and back once, half a sine, and stays at its mid-position,
+    """Half-sine shock: the tip moves out and back once and stays at its mid-position.
+
+    The displacement of the tip is
 
         w_s(t) = w_0 + A sin(pi t/T)  for t < T.
 

@@ -27,13 +27,15 @@ _SHARPEST = 5.7736
 
 @dataclass(frozen=True, kw_only=True)
 class BandLimitedNoise(Timed):
-    """A tip whose velocity is band-limited noise, the sum of 32 sines of equal strength and random phases,
+    """Band-limited noise: the velocity is the sum of 32 sines of equal amplitude and random phases.
+
+    The displacement of the tip is
 
         w_s(t) = w_0 + E(t) sum_j (a/omega_j) sin(omega_j t + phase_j),    a = V_rms b omega_1 sqrt(2/32),
 
-    one in each equal part of the band.  Places and phases come from a counter and the seed alone, so that a seed
-    is the same noise on every machine; after some 32 times the reciprocal of the band width it is no longer new.
-    E rises smoothly.
+    with one sine in each equal part of the band.  Frequencies and phases depend only on a counter and the seed, so
+    that a seed gives the same noise on every machine.  After about 32 times the reciprocal of the bandwidth the
+    noise is no longer new.  E rises smoothly.
 
     Parameters
     ----------

@@ -20,7 +20,9 @@ _Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Sine(Drive):
-    """A tip whose velocity is a sine of the amplitude V b omega_1 (Eq. 16),
+    """Harmonic motion of the tip with the velocity amplitude V b omega_1 (Eq. 16).
+
+    The displacement of the tip is
 
         w_s(t) = w_0 + (V b omega_1 / omega) sin(omega t + phase),    omega = Omega omega_1,
 

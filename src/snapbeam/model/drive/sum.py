@@ -23,15 +23,18 @@ MOST_TERMS = 4
 
 
 class SumDrive(Timed):
-    """Several drives one over the other,
+    """Sum of two to four drives.
+
+    The displacement of the tip is
 
         w_s(t) = w_0 + sum_i [w_i(t) - w_i(0)],
 
-    which begins at zero without a jump, whatever phases the terms have.  Made by :meth:`of`, or by ``+``:
+    which begins at w_0 without a jump for any phases of the terms.  Use :meth:`of` or ``+`` to create a sum:
     ``Sine(...) + Burst(...)``.
 
-    In parameter files its kind is that of its terms, ``"sine+burst"``, and the parameters of term i bear its number,
-    ``frequency_ratio_1``, ``length_2``, counted from 1.  A cycle is one of the first term.
+    In parameter files the type of a sum joins those of its terms, ``"sine+burst"``.  The parameters of term i end
+    with its number, counted from 1: ``frequency_ratio_1``, ``duration_cycles_2``.  A cycle is a cycle of the first
+    term.
     """
 
     terms: ClassVar[tuple[type[Drive], ...]] = ()

@@ -21,13 +21,13 @@ _Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class TwoTone(Timed):
-    """A sine and another one, a harmonic or any other tone,
+    """Two-tone excitation: a sine and a second one, a harmonic or any other tone.
+
+    The displacement of the tip is
 
         w_s(t) = w_0 + (V b omega_1/omega) sin(omega t) + A_2 [sin(omega_2 t + phase_2) - sin(phase_2)],
 
-    with A_2 = V_2 b omega_1/omega_2.
-
-    A cycle is one of the first.
+    with A_2 = V_2 b omega_1/omega_2.  A cycle is a period of the first sine.
 
     Parameters
     ----------
