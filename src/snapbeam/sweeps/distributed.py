@@ -1,4 +1,4 @@
-"""Who computes the tasks: this process, or the workers of a cluster, whose deaths are survived."""
+"""Workers that compute the tasks of a sweep: the threads of one process, or a Dask cluster."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ __all__ = [
 
 
 # ----------------------------------------------------------------------------------------------------
-# The workers of a cluster as they come and go: told, counted, and put back where they are this process's own.
+# The pool of workers of a cluster: changes, losses and replacement of local workers.
 
 
 _MOST_LOST = 12
-"""Workers, for each that is there, that may go without any task finished."""
+"""Maximum number of lost workers, per present worker, while no task finishes."""
 _PATIENCE = 20.0
-"""Seconds that a worker of this machine may be missing before another is started; twice as many each time."""
+"""Seconds after which a missing local worker is replaced; the time doubles with each replacement."""
 _MOST_MENDED = 5
 
 
@@ -67,18 +67,18 @@ class WorkerPool:
         self._mended = 0
 
     def finished(self) -> None:
-        """A task was finished."""
+        """Record that a task finished."""
         self.succeeded = True
         self._lost.clear()
         self._mended = 0
 
     def now(self, there: Mapping[str, int]) -> None:
-        """Look at who is there.
+        """Update the pool with the present workers.
 
         Raises
         ------
         CheckpointError
-            If workers come and go and never finish anything, or none can be started.
+            If workers are lost again and again without a result, or none can be started.
         """
         before, self._known = self._known, set(there)
         if before is None or bool(before) != bool(there):
@@ -86,13 +86,13 @@ class WorkerPool:
         self._lost |= (before or set()) - self._known
         if len(self._lost) > _MOST_LOST * max(1, len(there)):
             raise CheckpointError(
-                f"the workers cannot compute this map: {len(self._lost)} of them came and went and no task was "
-                "finished; they may have too little memory for one: give them more, or smaller tasks (chunk)"
+                f"the workers cannot compute this sweep: {len(self._lost)} of them were lost and no task finished; "
+                "they may have too little memory: give them more memory, or fewer points_per_task"
             )
         self._mend()
 
     def _mend(self) -> None:
-        """Start workers of this machine that have been missing for long."""
+        """Replace local workers that are missing for too long."""
         cluster = self._cluster
         if cluster is None or type(cluster).__name__ != "LocalCluster":
             return
@@ -102,15 +102,15 @@ class WorkerPool:
             self._whole_at = now
         elif now - self._whole_at > _PATIENCE * 2**self._mended:
             if self._mended >= _MOST_MENDED and not self._known:
-                raise CheckpointError("the workers cannot compute this map: none of them can be started")
+                raise CheckpointError("the workers cannot compute this sweep: none of them can be started")
             self._mended, self._whole_at = min(self._mended + 1, _MOST_MENDED), now
-            self.note("starting workers anew")
+            self.note("starting workers again")
             cluster.sync(_replace, cluster, self._known)
             cluster.scale(len(cluster.worker_spec))
 
 
 async def _replace(cluster: Any, there: set[str]) -> None:
-    """Forget the keepers whose workers are not there."""
+    """Remove the nannies whose workers are missing."""
     for name, nanny in list(cluster.workers.items()):
         if nanny.worker_address not in there:
             del cluster.workers[name]
@@ -131,52 +131,54 @@ async def _close(nanny: Any) -> None:
 
 
 ATTEMPTS = 3
-"""Times that a task may kill its worker, or raise in it, before it is given up."""
+"""Number of times that a task may kill its worker or raise an error before it counts as failed."""
 _POLL = 0.5
 _DELIVERY_POLL = 2.0
 _RECONNECT = 30.0
 _GONE = (OSError, TimeoutError, asyncio.TimeoutError, CancelledError, asyncio.CancelledError, RuntimeError)
-"""What calls to a scheduler that is not there any more raise."""
+"""Errors of calls to a scheduler that is gone."""
 
 
 class TaskResult(NamedTuple):
-    """Results of a task, and what computed them; the provenance of this process if none is given."""
+    """Results of a task and their provenance; None stands for this process."""
 
     columns: ResultTable
     provenance: Provenance | None = None
 
 
 class TaskError(NamedTuple):
-    """Why a task was given up."""
+    """Reason why a task failed."""
 
     reason: str
 
 
 class Workers(Protocol):
-    """Computes tasks of a stage and gives each with what came of it, in any order."""
+    """Computes tasks of a stage and yields each with its result or its error, in any order."""
 
     def run(
         self, work: PointWork, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
-    ) -> Iterator[tuple[int, TaskResult | TaskError]]: ...
+    ) -> Iterator[tuple[int, TaskResult | TaskError]]:
+        """Compute *tasks* of *stage*; yield each task with its result or its error, in any order."""
+        ...
 
 
 @dataclass(frozen=True)
 class LocalThreads:
-    """This process, with all its threads on one task after another."""
+    """The present process, which computes one task after another with all its threads."""
 
     threads: int | None = None
 
     def run(
         self, work: PointWork, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
     ) -> Iterator[tuple[int, TaskResult | TaskError]]:
-        """Compute the tasks in order; *progress* gets the points done of the present one."""
+        """Compute the tasks in order; *progress* receives the number of finished points of the present task."""
         for task in tasks:
             columns = work.compute(stage.columns(task), self.threads, lambda done, _: progress(done))
             yield task, TaskResult(columns)
 
 
 def compute_task(work: PointWork, points: Columns, threads: int, version: str, code: str) -> tuple[Any, ...]:
-    """What a worker of a cluster does: one task, with all its threads, if its code is that of who asks."""
+    """Compute one task on a worker, with all its threads, if its code is that of the requesting process."""
     provenance = provenance_of(work.setup.system)
     if (provenance.version, provenance.code) != (version, code):
         return None, None, astuple(provenance)
@@ -188,20 +190,20 @@ def compute_task(work: PointWork, points: Columns, threads: int, version: str, c
 class ClusterWorkers:
     """Workers of a Dask cluster.
 
-    Each worker has one task at a time, so the death of a worker is the doing of a known task, and each
-    task uses all the threads its worker was given.  Results come back to this process, the only one that
-    writes.  Nothing is waited for without end but workers that have yet to come.
+    Each worker computes one task at a time with all its threads, so that the task that kills a worker is known.
+    Results return to this process, which alone writes the checkpoint.  Every wait has a limit, except the wait for the
+    first worker.
     """
 
     client: Client
     note: Callable[[str], object] = print
     delivery: float = 60.0
-    """Seconds that a living worker has to hand over the results of a finished task."""
+    """Seconds after which results of a finished task count as lost."""
 
     def run(
         self, work: PointWork, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
     ) -> Iterator[tuple[int, TaskResult | TaskError]]:
-        """Compute the tasks as workers come and go."""
+        """Compute the tasks on the present workers."""
         provenance = provenance_of(work.setup.system)
         queue = deque(tasks)
         flying: dict[Future, tuple[int, str]] = {}
@@ -235,7 +237,9 @@ class ClusterWorkers:
                         queue.append(task)
                         continue
                     if not pool.succeeded and outcome.reason.startswith("raised"):
-                        raise CheckpointError(f"the workers cannot compute this map: a task {outcome.reason}")
+                        raise CheckpointError(
+                            f"the workers cannot compute this sweep: a task {outcome.reason}"
+                        )
                     yield task, TaskError(f"{outcome.reason}, {ATTEMPTS} times")
         finally:
             if flying:
@@ -252,7 +256,7 @@ class ClusterWorkers:
             return dict(self.client.nthreads())
 
     def _settled(self, flying: dict[Future, tuple[int, str]], there: dict[str, int]) -> list[Any]:
-        """Futures that ended, or whose worker is gone, after waiting a moment for one to."""
+        """Return futures that ended or whose worker is gone, after a short wait."""
         from distributed import wait
 
         if not flying:
@@ -265,7 +269,7 @@ class ClusterWorkers:
         return [(f, task, at) for f, (task, at) in flying.items() if f.done() or at not in there]
 
     def _outcome(self, future: Future, address: str) -> TaskResult | TaskError:
-        """What came of a task that ended; one whose results do not come is as one that killed its worker."""
+        """Return the result of a task that ended; lost results count like a killed worker."""
         from distributed import KilledWorker
 
         if not future.done():
@@ -282,10 +286,10 @@ class ClusterWorkers:
         return TaskError(f"raised {type(error).__name__}: {error}")
 
     def _delivered(self, future: Future, address: str) -> TaskResult | TaskError:
-        """The results of a finished task, as long as the worker that holds them lives.
+        """Fetch the results of a finished task.
 
-        When it dies before it handed them over, the scheduler would compute them again on the same worker, which
-        never comes back; so the task is dropped and handed out anew.
+        If the worker dies first, the scheduler would wait for the same worker, which does not return.  The task is
+        therefore cancelled and submitted again.
         """
         from distributed import KilledWorker
 
@@ -317,13 +321,13 @@ class ClusterWorkers:
 
 def _gone(why: object) -> CheckpointError:
     return CheckpointError(
-        f"the scheduler does not answer any more ({why}); no finished task is lost: give the same command again"
+        f"the scheduler does not answer ({why}); no finished task is lost: give the same command again"
     )
 
 
 @contextmanager
 def _answered() -> Iterator[None]:
-    """Turn what is raised about a scheduler that is gone into words."""
+    """Convert the errors of a scheduler that is gone to a CheckpointError."""
     try:
         yield
     except CheckpointError:
@@ -333,7 +337,7 @@ def _answered() -> Iterator[None]:
 
 
 # ----------------------------------------------------------------------------------------------------
-# Where the workers of a map come from: processes here, a scheduler that runs already, or a SLURM queue.
+# Clusters: local processes, a running scheduler, or a SLURM queue.
 
 
 _FORMS = "local:N, tcp://host:port, tls://host:port or a TOML file such as slurm.toml"
@@ -353,7 +357,7 @@ _NEEDED = ("cores", "interface", "memory")
 
 @dataclass(frozen=True)
 class Cluster:
-    """A cluster as it was asked for, checked."""
+    """A checked request for a cluster."""
 
     kind: str
     """``"local"``, ``"address"`` or ``"slurm"``."""
@@ -363,18 +367,18 @@ class Cluster:
 
 
 def parse_cluster(text: str) -> Cluster:
-    """Read what was given as cluster.
+    """Parse the argument *cluster*.
 
     Parameters
     ----------
     text : str
-        ``"local:4"`` for four processes here, ``"tcp://host:8786"`` or ``"tls://host:8786"`` for a scheduler
-        that runs already, or the path of a TOML file with a section ``[slurm]``.
+        ``"local:4"`` for four local processes, ``"tcp://host:8786"`` or ``"tls://host:8786"`` for a running
+        scheduler, or the path of a TOML file with a section ``[slurm]``.
 
     Raises
     ------
     InputError
-        If it is none of these; of a file, with the key that is wrong.
+        If the text has another form, or a key of the file is wrong.
     """
     if not isinstance(text, str) or not text:
         raise InputError(f"cluster = {shown(text)}: must be {_FORMS}")
@@ -411,7 +415,11 @@ def _read_slurm(path: Path) -> dict[str, Any]:
         if name not in given:
             raise InputError(
                 f"{path.name}: [slurm] {name} is missing"
-                + (": the network that the workers reach the scheduler by" if name == "interface" else "")
+                + (
+                    ": the network interface through which the workers reach the scheduler"
+                    if name == "interface"
+                    else ""
+                )
             )
     for name in ("cores", "jobs"):
         if name in given:
@@ -421,7 +429,7 @@ def _read_slurm(path: Path) -> dict[str, Any]:
 
 @contextmanager
 def open_client(cluster: Cluster) -> Iterator[Client]:
-    """Start or join a cluster; what was started here ends with the block."""
+    """Connect to a cluster; a cluster that is started here ends with the block."""
     try:
         import dask
         from distributed import Client
@@ -437,7 +445,7 @@ def open_client(cluster: Cluster) -> Iterator[Client]:
         try:
             yield client
         finally:
-            with suppress(Exception):  # a scheduler that is gone cannot be taken leave of
+            with suppress(Exception):  # a scheduler that is gone cannot be disconnected
                 client.close(timeout=5)
         return
     with dask.config.set({"distributed.comm.timeouts.connect": "60s"}):
@@ -463,12 +471,12 @@ def _local(workers: int) -> Any:
 
 
 def _one_thread_each() -> dict[str, str]:
-    """Settings that keep a linear algebra library from starting threads beside the engine's."""
+    """Return settings that keep linear algebra libraries from starting threads of their own."""
     return {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
 
 def _slurm(settings: dict[str, Any]) -> Any:
-    """One worker process a job, with all its cores; the scheduler listens on the interface that was named."""
+    """Start a SLURM cluster: one worker process for each job, with all its cores."""
     try:
         from dask_jobqueue import SLURMCluster
     except ImportError as error:
@@ -479,7 +487,7 @@ def _slurm(settings: dict[str, Any]) -> Any:
 
 
 def slurm_arguments(settings: dict[str, Any]) -> dict[str, Any]:
-    """What a job of a SLURM queue is asked for, in the words of dask-jobqueue."""
+    """Return the arguments of ``dask_jobqueue.SLURMCluster``."""
     exports = [f"export {name}={value}" for name, value in _one_thread_each().items()]
     return {
         "queue": settings.get("queue"),
