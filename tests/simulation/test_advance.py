@@ -447,7 +447,7 @@ SYSTEM = system_of(2)
         (
             lambda: sb.advance(SYSTEM, periods=1.5, save_every_period=True),
             InputError,
-            "periods = 1.5 with every = True",
+            "periods = 1.5 with save_every_period = True",
         ),
         (
             lambda: sb.advance(SYSTEM, sb.State(amplitude=[1.0, 2.0, 3.0])),
@@ -457,12 +457,12 @@ SYSTEM = system_of(2)
         (
             lambda: sb.advance(SYSTEM, integration=sb.Integration(tolerance=1e-3)),
             InputError,
-            "tolerance = 0.001: is for one run",
+            "tolerance = 0.001: applies to simulate",
         ),
         (
             lambda: sb.advance(sb.System(SYSTEM.model)),
             InputError,
-            "striker = None: a beam that nothing strikes needs a start",
+            "striker = None: without a striker the beam needs an initial_state",
         ),
         (
             lambda: sb.advance(SYSTEM, tangent=np.zeros((2, 2))),

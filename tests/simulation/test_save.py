@@ -129,7 +129,7 @@ def test_refusals(tmp_path) -> None:
     with pytest.raises(InputError, match="is no NetCDF file of results"):
         sb.load(tmp_path / "text.nc")
     run.dataset.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")
-    with pytest.raises(InputError, match=r"is no file of a run that Run\.save wrote"):
+    with pytest.raises(InputError, match=r"is not a run that Run\.save wrote"):
         sb.load(tmp_path / "dataset.nc")
     run.save(tmp_path / "run.nc")
     import h5netcdf
@@ -137,7 +137,7 @@ def test_refusals(tmp_path) -> None:
     for name, text in (("snapbeam_system", "{"), ("snapbeam_format", "snapbeam run 99")):
         with h5netcdf.File(tmp_path / "run.nc", "a") as file:
             before, file.attrs[name] = file.attrs[name], text
-        with pytest.raises(InputError, match=r"is damaged|is no file of a run"):
+        with pytest.raises(InputError, match=r"is damaged|is not a run"):
             sb.load(tmp_path / "run.nc")
         with h5netcdf.File(tmp_path / "run.nc", "a") as file:
             file.attrs[name] = before

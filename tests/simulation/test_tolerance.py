@@ -272,5 +272,5 @@ def test_a_drive_that_does_not_say_what_it_scales_with_is_refused(monkeypatch) -
     system = sb.System(model_of(1), CONTACT, sb.Striker(drive=MOTIONS["shock"], gap=0.0))
     ensemble = make_ensemble(system, sb.Integration(cycles=1))
     monkeypatch.setattr(sb.HalfSine, "amplitudes", ())
-    with pytest.raises(sb.InputError, match="'half_sine': names no number in its amplitudes"):
+    with pytest.raises(sb.InputError, match="drive = 'half_sine': must name the numbers"):
         _perturbed(ensemble, 0.5)

@@ -1,4 +1,4 @@
-"""Going on from a state: the primitive that questions about dynamics are made of."""
+"""Advance states by periods of the excitation."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ __all__ = ["advance"]
 _Array = NDArray[np.float64]
 
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
-PASSED = (
+_STATISTICS = (
     "status", "zero_crossings", "impacts", "peak_force", "impulse", "striker_work", "gross_work", "energy_dissipated",
     "min_displacement", "max_displacement", "min_midspan_displacement", "max_midspan_displacement", "contact_time_fraction",
 )  # fmt: skip
-"""Statistics of the way that a state has behind it."""
+"""Statistics of the time that a state was advanced over."""
 
 
 def advance(
@@ -45,41 +45,41 @@ def advance(
     save_every_period: bool = False,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> State:
-    """Where a system stands some periods of the excitation after it stood in a state.
+    """Advance a state, or a batch of states, by periods of the excitation.
 
-    Steps land on every whole period, and what follows depends on the state there alone: two calls of one period
-    each give, bit for bit, what one call of two periods gives (under a recorded drive to rounding).
-    :func:`~snapbeam.simulate` does not land in between and agrees to the error of its accuracy level.
+    A step ends at every whole period, and the further motion depends only on the state there.  Two calls of one period
+    are therefore bitwise identical with one call of two periods (under a recorded motion, equal to rounding).
+    :func:`~snapbeam.simulate` has no such steps and agrees to the error of its accuracy level.
 
     Parameters
     ----------
     system : System
     state : State, optional
-        One state, or a batch of them, which all cores march side by side; the system's start by default.
+        One state, or a batch, which all cores integrate in parallel; by default the initial state of the system.
     periods : float
-        Periods of the excitation, greater than 0; of the first mode where nothing strikes.
+        Periods of the excitation, greater than 0; without an excitation, periods of the first mode.
     tangent : array_like of shape (..., k, 2, N), optional
-        Small changes of amplitudes (m^0.5) and velocities (m^0.5/s) to carry along by the tangent flow of the same
-        steps: k of them for each state, or the same k for all.
+        Small changes of amplitudes (m^0.5) and velocities (m^0.5/s), which the tangent flow of the same steps
+        advances: k of them for each state, or the same k for all.
     integration : Integration, optional
-        Steps, accuracy, threads.  States go on on the CPU, for *periods*, and no run is decided early.
+        Solver settings.  The CPU advances the states for *periods*, without early termination.
     save_every_period : bool
-        Whether to give the states after each period, along a new first dimension, instead of the last one; their
-        ``passed`` is of the whole way, but for the status, which is of each state.
+        Whether to return the state after each period, along a new first dimension, instead of the last one.  The
+        ``statistics`` are those of all periods, except the status, which is that of each state.
     progress : callable, optional
-        Called as ``progress(done, total)`` with states; True writes a line to standard error.
+        Function that receives ``(done, total)``, numbers of states; True writes a line to standard error.
 
     Returns
     -------
     State
-        With ``passed``, what happened on the way (its statistics have the shape of the batch; a contact that is
-        still going on is none of the impacts yet), and ``tangent``, if some were given.  A state that the engine could
-        not reach has a ``passed["status"]`` that says why, and NaN for numbers.
+        The advanced state, with its ``statistics``, in the shape of the batch, and its ``tangent`` if *tangent* was
+        given.  A contact that has not ended does not count as an impact.  If a state could not be reached,
+        ``statistics["status"]`` gives the reason, and its numbers are NaN.
 
     Raises
     ------
     InputError
-        For bad input; for tangents under a law of contact whose force jumps; for more periods than a record holds.
+        For bad input; for tangents with a contact law whose force jumps; for more periods than a recorded motion has.
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
@@ -87,8 +87,7 @@ def advance(
         raise InputTypeError(f"state = {shown(state)}: must be a State")
     if system.further_contacts:
         raise InputError(
-            "striker: a state says where one striker stands and since when it touches; of several strikers ask for "
-            "whole runs, by simulate or a sweep"
+            "striker: a state contains the position of one striker only; for several strikers use simulate or a sweep"
         )
     integration = instance(
         "integration", Integration() if integration is None else integration, Integration, "an Integration"
@@ -108,11 +107,11 @@ def advance(
             f"state of {state.modes} modes: must have the {system.model.modes} modes of the model"
         )
     if save_every_period and not float(span).is_integer():
-        raise InputError(f"periods = {span:g} with every = True: must be a whole number")
+        raise InputError(f"periods = {span:g} with save_every_period = True: must be an integer")
     flat = state.flat()
     if integration.tolerance is not None:
         raise InputError(
-            f"tolerance = {integration.tolerance:g}: is for one run; give steps, or accuracy = 'reference'"
+            f"tolerance = {integration.tolerance:g}: applies to simulate; give step, or accuracy = 'reference'"
         )
     ensemble = make_ensemble(system, integration.replace(early_termination=False), start=flat, periods=span)
     _, engine = resolve("cpu")
@@ -127,27 +126,29 @@ def advance(
         vectors = (moved @ system.model.linear_modes.T).reshape((*state.batch, *moved.shape[1:]))
     found = _states(ensemble, landings, save_every_period)
     passed = statistics_of(ensemble, landings.accumulators_of_runs)
-    return _shaped(found, state.batch, save_every_period, {name: passed[name] for name in PASSED}, vectors)
+    return _shaped(
+        found, state.batch, save_every_period, {name: passed[name] for name in _STATISTICS}, vectors
+    )
 
 
 def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
     if system.contact is not None and not system.contact.properties.smooth:
         raise InputError(
-            f"tangent with contact = {shown(system.contact)}: its force jumps, so that the tangent flow does; give none"
+            f"tangent with contact = {shown(system.contact)}: its force jumps, and so does the tangent flow; give no tangent"
         )
     if system.striker is not None and system.striker.mass is not None:
         raise InputError(
-            f"tangent with striker mass = {system.striker.mass:g} kg: the tangent flow is that of the beam alone; give "
-            "none, or leave the mass out"
+            f"tangent with striker mass = {system.striker.mass:g} kg: the tangent flow does not contain the body "
+            "of the striker; give no tangent, or no mass"
         )
     if system.harvester is not None:
         raise InputError(
-            "tangent with a harvester: the tangent flow is that of the beam alone; give none, or leave it out"
+            "tangent with a harvester: the tangent flow does not contain its circuit; give no tangent, or no harvester"
         )
     if system.contact is not None and not system.contact.properties.tangent:
         raise InputError(
-            f"tangent with contact = {system.contact!r}: the tangent flow is known for laws whose force depends on the "
-            "penetration alone, such as HertzContact(stiffness); give none"
+            f"tangent with contact = {system.contact!r}: the tangent flow exists for laws whose force depends on the "
+            "penetration only, such as HertzContact(stiffness); give no tangent"
         )
     given = finite_array("tangent", tangent)
     shape = (2, flat.modes)
@@ -164,7 +165,7 @@ def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
 
 
 def _states(ensemble: Ensemble, landings: Landings, every: bool) -> list[State]:
-    """States after each period, or after the last one alone, with their status; NaN where a run did not come so far."""
+    """Return the states after each period, or after the last one, with their status; NaN if a run did not reach it."""
     count, accumulators = landings.q.shape[1], landings.accumulators_of_runs
     failed = ~np.isin(accumulators["status"], _REACHED)
     found = []
@@ -188,7 +189,7 @@ def _shaped(
     passed: dict[str, Any],
     tangent: _Array | None,
 ) -> State:
-    """States as one batch of the shape that was asked for."""
+    """Return states as one batch of the requested shape."""
     names = (
         "amplitude",
         "velocity",

@@ -1,8 +1,8 @@
-"""The labelled dataset of one run, simulated or measured: its names, dimensions and units.
+"""Schema of the dataset of a run, simulated or measured: names, dimensions and units.
 
-Displacements are normalised by the buckling level b and velocities by b omega_1, times are in seconds, ``cycle``
-counts periods of the excitation (the paper's tau).  A measured run has no modal amplitudes, force or energies, and
-may have dropouts: samples at which something was not found have ``valid`` = 0, and only there may a number be NaN.
+Displacements are normalised by the buckling level b and velocities by b omega_1.  Times are in seconds; ``cycle``
+counts periods of the excitation (the paper's tau).  A measured run has no modal amplitudes, force or energies.  Its
+dropouts have ``valid`` = 0, and only there a number may be NaN.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ __all__ = [
 
 
 class Variable(NamedTuple):
-    """What one variable of a run is: its dimensions, its unit and its name in words."""
+    """Variable of a run: dimensions, unit and long name."""
 
     dims: tuple[str, ...]
     units: str
@@ -50,9 +50,9 @@ SCHEMA: dict[str, Variable] = {
     "mode": Variable(("mode",), "1", "buckling mode"),
     "striker": Variable(("striker",), "1", "number of the striker"),
     "displacement_at_striker": Variable(("time",), "1", "beam displacement at the striker, over b"),
-    "midspan_displacement": Variable(("time",), "1", "beam displacement at the centre, over b"),
+    "midspan_displacement": Variable(("time",), "1", "beam displacement at mid-span, over b"),
     "velocity_at_striker": Variable(("time",), "1", "beam velocity at the striker, over b omega_1"),
-    "midspan_velocity": Variable(("time",), "1", "beam velocity at the centre, over b omega_1"),
+    "midspan_velocity": Variable(("time",), "1", "beam velocity at mid-span, over b omega_1"),
     "striker_displacement": Variable(("time",), "1", "striker displacement, over b"),
     "penetration_normalised": Variable(("time",), "1", "penetration, over b"),
     "contact_force": Variable(("time",), "N", "contact force"),
@@ -64,23 +64,23 @@ SCHEMA: dict[str, Variable] = {
     "energy_beam": Variable(("time",), "J", "kinetic and potential energy of the beam, above its well"),
     "energy_contact": Variable(("time",), "J", "energy stored in the contact"),
     "energy_striker": Variable(
-        ("time",), "J", "energy of the striker's motion beyond that of its drive, in its suspension included"
+        ("time",), "J", "energy of the striker's motion relative to its drive, suspension included"
     ),
     "striker_work": Variable(("time",), "J", "work done by the striker"),
     "energy_dissipated": Variable(("time",), "J", "energy dissipated"),
-    "base_displacement": Variable(("time",), "1", "displacement of the base in space, over b"),
-    "base_velocity": Variable(("time",), "1", "velocity of the base in space, over b omega_1"),
+    "base_displacement": Variable(("time",), "1", "displacement of the base, over b"),
+    "base_velocity": Variable(("time",), "1", "velocity of the base, over b omega_1"),
     "base_work": Variable(("time",), "J", "work done by the base, in its frame"),
-    "load_change": Variable(("time",), "N", "axial load beyond that of the reduction"),
+    "load_change": Variable(("time",), "N", "change of the axial load"),
     "load_work": Variable(("time",), "J", "work done by the change of the axial load"),
     "voltage": Variable(("time",), "V", "voltage across the harvester's load"),
     "power_load": Variable(("time",), "W", "power in the harvester's load"),
-    "energy_harvested": Variable(("time",), "J", "energy that ended in the harvester's load"),
+    "energy_harvested": Variable(("time",), "J", "energy dissipated in the harvester's load"),
     "energy_circuit": Variable(("time",), "J", "energy stored in the harvester's circuit"),
-    "energy_lost_contact": Variable(("time",), "J", "part of it that was lost in contact"),
+    "energy_lost_contact": Variable(("time",), "J", "part of the dissipated energy that was lost in contact"),
     "valid": Variable(("time",), "1", "whether the sample was measured"),
 }
-"""Every variable a run may have, by name; ``time``, ``cycle`` and ``mode`` are coordinates."""
+"""Variables of a run by name; ``time``, ``cycle``, ``mode`` and ``striker`` are coordinates."""
 
 _MODAL = ("modal_amplitude", "modal_velocity")
 _OF_STRIKERS = ("striker_displacements", "striker_penetrations", "striker_forces")
@@ -101,9 +101,9 @@ def trajectory_dataset(
     time : array_like, shape (samples,)
         Seconds, strictly increasing.
     cycle : array_like, shape (samples,), optional
-        Cycles of excitation since its start; left out of a run without excitation.
+        Cycles of excitation since its start; None for a run without excitation.
     attrs : mapping, optional
-        What the run came from: parameters and provenance.
+        Attributes: parameters and provenance.
     **variables : array_like
         The variables of :data:`SCHEMA` by name, of shape (samples,), or (samples, modes) for
         ``modal_amplitude`` and ``modal_velocity``.
@@ -128,7 +128,7 @@ def trajectory_dataset(
     for name, values in variables.items():
         if name in _COORDINATES or name not in SCHEMA:
             known = ", ".join(key for key in SCHEMA if key not in _COORDINATES)
-            raise InputError(f"{name}: not a variable of a run; the variables are {known}")
+            raise InputError(f"{name}: is not a variable of a run; must be one of {known}")
         array = np.asarray(values)
         if array.dtype.kind not in "biuf":
             raise InputTypeError(f"{name}: must be an array of numbers, not of {array.dtype}")
@@ -156,22 +156,22 @@ def _labelled(name: str, values: np.ndarray) -> tuple[tuple[str, ...], np.ndarra
 def check_trajectory(
     dataset: xr.Dataset, require: Iterable[str] = ("displacement_at_striker",)
 ) -> xr.Dataset:
-    """Return *dataset* if it follows the schema of a run; say what is wrong with it if not.
+    """Return *dataset* if it follows the schema of a run.
 
-    Variables beyond the schema are left alone, so that an experiment may add its own.
+    Variables that are not in the schema are not checked, so that an experiment may add its own.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         A run, simulated or measured.
     require : iterable of str
-        The variables the caller cannot do without.
+        Variables that the dataset must have.
 
     Raises
     ------
     InputError
-        If ``time`` or a required variable is missing, dimensions or units differ from :data:`SCHEMA`, times
-        do not increase strictly, or a number is not finite where ``valid`` does not say so.
+        If ``time`` or a required variable is missing, dimensions or units differ from :data:`SCHEMA`, times do not
+        increase strictly, or a number is not finite although its sample is valid.
     """
     import xarray as xr
 
@@ -179,7 +179,9 @@ def check_trajectory(
         raise InputTypeError(f"dataset: must be an xarray.Dataset, not {type(dataset).__name__}")
     missing = [name for name in ("time", *require) if name not in dataset.variables]
     if missing:
-        raise InputError(f"run without {', '.join(missing)}: it has {', '.join(map(str, dataset.variables))}")
+        raise InputError(
+            f"run without {', '.join(missing)}: its variables are {', '.join(map(str, dataset.variables))}"
+        )
     valid = dataset["valid"].values.astype(bool) if "valid" in dataset else None
     for name, quantity in SCHEMA.items():
         if name not in dataset.variables:
@@ -206,16 +208,16 @@ def check_trajectory(
 
 
 # ----------------------------------------------------------------------------------------------------
-# What a run with several strikers says of each: where its tip is, how deep it presses, and its force.
+# Displacement, penetration and force of each of several strikers.
 
 
 def strikers_of(
     ensemble: Ensemble, system: System, recorded: Recorded, values: _Array, first: _Array
 ) -> dict[str, _Array]:
-    """Series of shape (samples, strikers), the first one's in column 0, and the energy that all contacts store.
+    """Return series of shape (samples, strikers), and the energy stored in all contacts.
 
-    *first* is where the first tip is, over b.  The engine writes down the first contact; those of the others follow
-    from where the beam is and their motions.
+    *first* is the displacement of the first tip, over b.  The engine records the first contact; the others follow from
+    the displacement of the beam and their motions.
     """
     others, length = ensemble.others, system.scale.length
     assert others is not None and system.striker is not None
@@ -247,7 +249,7 @@ def strikers_of(
 
 
 def _follows(ensemble: Ensemble, system: System, recorded: Recorded) -> _Array:
-    """What a base does to tips that stand in space, in its frame, as seen from the first striker's side."""
+    """Return the displacement of fixed tips relative to a moving base, in the direction of the first striker."""
     if system.base_excitation is None or system.base_excitation.striker_on_base:
         return np.zeros(recorded.times.size)
     moved = motions_of(ensemble, system, recorded.times)["base_excitation"][0]
@@ -255,7 +257,7 @@ def _follows(ensemble: Ensemble, system: System, recorded: Recorded) -> _Array:
 
 
 # ----------------------------------------------------------------------------------------------------
-# From the pieces that an engine wrote down to the datasets of a run.
+# Datasets of a run from the pieces that an engine recorded.
 
 
 _Array = NDArray[np.float64]
@@ -270,7 +272,7 @@ IMPACT_COLUMNS = (
 
 
 def joined(pieces: list[Recorded]) -> Recorded:
-    """Pieces of a run as one, its samples in the order of time."""
+    """Join pieces of a run, with the samples in the order of time."""
     times, q, p, values, impacts = (
         np.concatenate(parts) for parts in zip(*(piece[:5] for piece in pieces), strict=True)
     )
@@ -295,9 +297,9 @@ def run_dataset(
     period: float,
     attrs: dict[str, Any],
 ) -> xr.Dataset:
-    """The time series of a run.
+    """Return the time series of a run.
 
-    *times* are the instants that were asked for; those that the run did not reach are NaN, with ``valid`` = 0.
+    *times* are the requested times; those that the run did not reach are NaN, with ``valid`` = 0.
     """
     structure, model = ensemble.structure, system.model
     values = recorded.values.copy()
@@ -310,7 +312,7 @@ def run_dataset(
         values[:, 2] -= own
     if structure.circuit:
         values[:, 2] -= 0.5 * recorded.p[:, -1] ** 2
-    if ensemble.tapped is not None:  # what the coil's own resistance takes
+    if ensemble.tapped is not None:  # dissipated in the resistance of the coil
         values[:, 5] += (1.0 - ensemble.tapped.share[0]) * values[:, 9]
     location = 0.5 if system.striker is None else system.striker.location
     shape = model.shape_at(location)
@@ -365,7 +367,7 @@ def run_dataset(
 def _harvested(
     ensemble: Ensemble, tapped: CircuitCoupling, recorded: Recorded, values: _Array
 ) -> dict[str, _Array]:
-    """What a run says of a harvester."""
+    """Return the variables of a harvester."""
     structure = ensemble.structure
     assert structure.tapped is not None
     if structure.circuit:
@@ -384,7 +386,7 @@ def _harvested(
 
 
 def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Array) -> dict[str, _Array]:
-    """What a run says of a moving base and of a changing axial load."""
+    """Return the variables of a base excitation and of a changing axial load."""
     found: dict[str, _Array] = {}
     if system.base_excitation is None and system.axial_load is None:
         return found
@@ -400,7 +402,7 @@ def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Arr
 
 
 def impact_table(table: _Array, attrs: dict[str, Any]) -> xr.Dataset:
-    """The impacts of a run, one after the other."""
+    """Return the table of the impacts of a run."""
     import xarray as xr
 
     data = {

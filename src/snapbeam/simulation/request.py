@@ -38,15 +38,15 @@ def kernel_input(system: Any, integration: Any) -> tuple[System, Integration]:
 
 
 def require_motion(system: System) -> None:
-    """Refuse a system in which nothing could move."""
+    """Refuse a system without excitation and initial state."""
     if system.striker is None and system.initial_state is None and not system.moving:
         raise InputError(
-            "striker = None: a beam that nothing strikes needs a start to move from (initial_state)"
+            "striker = None: without a striker the beam needs an initial_state; give one, or a striker"
         )
 
 
 def cycle_of(system: System) -> float:
-    """Seconds of one cycle of excitation, or of the first mode where nothing strikes."""
+    """Return the period of the excitation in seconds; without an excitation, that of the first mode."""
     freq = system.model.reference_frequency
     if system.primary_excitation is None:
         return 1.0 / freq

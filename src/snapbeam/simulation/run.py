@@ -1,4 +1,4 @@
-"""A run: what it did, sample by sample, impact by impact and in a few numbers."""
+"""A recorded run: time series, impacts and summary."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _KINDS = ("run", "modal_amplitudes", "energies", "spectrum", "phase_portrait")
 
 
 def _described(system: System) -> list[tuple[str, str, str]]:
-    """Sections of a system and what stands in them."""
+    """Return the sections of a system and their contents."""
     return [line.partition("  ") for line in system.describe().splitlines()]
 
 
@@ -39,17 +39,17 @@ class Run:
     dataset : xarray.Dataset
         Time series: the variables of :data:`snapbeam.simulation.dataset.SCHEMA`.
     summary : RunSummary
-        The class and the statistics.
+        Response class and statistics.
     impacts : xarray.Dataset
         Onset, duration, peak force and impulse of each impact.
     system : System
-        What was run, and
+        The model.
     integration : Integration
-        how.
+        Solver settings.
     accuracy : ErrorEstimate or None
-        What an asked tolerance gave.
+        Error estimate, if a tolerance was given.
     final_state : State or None
-        Where the run stands at its end; None if it failed.
+        State at the end of the run; None if the run failed.
     """
 
     dataset: xr.Dataset
@@ -62,11 +62,7 @@ class Run:
 
     @classmethod
     def of(cls, tables: Callable[[], tuple[xr.Dataset, xr.Dataset]], **parts: Any) -> Run:
-        """A run whose dataset and impacts are made by *tables* when one of them is first asked for.
-
-        Who wants the outcome alone, as ``snapbeam simulate`` without a file does, waits for neither; *parts* are the
-        other attributes.
-        """
+        """Return a run whose dataset and impacts *tables* computes at the first access; *parts* are other attributes."""
         run = cls.__new__(cls)
         vars(run).update({"accuracy": None, "final_state": None} | parts | {"_tables": tables})
         return run
@@ -85,7 +81,7 @@ class Run:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the run to a NetCDF file, whole or not at all; :func:`snapbeam.load` reads it back.
+        """Write the run to a NetCDF file atomically; :func:`snapbeam.load` reads it.
 
         Raises
         ------
@@ -97,7 +93,7 @@ class Run:
         save_run(self, path)
 
     def plot(self, kind: str = "run", ax: Any = None, **options: Any) -> Any:
-        """Draw the run: ``"run"``, ``"modal_amplitudes"``, ``"energies"``, ``"spectrum"`` or ``"phase_portrait"``.
+        """Plot the run: ``"run"``, ``"modal_amplitudes"``, ``"energies"``, ``"spectrum"`` or ``"phase_portrait"``.
 
         Options are those of the function ``plot_...`` of :mod:`snapbeam.plot`; returns the axes.
         """

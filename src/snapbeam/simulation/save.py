@@ -1,4 +1,4 @@
-"""Runs on disk: one NetCDF file with everything a run is."""
+"""Saving and loading of runs: one NetCDF file for each run."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ _COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 def save_run(run: Run, path: str | os.PathLike[str]) -> None:
     """Write a run; see :meth:`snapbeam.Run.save`.
 
-    The root group holds the time series, the groups ``impacts`` and ``outcome`` the rest; the system, the
-    integration, the accuracy and the end are JSON in attributes of the root.
+    The root group contains the time series, the groups ``impacts`` and ``summary`` the rest.  Attributes of the root
+    contain the system, the integration, the error estimate and the final state as JSON.
     """
     target = check_writable(path, "path", (".nc",))
     root = run.dataset.assign_attrs(description(run.system, run.integration, run.accuracy, run.final_state))
@@ -49,7 +49,7 @@ def save_run(run: Run, path: str | os.PathLike[str]) -> None:
 def description(
     system: System, integration: Integration, accuracy: ErrorEstimate | None, end: State | None
 ) -> dict[str, str]:
-    """The attributes of a file from which a run is read again."""
+    """Return the attributes from which a run is read again."""
     described = {
         "snapbeam_format": _FORMAT,
         "snapbeam_system": _json(system.to_mapping()),
@@ -68,13 +68,13 @@ def load(path: str | os.PathLike[str]) -> Run:
     Raises
     ------
     InputError
-        If the file cannot be read or holds no run.
+        If the file cannot be read or does not contain a run.
     """
     path = file_path("path", path)
     dataset = read_netcdf(path)
     attrs = dict(dataset.attrs)
     if attrs.pop("snapbeam_format", None) != _FORMAT:
-        raise InputError(f"path = {str(path)!r}: is no file of a run that Run.save wrote")
+        raise InputError(f"path = {str(path)!r}: is not a run that Run.save wrote; simulate it again")
     parts = {name: read_netcdf(path, group=name) for name in _GROUPS}
     try:
         system = System.from_mapping(_arrays(json.loads(attrs.pop("snapbeam_system"))))
@@ -95,7 +95,7 @@ def load(path: str | os.PathLike[str]) -> Run:
 
 
 def summary_dataset(outcome: RunSummary) -> xr.Dataset:
-    """The statistics of a run as scalar variables, with what their codes mean."""
+    """Return the statistics of a run as scalar variables, with the meanings of codes."""
     import xarray as xr
 
     variables: dict[str, Any] = {}
@@ -111,7 +111,7 @@ def summary_dataset(outcome: RunSummary) -> xr.Dataset:
 
 
 def code_flags(kinds: type[ResponseClass] | type[RunStatus]) -> dict[str, Any]:
-    """What codes mean, as the attributes that the CF conventions give them."""
+    """Return the meanings of codes as attributes of the CF conventions."""
     return {
         "flag_values": np.array([int(kind) for kind in kinds], dtype=np.int8),
         "flag_meanings": " ".join(
@@ -122,7 +122,7 @@ def code_flags(kinds: type[ResponseClass] | type[RunStatus]) -> dict[str, Any]:
 
 
 def compressed(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
-    """How the variables of a dataset are encoded."""
+    """Return the encoding of the variables of a dataset."""
     return {name: _COMPRESSION for name, variable in dataset.variables.items() if variable.ndim}
 
 

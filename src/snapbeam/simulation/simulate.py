@@ -1,4 +1,4 @@
-"""One run, recorded: the beam, the striker, and everything that can be read off them."""
+"""Simulate and record single runs."""
 
 from __future__ import annotations
 
@@ -45,22 +45,22 @@ __all__ = [
     "end_state",
     "prepared",
     "reached_by",
-    "said_of",
+    "run_attributes",
     "simulate",
 ]
 
 
 # ----------------------------------------------------------------------------------------------------
-# Systems and integrations as attributes of files: every parameter by name.
+# Attributes of datasets: all parameters by name.
 
 
 CONVENTIONS = "CF-1.11"
 _LONGEST = 1024
-"""Numbers of an array that an attribute may hold."""
+"""Maximum size of an array in an attribute."""
 
 
 def describe_system(system: System, plan: Plan) -> dict[str, Any]:
-    """The parameters of a system but those of its drive and striker, and its steps, as attributes."""
+    """Return the parameters of a system, except those of its drive and striker, and its steps as attributes."""
     model = system.model
     damping = model.damping_ratio
     attrs: dict[str, Any] = {
@@ -90,7 +90,7 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
 
 
 def _of_others(system: System) -> dict[str, Any]:
-    """What is said of the strikers beside the first."""
+    """Return the attributes of the strikers after the first."""
     attrs: dict[str, Any] = {"strikers": 1 + len(system.further_contacts)} if system.further_contacts else {}
     for section, values in system.to_mapping().items() if system.further_contacts else ():
         part, number = numbered(section)
@@ -105,7 +105,7 @@ def _of_others(system: System) -> dict[str, Any]:
 
 
 def _short(part: Any) -> dict[str, Any]:
-    """The quantities of a part by the names they have in datasets."""
+    """Return the parameters of a part by their names in datasets."""
     return {
         item.short or name: getattr(part, name)
         for name, item in quantities(type(part)).items()
@@ -121,9 +121,9 @@ def attributes_of(
     more: dict[str, Any],
     points: Any = None,
 ) -> dict[str, Any]:
-    """The attributes of a file: a title, every parameter, what made it, and the hash of all of it.
+    """Return the attributes of a dataset: title, all parameters, provenance, and the hash of all of it.
 
-    *points* tell one sweep from another.
+    *points* identify a sweep.
     """
     attrs: dict[str, Any] = {"Conventions": CONVENTIONS, "title": title}
     attrs |= describe_system(system, plan) | more
@@ -136,7 +136,7 @@ def attributes_of(
 
 
 def _short_arrays(value: Any) -> Any:
-    """Plain values; an array too long for an attribute is named by its hash."""
+    """Return plain values; an array that is too long for an attribute is replaced by its hash."""
     if isinstance(value, np.ndarray):
         if value.size > _LONGEST:
             return {"shape": list(value.shape), "sha256": array_hash(value)}
@@ -151,46 +151,46 @@ def _plain(integration: Integration) -> dict[str, Any]:
 
 
 # ----------------------------------------------------------------------------------------------------
-# What a recorded run is made of before its first step, and what is said of it after its last.
+# Preparation of a recorded run, and its attributes.
 
 
 _Array = NDArray[np.float64]
 
 _SAMPLES_PER_CYCLE = 200
-"""Regular samples of a run per cycle of the excitation or of the first mode, whichever is the faster."""
+"""Regular samples per cycle of the excitation or of the first mode, whichever is shorter."""
 MEMORY_LIMIT = 4 * 2**30
-"""Bytes that the samples of a run may take."""
+"""Maximum memory of the samples of a run, bytes."""
 _ENERGY_ERROR = 1e-3
-"""Of the gross work, from which a run says that it misses its energy ledger."""
+"""Energy-balance error, over the gross work, above which a run gets a diagnostic."""
 _ENDED = (RunStatus.OK, RunStatus.EARLY_STOP)
 
 
 class Prepared(NamedTuple):
-    """A run that can begin."""
+    """A checked run with its steps and sample times."""
 
     system: System
     integration: Integration
     plan: Plan
     accuracy: ErrorEstimate | None
-    """What an asked tolerance gave."""
+    """Error estimate, if a tolerance was given."""
     ensemble: Ensemble
     times: _Array | None
-    """Instants that were asked for, s."""
+    """Requested sample times, s."""
     samples: int
-    """Instants to record, beside the ends of steps in contact."""
+    """Number of sample times, without the ends of steps in contact."""
     end: float
-    """s"""
+    """End of the run, s."""
     period: float
-    """Of a cycle, s."""
+    """Period of a cycle, s."""
 
     @property
     def instants(self) -> _Array:
-        """To record, s."""
+        """Sample times, s."""
         return np.linspace(0.0, self.end, self.samples) if self.times is None else self.times
 
 
 def prepared(system: System, integration: Integration, sample_times: ArrayLike | None) -> Prepared:
-    """Choose the steps of a run and the instants to record; says what is doubtful of the system.
+    """Choose the steps and the sample times of a run, and report the diagnostics of the system.
 
     Raises
     ------
@@ -209,23 +209,23 @@ def prepared(system: System, integration: Integration, sample_times: ArrayLike |
     return Prepared(system, integration, plan, accuracy, ensemble, times, count, end, period)
 
 
-def said_of(run: Prepared, outcome: RunSummary, accumulators_of_runs: Any) -> dict[str, Any]:
-    """The attributes of a run that ended; says where it misses its energy ledger."""
+def run_attributes(run: Prepared, summary: RunSummary, accumulators_of_runs: Any) -> dict[str, Any]:
+    """Return the attributes of a run that ended; reports an energy-balance error."""
     lasted = run.end / run.period
     more: dict[str, Any] = _own_attributes(run.system, run.integration, lasted)
-    more["response_class"] = outcome.response_class.label
-    more["status"] = f"{outcome.status.name}: {outcome.status.advice}"
+    more["response_class"] = summary.response_class.label
+    more["status"] = f"{summary.status.name}: {summary.status.advice}"
     attrs = attributes_of("run of a struck bistable beam", run.system, run.integration, run.plan, more)
     attrs["gross_work"] = float(accumulators_of_runs["gross_work"][0])
     attrs["energy_error"] = _energy_error(accumulators_of_runs)
-    tell(_unbalanced(attrs["energy_error"]))
+    tell(_energy_diagnostics(attrs["energy_error"]))
     if run.accuracy is not None:
         attrs |= run.accuracy.attributes()
     return attrs
 
 
 def _own_attributes(system: System, integration: Integration, lasted: float) -> dict[str, Any]:
-    """What attributes say of the drive, the striker and how long it went on."""
+    """Return the attributes of the drive, the striker and the duration."""
     striker = system.striker
     attrs: dict[str, Any] = {"cycles": round(lasted, 9), "engine": "cpu"}
     if striker is not None and striker.drive.harmonic:
@@ -246,9 +246,9 @@ def _own_attributes(system: System, integration: Integration, lasted: float) -> 
 
 
 def _energy_error(accumulators_of_runs: Any) -> float:
-    """What the ledger of a recorded run misses at its end, over the gross work: 0 for exact steps.
+    """Return the energy-balance error of a recorded run at its end, over the gross work; 0 for exact steps.
 
-    The striker's work less what the beam and the contact gained and what was dissipated, as it was integrated.
+    The error is the external work minus the energy gain of beam, contact and circuit and the dissipated energy.
     """
     accumulators = accumulators_of_runs[0]
     with np.errstate(invalid="ignore"):  # a run that failed has no numbers
@@ -267,14 +267,14 @@ def _energy_error(accumulators_of_runs: Any) -> float:
     return float(missed) / scale
 
 
-def _unbalanced(error: float) -> list[Diagnostic]:
+def _energy_diagnostics(error: float) -> list[Diagnostic]:
     if not abs(error) > _ENERGY_ERROR:
         return []
     return [
         Diagnostic(
-            "ledger-missed",
-            f"the run misses its energy ledger by {abs(error):.2g} of the gross work: its steps are too "
-            "long for what the beam does; use accuracy = 'reference', a tolerance, or a smaller step",
+            "energy-balance",
+            f"the energy-balance error is {abs(error):.2g} of the gross work: the steps are too long; use "
+            "accuracy = 'reference', a tolerance, or a smaller step",
             {"energy_error": error},
         )
     ]
@@ -291,21 +291,20 @@ def _regular_count(system: System, end: float, period: float) -> int:
 
 
 def check_memory(system: System, samples: int, with_contacts: bool) -> None:
-    """Refuse a run whose samples would not fit, before anything is computed."""
+    """Refuse a run whose samples do not fit into the memory limit, before any step."""
     row = 8 * (4 * system.model.modes + 20)
     size = samples * row * (1.5 if with_contacts else 1.0)
     if size > MEMORY_LIMIT:
         raise InputError(
             f"{samples} samples of {system.model.modes} modes would take {size / 2**30:.1f} GiB, the limit is "
-            f"{MEMORY_LIMIT / 2**30:.0f} GiB: give fewer sample_times, or fewer cycles, or have "
-            "it written in pieces by simulate_to_file (--stream)"
+            f"{MEMORY_LIMIT / 2**30:.0f} GiB: give fewer sample_times or cycles, or use simulate_to_file (--stream)"
         )
 
 
 def _checked_times(sample_times: ArrayLike, end: float) -> _Array:
     times = finite_array("sample_times", sample_times, 1).copy()
     if times.size == 0:
-        raise InputError("sample_times = []: must hold at least one instant")
+        raise InputError("sample_times = []: must contain at least one time")
     if (np.diff(times) <= 0.0).any():
         raise InputError("sample_times: must be strictly increasing")
     if times[0] < 0.0 or times[-1] > end * (1.0 + 1e-9):
@@ -316,16 +315,16 @@ def _checked_times(sample_times: ArrayLike, end: float) -> _Array:
 
 
 def reached_by(recorded: Recorded, until: float) -> Recorded:
-    """The samples up to where a run came that did not go to its end."""
+    """Return the samples up to the time that a run reached."""
     kept = recorded.times <= until
     return recorded._replace(
         times=recorded.times[kept], q=recorded.q[kept], p=recorded.p[kept], values=recorded.values[kept]
     )
 
 
-def end_state(ensemble: Ensemble, recorded: Recorded, outcome: RunSummary) -> State | None:
-    """Where a run stands at its end; None if it failed."""
-    if outcome.status not in _ENDED:
+def end_state(ensemble: Ensemble, recorded: Recorded, summary: RunSummary) -> State | None:
+    """Return the state at the end of a run; None if the run failed."""
+    if summary.status not in _ENDED:
         return None
     last, time = recorded.last, int(recorded.accumulators_of_runs["time"][0])
     states = states_of(
@@ -369,25 +368,25 @@ def simulate(
     sample_times: ArrayLike | None = None,
     progress: Any = None,
 ) -> Run | list[Run]:
-    """Integrate one run and record it.
+    """Simulate one run and record its time series.
 
-    The beam starts at rest in the well that the striker pushes it out of (the lower one for a striker below), the tip
-    touching it (Eqs. 11-18), or where the system says.  Without a striker the beam vibrates freely from the system's
-    start, and a cycle is one of the first mode.
+    The beam starts from the initial state of the system.  By default it is at rest, with the tip in contact, in the
+    well that the striker pushes it out of (the lower one for a striker below, Eqs. 11-18).  Without a striker the beam
+    vibrates freely from the initial state, and a cycle is a period of the first mode.
 
     Parameters
     ----------
     system : System, or a list of them
-        What is run; several are run side by side on all cores (``integration.threads``).
+        The model; several models are simulated in parallel on all cores (``integration.threads``).
     integration : Integration, optional
-        How: cycles, steps or accuracy or tolerance, early decision.  One recorded run is always the CPU's work.
+        Solver settings.  Recorded runs always use the CPU.
     sample_times : array_like, optional
-        Instants to record, s, ascending, from 0 to the end of the run.  By default 200 per cycle of the
-        excitation or of the first mode, and the ends of the steps of each impact.  Instants that a run which was
-        decided early or failed did not reach are NaN, with ``valid`` = 0.
+        Times to record, s, ascending, from 0 to the end of the run.  By default 200 per cycle of the excitation or of
+        the first mode, and the ends of the steps of each impact.  Times that a run did not reach, because it ended
+        early or failed, are NaN, with ``valid`` = 0.
     progress : callable, optional
-        Called with the share of the run that is done, several times a second; True writes a line to standard error.
-        Of several runs: called as ``progress(done, total)``.
+        Function that receives the finished fraction of the run, several times per second; True writes a line to
+        standard error.  For several runs it receives ``(done, total)``.
 
     Returns
     -------
@@ -396,8 +395,8 @@ def simulate(
     Raises
     ------
     InputError
-        For bad input, and for a run whose samples would take more than 4 GiB.  A run that fails numerically does not
-        raise: ``run.outcome.status`` says why.
+        For bad input, and for a run whose samples need more than 4 GiB.  A run that fails numerically does not
+        raise: ``run.summary.status`` gives the reason.
     """
     if isinstance(system, (list, tuple)):
         return _several(system, integration, sample_times, progress)
@@ -410,33 +409,33 @@ def simulate(
     recorded = joined(list(engine.record(ensemble, run.instants, times is None, report)))
     if report is not None:
         report(1.0)
-    outcome = RunSummary.from_statistics(
+    summary = RunSummary.from_statistics(
         statistics_of(ensemble, recorded.accumulators_of_runs, run.end / run.period)
     )
-    if times is None and outcome.status != RunStatus.OK:
+    if times is None and summary.status != RunStatus.OK:
         recorded = reached_by(
             recorded, float(recorded.accumulators_of_runs["time"][0] * ensemble.runs["tick"][0])
         )
         if recorded.times.size == 0:
-            times = np.zeros(1)  # it failed before anything could be written down
-    attrs = said_of(run, outcome, recorded.accumulators_of_runs)
+            times = np.zeros(1)  # the run failed before its first sample
+    attrs = run_attributes(run, summary, recorded.accumulators_of_runs)
     return Run.of(
         lambda: (
             run_dataset(ensemble, system, recorded, times, run.period, attrs),
             impact_table(recorded.impacts, attrs),
         ),
-        summary=outcome,
+        summary=summary,
         system=system,
         integration=integration,
         accuracy=run.accuracy,
-        final_state=end_state(ensemble, recorded, outcome),
+        final_state=end_state(ensemble, recorded, summary),
     )
 
 
 def _several(
     systems: Sequence[Any], integration: Integration | None, sample_times: ArrayLike | None, progress: Any
 ) -> list[Run]:
-    """Runs of several systems, on all cores: kernels give up the interpreter's lock."""
+    """Simulate several systems on all cores; kernels release the interpreter lock."""
     report = counting(progress, "simulate", "runs")
     for at, system in enumerate(systems):
         if not isinstance(system, System):

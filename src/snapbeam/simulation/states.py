@@ -1,4 +1,4 @@
-"""From an engine's coordinates to states, and back without losing a bit."""
+"""States from the coordinates of an engine."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _Integers = NDArray[np.int64]
 
 
 def circuit_unit(ensemble: Ensemble) -> float:
-    """What a circuit's coordinate is multiplied by to give volts or amperes."""
+    """Return the factor from the coordinate of a circuit to volts or amperes."""
     harvester = ensemble.harvester
     if harvester is None or harvester.inertia == 0.0:
         return 1.0
@@ -29,14 +29,15 @@ def circuit_unit(ensemble: Ensemble) -> float:
 def states_of(
     ensemble: Ensemble, q: _Array, p: _Array, well_sign: _Integers, contact_ticks: _Integers, ticks: _Integers
 ) -> State:
-    """States of the runs of an ensemble, a batch of shape (runs,).
+    """Return the states of the runs of an ensemble, a batch of shape (runs,).
 
-    *q* and *p* of shape (runs, N) are linear modes about the well *home*; *ticks* is when.
+    *q* and *p*, of shape (runs, N), are coordinates of the linear modes about the well *well_sign*; *ticks* is the
+    time in ticks.
     """
     structure, runs = ensemble.structure, ensemble.runs
     far = (well_sign < 0)[:, None]
     first = np.where(far, q + structure.shift, q)
-    # a sine comes round after each turn; a record has an end
+    # the phase of a periodic drive is reduced to one period
     comes_round = ensemble.drive.harmonic or (ensemble.drive.parts and ensemble.drive.is_periodic)
     turned = (ticks % runs["period"] if comes_round else ticks) / runs["period"]
     tick = runs["tick"]

@@ -1,4 +1,4 @@
-"""A run that is written to its file while it goes on, and never stands in memory whole."""
+"""Simulate a run and write it to a file piece by piece."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.simulation.dataset import impact_table, joined, run_dataset
 from snapbeam.simulation.save import compressed, description, summary_dataset
-from snapbeam.simulation.simulate import Prepared, end_state, prepared, reached_by, said_of
+from snapbeam.simulation.simulate import Prepared, end_state, prepared, reached_by, run_attributes
 from snapbeam.simulation.summary import RunSummary
 from snapbeam.solver.registry import resolve
 from snapbeam.solver.statistics import Recorded, statistics_of
@@ -31,9 +31,9 @@ __all__ = ["simulate_to_file"]
 
 
 _KEPT_BACK = 4096
-"""Samples of a piece that wait for the next one, which may hold some that are earlier."""
+"""Samples of a piece that are held back, because the next piece may contain earlier ones."""
 _CHUNK = 2**16
-"""Numbers of a chunk of a variable."""
+"""Numbers in a chunk of a variable."""
 
 
 def simulate_to_file(
@@ -44,11 +44,11 @@ def simulate_to_file(
     sample_times: ArrayLike | None = None,
     progress: Callable[[float], object] | bool | None = None,
 ) -> RunSummary:
-    """Simulate one run and write it to a file while it goes on: the file that ``simulate(...).save(path)`` writes.
+    """Simulate one run and write it to a file during the simulation.
 
-    Memory does not grow with what a sample holds, modes and energies; it takes 8 bytes for each instant that is to be
-    recorded, and some 200 MB beside.  :func:`snapbeam.load` reads the file whole; ``xarray.open_dataset(path)``
-    reads what is asked of it.
+    The file is that of ``simulate(...).save(path)``.  The memory is about 200 MB plus 8 bytes for each recorded time,
+    for any number of modes.  :func:`snapbeam.load` reads the complete file; ``xarray.open_dataset(path)`` reads parts
+    of it.
 
     Parameters
     ----------
@@ -56,22 +56,23 @@ def simulate_to_file(
     integration : Integration, optional
         As for :func:`snapbeam.simulate`.
     path : path
-        NetCDF file to write, ending in ``.nc``.  It is put there when the run is over, whole or not at all.
+        NetCDF file, ending in ``.nc``.  It appears when the run has ended, complete or not at all.
     sample_times : array_like, optional
-        As for :func:`snapbeam.simulate`.  Instants that the run did not reach are left out.
+        As for :func:`snapbeam.simulate`.  Times that the run did not reach are omitted.
     progress : callable, optional
-        Called with the share of the run that is done, several times a second; True writes a line to standard error.
+        Function that receives the finished fraction of the run, several times per second; True writes a line to standard
+        error.
 
     Returns
     -------
-    Outcome
+    RunSummary
 
     Raises
     ------
     InputError
         For bad input.
     NoRoomError
-        If the disk has no room for it.
+        If the disk is full.
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
@@ -83,14 +84,14 @@ def simulate_to_file(
         writer = _Writer(file, run)
         for piece in engine.record(run.ensemble, run.instants, run.times is None, report):
             writer.take(piece)
-        outcome = writer.finish()
+        summary = writer.finish()
     if report is not None:
         report(1.0)
-    return outcome
+    return summary
 
 
 class _Writer:
-    """Puts pieces of a run into a file, in the order of time."""
+    """Writes pieces of a run to a file, in the order of time."""
 
     def __init__(self, file: h5netcdf.File, run: Prepared) -> None:
         self.file, self.run, self.written = file, run, 0
@@ -98,7 +99,7 @@ class _Writer:
         self.impacts: list[Any] = []
 
     def take(self, piece: Recorded) -> None:
-        """Write a piece but for its last samples, which wait for the next."""
+        """Write a piece without its last samples, which wait for the next piece."""
         self.impacts.append(piece.impacts)
         piece = piece._replace(impacts=piece.impacts[:0])
         together = joined([piece] if self.waiting is None else [self.waiting, piece])
@@ -108,32 +109,32 @@ class _Writer:
             self.append(_part(together, slice(begin, min(ready, begin + _CHUNK))))
 
     def finish(self) -> RunSummary:
-        """Write what waits, the impacts, the outcome and what there is to say of the run."""
+        """Write the remaining samples, the impacts, the summary and the attributes."""
         from xarray.backends import H5NetCDFStore
 
         run, last = self.run, self.waiting
-        assert last is not None  # an engine hands over one piece at least
-        outcome = RunSummary.from_statistics(
+        assert last is not None  # an engine yields at least one piece
+        summary = RunSummary.from_statistics(
             statistics_of(run.ensemble, last.accumulators_of_runs, run.end / run.period)
         )
-        if outcome.status != RunStatus.OK:
+        if summary.status != RunStatus.OK:
             last = reached_by(
                 last, float(last.accumulators_of_runs["time"][0] * run.ensemble.runs["tick"][0])
             )
-        attrs = said_of(run, outcome, last.accumulators_of_runs)
+        attrs = run_attributes(run, summary, last.accumulators_of_runs)
         self.append(last, np.zeros(1) if self.written + last.times.size == 0 else None)
-        end = end_state(run.ensemble, last, outcome)
+        end = end_state(run.ensemble, last, summary)
         self.file.attrs.update(attrs | description(run.system, run.integration, run.accuracy, end))
         tables = {
             "impacts": impact_table(np.concatenate(self.impacts), attrs).assign_attrs({}),
-            "summary": summary_dataset(outcome),
+            "summary": summary_dataset(summary),
         }
         for name, table in tables.items():
             table.dump_to_store(H5NetCDFStore(self.file.create_group(name)), encoding=compressed(table))
-        return outcome
+        return summary
 
     def append(self, samples: Recorded, times: Any = None) -> None:
-        """Write samples behind those that stand in the file; *times* are instants that were not reached."""
+        """Append samples to the file; *times* are times that were not reached."""
         from xarray.backends import H5NetCDFStore
 
         if samples.times.size == 0 and times is None:

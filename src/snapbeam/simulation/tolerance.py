@@ -1,9 +1,8 @@
-"""Error on request: steps refined until two runs agree, as far as the problem's conditioning allows.
+"""Steps for a requested tolerance, and the error estimate of a run.
 
 An impacting beam can be chaotic.  Two runs whose drives differ by a relative 1e-13, little more than rounding, then
-part company, and from there on no integrator can promise anything about a single run.  Accuracy is therefore
-judged up to a horizon, the time at which that response exceeds a tenth of the tolerance, and the horizon
-is reported.
+diverge, and no integrator can bound the error of a single run after that time.  snapbeam therefore estimates the error
+up to the predictability horizon: the time at which the difference of these runs exceeds a tenth of the tolerance.
 """
 
 from __future__ import annotations
@@ -36,42 +35,42 @@ __all__ = ["PERTURBATION", "ErrorEstimate", "perturbation_growth", "steps_for"]
 _Array = NDArray[np.float64]
 
 PERTURBATION = 1e-13
-"""Relative change of the drive whose response is called the conditioning."""
+"""Relative change of the drive for the perturbation growth."""
 _SHARE = 0.1
-"""Of the tolerance: what the response to the perturbation may take before nothing more is promised."""
+"""Fraction of the tolerance that the perturbation growth reaches at the predictability horizon."""
 _SAMPLES_PER_CYCLE = 40
 _MOST_SAMPLES = 400_000
 _CHEAP = 3e-5
-"""Tolerance from which order 4 is the cheaper one."""
+"""Tolerance above which order 4 takes less time than order 6."""
 _ROUGH = (("standard", 1.0), ("standard", 0.5))
 _FINE = tuple(("reference", 2.0**power) for power in range(1, -5, -1))
-"""Level of accuracy and length of its steps over those that the level takes, from coarse to fine."""
+"""Accuracy level and factor of its steps, from coarse to fine."""
 _BETWEEN = 2.0
-"""What a difference may be between the instants that are compared, over what it is there."""
+"""Bound of a difference between the compared times, relative to its values at these times."""
 
 
 @dataclass(frozen=True)
 class ErrorEstimate:
-    """What a tolerance asked of :func:`~snapbeam.simulate` gave."""
+    """Error estimate of a run of :func:`~snapbeam.simulate` with a tolerance."""
 
     tolerance: float
-    """Asked: greatest error of the displacement at the contact point and at the centre, b."""
+    """Requested maximum error of the displacement at the striker and at mid-span, in units of b."""
     estimated_error: float
-    """Bound of the error up to the horizon, b: twice the greatest difference from the next coarser run, which is larger
-    than the error wherever refinement converges, and the conditioning there."""
+    """Bound of the error up to the horizon, in units of b: twice the maximum difference from the next coarser run, which
+    exceeds the error if the refinement converges, plus the perturbation growth."""
     predictability_horizon: float
-    """Up to here, s, the estimate holds: the end of the run, or where the conditioning forbids more."""
+    """Time up to which the estimate is valid, s: the end of the run, or the predictability horizon."""
     perturbation_growth: float
-    """Greatest change of the displacement, up to the end of the run, by a relative change of V by 1e-13, b."""
+    """Maximum change of the displacement during the run, in units of b, for a relative change of the drive by 1e-13."""
     reached: bool
-    """Whether the estimate is within the tolerance up to the conditioning's horizon."""
+    """Whether the estimate is within the tolerance up to the predictability horizon."""
     step: float
-    """Flight step, s."""
+    """Step in free flight, s."""
     order: int
-    """Of the composition."""
+    """Order of the splitting method."""
 
     def attributes(self) -> dict[str, float | int]:
-        """The same, as attributes of a file."""
+        """Return the estimate as attributes of a dataset."""
         return {
             f"accuracy_{item.name}": int(value) if isinstance(value, bool) else value
             for item in fields(self)
@@ -87,7 +86,7 @@ def perturbation_growth(
     accuracy: str = "reference",
     perturbation: float = PERTURBATION,
 ) -> xr.Dataset:
-    """How far a tiny change of the drive moves a run: what no integrator can promise to undercut.
+    """Compute the growth of a small perturbation of the drive: a lower limit of the error of any integrator.
 
     Parameters
     ----------
@@ -95,15 +94,15 @@ def perturbation_growth(
     integration : Integration, optional
         The number of cycles and the solver settings.  ``accuracy`` takes the place of its accuracy and tolerance.
     accuracy : {"standard", "reference"}
-        Steps of the two runs compared.
+        Accuracy level of the two compared runs.
     perturbation : float
-        Relative change of every motion that drives the system, or of the start if nothing does.
+        Relative change of every motion that drives the system, or of the initial state if nothing drives it.
 
     Returns
     -------
     xarray.Dataset
-        Over ``time`` (s) and ``cycle``: ``separation``, the greatest change up to that time of the displacement
-        at the contact point and at the centre, over b.
+        Over ``time`` (s) and ``cycle``: ``separation``, the maximum change up to that time of the displacement
+        at the striker and at mid-span, in units of b.
 
     Raises
     ------
@@ -120,13 +119,18 @@ def perturbation_growth(
     ensemble = make_ensemble(system, integration, plan=plan)
     times = _instants(system, ensemble)
     separation = _apart(_watch(system, ensemble, times), _watch(system, _perturbed(ensemble, size), times))
-    attrs = {"title": "conditioning of a run", "perturbation": size, "step": plan.step, "order": plan.order}
+    attrs = {
+        "title": "perturbation growth of a run",
+        "perturbation": size,
+        "step": plan.step,
+        "order": plan.order,
+    }
     return xr.Dataset(
         {
             "separation": (
                 "time",
                 separation,
-                {"units": "1", "long_name": "greatest change of the displacement so far, over b"},
+                {"units": "1", "long_name": "maximum change of the displacement so far, over b"},
             )
         },
         {
@@ -138,12 +142,11 @@ def perturbation_growth(
 
 
 def steps_for(system: System, integration: Integration) -> tuple[Plan, ErrorEstimate]:
-    """Steps with which a run meets the tolerance of *integration*, and what they gave.
+    """Return steps with which a run meets the tolerance of *integration*, and the error estimate.
 
-    Runs of ever finer steps are compared with the one before, at the contact point and at the centre, 40 times
-    a cycle, until they differ by less than half the tolerance up to the horizon; the finer one is taken, so the
-    difference bounds its error from above wherever refinement converges.  What the run makes of a relative change
-    of the drive by 1e-13, little more than it makes of rounding, is added.
+    Runs with finer and finer steps are compared at the striker and at mid-span, 40 times per cycle, until two of them
+    differ by less than half the tolerance up to the horizon.  The steps of the finer run are taken; the difference
+    bounds its error if the refinement converges.  The perturbation growth is added to the estimate.
     """
     limit = integration.tolerance
     assert limit is not None
@@ -169,8 +172,8 @@ def steps_for(system: System, integration: Integration) -> tuple[Plan, ErrorEsti
     if not reached:
         last = min(last, _last_within(bound, limit))
         warnings.warn(
-            f"tolerance = {limit:g} b is met only up to {times[last]:g} s of {times[-1]:g} s although the conditioning "
-            "would allow more; integration.accuracy says so too",
+            f"tolerance = {limit:g} b is met only up to {times[last]:g} s of {times[-1]:g} s, which is less than the "
+            "predictability horizon; see run.accuracy, or give a larger tolerance",
             RuntimeWarning,
             stacklevel=3,
         )
@@ -193,7 +196,7 @@ def _instants(system: System, ensemble: Ensemble) -> _Array:
 
 
 def _perturbed(ensemble: Ensemble, size: float) -> Ensemble:
-    """The same run with all that drives it, or its start if nothing does, changed by a relative *size*."""
+    """Return the run with its drives, or its initial state if nothing drives it, changed by a relative *size*."""
     factor, numbers = 1.0 + size, ensemble.drive_numbers.copy()
     names = ensemble.drive.number_names
     scaled = [names.index(name) for name in ensemble.drive.amplitudes if name in names]
@@ -201,15 +204,15 @@ def _perturbed(ensemble: Ensemble, size: float) -> Ensemble:
     driven = bool(numbers[:, scaled].any() or ensemble.samples.any())
     if not driven and (ensemble.runs["tip_speed"] != 0.0).any():
         raise InputError(
-            f"the drive {ensemble.drive.name!r}: names no number in its amplitudes that its motion is proportional to, "
-            "so that nothing can be said of how a run responds to a change of it"
+            f"drive = {ensemble.drive.name!r}: must name the numbers that its motion is proportional to in its "
+            "amplitudes; otherwise the perturbation growth is unknown"
         )
     starts = ensemble.starts if driven else ensemble.starts * factor
     return replace(ensemble, drive_numbers=numbers, starts=starts, samples=ensemble.samples * factor)
 
 
 def _watch(system: System, ensemble: Ensemble, times: _Array) -> _Array:
-    """Displacements of the beam at the striker's location and at the centre, over b, shape (times, 2)."""
+    """Return displacements of the beam at the striker and at mid-span, over b, shape (times, 2)."""
     recorded = joined(list(resolve("cpu")[1].record(ensemble, times, False)))
     beam = ensemble.structure.row_of_beam(ensemble.contact_rows[0])
     read_out = np.column_stack((beam, ensemble.structure.center))
@@ -219,11 +222,11 @@ def _watch(system: System, ensemble: Ensemble, times: _Array) -> _Array:
 
 
 def _apart(a: _Array, b: _Array) -> _Array:
-    """Greatest difference of two runs so far; infinite from where one of them failed."""
+    """Return the maximum difference of two runs so far; infinite after the time at which one of them failed."""
     difference = np.abs(a - b).max(axis=1)
     return np.asarray(np.maximum.accumulate(np.where(np.isfinite(difference), difference, np.inf)))
 
 
 def _last_within(growing: _Array, limit: float) -> int:
-    """Index of the last instant at which a growing quantity, 0 at first, is within *limit*."""
+    """Return the index of the last time at which a growing quantity, 0 at first, is within *limit*."""
     return max(int(np.searchsorted(growing, limit, side="right")) - 1, 0)
