@@ -151,9 +151,7 @@ def test_workers_that_are_too_small_are_given_up(tmp_path, work, monkeypatch):
     monkeypatch.setattr("distributed.wait", lambda futures, **options: None)
     monkeypatch.setattr(workers, "_POLL", 0.0)
     monkeypatch.setattr(workers, "ATTEMPTS", 1000)
-    with pytest.raises(
-        CheckpointError, match="came and went and no task was finished; they may have too little mem"
-    ):
+    with pytest.raises(CheckpointError, match="were lost and no task finished; they may have too little mem"):
         within(60, computed, tmp_path / "store", work, _Coming())
 
 
@@ -185,7 +183,7 @@ def test_a_scheduler_that_is_killed(tmp_path, work, monkeypatch, tried):
                 monkeypatch.setattr(ClusterWorkers, "_delivered", then_kill)
                 return computed(tmp_path / "store", work, client)
 
-        with pytest.raises(CheckpointError, match="the scheduler does not answer any more"):
+        with pytest.raises(CheckpointError, match="the scheduler does not answer"):
             within(180, go)
     finally:
         process.kill()

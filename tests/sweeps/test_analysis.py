@@ -19,7 +19,7 @@ def test_threshold_of_a_known_map(synthetic_map):
     notch = threshold_notch(x, found, step, (0.8, 2.2))
     assert abs(notch.position - 1.2) <= 0.5 * (notch.high - notch.low) + 0.1
     assert notch.low <= 1.2 <= notch.high
-    with pytest.raises(InputError, match="must hold a point"):
+    with pytest.raises(InputError, match="must contain a point"):
         threshold_notch(x, found, step, (7.0, 8.0))
 
 
@@ -48,5 +48,5 @@ def test_comparing_maps(synthetic_map):
     other = synthetic_map.copy(deep=True)
     other.response_class[5, 3] = ResponseClass.CONTINUOUS
     assert compare_maps(synthetic_map, other).changed == pytest.approx(1 / 1000)
-    with pytest.raises(InputError, match="must share one grid"):
+    with pytest.raises(InputError, match="must have the same grid"):
         compare_maps(synthetic_map, other.isel(frequency_ratio=slice(5)))

@@ -141,7 +141,9 @@ def test_a_poisonous_task_is_set_apart(tmp_path, small, whole, client):
 
 def test_workers_that_cannot_compute_at_all(tmp_path, small, client):
     work, stage = trouble(small, tmp_path, always=dict.fromkeys(range(7), "raise"))
-    with pytest.raises(CheckpointError, match="cannot compute this map: a task raised RuntimeError: no luck"):
+    with pytest.raises(
+        CheckpointError, match="cannot compute this sweep: a task raised RuntimeError: no luck"
+    ):
         computed(tmp_path / "store", work, stage, client)
 
 
@@ -205,7 +207,10 @@ def test_slurm(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (SLURM.replace('interface = "lo"\n', ""), "interface is missing: the network that the workers reach"),
+        (
+            SLURM.replace('interface = "lo"\n', ""),
+            "interface is missing: the network interface through which the workers reach",
+        ),
         (SLURM.replace("cores = 16", 'cores = "16"'), r"cores = '16': must be of type int"),
         (SLURM + "nodes = 3\n", "nodes: unknown key; must be one of account, cores"),
         ("cores = 3\n", r"must contain one section, \[slurm\]"),

@@ -397,24 +397,24 @@ def test_parameters_that_are_only_in_order_together(system) -> None:
         (
             lambda s: sb.sweep(s, {"location": [0.3]}, sb.Integration(tolerance=1e-3)),
             InputError,
-            "tolerance = 0.001: is for one run; give a sweep a step",
+            "tolerance = 0.001: applies to single runs; for a sweep give step",
         ),
         (
             lambda s: sb.sweep(s, {"restitution_coefficient": [0.1, 0.2]}),
             InputError,
-            r"contact\.coefficient: no parameter of this system; it has beam\.length",
+            r"contact\.coefficient: is not a parameter of this system; its parameters are beam\.length",
         ),
         (
             lambda s: sb.sweep(
                 sb.System(s.model, initial_state=sb.State(amplitude=[0.0, 0.0])), {"location": [0.3]}
             ),
             InputError,
-            r"striker\.location: no parameter of this system",
+            r"striker\.location: is not a parameter of this system",
         ),
         (
             lambda s: sb.sweep(sb.System(s.model), {"modes": [1, 2]}),
             InputError,
-            "striker = None: .* needs a start",
+            "striker = None: .* needs an initial_state",
         ),
         (
             lambda s: sb.sweep(s, {"beam.buckling_level": [3e-4], "beam.axial_load": [30.0]}),

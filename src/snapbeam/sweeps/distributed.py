@@ -51,10 +51,11 @@ _MOST_MENDED = 5
 
 
 class WorkerPool:
-    """Who is there.
+    """Present workers of a cluster.
 
-    Tells when that changes between nobody and somebody, gives up when too many went without a result, and starts
-    workers of this machine anew that their runner has lost, as it does one that is killed while it starts.
+    The pool reports when the first worker comes and the last worker goes.  It raises an error if too many workers are
+    lost without a result.  It replaces local workers that Dask does not restart, such as a worker that is killed
+    while it starts.
     """
 
     def __init__(self, client: Client, note: Callable[[str], object]) -> None:

@@ -1,4 +1,4 @@
-"""A sweep before it is computed: the system, its points and how each run is integrated, checked once."""
+"""Checked setup of a sweep: its system, points and integration."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ __all__ = [
 
 
 # ----------------------------------------------------------------------------------------------------
-# What is refused of a sweep before any run, and what is doubtful about it.
+# Checks and diagnostics of a sweep before any run.
 
 
 def require_parameters(system: System, points: Points) -> None:
-    """Refuse axes over what the system does not have, by its first point."""
+    """Refuse axes of parameters that the system does not have, at its first point."""
     first = {name: values[0] for name, values in points.take(np.zeros(1, dtype=np.int64)).items()}
     for name in first:
         if (
@@ -57,19 +57,23 @@ def require_parameters(system: System, points: Points) -> None:
             continue
         section, _, field = name.partition(".")
         if field != "gap" or section not in {each.partition(".")[0] for each in system.parameters}:
-            raise InputError(f"{name}: no parameter of this system; it has {', '.join(system.parameters)}")
+            raise InputError(
+                f"{name}: is not a parameter of this system; its parameters are {', '.join(system.parameters)}"
+            )
     if (
         system.striker is None
         and system.initial_state is None
         and not system.moving
         and not any(name.startswith("initial_state.") for name in first)
     ):
-        raise InputError("striker = None: a beam that nothing strikes needs a start to move from")
+        raise InputError(
+            "striker = None: without a striker the beam needs an initial_state; give one, or a striker"
+        )
     _at(system, first)
 
 
 def _at(system: System, point: dict[str, Any]) -> System:
-    """The system at a point."""
+    """Return the system at a point."""
     plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in point.items()}
     return system.replace(
         **{name: value for name, value in plain.items() if not name.startswith("integration.")}
@@ -77,7 +81,7 @@ def _at(system: System, point: dict[str, Any]) -> System:
 
 
 def diagnostics_of(system: System, points: Points) -> Iterator[Diagnostic]:
-    """What is doubtful about the system, or at the ends of what is swept."""
+    """Yield the diagnostics of the system, and of the sweep at the limits of its parameters."""
     yield from system.diagnostics()
     for number in _ends(points):
         point = {name: values[0] for name, values in points.take(np.array([number])).items()}
@@ -85,7 +89,7 @@ def diagnostics_of(system: System, points: Points) -> Iterator[Diagnostic]:
 
 
 def _ends(points: Points) -> list[int]:
-    """Points at which some number is least or greatest."""
+    """Return the points at which a parameter is minimum or maximum."""
     if isinstance(points, Grid):
         corners = [(0,) * len(points.shape)]
         corners += [
@@ -98,9 +102,9 @@ def _ends(points: Points) -> list[int]:
 
 
 def require_every_structure(setup: SweepSetup) -> None:
-    """Refuse structures that are none, starts that do not fit them, and steps that do not resolve some run.
+    """Refuse invalid models, initial conditions that do not fit them, and steps that are too long, before any run.
 
-    Before any run: a sweep does not end in the middle of the night because its last beam is not buckled.
+    A sweep therefore cannot end hours later because its last beam is not buckled.
     """
     names = setup.points.names
     stepped = setup.integration.step is not None or "integration.step" in names
@@ -121,20 +125,20 @@ Progress = Callable[[int, int], object]
 
 TITLE = "map of the response of a struck bistable beam"
 _ALWAYS = ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location")
-"""Parameters that every map says, swept or not."""
+"""Parameters that every dataset contains, swept or not."""
 
 
 @dataclass(frozen=True, eq=False)
 class SweepSetup:
-    """A sweep that makes sense."""
+    """A checked sweep."""
 
     system: System
     integration: Integration
-    """With the engine resolved."""
+    """Solver settings, with the selected engine."""
     points: Points
 
     def with_points(self, points: Points) -> SweepSetup:
-        """The same sweep over other points."""
+        """Return the same sweep over other points."""
         return SweepSetup(self.system, self.integration, points)
 
     def integrate(
@@ -148,7 +152,7 @@ class SweepSetup:
     ) -> dict[str, NDArray[Any]]:
         """Integrate runs and return their statistics, arrays of shape (runs,) by name.
 
-        What a run gives depends on its own point alone, not on what it is marched with.
+        The results of a run depend only on its own point, not on the other runs of its batch.
 
         Parameters
         ----------
@@ -157,10 +161,10 @@ class SweepSetup:
         threads, progress
             As for an engine.
         start : callable, optional
-            ``start(system, state) -> State``: where the runs of a system begin instead; *state* is where the
-            points say, None if they say nothing of it.
+            ``start(system, state) -> State`` returns other initial conditions; *state* is that of the points, or
+            None if they do not determine it.
         step_factor : float
-            Times the length of every step.
+            Factor of all steps.
         """
         total = next(iter(columns.values())).size
         found: dict[str, NDArray[Any]] = {}
@@ -200,7 +204,7 @@ class SweepSetup:
     def groups(
         self, columns: Columns
     ) -> Iterator[tuple[System, Integration, NDArray[np.int64], dict[str, NDArray[np.float64]]]]:
-        """The points by structure: a system, an integration, which points, and what differs among them."""
+        """Yield the points by model: a system, an integration, the numbers of its points, and their parameters."""
         structural = [name for name in columns if not lookup(name).is_run]
         own = [name for name in columns if name not in structural]
         total = next(iter(columns.values())).size
@@ -223,7 +227,7 @@ class SweepSetup:
             yield system, integration, which, points
 
     def neighbour(self, changes: dict[str, Any]) -> tuple[System, Integration]:
-        """The system and the integration with some parameters of their structure changed."""
+        """Return the system and the integration with other model-level parameters."""
         of_run = {
             name.removeprefix("integration."): value
             for name, value in changes.items()
@@ -235,7 +239,7 @@ class SweepSetup:
 
     @staticmethod
     def start_of(system: System, points: dict[str, NDArray[np.float64]]) -> State | None:
-        """Where runs of a system begin, if the points say something of it."""
+        """Return the initial conditions of the runs, if the points determine them."""
         prefix = "initial_state."
         own = {
             name.removeprefix(prefix): values for name, values in points.items() if name.startswith(prefix)
@@ -244,12 +248,12 @@ class SweepSetup:
 
     @cached_property
     def plan(self) -> Plan:
-        """Steps of the system as it stands."""
+        """Steps of the system of the sweep."""
         return plans_of(self.system, self.integration, run_columns(self.system, {}))[0]
 
     @property
     def fixed(self) -> dict[str, float]:
-        """What every map says of the drive and the striker, where it is not swept, by dotted name."""
+        """Parameters of drive and striker that every dataset contains and that are not swept, by dotted name."""
         parameters = self.system.parameters
         return {
             name: parameters[name] for name in _ALWAYS if name in parameters and name not in self.points.names
@@ -257,7 +261,7 @@ class SweepSetup:
 
     @property
     def structural(self) -> list[str]:
-        """What differs among the points and changes the frequencies, the length scale or the steps."""
+        """Swept parameters that change the frequencies, the length scale or the steps."""
         return [
             name
             for name in self.points.names
@@ -267,7 +271,7 @@ class SweepSetup:
         ]
 
     def identity(self) -> dict[str, Any]:
-        """Everything that the numbers depend on, plain: what two sweeps must share to be one."""
+        """Return plain values of everything that the results depend on; sweeps with equal values have equal results."""
         integration = {
             name: getattr(self.integration, name) for name in quantities(Integration) if name != "threads"
         }
@@ -279,7 +283,7 @@ class SweepSetup:
         }
 
     def attributes(self, title: str = TITLE, more: dict[str, Any] | None = None) -> dict[str, Any]:
-        """The attributes of a file: a title, every parameter, and what made it."""
+        """Return the attributes of a dataset: title, all parameters and provenance."""
         own: dict[str, Any] = {
             "cycles": self._cycles(),
             "engine": self.integration.engine,
@@ -301,7 +305,7 @@ class SweepSetup:
             }
         beam = self.system.model.beam
         if beam is not None and any(name.startswith(("beam.", "boundary.")) for name in self.points.names):
-            # the one of the two that follows from the other follows anew at every point
+            # the one that follows from the other differs at every point
             pair = {"beam.buckling_level", "beam.axial_load"}
             given = pair & set(self.points.names) or {f"beam.{beam.given}"}
             varied |= {lookup(name).short for name in pair - given}
@@ -310,14 +314,14 @@ class SweepSetup:
         return attrs
 
     def _cycles(self) -> float:
-        """Cycles of each run; those of the record, if it is marched to its end."""
+        """Return the number of cycles of each run; a recorded motion determines it if none is given."""
         drive = None if self.system.striker is None else self.system.striker.drive
         if isinstance(drive, RecordedMotion) and self.integration.cycles is None:
             return round(drive.duration * drive.frequency, 9)
         return self.integration.cycles_or_default
 
     def coordinates(self) -> dict[str, Any]:
-        """Coordinates of a dataset: dimensions, what holds throughout, and what goes with the structure."""
+        """Return the coordinates of a dataset: axes, fixed parameters and quantities that depend on the model."""
         coords = self.points.coordinates()
         for name, value in self.fixed.items():
             row = lookup(name)
@@ -327,7 +331,7 @@ class SweepSetup:
         return coords
 
     def _of_structure(self) -> dict[str, Any]:
-        """Frequency and length that normalise, and step, over what changes them."""
+        """Return reference frequency, step and length scale as functions of the parameters that change them."""
         names = self.structural
         if isinstance(self.points, Grid):
             axes = [self.points.axes[name] for name in names]
@@ -357,7 +361,7 @@ class SweepSetup:
         }
 
     def dataset(self, statistics: dict[str, NDArray[Any]]) -> xr.Dataset:
-        """The statistics of every point as a labelled map."""
+        """Return the statistics of all points as a dataset."""
         import xarray as xr
 
         dataset = xr.Dataset(coords=self.coordinates(), attrs=self.attributes())
@@ -367,7 +371,7 @@ class SweepSetup:
 
 
 def sweep_setup(system: System, axes: Any, integration: Integration | None = None) -> SweepSetup:
-    """Check what is asked of a sweep; the parameters are those of :func:`snapbeam.sweep`."""
+    """Check a sweep; the parameters are those of :func:`snapbeam.sweep`."""
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     integration = Integration() if integration is None else integration
@@ -375,7 +379,7 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
     if integration.tolerance is not None:
         raise InputError(
-            f"tolerance = {integration.tolerance:g}: is for one run; give a sweep a step, or accuracy = 'reference'"
+            f"tolerance = {integration.tolerance:g}: applies to single runs; for a sweep give step, or accuracy = 'reference'"
         )
     points = axes if isinstance(axes, Points) else points_of(axes)
     require_parameters(system, points)
@@ -399,9 +403,9 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
 
 
 def _alike(system: System, state: State | None, runs: int) -> list[NDArray[np.int64]]:
-    """The runs that are marched together: of free beams, those that begin on the same side of the centre.
+    """Return batches of runs that can be integrated together.
 
-    A free beam is seen from the well that it begins in, a struck one from its striker.
+    The sign convention of a beam with a striker follows from the striker, that of a free beam from its initial well.
     """
     every = np.arange(runs)
     if system.striker is not None or state is None or not state.batch:
@@ -411,7 +415,7 @@ def _alike(system: System, state: State | None, runs: int) -> list[NDArray[np.in
 
 
 def variable_attributes(name: str) -> dict[str, Any]:
-    """Unit and name in words of one variable of a map; for codes, what they mean."""
+    """Return the attributes of a variable: unit, long name, and the meanings of codes."""
     row = STATISTICS[name]
     labels: dict[str, Any] = {"units": row.unit, "long_name": row.long_name}
     if name == "response_class":

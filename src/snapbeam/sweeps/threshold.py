@@ -1,4 +1,4 @@
-"""Thresholds: the values of a parameter between which a beam begins to snap through, over any other parameters."""
+"""Thresholds of the interwell response along one parameter, and quantities of maps."""
 
 from __future__ import annotations
 
@@ -206,14 +206,14 @@ def _above_all(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 # ----------------------------------------------------------------------------------------------------
-# Numbers read off maps: thresholds, their notches, shares of classes, what differs between two maps.
+# Quantities of maps: thresholds, notches, class fractions and differences.
 
 
 _Array = NDArray[np.float64]
 
 
 def is_interwell(response: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Which responses snapped through at least once."""
+    """Return which responses snapped through at least once."""
     return np.asarray(response >= ResponseClass.TRANSIENT_1)
 
 
@@ -225,7 +225,9 @@ def interwell_threshold(ds: xr.Dataset, amplitude: str = "velocity_amplitude") -
     """
     response = ds["response_class"].transpose(..., amplitude)
     if response.ndim != 2:
-        raise InputError(f"map over {response.dims}: must have {amplitude!r} and one more axis")
+        raise InputError(
+            f"map over {response.dims}: must have {amplitude!r} and one more axis; select one value of the others"
+        )
     snapped = is_interwell(response.values)
     failed = response.values == ResponseClass.UNKNOWN
     if "status" in ds:
@@ -238,7 +240,7 @@ def interwell_threshold(ds: xr.Dataset, amplitude: str = "velocity_amplitude") -
 
 @dataclass(frozen=True)
 class Notch:
-    """A local minimum of a threshold: where, how low, and between where it is within one step of that."""
+    """Local minimum of a threshold: position, height, and the interval within one step of the height."""
 
     position: float
     height: float
@@ -247,14 +249,14 @@ class Notch:
 
 
 def threshold_notch(x: _Array, threshold: _Array, step: float, window: tuple[float, float]) -> Notch:
-    """The deepest local minimum of a threshold curve inside a window.
+    """Return the deepest local minimum of a threshold curve inside a window.
 
-    The position is the middle of the stretch about the lowest point over which the curve stays within one
-    *step* of the amplitude axis; the stretch is its uncertainty.
+    The position is the middle of the interval around the lowest point in which the curve is within one *step* of the
+    amplitude axis; this interval is the uncertainty of the position.
     """
     inside = (x >= window[0]) & (x <= window[1]) & np.isfinite(threshold)
     if not inside.any():
-        raise InputError(f"window = {window}: must hold a point of the threshold")
+        raise InputError(f"window = {window}: must contain a point of the threshold")
     at = int(np.flatnonzero(inside)[np.argmin(threshold[inside])])
     limit = threshold[at] + 1.0001 * step
     first = last = at
@@ -268,18 +270,18 @@ def threshold_notch(x: _Array, threshold: _Array, step: float, window: tuple[flo
 def class_fraction(
     response: NDArray[np.int8], kind: ResponseClass, where: NDArray[np.bool_] | None = None
 ) -> float:
-    """Share of the points, those *where* holds, that have a class; NaN if there are none."""
+    """Return the fraction of the points, or of those selected by *where*, in a class; NaN without points."""
     points = response if where is None else response[where]
     return float(np.mean(points == kind)) if points.size else float("nan")
 
 
 @dataclass(frozen=True)
 class Difference:
-    """What differs between two maps of one grid, as shares of all points.
+    """Differences between two maps over the same grid.
 
-    ``changed``: the class; ``snapped``: whether it is interwell; ``at_border``: of the changed points, those
-    with a neighbour of another class in the first map; ``share``: the greatest change of the share of a
-    class; ``threshold``: ratio of the mean interwell thresholds, second over first.
+    ``changed``: fraction of points with another class.  ``snapped``: fraction of points where only one response is
+    interwell.  ``at_border``: fraction of the changed points that have a neighbour of another class in the first map.
+    ``share``: maximum change of a class fraction.  ``threshold``: ratio of the mean thresholds, second over first.
     """
 
     changed: float
@@ -293,7 +295,7 @@ def compare_maps(first: xr.Dataset, second: xr.Dataset) -> Difference:
     """Compare the classes of two maps over the same grid."""
     a, b = first["response_class"].values, second["response_class"].values
     if a.shape != b.shape or a.ndim != 2:
-        raise InputError(f"maps of shapes {a.shape} and {b.shape}: must share one grid of two axes")
+        raise InputError(f"maps of shapes {a.shape} and {b.shape}: must have the same grid with two axes")
     changed = a != b
     border = np.zeros_like(changed)
     for axis in (0, 1):
