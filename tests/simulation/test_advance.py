@@ -477,7 +477,7 @@ SYSTEM = system_of(2)
         (
             lambda: sb.advance(SYSTEMS["elastic"], tangent=np.zeros((1, 2, 1))),
             InputError,
-            "its force jumps, so that the tangent flow does; give none",
+            "its force jumps, and so does the tangent flow; give no tangent",
         ),
     ],
 )

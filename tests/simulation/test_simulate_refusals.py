@@ -92,7 +92,7 @@ SYSTEM = sb.System(BUCKLED, default_values.CONTACT, SHAKER)
         (
             lambda: sb.simulate(SYSTEM, sb.Integration(cycles=10**6)),
             sb.InputError,
-            r"\d+ samples of 2 modes would take .* GiB, the limit is 4 GiB: give fewer sample_times, or fewer cycles",
+            r"\d+ samples of 2 modes would take .* GiB, the limit is 4 GiB: give fewer sample_times or cycles",
         ),
         (
             lambda: sb.simulate(SYSTEM, sb.Integration(cycles=10**7)),
