@@ -143,8 +143,6 @@ _KINDS: dict[str, Mapping[str, type]] = {
     "harvester": HARVESTERS,
 }
 """What a section may be of, where its ``type`` says so."""
-_OF_MAP = {"frequency_ratio": "drive", "velocity_amplitude": "drive", "location": "striker"}
-"""Names that a section [map] of version 0.1 may hold, and the sections they belong to."""
 _SYMBOLS = {
     "E": "young_modulus", "L": "length", "N": "modes", "Omega": "frequency_ratio", "P": "axial_load",
     "V": "velocity_amplitude", "b": "buckling_level", "e": "coefficient", "f1": "reference_frequency", "h": "thickness",
@@ -154,58 +152,18 @@ _SYMBOLS = {
 
 
 def checked_sections(sections: Mapping[str, Any]) -> tuple[dict[str, dict[str, Any]], list[str]]:
-    """What was given, by section and name, and a line for everything that is wrong."""
+    """Return the checked values by section and name, and one message for each fault."""
     lines: list[str] = []
     found: dict[str, dict[str, Any]] = {}
-    for section, name, value, named in _entries(sections, lines):
-        if section != "sweep" and name in found.get(section, {}):
-            message = f"{name}: is given in two sections"
-        else:
-            message = _checked(section, name, value, found)
-        if message:
-            lines.append(f"[{named}] {message}")
-    return found, lines
-
-
-def _entries(sections: Mapping[str, Any], lines: list[str]) -> list[tuple[str, str, Any, str]]:
-    """Section, name and value of everything given, and the section it was given in; faults go to *lines*."""
-    found = []
-    mapping("sections", sections)
-    shaker = sections.get("shaker")
-    single = set(shaker) if isinstance(shaker, Mapping) else set()
-    for section, values in sections.items():
-        if numbered(str(section))[0] not in (*SECTIONS, "shaker", "map"):
+    for section, values in mapping("sections", sections).items():
+        if numbered(str(section))[0] not in SECTIONS:
             lines.append(f"[{section}]: unknown section{_nearest(str(section), list(SECTIONS))}")
         elif not isinstance(values, Mapping):
             lines.append(f"{section} = {shown(values)}: must be a section [{section}]")
         else:
-            for name, value in values.items():
-                if section == "map" and name not in _OF_MAP:
-                    lines.append(f"[map] {name}: unknown key{_nearest(str(name), list(_OF_MAP))}")
-                    continue
-                place = _place(section, str(name), value)
-                if section == "map" and name in single:
-                    place = (
-                        "sweep",
-                        f"{_OF_MAP[name]}.{name}",
-                    )  # of the map alone; the other is of single runs
-                found.append((*place, value, section))
-    return [(section, name, value, shown) for section, name, value, shown in found]
-
-
-def _place(section: str, name: str, value: Any) -> tuple[str, str]:
-    """Where something belongs.
-
-    Version 0.1 had the striker and its drive in one section, axes by short names, and the reference frequency in [integration].
-    """
-    if section == "shaker":
-        return ("drive" if name in ("frequency_ratio", "velocity_amplitude") else "striker"), name
-    if section == "map":
-        single = isinstance(value, (int, float)) and not isinstance(value, bool)
-        return (_OF_MAP[name], name) if single else ("sweep", f"{_OF_MAP[name]}.{name}")
-    if section == "integration" and name == "reference_frequency":
-        return "model", name
-    return section, name
+            faults = [_checked(section, str(name), value, found) for name, value in values.items()]
+            lines += [f"[{section}] {message}" for message in faults if message]
+    return found, lines
 
 
 def _known(section: str, found: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -647,7 +605,7 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config
     Parameters
     ----------
     sections : mapping of mapping
-        Values by section and name.  Sections ``shaker`` and ``map``, as version 0.1 had them, are read too.
+        Values by section and name.
     source : str
         Where they come from, to stand before each refusal.
 
