@@ -43,9 +43,9 @@ class Tip:
 class Followed:
     """What was found at the times asked for, displacements over b."""
 
-    displacement: Array
+    displacement_at_striker: Array
     midspan_displacement: Array
-    penetration: Array
+    penetration_normalised: Array
     own: Array
     """State of the body, shape (times, numbers)."""
     force: Array
@@ -134,7 +134,7 @@ def _above(pair: tuple[float, float]) -> tuple[float, float]:
 
 def differences(data: Any, truth: Followed) -> dict[str, float]:
     """Greatest differences of a run's dataset, over b, by name."""
-    names = ("displacement", "midspan_displacement", "penetration")
+    names = ("displacement_at_striker", "midspan_displacement", "penetration_normalised")
     return {name: float(np.abs(data[name].values - getattr(truth, name)).max()) for name in names}
 
 

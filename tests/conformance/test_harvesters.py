@@ -182,7 +182,7 @@ def test_sweep_of_the_load() -> None:
 
 
 def test_refusals() -> None:
-    with pytest.raises(InputError, match=r"start = 0.5: must be less than stop"):
+    with pytest.raises(InputError, match=r"patch_start = 0.5: must be less than patch_end"):
         sb.PiezoelectricHarvester(
             moment_per_volt=1e-3, capacitance=1e-9, resistance=1e4, patch_start=0.5, patch_end=0.4
         )

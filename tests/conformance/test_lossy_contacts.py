@@ -75,13 +75,13 @@ def test_no_loss_is_hertz() -> None:
 LOSSY = {
     "hunt-crossley": (
         sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05),
-        lambda law: lambda d, v: law.stiffness * d**1.5 * (1.0 + law.loss * v),
-        lambda law: lambda d, v: 1.0 + law.loss * v,
+        lambda law: lambda d, v: law.stiffness * d**1.5 * (1.0 + law.damping_factor * v),
+        lambda law: lambda d, v: 1.0 + law.damping_factor * v,
     ),
     "kelvin-voigt": (
         sb.KelvinVoigt(2e6, 20.0),
-        lambda law: lambda d, v: law.spring * d + law.damper * v,
-        lambda law: lambda d, v: law.spring * d + law.damper * v,
+        lambda law: lambda d, v: law.linear_stiffness * d + law.linear_damping * v,
+        lambda law: lambda d, v: law.linear_stiffness * d + law.linear_damping * v,
     ),
 }
 # error of w in b, measured: level standard and reference
@@ -119,7 +119,7 @@ def test_trajectory(name, modes, cycles, at_standard, at_reference) -> None:
         )
         bound = max(3.0 * measured, 1e-10)
         np.testing.assert_allclose(
-            run.dataset.displacement_at_striker, truth.displacement, rtol=0.0, atol=bound
+            run.dataset.displacement_at_striker, truth.displacement_at_striker, rtol=0.0, atol=bound
         )
         np.testing.assert_allclose(
             run.dataset.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
@@ -172,6 +172,6 @@ def test_refusals() -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
     system = sb.System(model, law, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1))
     with pytest.raises(
-        InputError, match="the tangent flow is known for laws whose force depends on the penetration alone"
+        InputError, match="the tangent flow exists for laws whose force depends on the penetra"
     ):
         sb.advance(system, periods=1, tangent=np.zeros((1, 2, 2)))

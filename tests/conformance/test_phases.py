@@ -151,5 +151,5 @@ def test_phases_that_would_be_ignored_are_refused() -> None:
     with pytest.raises(sb.InputError, match="state phase"):
         sb.dynamics.bifurcation_diagram(
             system_of(("striker",)), "velocity_amplitude", [0.1, 0.2], sweeps=(),
-            starts=sb.dynamics.InitialConditions(count=2, phase=True), periods=(1, 2),
+            initial_conditions=sb.dynamics.InitialConditions(count=2, phase=True), periods=(1, 2),
         )  # fmt: skip
