@@ -127,7 +127,12 @@ def mixture(seed: int, modes: int) -> Mixture:
             axial_support_stiffness=ends[2],
         )
     )
-    given = sb.Imperfection(**uneven) if uneven else None
+    names = {"rise": "midspan_amplitude", "skew": "antisymmetric_amplitude"}
+    given = (
+        sb.Imperfection(**{names.get(name, name): value for name, value in uneven.items()})
+        if uneven
+        else None
+    )
     model = sb.ReducedModel.from_beam(structure, modes=modes, imperfection=given)
     beam = MixedBeam(modes, ends, uneven)
     unit, first = model.length_scale or LEVEL, 2.0 * math.pi * model.reference_frequency

@@ -60,7 +60,9 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
         data = run.dataset
         name = "displacement_at_striker" if stop != "none" else "midspan_displacement"
-        np.testing.assert_allclose(data[name], getattr(truth, name.removesuffix("_at_striker")), rtol=0.0, atol=bound)
+        np.testing.assert_allclose(
+            data[name], getattr(truth, name.removesuffix("_at_striker")), rtol=0.0, atol=bound
+        )
         np.testing.assert_allclose(
             data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
         )

@@ -70,7 +70,9 @@ def test_independent_solution(modes, cycles, given) -> None:
             sample_times=times,
         )
         data = run.dataset
-        np.testing.assert_allclose(data.displacement_at_striker, truth.displacement_at_striker, rtol=0.0, atol=bound)
+        np.testing.assert_allclose(
+            data.displacement_at_striker, truth.displacement_at_striker, rtol=0.0, atol=bound
+        )
         np.testing.assert_allclose(
             data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
         )
