@@ -137,7 +137,7 @@ def try_one(system: sb.System, name: str, folder: Path) -> str:
     status = in_child(lambda: doomed(sweep, folder / "store"))
     if not os.WIFSIGNALED(status):
         return "was not killed"
-    done = (folder / "store" / "ledger.jsonl").read_text(encoding="utf-8").count("\n")
+    done = (folder / "store" / "tasks.jsonl").read_text(encoding="utf-8").count("\n")
     if done != 1:
         return f"{done} tasks done when it was killed"
     if in_child(lambda: plain(sweep(folder / "store")), folder / "found") != 0:

@@ -50,7 +50,7 @@ def test_kept_and_told() -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
     system = sb.System(model, default_values.CONTACT, sb.Striker(drive=total))
     assert sb.System.from_mapping(system.to_mapping()) == system
-    assert system.to_mapping()["drive"]["kind"] == "sine+burst"
+    assert system.to_mapping()["drive"]["type"] == "sine+burst"
     assert system.replace(**{"drive.duration_cycles_2": 4.0}).get("drive.duration_cycles_2") == 4.0
     with pytest.raises(sb.InputError, match="its own time axis"):
         SINE + sb.FixedStop()

@@ -244,13 +244,13 @@ def test_early_decisions(modes, count, cycles) -> None:
 def test_refusals() -> None:
     with pytest.raises(InputError, match="needs two wells: this imperfection leaves one"):
         model_of(3, rise=2e-4).require_bistable("a map")
-    with pytest.raises(InputError, match=r"skew = .*: needs a second mode"):
+    with pytest.raises(InputError, match=r"antisymmetric_amplitude = .*: needs a second mode"):
         model_of(1, skew=1e-5)
     with pytest.raises(InputError, match="unequal wells is marched by the CPU engine alone"):
         resolve("cuda", unequal_wells=True)
     with pytest.raises(InputError, match="must ascend from 0 to 1"):
         sb.Imperfection(profile=[[0.0, 0.2, 0.4, 0.9], [0.0, 1e-5, 1e-5, 0.0]])
-    with pytest.raises(InputError, match="equilibrium beside transverse_force"):
+    with pytest.raises(InputError, match="well_amplitude with transverse_force"):
         sb.ReducedModel.from_matrices(
             [[1.0]],
             [-1.0],
