@@ -105,7 +105,10 @@ def test_a_run_of_several_strikers(tmp_path) -> None:
 AXES = {
     "structure and run": {"beam.buckling_level": [3e-4, 3.5e-4], "frequency_ratio": [1.0, 1.2]},
     "contact": {"contact.stiffness": [1e8, 4e8], "striker.gap": [0.0, 1e-5]},
-    "initial_state": {"initial_state.amplitude[1]": [-1.0, 1.0], "initial_state.striker_position": [-4e-4, -3.5e-4]},
+    "initial_state": {
+        "initial_state.amplitude[1]": [-1.0, 1.0],
+        "initial_state.striker_position": [-4e-4, -3.5e-4],
+    },
     "words": {"striker.side": ["below", "above"], "integration.cycles": [2, 3]},
 }
 
