@@ -225,6 +225,12 @@ def file_path(name: str, value: Any) -> Path:
     if not isinstance(value, (str, os.PathLike)) or "\0" in str(value):
         raise InputTypeError(f"{name} = {shown(value)}: must be a path")
     path = Path(value)
+    try:
+        os.fsencode(path)
+    except UnicodeEncodeError as error:
+        raise InputError(
+            f"{name} = {shown(str(value))}: cannot be encoded in this locale ({error.encoding})"
+        ) from None
     if len(os.fsencode(path)) > _LONGEST_PATH or any(len(os.fsencode(part)) > 255 for part in path.parts):
         raise InputError(f"{name} = {shown(str(value))}: must be a path of names up to 255 bytes")
     return path
