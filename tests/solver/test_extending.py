@@ -160,7 +160,7 @@ def test_a_beam_struck_by_a_spring(own, tmp_path) -> None:
 
 def test_a_parameter_that_the_law_does_not_have_is_refused(own) -> None:
     law, *_ = own
-    with pytest.raises(InputError, match=r"contact\.stiffness: no parameter of this system"):
+    with pytest.raises(InputError, match=r"contact\.stiffness: is not a parameter of this system"):
         sb.sweep(thrown(law, 1e6), {"contact.stiffness": [1e8, 2e8]}, sb.Integration(cycles=1))
     with pytest.raises(InputError, match="linear_stiffness = 0: must be a finite number greater than 0 N/m"):
         law(0)
