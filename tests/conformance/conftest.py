@@ -67,9 +67,9 @@ class March:
     ) -> Marched:
         # a limit that a march meets on its way; one that it cannot but meet is refused before
         limit = integration.pop("max_steps", None)
-        kernel_input = sb.Integration(**({"cycles": 1} | integration))
+        how = sb.Integration(**({"cycles": 1} | integration))
         if contact is None:
-            ensemble = make_ensemble(sb.System(model, initial_state=start), kernel_input)
+            ensemble = make_ensemble(sb.System(model, initial_state=start), how)
             return Marched(ensemble, self.engine.run_ensemble(ensemble, threads, None))
         own = {"drive.frequency_ratio": frequency_ratio, "drive.velocity_amplitude": velocity_amplitude}
         striker = sb.Striker(
@@ -82,7 +82,7 @@ class March:
         given = (own if drive is None else {}) | {"striker.location": location}
         columns = np.broadcast_arrays(*map(np.atleast_1d, given.values()))
         points = {name: np.array(column, dtype=float) for name, column in zip(given, columns, strict=True)}
-        ensemble = make_ensemble(sb.System(model, contact, striker, start), kernel_input, points)
+        ensemble = make_ensemble(sb.System(model, contact, striker, start), how, points)
         if limit is not None:
             ensemble = dataclasses.replace(ensemble, max_steps=limit)
         return Marched(ensemble, self.engine.run_ensemble(ensemble, threads, None))

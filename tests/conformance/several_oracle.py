@@ -48,7 +48,7 @@ class Struck:
     work: Array
 
 
-def apply_impact_law(
+def solve_several(
     beam: PaperBeam, tips: Sequence[Tip], times: Array, rtol: float = 1e-11, start: Array | None = None
 ) -> Struck:
     """Integrate from rest in the lower well, or from amplitudes *start* at rest."""

@@ -42,7 +42,7 @@ CYCLES = {1: 3, 3: 2, 8: 1}
 @pytest.mark.parametrize("modes", CYCLES)
 @pytest.mark.parametrize("name", LAWS)
 def test_against_an_independent_solution(name: str, modes: int) -> None:
-    """1e-3 b at level *map*, 1e-7 b at level *reference*, and a ledger that closes to 1e-4 of the gross work."""
+    """1e-3 b at level *standard*, 1e-7 b at level *reference*, and a ledger that closes to 1e-4 of the gross work."""
     law, force = LAWS[name]
     beam, cycles = PaperBeam(modes), CYCLES[modes]
     first = float(beam.omega[0])

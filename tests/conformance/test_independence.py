@@ -56,14 +56,14 @@ def test_runs_of_different_contact_are_what_they_are_alone(march, model_of) -> N
 
     stiffness = np.array([1e7, 4e8, 3e9])
     shaker = sb.Shaker(frequency_ratio=1.3, velocity_amplitude=0.25)
-    kernel_input = sb.Integration(cycles=3)
+    integration = sb.Integration(cycles=3)
     whole = make_ensemble(
-        sb.System(model_of(2), default_values.CONTACT, shaker), kernel_input, {"contact.stiffness": stiffness}
+        sb.System(model_of(2), default_values.CONTACT, shaker), integration, {"contact.stiffness": stiffness}
     )
     accumulators_of_runs = march.engine.run_ensemble(whole, None, None)
     assert len(set(accumulators_of_runs["steps"].tolist())) == 3
     for i, value in enumerate(stiffness):
-        alone = make_ensemble(sb.System(model_of(2), sb.HertzContact(float(value)), shaker), kernel_input)
+        alone = make_ensemble(sb.System(model_of(2), sb.HertzContact(float(value)), shaker), integration)
         assert alone.runs["tick"][0] == whole.runs["tick"][i]
         assert alone.runs["finest"][0] == whole.runs["finest"][i]
         found = march.engine.run_ensemble(alone, None, None)

@@ -39,9 +39,9 @@ def test_tangents_are_the_derivatives(name: str, modes: int) -> None:
     system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, gap=GAP), **around)
     well, omega = model.wells[0], float(model.omega[0])
     size = float(np.abs(well).max())
-    rng, apply_contact_loss = np.random.default_rng(3), 1.0 / np.arange(1, modes + 1) ** 2
-    at = well + 1e-2 * size * rng.normal(size=modes) * apply_contact_loss
-    rate = 1e-2 * omega * size * rng.normal(size=modes) * apply_contact_loss
+    rng, weights = np.random.default_rng(3), 1.0 / np.arange(1, modes + 1) ** 2
+    at = well + 1e-2 * size * rng.normal(size=modes) * weights
+    rate = 1e-2 * omega * size * rng.normal(size=modes) * weights
     changes = np.zeros((2 * modes, 2, modes))
     changes[:modes, 0], changes[modes:, 1] = np.eye(modes), omega * np.eye(modes)
     steps = CHANGE * size * np.concatenate((changes, -changes))

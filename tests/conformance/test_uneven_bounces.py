@@ -64,7 +64,7 @@ def deepest_omega(beam) -> float:
 
 @pytest.mark.slow
 def test_against_an_event_driven_solution() -> None:
-    """1e-3 b at level *map*, 1e-7 b at level *reference*, crossings to the other well on the way."""
+    """1e-3 b at level *standard*, 1e-7 b at level *reference*, crossings to the other well on the way."""
     model = sb.ReducedModel.from_beam(
         default_values.BEAM, modes=1, imperfection=sb.Imperfection(midspan_amplitude=RISE)
     )

@@ -100,5 +100,5 @@ def test_several_strikers_are_refused_by_name():
     stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5)
     system = sb.System(MODEL, default_values.CONTACT, [STRIKER, stop])
     for ask in (Stroboscope, sb.dynamics.lyapunov_spectrum, sb.dynamics.find_attractors, sb.advance):
-        with pytest.raises(sb.InputError, match="of several strikers ask for whole runs"):
+        with pytest.raises(sb.InputError, match="a state contains the position of one striker only"):
             ask(system)

@@ -114,7 +114,7 @@ def test_a_step_that_does_not_resolve_a_period_is_refused(ratio: float) -> None:
     words = "a cycle of excitation" if ratio > 1.0 else "a period of the first mode"
     for door in (
         sb.simulate,
-        lambda system, kernel_input: sb.sweep(system, {"velocity_amplitude": [0.1, 0.2]}, kernel_input),
+        lambda system, integration: sb.sweep(system, {"velocity_amplitude": [0.1, 0.2]}, integration),
     ):
         with pytest.raises(
             sb.InputError, match=r"step = 1 s: does not resolve .*must be at most .*a quarter of it"

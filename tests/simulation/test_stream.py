@@ -38,35 +38,31 @@ def test_instants_asked_for(tmp_path) -> None:
     times = np.linspace(0.0, 0.01, 50)
     sb.simulate_to_file(system, integration, path=tmp_path / "run.nc", sample_times=times)
     found = sb.load(tmp_path / "run.nc").dataset
-    kernel_input = sb.simulate(system, integration, sample_times=times).dataset
+    expected = sb.simulate(system, integration, sample_times=times).dataset
     np.testing.assert_array_equal(found.time, times)
-    np.testing.assert_allclose(
-        found.displacement_at_striker, kernel_input.displacement_at_striker, rtol=1e-13
-    )
+    np.testing.assert_allclose(found.displacement_at_striker, expected.displacement_at_striker, rtol=1e-13)
 
 
-def same(found: sb.Run, kernel_input: sb.Run, outcome: sb.RunSummary) -> None:
+def same(found: sb.Run, expected: sb.Run, outcome: sb.RunSummary) -> None:
     """But for the last digit of what is summed over modes, which hangs on how many samples are summed at a time."""
-    assert set(found.dataset.variables) == set(kernel_input.dataset.variables)
-    for name, variable in kernel_input.dataset.variables.items():
+    assert set(found.dataset.variables) == set(expected.dataset.variables)
+    for name, variable in expected.dataset.variables.items():
         values, largest = found.dataset[name].values, np.nanmax(np.abs(variable.values), initial=0.0)
         np.testing.assert_allclose(values, variable.values, rtol=1e-13, atol=1e-14 * largest, err_msg=name)
         assert found.dataset[name].attrs == variable.attrs
-    np.testing.assert_array_equal(found.impacts.to_array(), kernel_input.impacts.to_array())
-    np.testing.assert_equal(dict(found.summary), dict(kernel_input.summary))
-    np.testing.assert_equal(dict(outcome), dict(kernel_input.summary))
-    attrs = {
-        key: value for key, value in kernel_input.dataset.attrs.items() if key not in ("created", "command")
-    }
+    np.testing.assert_array_equal(found.impacts.to_array(), expected.impacts.to_array())
+    np.testing.assert_equal(dict(found.summary), dict(expected.summary))
+    np.testing.assert_equal(dict(outcome), dict(expected.summary))
+    attrs = {key: value for key, value in expected.dataset.attrs.items() if key not in ("created", "command")}
     for key, value in attrs.items():
         np.testing.assert_equal(found.dataset.attrs[key], value, err_msg=key)
-    assert found.system == kernel_input.system and found.integration == kernel_input.integration
-    assert found.accuracy == kernel_input.accuracy and (found.final_state is None) == (
-        kernel_input.final_state is None
+    assert found.system == expected.system and found.integration == expected.integration
+    assert found.accuracy == expected.accuracy and (found.final_state is None) == (
+        expected.final_state is None
     )
-    if kernel_input.final_state is not None and found.final_state is not None:
-        np.testing.assert_array_equal(found.final_state.amplitude, kernel_input.final_state.amplitude)
-        np.testing.assert_array_equal(found.final_state.velocity, kernel_input.final_state.velocity)
+    if expected.final_state is not None and found.final_state is not None:
+        np.testing.assert_array_equal(found.final_state.amplitude, expected.final_state.amplitude)
+        np.testing.assert_array_equal(found.final_state.velocity, expected.final_state.velocity)
 
 
 def test_refusals(tmp_path) -> None:

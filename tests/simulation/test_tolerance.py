@@ -107,10 +107,10 @@ def test_named_levels() -> None:
         for name in ("standard", "reference")
     }
     step = levels["reference"].dataset.attrs["step"]
-    kernel_input = sb.Integration(cycles=5, accuracy="reference")
-    (plan,) = plans_of(system, kernel_input, {})
+    reference = sb.Integration(cycles=5, accuracy="reference")
+    (plan,) = plans_of(system, reference, {})
     assert plan.step == pytest.approx(step)
-    ensemble = make_ensemble(system, kernel_input, plan=plan._replace(step=0.5 * step))
+    ensemble = make_ensemble(system, reference, plan=plan._replace(step=0.5 * step))
     recorded = joined(list(cpu_engine.record(ensemble, times, False)))
     alpha = ensemble.structure.amplitudes(recorded.q)
     truth = alpha @ model.shape_at(1 / 2.1) / model.length_scale

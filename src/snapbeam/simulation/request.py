@@ -11,10 +11,10 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.util.validation import InputError, InputTypeError, shown
 
-__all__ = ["cycle_of", "kernel_input", "require_motion"]
+__all__ = ["checked_request", "cycle_of", "require_motion"]
 
 
-def kernel_input(system: Any, integration: Any) -> tuple[System, Integration]:
+def checked_request(system: Any, integration: Any) -> tuple[System, Integration]:
     """Check a system and an integration.
 
     Parameters

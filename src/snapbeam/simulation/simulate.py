@@ -19,7 +19,7 @@ from snapbeam.model.state import State
 from snapbeam.model.striker import numbered
 from snapbeam.model.system import System
 from snapbeam.simulation.dataset import impact_table, joined, run_dataset
-from snapbeam.simulation.request import cycle_of, kernel_input
+from snapbeam.simulation.request import checked_request, cycle_of
 from snapbeam.simulation.run import Run
 from snapbeam.simulation.states import states_of
 from snapbeam.simulation.summary import RunSummary
@@ -400,7 +400,7 @@ def simulate(
     """
     if isinstance(system, (list, tuple)):
         return _several(system, integration, sample_times, progress)
-    system, integration = kernel_input(system, integration)
+    system, integration = checked_request(system, integration)
     report = sharing(progress, "run")
     run = prepared(system, integration, sample_times)
     times, ensemble = run.times, run.ensemble
@@ -440,7 +440,7 @@ def _several(
     for at, system in enumerate(systems):
         if not isinstance(system, System):
             raise InputTypeError(f"system[{at}] = {shown(system)}: must be a System")
-    checked = [kernel_input(system, integration) for system in systems]
+    checked = [checked_request(system, integration) for system in systems]
     threads = next((each.threads for _, each in checked), None) or usable_cores()
     with ThreadPoolExecutor(max_workers=max(1, min(threads, len(systems) or 1))) as pool:
         waiting = [pool.submit(simulate, system, each, sample_times=sample_times) for system, each in checked]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from snapbeam.model.integration import ACCURACIES, Integration
 from snapbeam.model.system import System
 from snapbeam.simulation.dataset import joined
-from snapbeam.simulation.request import cycle_of, kernel_input
+from snapbeam.simulation.request import checked_request, cycle_of
 from snapbeam.solver.assemble import make_ensemble, plans_of, run_columns
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.registry import resolve
@@ -113,7 +113,7 @@ def perturbation_growth(
 
     size = positive("perturbation", perturbation)
     level = choice("accuracy", accuracy, ACCURACIES)
-    system, integration = kernel_input(system, integration)
+    system, integration = checked_request(system, integration)
     integration = integration.replace(accuracy=level, tolerance=None, early_termination=False)
     plan = plans_of(system, integration, run_columns(system, {}))[0]
     ensemble = make_ensemble(system, integration, plan=plan)
