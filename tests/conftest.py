@@ -27,7 +27,7 @@ def pytest_configure():
 
 
 FIRST = (
-    "conformance/test_frozen.py",
+    "conformance/test_reference_corpus.py",
     "lab/test_mistakes.py",
     "conformance/test_independence.py",
     "lab/",

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-import frozen
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
+from start_up import start_up
 
 import snapbeam as sb
 from snapbeam.model import default_values
@@ -105,16 +105,6 @@ def model_of():
             default_values.BEAM, modes, damping_ratio
         )
     )
-
-
-def start_up(
-    model: sb.ReducedModel, ratio: float = 1.3, velocity: float = 0.3, cycles: int = 8
-) -> sb.RecordedMotion:
-    """A record of a tip that starts up over three cycles, to a sine and its second harmonic."""
-    case = {"frequency_ratio": ratio, "velocity_amplitude": velocity, "cycles": cycles, "location": 0.5}
-    drive = frozen.recorded(case, model).striker().drive
-    assert isinstance(drive, sb.RecordedMotion)
-    return drive
 
 
 @dataclass(frozen=True)
