@@ -77,7 +77,7 @@ test: lint
 	$(BIN)/python -m pytest -m "not slow" --durations=15 -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 test-slow: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -m slow --durations=15
+	$(BIN)/python -m pytest -m slow --durations=15 -n $(WORKERS) --dist loadfile
 
 # The lower bounds that pyproject.toml states, installed and tested.  Python 3.11 is the oldest.
 OLDEST ?= .venv-oldest

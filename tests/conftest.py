@@ -28,19 +28,17 @@ def pytest_configure():
 
 FIRST = (
     "conformance/test_reference_corpus.py",
-    "lab/test_mistakes.py",
-    "conformance/test_independence.py",
     "lab/",
     "conformance/",
 )
-"""The files and folders to begin with.  The first and the third file compile the kernels that most tests use."""
+"""The files and folders to begin with.  The first file compiles the kernels that most tests use."""
 
 
 def pytest_collection_modifyitems(items):
     """Sort the files so that two workers hardly ever compile the same kernel, which takes ten seconds.
 
-    With ``--dist loadfile --no-loadscope-reorder`` one worker begins with the first and the third file.  The other
-    runs tests of the laboratory, which need no kernel, and later finds the common kernels on disk.
+    With ``--dist loadfile --no-loadscope-reorder`` one worker begins with the first file.  The other runs tests of the
+    laboratory, which need no kernel, and later finds the common kernels on disk.
     """
 
     def place(item):

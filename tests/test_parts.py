@@ -136,7 +136,7 @@ def commands_of(part: str) -> list[str]:
 
 
 def works_without(part: str, copy: Path) -> None:
-    """Import the package, show its help and collect all remaining tests."""
+    """Import the package and show its help."""
     code = f"import snapbeam, snapbeam.parts; print(snapbeam.__file__); print({part!r} in snapbeam.parts.installed_parts())"
     place, left = in_copy(copy, "-c", code).split()
     assert Path(place).is_relative_to(copy) and left == "False"
@@ -144,10 +144,6 @@ def works_without(part: str, copy: Path) -> None:
     assert re.search(r"\bsimulate\b", shown)
     for command in commands_of(part):
         assert not re.search(rf"^\W*{command} ", shown, re.MULTILINE), command
-    collected = in_copy(
-        copy, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "--collect-only", "tests"
-    )
-    assert re.search(r"\d{3,} tests collected", collected)
 
 
 def test_works_without_a_part(tmp_path: Path) -> None:
@@ -159,6 +155,10 @@ def test_works_without_a_part(tmp_path: Path) -> None:
 def test_works_without_each_part(tmp_path: Path, part: str) -> None:
     copy = without(part, tmp_path)
     works_without(part, copy)
+    collected = in_copy(
+        copy, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "--collect-only", "tests"
+    )
+    assert re.search(r"\d{3,} tests collected", collected)
     in_copy(
         copy, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "-m", "not slow", "tests/test_import.py",
         "tests/model", "tests/cli/test_app.py::test_version_and_help",

@@ -47,6 +47,7 @@ def test_a_gap_that_closes(plain) -> None:
     np.testing.assert_array_equal(end(sb.Striker(drive=SHAKER, gap=0.0)), plain)
 
 
+@pytest.mark.slow
 def test_a_long_start_is_none(plain) -> None:
     """A burst that rises at once and outlasts the run: the sine."""
     recedes(

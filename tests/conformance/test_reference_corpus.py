@@ -36,7 +36,7 @@ def check(some: list[rc.Case]) -> None:
         pytest.skip(f"{len(skipped)} of {len(some)} cases not compared; the first: {skipped[0]}")
 
 
-@pytest.mark.parametrize("entry", sorted({case.entry for case in rc.cases() if case.quick}))
+@pytest.mark.parametrize("entry", rc.QUICK)
 def test_sample(entry: str) -> None:
     """Ensembles, recorded runs and advanced states of systems whose kernels other quick tests compile too."""
     check([case for case in cases() if case.quick and case.entry == entry])

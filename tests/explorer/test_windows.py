@@ -107,6 +107,7 @@ def test_the_papers_beam_is_mapped_while_one_looks(tab, serve, folder):
     page.wait(lambda: "zero_crossings" in page.head() and "bit for bit" in page.notes(), "a run")
 
 
+@pytest.mark.slow
 def test_what_each_of_two_strikers_does_is_shown_and_kept(one_mode, jobs) -> None:
     """A map to be computed offers it, a window has it with unit and words, after what all of them do together."""
     from snapbeam.explorer.cards import window_dataset

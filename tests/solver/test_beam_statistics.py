@@ -85,6 +85,7 @@ def _peak(held: float, step: tuple) -> float:
     return max(held, abs(step.displacement[1]))
 
 
+@pytest.mark.slow
 def test_energy_in_a_circuit_is_not_in_the_modes() -> None:
     """All modes of the beam are high here, so that their share is 1, whatever energy the circuit stores."""
     coil = sb.ElectromagneticHarvester(force_factor=3.0, resistance=50.0, inductance=0.5)

@@ -77,6 +77,7 @@ def test_a_gap_and_a_striker_above(monkeypatch):
     assert_same(monkeypatch, ensemble(1, striker={"side": "above", "gap": 2e-5}))
 
 
+@pytest.mark.slow
 def test_a_striker_with_mass(monkeypatch):
     """Extremes and the share of high modes are those of the beam in both layouts, as recorded runs have them."""
     body = {"mass": 0.02, "suspension_stiffness": 700.0, "suspension_damping": 0.1}
