@@ -8,7 +8,6 @@ import os
 import re
 import shutil
 import subprocess
-import tempfile
 from functools import partial
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from benchmarks.cases import Case
 from benchmarks.peers import Method, Solver
 from benchmarks.rhs import compiled_system
+from snapbeam.solver.compilation import private_folder
 
 __all__ = ["METHODS"]
 
@@ -33,13 +33,11 @@ def _library() -> ctypes.CDLL:
     if compiler is None:
         raise ImportError("no C++ compiler", name="boost")
     text = _SOURCE.read_bytes() + " ".join((compiler, *_OPTIONS)).encode()
-    folder = (
-        Path(tempfile.gettempdir()) / f"snapbeam-boost-{os.getuid()}-{hashlib.sha256(text).hexdigest()[:12]}"
-    )
-    folder.mkdir(mode=0o700, exist_ok=True)
-    built = folder / "peer.so"
+    folder = Path(private_folder())  # code is loaded from here: nobody else may write there
+    name = f"boost-{hashlib.sha256(text).hexdigest()[:12]}"
+    built = folder / f"{name}.so"
     if not built.exists():
-        made = folder / f"{os.getpid()}.so"
+        made = folder / f"{name}-{os.getpid()}.so"
         done = subprocess.run(
             [compiler, *_OPTIONS, str(_SOURCE), "-o", str(made)], capture_output=True, text=True
         )

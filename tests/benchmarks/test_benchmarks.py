@@ -38,6 +38,19 @@ def test_every_benchmark_can_be_imported():
     assert set(done.stdout.split()) <= NEEDS, done.stdout
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no access bits")
+def test_boost_is_not_loaded_from_a_folder_that_others_can_write(tmp_path):
+    folder = tmp_path / f"snapbeam-{os.getuid()}"
+    folder.mkdir()
+    folder.chmod(0o777)
+    done = subprocess.run(
+        [sys.executable, "-c", "import benchmarks.peers.boost_peer"],
+        cwd=ROOT, env=dict(os.environ, TMPDIR=str(tmp_path), CXX="true"), capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert f"{folder} is not this user's alone" in done.stderr
+    assert list(folder.iterdir()) == []
+
+
 @pytest.mark.slow
 def test_the_gpus_benchmark_runs_in_the_simulator(tmp_path):
     pytest.importorskip("numba_cuda")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from itertools import combinations
 
 import matplotlib.pyplot as plt
@@ -83,3 +86,32 @@ def test_size_of_a_column(tmp_path):
         new_figure("wide")
     with pytest.raises(InputError, match=r"must end in \.png or \.pdf or \.svg"):
         save_figure(figure, tmp_path / "a.jpeg")
+
+
+_BACKEND = """
+import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg as FigureCanvas
+from matplotlib.backend_bases import FigureManagerBase as FigureManager
+
+mpl.interactive(True)
+"""
+"""Behaves as the backend of a notebook does: it switches the interactive mode on when it is loaded."""
+_PLOTS = """
+import matplotlib as mpl
+from snapbeam.plot.style import new_figure
+
+for k in range(3):
+    new_figure()
+    assert mpl.is_interactive(), k
+"""
+
+
+def test_every_figure_of_a_notebook_is_shown(tmp_path):
+    """The interactive mode, by which a notebook shows figures, stays on after the first figure."""
+    (tmp_path / "like_a_notebook.py").write_text(_BACKEND, encoding="utf-8")
+    path = os.pathsep.join((str(tmp_path), os.environ.get("PYTHONPATH", "")))
+    environment = dict(os.environ, MPLBACKEND="module://like_a_notebook", PYTHONPATH=path)
+    done = subprocess.run(
+        [sys.executable, "-c", _PLOTS], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr

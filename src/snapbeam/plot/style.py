@@ -99,7 +99,15 @@ _RC: Any = {
 
 
 def house_style() -> AbstractContextManager[None]:
-    """Return a context in which Matplotlib draws in the house style."""
+    """Return a context in which Matplotlib draws in the house style.
+
+    Matplotlib loads its backend first.  In a notebook the backend switches ``rcParams["interactive"]`` on, and the end
+    of the context would switch it off again if the backend were loaded inside.
+    """
+    import matplotlib.pyplot as plt
+
+    if not plt.get_fignums():  # where there is a figure, the backend is loaded
+        plt.draw_if_interactive()
     return mpl.rc_context(_RC)
 
 
