@@ -67,7 +67,8 @@ def values_of(system: sb.System, name: str) -> list[Any]:
         return list(row.choices[:2])
     if row.kind is bool:
         return [False, True]
-    own = system.get(name) if not name.startswith("run.") else getattr(sb.Integration(), name[4:])
+    section, _, field = name.partition(".")
+    own = getattr(sb.Integration(), field) if section == "integration" else system.get(name)
     if row.kind is int:
         return [int(own), int(own) + 1]
     return [0.1, 0.2] if not own else sorted([float(own), 1.03 * float(own)])
