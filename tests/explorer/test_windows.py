@@ -104,7 +104,7 @@ def test_the_papers_beam_is_mapped_while_one_looks(tab, serve, folder):
     finer = ("blocks of 9", "blocks of 3", "blocks of 1 ", "all ")
     page.wait(lambda: any(words in page.state() for words in finer), "the coarsest level")
     page.click(1.2, 0.3)
-    page.wait(lambda: "zero_crossings" in page.head() and "bit for bit" in page.notes(), "a run")
+    page.wait(lambda: "crossings" in page.head() and "bit for bit" in page.notes(), "a run")
 
 
 @pytest.mark.slow

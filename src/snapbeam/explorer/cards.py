@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import tempfile
 import time
 import tomllib
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import panel as pn
+from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 from snapbeam import InputError, Integration, ResponseClass, System, write_netcdf
@@ -45,7 +45,7 @@ from snapbeam.explorer.maps import (
     system_toml,
 )
 from snapbeam.explorer.shared import Shared
-from snapbeam.explorer.style import Look, styled
+from snapbeam.explorer.style import Html, Look, styled
 from snapbeam.model.parameter_file import Config, config_from_mapping
 from snapbeam.model.parameters import Parameter, lookup, parameters
 from snapbeam.plot.style import CLASS_COLORS
@@ -57,6 +57,11 @@ if TYPE_CHECKING:
     from snapbeam.explorer.page import Page
 
 __all__ = ["MapCard", "SystemCard", "TakeCard", "WindowControl", "changed_parameters", "window_dataset"]
+
+
+_HEADING = Markup("<h2>{}</h2>")
+_NOTE = Markup('<p class="note">{}</p>')
+_BAD = Markup('<p class="bad">{}</p>')
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -289,13 +294,9 @@ class MapCard:
             options={"threshold": "threshold", "V_QS1": "quasi", "measured": "dots", "windows": "windows"},
             value=["windows"], button_type="default",
         )  # fmt: skip
-        self.hover = pn.pane.HTML(
-            "&nbsp;", sizing_mode="stretch_width", css_classes=["hover"], margin=(0, 0, 0, 4)
-        )
-        self.state = pn.pane.HTML(
-            "", sizing_mode="stretch_width", css_classes=["map-state"], margin=(0, 0, 0, 4)
-        )
-        self.key = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 0, 0, 4))
+        self.hover = Html("\xa0", sizing_mode="stretch_width", css_classes=["hover"], margin=(0, 0, 0, 4))
+        self.state = Html("", sizing_mode="stretch_width", css_classes=["map-state"], margin=(0, 0, 0, 4))
+        self.key = Html("", sizing_mode="stretch_width", margin=(0, 0, 0, 4))
         for widget in (self.x, self.y):
             widget.param.watch(self._axes_changed, "value")
         self.show.param.watch(lambda _: self.post(self.redraw), "value")
@@ -323,7 +324,9 @@ class MapCard:
             if isinstance(wanted, float) and points.dtype.kind == "f"
             else 0
         )
-        return pn.widgets.DiscreteSlider(name=title, options=labels, value=value, width=240)
+        # this one of Panel's widgets shows its name and its labels as HTML
+        options = {str(escape(label)): at for label, at in labels.items()}
+        return pn.widgets.DiscreteSlider(name=str(escape(title)), options=options, value=value, width=240)
 
     def _axes_changed(self, event: Any) -> None:
         if self.x.value == self.y.value:  # the two change places
@@ -481,12 +484,10 @@ class MapCard:
             )
             if kind is ResponseClass.UNKNOWN and (kinds is None or not (kinds == int(kind)).any()):
                 continue
-            items.append(
-                f'<span class="swatch" style="background:{CLASS_COLORS[kind]}"></span>{kind.label}{share}'
-            )
-        self.key.object = (
-            f'<div class="key">{" &nbsp; ".join(items)}</div>' if self.show.value == "response_class" else ""
-        )
+            swatch = Markup('<span class="swatch" style="background:{}"></span>{}{}')
+            items.append(swatch.format(CLASS_COLORS[kind], kind.label, share))
+        shown = Markup('<div class="key">{}</div>').format(Markup(" &nbsp; ").join(items))
+        self.key.object = shown if self.show.value == "response_class" else ""
 
     def say(self, words: str) -> None:
         """Add a line to what is wrong."""
@@ -499,7 +500,7 @@ class MapCard:
         if self.shared.why_not:
             lines.append(f"runs cannot be computed: {self.shared.why_not}")
         lines += self._words
-        self.state.object = "<br>".join(html.escape(line) for line in lines)
+        self.state.object = Markup("<br>").join(lines)
 
     # ------------------------------------------------------------------ points
 
@@ -559,14 +560,14 @@ class MapCard:
                     values = None
                 if values is not None:
                     held[each] = values[place].item()
-        parts = [html.escape(point.words())]
+        parts = [point.words()]
         if "response_class" in held:
-            parts.append(f"<b>{ResponseClass(int(held['response'])).label}</b>")
+            parts.append(Markup("<b>{}</b>").format(ResponseClass(int(held["response_class"])).label))
         for each in dict.fromkeys((name, "zero_crossings", "peak_force")):
             if each in held and each != "response_class":
                 unit = self.source.label(each)[1]
                 parts.append(f"{each.replace('_', ' ')} {held[each]:.5g}{'' if unit == '1' else f' {unit}'}")
-        self.hover.object = " &nbsp;·&nbsp; ".join(parts)
+        self.hover.object = Markup(" &nbsp;·&nbsp; ").join(parts)
 
     def use(self, system: System, integration: Integration, changed: bool) -> None:
         """Compute points and windows of another system from now on."""
@@ -632,8 +633,8 @@ class SystemCard:
         self.post, self.downloads = post, downloads
         self.used: Callable[[System, Integration], None] = lambda *_: None
         self.fields: dict[str, Any] = {}
-        self.words = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["system-words"])
-        self.facts = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["system-facts"])
+        self.words = Html("", sizing_mode="stretch_width", css_classes=["system-words"])
+        self.facts = Html("", sizing_mode="stretch_width", css_classes=["system-facts"])
         self.box = pn.Column(sizing_mode="stretch_width", margin=0)
         apply = pn.widgets.Button(name="Use this system", button_type="primary", width=130)
         apply.on_click(lambda _: post(self.apply))
@@ -701,7 +702,7 @@ class SystemCard:
             if section == "contact":
                 fields = [self.law, *fields]
             if fields:
-                parts += [pn.pane.HTML(f"<h2>{title}</h2>", margin=0), pn.FlexBox(*fields, margin=0)]
+                parts += [Html(_HEADING.format(title), margin=0), pn.FlexBox(*fields, margin=0)]
         for part in parts:
             styled(part, self.look)
         self.box.objects = parts
@@ -804,7 +805,7 @@ class SystemCard:
 
     def refuse(self, words: str) -> None:
         """Say what cannot be done."""
-        self.words.object = f'<p class="bad" role="alert">{html.escape(words)}</p>'
+        self.words.object = Markup('<p class="bad" role="alert">{}</p>').format(words)
 
     def _save(self) -> None:
         try:
@@ -830,10 +831,11 @@ class SystemCard:
                 ("b/r", f"{beam.buckling_level / beam.radius_of_gyration:.4g}"),
                 ("P/P_cr", f"{beam.axial_load / beam.critical_load:.5g}"),
             ]
-        cells = "".join(f"<td><span class=faint>{name}</span> <b>{value}</b></td>" for name, value in facts)
+        cell = Markup('<td><span class="faint">{}</span> <b>{}</b></td>')
+        cells = Markup("").join(cell.format(name, value) for name, value in facts)
         found = [each.message for each in self.system.diagnostics()]
-        doubts = "".join(f'<p class="bad">{html.escape(each)}</p>' for each in found)
-        self.facts.object = f'<table class="facts"><tr>{cells}</tr></table>{doubts}'
+        doubts = Markup("").join(_BAD.format(each) for each in found)
+        self.facts.object = Markup('<table class="facts"><tr>{}</tr></table>{}').format(cells, doubts)
 
 
 def _kinds(section: str) -> list[str]:
@@ -887,8 +889,8 @@ class TakeCard:
 
     def __init__(self, page: Page) -> None:
         self.page = page
-        self.words = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["take-words"])
-        self.text = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["take-text"])
+        self.words = Html("", sizing_mode="stretch_width", css_classes=["take-words"])
+        self.text = Html("", sizing_mode="stretch_width", css_classes=["take-text"])
         self.kind = pn.widgets.RadioButtonGroup(options=["png", "pdf", "svg"], value="png")
         self.slow = pn.widgets.FloatInput(
             name="slow motion at the hardest impact (s)", value=4.0, start=0.0, end=30.0, width=260
@@ -916,13 +918,13 @@ class TakeCard:
         """The card."""
         make = self.buttons
         return pn.Column(
-            pn.pane.HTML("<h2>Pictures in the style of the journal</h2>", margin=0),
+            Html(_HEADING.format("Pictures in the style of the journal"), margin=0),
             pn.FlexBox(make["Map"], make["Run"], self.kind, margin=0, align_items="center"),
-            pn.pane.HTML("<h2>The beam moving, of the cycles that are seen</h2>", margin=0),
+            Html(_HEADING.format("The beam moving, of the cycles that are seen"), margin=0),
             pn.FlexBox(make["MP4"], make["GIF"], self.length, self.slow, margin=0, align_items="center"),
-            pn.pane.HTML("<h2>Data</h2>", margin=0),
+            Html(_HEADING.format("Data"), margin=0),
             pn.FlexBox(make["Run as NetCDF"], make["Map as NetCDF"], make["Window as NetCDF"], self.link, margin=0),
-            pn.pane.HTML("<h2>Measured points to lay over the map (CSV)</h2>", margin=0), self.dots,
+            Html(_HEADING.format("Measured points to lay over the map (CSV)"), margin=0), self.dots,
             self.words, self.text, sizing_mode="stretch_width", css_classes=["card", "take"],
         )  # fmt: skip
 
@@ -945,10 +947,12 @@ class TakeCard:
             command = run_command(over if on_map else point.values, file, on_map)
             beside = "" if on_map else " (with the system saved as system.toml beside it)"
             parts.append(
-                f'<h2>The command that makes this run{beside}</h2><pre class="command">{html.escape(command)}</pre>'
+                Markup('<h2>The command that makes this run{}</h2><pre class="command">{}</pre>').format(
+                    beside, command
+                )
             )
             text = python_lines(run.system, run.integration)
-            parts.append(f'<h2>The same in Python</h2><pre class="python">{html.escape(text)}</pre>')
+            parts.append(Markup('<h2>The same in Python</h2><pre class="python">{}</pre>').format(text))
         window = self._window()
         if window is not None:
             axes = {
@@ -957,10 +961,11 @@ class TakeCard:
             }
             if not any(window.log):
                 parts.append(
-                    "<h2>The command that makes the finest window</h2>"
-                    f'<pre class="map-command">{html.escape(map_command(axes, {}))}</pre>'
+                    Markup(
+                        '<h2>The command that makes the finest window</h2><pre class="map-command">{}</pre>'
+                    ).format(map_command(axes, {}))
                 )
-        self.text.object = "".join(parts) or '<p class="note">Click on a point of the map first.</p>'
+        self.text.object = Markup("").join(parts) or _NOTE.format("Click on a point of the map first.")
 
     def _window(self) -> Any:
         windows = self.page.card.windows()
@@ -968,24 +973,22 @@ class TakeCard:
 
     def refuse(self, words: str) -> None:
         """Say what cannot be done."""
-        self.words.object = f'<p class="bad" role="alert">{html.escape(words)}</p>'
+        self.words.object = Markup('<p class="bad" role="alert">{}</p>').format(words)
 
     # ------------------------------------------------------------------ files
 
     def _make(self, name: str, suffix: str, write: Callable[[Any, Token], object]) -> None:
         """Make a file beside the page and hand it to the browser."""
         page = self.page
-        self.words.object = f'<p class="busy">making {html.escape(name)}{suffix}</p>'
+        self.words.object = Markup('<p class="busy">making {}{}</p>').format(name, suffix)
         token = Token(_EXPORT_SECONDS)
 
         def done(content: bytes | None, error: str) -> None:
             def tell() -> None:
                 if content is None:
-                    self.words.object = f'<p class="bad">{html.escape(error)}</p>'
+                    self.words.object = _BAD.format(error)
                 else:
-                    self.words.object = (
-                        f'<p class="note">{html.escape(name)}{suffix}, {len(content) / 1e3:.0f} kB</p>'
-                    )
+                    self.words.object = _NOTE.format(f"{name}{suffix}, {len(content) / 1e3:.0f} kB")
                     page.downloads.give(f"{name}{suffix}", content)
 
             page.post(tell)
@@ -995,7 +998,7 @@ class TakeCard:
     def _run(self) -> Run | None:
         run = self.page.runs[self.page.which].run
         if run is None:
-            self.words.object = '<p class="bad">there is no run: click on a point of the map first</p>'
+            self.words.object = _BAD.format("there is no run: click on a point of the map first")
         return run
 
     def _picture(self, of: str) -> None:
@@ -1069,7 +1072,7 @@ class TakeCard:
     def _map_data(self) -> None:
         source = self.page.card.source
         if not source.skeleton.data_vars:
-            self.words.object = '<p class="bad">there is no map: take the window</p>'
+            self.words.object = _BAD.format("there is no map: take the window")
             return
 
         def write(path: Any, _: Token) -> None:
@@ -1080,7 +1083,7 @@ class TakeCard:
     def _window_data(self) -> None:
         window = self._window()
         if window is None or not window.values:
-            self.words.object = '<p class="bad">no window was computed</p>'
+            self.words.object = _BAD.format("no window was computed")
             return
         dataset = window_dataset(window)
         self._make("window", ".nc", lambda path, _: write_netcdf(dataset, path))
@@ -1105,7 +1108,7 @@ class TakeCard:
             self.refuse(str(error))
             return
         self.page.card.dots = dots
-        self.words.object = f'<p class="note">{len(dots)} measured points</p>'
+        self.words.object = _NOTE.format(f"{len(dots)} measured points")
         self.page.card.layers.value = [*{*self.page.card.layers.value, "dots"}]
         self.page.card.redraw()
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import html
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 import panel as pn
 from bokeh.models import ColumnDataSource
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 import snapbeam as sb
@@ -23,7 +23,7 @@ from snapbeam.explorer.maps import Point, compared
 from snapbeam.explorer.maps import chances as chances_of
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
-from snapbeam.explorer.style import Look, framed, look_of
+from snapbeam.explorer.style import Html, Look, framed, look_of
 
 __all__ = ["Answer", "Page", "answer"]
 
@@ -78,7 +78,7 @@ def _quick(system: Any, integration: Any, token: Token) -> Run | None:
         return None
     times = _even_times(system, integration, _QUICK)
     run = sb.simulate(system, integration, sample_times=times, progress=token.check)
-    if run.outcome.status is not RunStatus.OK:
+    if run.summary.status is not RunStatus.OK:
         return None
     _ = run.dataset  # made here and not on the page's thread, which others wait for
     return run
@@ -138,7 +138,7 @@ class Page:
         self.downloads = Downloads()
         self.fields: dict[str, Any] = {}
         self.typed = pn.FlexBox(margin=0)
-        self.old = pn.pane.HTML("", sizing_mode="stretch_width", margin=0, css_classes=["old-words"])
+        self.old = Html("", sizing_mode="stretch_width", margin=0, css_classes=["old-words"])
         self.go = pn.widgets.Button(name="Run", button_type="primary", width=70, align="end")
         self.go.on_click(lambda _: self.post(self._ask_typed))
         self._make_fields()
@@ -366,7 +366,7 @@ class Page:
         old = f"The map is old: it is of the system before. Changed: {names}" if self.changes else ""
         if not self.shared.source.skeleton.data_vars:
             old = f"Changed: {names}" if self.changes else ""
-        self.old.object = f'<p class="old" role="status">{html.escape(old)}</p>' if old else ""
+        self.old.object = Markup('<p class="old" role="status">{}</p>').format(old) if old else ""
         for view, point in zip(self.runs, self.points, strict=False):
             if view.run is not None and point is not None:
                 view.say("old", "old: of the system before; run it again to see the changed one", bad=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -23,11 +22,13 @@ from bokeh.models import (
     Toggle,
 )
 from bokeh.transform import linear_cmap
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from snapbeam import STATISTICS, ResponseClass, RunStatus
 from snapbeam.explorer.style import (
     Cursor,
+    Html,
     Look,
     blend,
     class_chip,
@@ -429,7 +430,7 @@ class Energy(RunPanel):
             )
         legend(self.plot, look)
         self.cursor.attach(self.plot)
-        self.words = pn.pane.HTML("", sizing_mode="stretch_width")
+        self.words = Html("", sizing_mode="stretch_width")
         return [self.wrap(self.plot), self.words]
 
     def show(self, run: Run, low: float, high: float) -> None:
@@ -452,10 +453,11 @@ class Energy(RunPanel):
             )
             scale = max(abs(parts["striker_work"]), parts["energy_dissipated"], 1e-300)
             barrier = run.system.model.saddle_energy - run.system.model.well_energy
-            self.words.object = (
-                f'<p class="note">At the end the books balance to {left:.2g} J, {abs(left) / scale:.1g} of the work. '
-                f"The barrier between the wells is {1e6 * barrier:.4g} µJ.</p>"
+            words = (
+                f"At the end the books balance to {left:.2g} J, {abs(left) / scale:.1g} of the work. "
+                f"The barrier between the wells is {1e6 * barrier:.4g} µJ."
             )
+            self.words.object = Markup('<p class="note">{}</p>').format(words)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -502,7 +504,7 @@ class Impacts(RunPanel):
             stylesheets=[sheet(self.look), _TABLE],
         )
         self.source.selected.on_change("indices", self._chosen)
-        self.words = pn.pane.HTML("", sizing_mode="stretch_width")
+        self.words = Html("", sizing_mode="stretch_width")
         return [self.words, pn.pane.Bokeh(table, sizing_mode="stretch_width")]
 
     def show(self, run: Run, low: float, high: float) -> None:
@@ -520,12 +522,16 @@ class Impacts(RunPanel):
         }  # fmt: skip
         count = run.impacts.sizes["impact"]
         more = f"; the first {_MOST} are listed" if count > _MOST else ""
-        self.words.object = f'<p class="note">{count} impacts{more}. Click on one to see it closer.</p>'
+        words = f"{count} impacts{more}. Click on one to see it closer."
+        self.words.object = Markup('<p class="note">{}</p>').format(words)
 
     def _chosen(self, _: str, __: Any, rows: list[int]) -> None:
         if rows:
             at = rows[0]
             self.closer(float(self.source.data["cycle"][at]), float(self.source.data["duration"][at]) * 1e-6)
+
+
+_ROW = Markup('<tr><td>{}</td><td class="num">{}</td><td class="unit">{}</td><td><code>{}</code></td></tr>')
 
 
 class Numbers(RunPanel):
@@ -535,7 +541,7 @@ class Numbers(RunPanel):
 
     def build(self) -> list[Any]:
         """Return the models of this view."""
-        self.table = pn.pane.HTML("", sizing_mode="stretch_width")
+        self.table = Html("", sizing_mode="stretch_width")
         return [self.table]
 
     def show(self, run: Run, low: float, high: float) -> None:
@@ -548,16 +554,8 @@ class Numbers(RunPanel):
             text = "–" if isinstance(shown, float) and np.isnan(shown) else text
             unit = "" if row is None or row.unit == "1" else row.unit
             words = "" if row is None else row.long_name
-            cells = (
-                html.escape(words),
-                html.escape(text),
-                html.escape(unit),
-                f"<code>{html.escape(name)}</code>",
-            )
-            kinds = ("", ' class="num"', ' class="unit"', "")
-            row_text = "".join(f"<td{kind}>{cell}</td>" for kind, cell in zip(kinds, cells, strict=True))
-            rows.append(f"<tr>{row_text}</tr>")
-        self.table.object = f'<table class="numbers">{"".join(rows)}</table>'
+            rows.append(_ROW.format(words, text, unit, name))
+        self.table.object = Markup('<table class="numbers">{}</table>').format(Markup("").join(rows))
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -857,6 +855,11 @@ _SETTLE = 60
 """Milliseconds that a range must rest before the samples in it are sent."""
 
 
+_BUSY = Markup('<span class="busy">{}</span>')
+_BAD = Markup('<span class="bad">{}</span>')
+_FAINT = Markup('<span class="faint">{}</span>')
+
+
 class RunView:
     """The card of one run.
 
@@ -884,12 +887,8 @@ class RunView:
             Modal(look, self.cursor), Energy(look, self.cursor), Impacts(look, self.cursor, self._closer),
             BeamPanel(look, self.cursor), Numbers(look, self.cursor),
         ]  # fmt: skip
-        self.head = pn.pane.HTML(
-            "", sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-head"]
-        )
-        self.note = pn.pane.HTML(
-            "", sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-note"]
-        )
+        self.head = Html("", sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-head"])
+        self.note = Html("", sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-note"])
         self.tabs = pn.Tabs(
             *((part.title, part.place) for part in self.parts), dynamic=True, sizing_mode="stretch_width", margin=0
         )  # fmt: skip
@@ -913,23 +912,22 @@ class RunView:
     def begin(self, words: str) -> None:
         """Say what is computed, over the run before."""
         self._write_notes()
-        self._head('<span class="busy">computing</span>', words)
+        self._head(_BUSY.format("computing"), words)
 
     def wait(self, words: str, seconds: float, why: str) -> None:
         """Say for how long it has been computed, and what takes the time if that is known."""
-        below = f'<span class="faint">{html.escape(why)}</span>' if why else ""
-        self._head(f'<span class="busy">computing, {seconds:.0f} s</span>', words, below)
+        self._head(_BUSY.format(f"computing, {seconds:.0f} s"), words, _FAINT.format(why) if why else "")
 
     def fail(self, words: str) -> None:
         """Say why there is no run."""
         self.notes = {}
         self._write_notes()
-        self._head('<span class="bad">no run</span>', words)
+        self._head(_BAD.format("no run"), words)
 
     def _head(self, kind: str, words: str, below: str = "") -> None:
-        line = f"<br>{below}" if below else ""
-        self.head.object = (
-            f'<span class="point">{html.escape(self.name)}</span> {kind} {html.escape(words)}{line}'
+        line = Markup("<br>{}").format(below) if below else ""
+        self.head.object = Markup('<span class="point">{}</span> {} {}{}').format(
+            self.name, kind, words, line
         )
 
     def show(self, run: Run, words: str, fresh: bool) -> None:
@@ -943,9 +941,9 @@ class RunView:
             counts = (
                 f"{answer.zero_crossings} crossings, {answer.impacts} impacts, ends in the {well} well{final}"
             )
-            self._head(class_chip(answer.response_class), words, f'<span class="faint">{counts}</span>')
+            self._head(class_chip(answer.response_class), words, _FAINT.format(counts))
         else:
-            why = f'<span class="bad">{answer.status.name}: {html.escape(answer.status.advice)}</span>'
+            why = _BAD.format(f"{answer.status.name}: {answer.status.advice}")
             self._head(class_chip(ResponseClass.UNKNOWN), words, why)
         if fresh:
             x, _ = across(run)
@@ -958,12 +956,11 @@ class RunView:
 
     def say(self, about: str, words: str, bad: bool = False) -> None:
         """Put a line under the class, one for each thing that it is about."""
-        kind = "bad" if bad else "faint"
-        self.notes[about] = f'<span class="{kind}">{html.escape(words)}</span>' if words else ""
+        self.notes[about] = (_BAD if bad else _FAINT).format(words) if words else ""
         self._write_notes()
 
     def _write_notes(self) -> None:
-        self.note.object = "<br>".join(text for text in self.notes.values() if text)
+        self.note.object = Markup("<br>").join(text for text in self.notes.values() if text)
 
     def _draw(self) -> None:
         self.active.activate()

@@ -155,11 +155,10 @@ def make_server(
 def _factory(shared: Shared) -> Callable[[], Any]:
     def page() -> Any:
         from snapbeam.explorer.page import Page
+        from snapbeam.explorer.style import Html
 
         if shared.pages >= SESSIONS:
-            return pn.pane.HTML(
-                f"<p>{SESSIONS} pages are open, the most that there may be: close one of them.</p>"
-            )
+            return Html(f"{SESSIONS} pages are open, the most that there may be: close one of them.")
         shared.pages += 1
         pn.state.curdoc.template_variables.setdefault("dist_url", _OWN)
         try:

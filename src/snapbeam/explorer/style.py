@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -15,6 +14,7 @@ from bokeh.core.property.descriptors import UnsetValueError
 from bokeh.events import ConnectionLost, DocumentReady
 from bokeh.models import ColumnDataSource, CustomJS, Range1d, Span
 from bokeh.plotting import figure as bokeh_figure
+from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 from snapbeam import ResponseClass
@@ -29,6 +29,7 @@ __all__ = [
     "DARK",
     "LIGHT",
     "Cursor",
+    "Html",
     "Look",
     "blend",
     "class_chip",
@@ -241,10 +242,26 @@ def colors_of(name: str, values: NDArray[Any], limits: tuple[float, float]) -> N
     return np.ascontiguousarray(bytes_).view(np.uint32).reshape(values.shape)
 
 
-def class_chip(kind: ResponseClass) -> str:
+class Html(pn.pane.HTML):
+    """Text on the page.  It shows ``Markup`` as HTML and escapes every other text.
+
+    All texts of the page are shown by it.  Text from files, addresses and messages therefore never becomes HTML:
+    ``Markup("<b>{}</b>").format(text)`` escapes *text*, and a plain string is escaped here.
+    """
+
+    priority = 0  # Panel must not choose it by itself
+
+    def _transform_object(self, obj: Any) -> dict[str, Any]:
+        found: dict[str, Any] = super()._transform_object(str(escape("" if obj is None else obj)))
+        return found
+
+
+def class_chip(kind: ResponseClass) -> Markup:
     """The name of a class on its colour."""
     ink = "#111" if kind in (ResponseClass.TRANSIENT_2, ResponseClass.CONTINUOUS) else "#fff"
-    return f'<span class="chip" style="background:{CLASS_COLORS[kind]};color:{ink}">{kind.label}</span>'
+    return Markup('<span class="chip" style="background:{};color:{}">{}</span>').format(
+        CLASS_COLORS[kind], ink, kind.label
+    )
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -366,10 +383,8 @@ def framed(page: Page) -> Any:
     """All of a page."""
     look, shared = page.look, page.shared
     pn.config.raw_css = [sheet(look)]
-    name = html.escape(shared.source.name)
-    title = pn.pane.HTML(
-        f'<h1>snapbeam <span class="faint">{name}</span></h1>', margin=0, sizing_mode="stretch_width"
-    )
+    words = Markup('<h1>snapbeam <span class="faint">{}</span></h1>').format(shared.source.name)
+    title = Html(words, margin=0, sizing_mode="stretch_width")
     dark = pn.widgets.Button(name="Dark" if look.name == "default" else "Light", width=70, align="center")
     dark.js_on_click(code=_THEME)
     top = pn.Row(
@@ -395,7 +410,7 @@ def framed(page: Page) -> Any:
 
     left.param.watch(lambda _: page.post(turned), "active")
     runs = pn.FlexBox(page.runs[0].layout, margin=0, css_classes=["right"])
-    page.runs[0].head.object = f'<span class="faint">{_FIRST}</span>'
+    page.runs[0].head.object = Markup('<span class="faint">{}</span>').format(_FIRST)
     body = pn.FlexBox(
         left,
         runs,
