@@ -214,7 +214,7 @@ def test_slurm(tmp_path):
         (SLURM.replace("cores = 16", 'cores = "16"'), r"cores = '16': must be of type int"),
         (SLURM + "nodes = 3\n", "nodes: unknown key; must be one of account, cores"),
         ("cores = 3\n", r"must contain one section, \[slurm\]"),
-        ("[slurm\n", "is not TOML"),
+        ("[slurm\n", "is no TOML"),
     ],
 )
 def test_slurm_files_that_are_wrong(tmp_path, text, message):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -75,12 +74,10 @@ def read(file: Path, section: str) -> tuple[Config, ParameterUncertainty, dict[s
     """
     from snapbeam.model.parameter_file import config_from_mapping
     from snapbeam.uncertainty.distributions import uncertainty_from_mapping
+    from snapbeam.util.input_files import read_toml
     from snapbeam.util.validation import InputError
 
-    try:
-        sections = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"file = {str(file)!r}: cannot be read as TOML, {error}") from None
+    sections = read_toml("file", file)
     if "uncertainty" not in sections:
         raise InputError(
             f"{file.name}: has no section [uncertainty]; add one, or use snapbeam map for a system without uncertainty"

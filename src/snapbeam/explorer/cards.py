@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 import time
-import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from snapbeam.explorer.jobs import (
     UPLOAD,
     WINDOW_SECONDS,
     Downloads,
+    Jobs,
     Token,
     Waiting,
     drawing,
@@ -49,6 +49,7 @@ from snapbeam.explorer.style import Html, Look, styled
 from snapbeam.model.parameter_file import Config, config_from_mapping
 from snapbeam.model.parameters import Parameter, lookup, parameters
 from snapbeam.plot.style import CLASS_COLORS
+from snapbeam.util.input_files import parsed_toml
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -617,6 +618,8 @@ class SystemCard:
         ``post(work)``: do something on the page's own thread.
     downloads : Downloads
     look : Look
+    jobs : Jobs
+        Threads that read files, so that the page answers meanwhile.
     """
 
     def __init__(
@@ -626,8 +629,9 @@ class SystemCard:
         post: Callable[[Callable[[], None]], None],
         downloads: Downloads,
         look: Look,
+        jobs: Jobs,
     ) -> None:
-        self.look = look
+        self.look, self.jobs = look, jobs
         self.first = (system, integration)
         self.system, self.integration = system, integration
         self.post, self.downloads = post, downloads
@@ -791,17 +795,16 @@ class SystemCard:
     def _given(self, content: bytes | None) -> None:
         if not content:
             return
-        try:
-            if len(content) > UPLOAD:
-                raise InputError(too_large("the file", len(content)))
-            try:
-                sections = tomllib.loads(content.decode("utf-8"))
-            except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError, ValueError) as error:
-                raise InputError(f"the file is no TOML: {error}") from None
-            config: Config = config_from_mapping(sections, "the file")
-            self.take(config.system, config.integration)
-        except InputError as error:
-            self.refuse(str(error))
+        if len(content) > UPLOAD:
+            self.refuse(too_large("the file", len(content)))
+            return
+
+        def done(config: Config | None, error: str) -> None:
+            self.post(
+                lambda: self.refuse(error) if config is None else self.take(config.system, config.integration)
+            )
+
+        self.jobs.run(lambda _: _uploaded_config(content), done, Token())
 
     def refuse(self, words: str) -> None:
         """Say what cannot be done."""
@@ -1089,28 +1092,46 @@ class TakeCard:
         self._make("window", ".nc", lambda path, _: write_netcdf(dataset, path))
 
     def _dots(self, content: bytes | None) -> None:
-        from snapbeam.sweeps.measured_points import read_measured_points
-
         if not content:
             return
-        attrs = self.page.card.source.attrs
-        try:
-            if len(content) > UPLOAD:
-                raise InputError(too_large("the table", len(content)))
-            with tempfile.TemporaryDirectory(prefix="snapbeam-") as folder:
-                path = Path(folder) / "dots.csv"
-                path.write_bytes(content)
-                level = attrs.get("beam_buckling_level")
-                dots = read_measured_points(
-                    path, reference_frequency=attrs.get("reference_frequency"), buckling_level=level
-                )
-        except (InputError, UnicodeDecodeError) as error:
-            self.refuse(str(error))
+        if len(content) > UPLOAD:
+            self.refuse(too_large("the table", len(content)))
             return
-        self.page.card.dots = dots
-        self.words.object = _NOTE.format(f"{len(dots)} measured points")
-        self.page.card.layers.value = [*{*self.page.card.layers.value, "dots"}]
-        self.page.card.redraw()
+        page, attrs = self.page, self.page.card.source.attrs
+
+        def done(dots: Any, error: str) -> None:
+            def tell() -> None:
+                if dots is None:
+                    self.refuse(error)
+                    return
+                page.card.dots = dots
+                self.words.object = _NOTE.format(f"{len(dots)} measured points")
+                page.card.layers.value = list(dict.fromkeys([*page.card.layers.value, "dots"]))
+                page.card.redraw()
+
+            page.post(tell)
+
+        page.shared.jobs.run(lambda _: _uploaded_points(content, attrs), done, Token())
+
+
+def _uploaded_config(content: bytes) -> Config:
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"the file: is no TOML, {error}") from None
+    return config_from_mapping(parsed_toml(text, "the file"), "the file")
+
+
+def _uploaded_points(content: bytes, attrs: dict[str, Any]) -> Any:
+    from snapbeam.sweeps.measured_points import read_measured_points
+
+    with tempfile.TemporaryDirectory(prefix="snapbeam-") as folder:
+        path = Path(folder) / "points.csv"
+        path.write_bytes(content)
+        level = attrs.get("beam_buckling_level")
+        return read_measured_points(
+            path, reference_frequency=attrs.get("reference_frequency"), buckling_level=level
+        )
 
 
 def _posted(page: Page, work: Callable[[], None]) -> Callable[[Any], None]:

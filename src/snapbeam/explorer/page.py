@@ -175,7 +175,12 @@ class Page:
         if self._system is None:
             assert self.shared.system is not None
             self._system = SystemCard(
-                self.shared.system, self.shared.integration, self.post, self.downloads, self.look
+                self.shared.system,
+                self.shared.integration,
+                self.post,
+                self.downloads,
+                self.look,
+                self.shared.jobs,
             )
             self._system.used = self._use
         return self._system

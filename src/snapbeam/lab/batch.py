@@ -9,7 +9,6 @@ import json
 import math
 import os
 import re
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -29,6 +28,7 @@ from snapbeam.lab.vibrometer import DriveMeasurement, measure_drive, shaker_sign
 from snapbeam.lab.waveform_comparison import LEAST_CYCLES, measure_response
 from snapbeam.util.diagnostics import Diagnostic, Severity, diagnostics_of
 from snapbeam.util.files import atomic_path, check_writable
+from snapbeam.util.input_files import read_toml
 from snapbeam.util.netcdf import write_netcdf
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, integer, positive, shown, within
@@ -275,12 +275,7 @@ def load_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -
     """
     sections: dict[str, dict[str, Any]] = {"camera": {}, "tracking": {}, "signal": {}, "campaign": {}}
     if path is not None:
-        try:
-            read = tomllib.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise InputError(f"settings = {str(path)!r}: cannot be read, {error.strerror}") from error
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: is no TOML, {error}") from error
+        read = read_toml("settings", path)
         for name, values in read.items():
             if name not in sections or not isinstance(values, dict):
                 raise InputError(f"{path}: [{name}]: unknown section; must be among {', '.join(sections)}")

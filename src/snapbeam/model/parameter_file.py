@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import math
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -31,6 +30,7 @@ from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import numbered
 from snapbeam.model.system import System
 from snapbeam.util.files import atomic_path, check_writable
+from snapbeam.util.input_files import read_toml
 from snapbeam.util.validation import InputError, file_path, finite, instance, mapping, shown
 
 __all__ = [
@@ -683,15 +683,7 @@ def load_config(path: str | os.PathLike[str]) -> Config:
         If it cannot be read or is no TOML, and for anything :func:`config_from_mapping` refuses.
     """
     file = file_path("config", path)
-    try:
-        sections = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"config = {str(path)!r}: cannot be read, {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"config = {str(path)!r}: is no TOML, {error}") from error
-    except ValueError as error:  # an integer of thousands of digits
-        raise InputError(f"config = {str(path)!r}: cannot be read, {error}") from error
-    return config_from_mapping(sections, file.name)
+    return config_from_mapping(read_toml("config", file), file.name)
 
 
 def dump_config(config: Config, path: str | os.PathLike[str], comment: str = "") -> None:

@@ -27,8 +27,9 @@ from snapbeam.model.state import State
 from snapbeam.model.striker import ContactPair, Shaker, Striker, check_others, parted
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.files import atomic_path, check_writable
+from snapbeam.util.input_files import read_toml
 from snapbeam.util.provenance import canonical_json
-from snapbeam.util.validation import InputError, InputTypeError, file_path, instance, shown
+from snapbeam.util.validation import InputError, InputTypeError, instance, shown
 
 __all__ = ["System", "check_world"]
 
@@ -320,19 +321,7 @@ class System:
         InputError
             If the file cannot be read, is no TOML or describes no system.
         """
-        import tomllib
-
-        path = file_path("path", path)
-        try:
-            with open(path, "rb") as stream:
-                sections = tomllib.load(stream)
-        except OSError as error:
-            raise InputError(f"path = {str(path)!r}: cannot be read, {error.strerror or error}") from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise InputError(f"path = {str(path)!r}: is no TOML, {error}") from None
-        except ValueError as error:  # an integer of thousands of digits
-            raise InputError(f"path = {str(path)!r}: cannot be read, {error}") from None
-        return cls.from_mapping(sections)
+        return cls.from_mapping(read_toml("path", path))
 
     def describe(self) -> str:
         """The system in a few lines, for a person to read."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import time
-import tomllib
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
@@ -18,6 +17,7 @@ from snapbeam.solver.cpu.driver import usable_cores
 from snapbeam.sweeps.checkpoint.records import CheckpointError
 from snapbeam.sweeps.points import Columns
 from snapbeam.sweeps.tasks import PointWork, Provenance, ResultTable, Stage, provenance_of
+from snapbeam.util.input_files import read_toml
 from snapbeam.util.provenance import code_hash
 from snapbeam.util.validation import InputError, integer, shown
 
@@ -396,12 +396,7 @@ def parse_cluster(text: str) -> Cluster:
 
 
 def _read_slurm(path: Path) -> dict[str, Any]:
-    try:
-        sections = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"cluster = {str(path)!r}: cannot be read, {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"cluster = {str(path)!r}: is not TOML, {error}; correct the file") from error
+    sections = read_toml("cluster", path)
     given = sections.pop("slurm", None)
     if sections or not isinstance(given, dict):
         raise InputError(f"cluster = {str(path)!r}: must contain one section, [slurm]")

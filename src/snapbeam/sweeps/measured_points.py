@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.util.input_files import input_text
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, file_path, positive
 
@@ -84,11 +85,7 @@ def read_measured_points(
         Names the file, the line and the column of what cannot be used.
     """
     file = file_path("path", path)
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"measurements = {str(path)!r}: cannot be read, {reason}") from error
+    text = input_text("measurements", file)
     first = next(
         (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), ""
     )

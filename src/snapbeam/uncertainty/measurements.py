@@ -5,11 +5,11 @@ from __future__ import annotations
 import itertools
 import math
 import os
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
+from snapbeam.util.input_files import read_toml
 from snapbeam.util.validation import InputError, InputTypeError, choice, file_path, positive, shown
 
 __all__ = ["HERTZ_TIME", "ContactTest", "Measurements", "load_measurements"]
@@ -183,12 +183,7 @@ def load_measurements(path: str | os.PathLike[str]) -> tuple[Measurements, dict[
         If the file cannot be read, or holds an unknown or unusable entry; the message names file and entry.
     """
     source = file_path("path", path)
-    try:
-        sections = tomllib.loads(source.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{source}: cannot be read, {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{source}: is no TOML, {error}") from error
+    sections = read_toml("path", source)
     measured = sections.pop("measured", None)
     if not isinstance(measured, dict):
         raise InputError(f"{source}: has no section [measured]")

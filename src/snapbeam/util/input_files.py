@@ -1,0 +1,113 @@
+"""Files that a user gives: regular files below a size limit, and TOML whose keys are not too deep."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from snapbeam.util.validation import InputError, file_path
+
+__all__ = ["LARGEST_INPUT", "input_bytes", "input_text", "parsed_toml", "read_toml"]
+
+
+LARGEST_INPUT = 64 * 2**20
+"""Largest file of parameters or of a table, bytes."""
+_KEY_PARTS = 8
+"""Most parts of a dotted key.  The parser's time grows with the square of their number."""
+
+
+def input_bytes(name: str, path: str | os.PathLike[str], largest: int = LARGEST_INPUT) -> bytes:
+    """Return the contents of a regular file.
+
+    Parameters
+    ----------
+    name : str
+        The parameter to name in a refusal.
+    path : path
+        The file.
+    largest : int
+        Largest size, bytes.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is larger, or is no regular file, such as a device or a pipe.
+    """
+    file = file_path(name, path)
+    try:
+        kind = file.stat().st_mode
+        if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
+            raise InputError(f"{name} = {str(path)!r}: must be a regular file, not a device or a pipe")
+        with file.open("rb") as stream:
+            data = stream.read(largest + 1)
+    except OSError as error:
+        raise InputError(f"{name} = {str(path)!r}: cannot be read, {error.strerror or error}") from error
+    if len(data) > largest:
+        raise InputError(f"{name} = {str(path)!r}: must be at most {largest / 2**20:g} MiB")
+    return data
+
+
+def input_text(name: str, path: str | os.PathLike[str]) -> str:
+    """Return the text of a regular file in UTF-8.
+
+    Raises
+    ------
+    InputError
+        For anything :func:`input_bytes` refuses, and if the file is not in UTF-8.
+    """
+    try:
+        return input_bytes(name, path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{name} = {str(path)!r}: cannot be read, {error}") from error
+
+
+# Strings and comments, which may contain any number of full stops.  Each alternative also matches a string without an
+# end, so that the search takes a time proportional to the length of the text.
+_STRINGS = re.compile(
+    r'"""(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5})?|'
+    r"'''(?:[^']|'(?!''))*+(?:'{3,5})?|"
+    r'"(?:[^"\\\n]|\\.)*+"?|'
+    r"'[^'\n]*+'?|#[^\n]*+",
+    re.DOTALL,
+)
+_DEEP = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{_KEY_PARTS}}}")
+
+
+def parsed_toml(text: str, what: str) -> dict[str, Any]:
+    """Return the sections of a TOML text.
+
+    Parameters
+    ----------
+    text : str
+    what : str
+        What a refusal names, such as ``config = 'system.toml'``.
+
+    Raises
+    ------
+    InputError
+        If the text is no TOML, or a key has more than eight parts.
+    """
+    plain = _STRINGS.sub(lambda found: "" if found[0].startswith("#") else "s", text)
+    if _DEEP.search(plain):
+        raise InputError(f"{what}: a key must have at most {_KEY_PARTS} parts separated by full stops")
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"{what}: is no TOML, {error}") from error
+    except ValueError as error:  # an integer of thousands of digits
+        raise InputError(f"{what}: cannot be read, {error}") from error
+
+
+def read_toml(name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the sections of a TOML file.
+
+    Raises
+    ------
+    InputError
+        For anything :func:`input_text` and :func:`parsed_toml` refuse.
+    """
+    return parsed_toml(input_text(name, path), f"{name} = {str(Path(path))!r}")
