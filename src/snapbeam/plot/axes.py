@@ -88,7 +88,7 @@ def symbol_of(dataset: xr.Dataset, name: str) -> str:
 
 
 def _parameter(dataset: xr.Dataset, name: str) -> Parameter | None:
-    """The row of the table for an axis: as its coordinate says, or by its name, as in files of version 0.1."""
+    """The row of the table for an axis, by its attribute, or for a fixed parameter, by the name in the dataset."""
     full = dataset[name].attrs.get("parameter", name) if name in dataset.coords else name
     try:
         return lookup(str(full))
