@@ -52,21 +52,21 @@ def main() -> int:
     parser.add_argument("part", nargs="*", help=f"any of {', '.join(parts)}; by default all but the last two")
     parser.add_argument("--quick", action="store_true", help="few repeats, short runs: does everything work")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/bench"), metavar="FOLDER")
-    kernel_input = parser.parse_args()
-    unknown = [part for part in kernel_input.part if part not in parts]
+    arguments = parser.parse_args()
+    unknown = [part for part in arguments.part if part not in parts]
     if unknown:
         parser.error(f"part = {unknown[0]!r}: must be one of {', '.join(parts)}")
-    kernel_input.output.mkdir(parents=True, exist_ok=True)
+    arguments.output.mkdir(parents=True, exist_ok=True)
     status = 0
-    for part in kernel_input.part or _PARTS:
+    for part in arguments.part or _PARTS:
         if part == "peers":
             for peer in PEERS:
                 found = methods(peer)
                 print(found if isinstance(found, str) else f"{peer}: {', '.join(m.name for m in found)}")
         elif part == "regressions":
-            status = _regressions(kernel_input.output, kernel_input.quick) or status
+            status = _regressions(arguments.output, arguments.quick) or status
         else:
-            import_module(f"benchmarks.{_PARTS[part]}").run(kernel_input.output, kernel_input.quick)
+            import_module(f"benchmarks.{_PARTS[part]}").run(arguments.output, arguments.quick)
     return status
 
 

@@ -83,9 +83,9 @@ def bounced(of: Drawn) -> Bounced:
 def judge(runs: list[Bounced]) -> None:
     """Within the limits, or what the conditioning makes of a tiny change of the drive; the figures are printed."""
     regular = [run.separation <= CHAOTIC for run in runs]
-    cycles, kernel_output = sum(r.size for r in regular), sum(int(r.sum()) for r in regular)
+    cycles, compared = sum(r.size for r in regular), sum(int(r.sum()) for r in regular)
     print(
-        f"{kernel_output} of {cycles} cycles are compared, {sum(r.all() for r in regular)} of {len(runs)} runs whole"
+        f"{compared} of {cycles} cycles are compared, {sum(r.all() for r in regular)} of {len(runs)} runs whole"
     )
     beyond = []
     for level, limit in LIMIT.items():

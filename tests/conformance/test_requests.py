@@ -68,15 +68,15 @@ def request_of(rng: np.random.Generator) -> KernelOutput:
     return KernelOutput(tolerance, run.accuracy.estimated_error, error, run.accuracy.reached, words)
 
 
-def judge(kernel_output: list[KernelOutput]) -> None:
+def judge(results: list[KernelOutput]) -> None:
     """No request broken, and the estimate a bound; the figures are printed."""
-    broken = [each for each in kernel_output if each.error > each.tolerance]
-    below = [each for each in kernel_output if each.error > each.estimate + 1e-13]
-    print(f"{len(broken)} of {len(kernel_output)} broken: {broken}")
+    broken = [each for each in results if each.error > each.tolerance]
+    below = [each for each in results if each.error > each.estimate + 1e-13]
+    print(f"{len(broken)} of {len(results)} broken: {broken}")
     print(f"{len(below)} estimates below the error: {below}")
-    print(f"not reached: {sum(not each.reached for each in kernel_output)}")
+    print(f"not reached: {sum(not each.reached for each in results)}")
     assert not broken
-    assert len(below) <= 0.05 * len(kernel_output)
+    assert len(below) <= 0.05 * len(results)
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ HIDDEN = np.ma.array([0.1, 99.0], mask=[False, True])
         (lambda: sb.classify([True], [False], 4, 1), "zero_crossings"),
         (lambda: sb.classify([1, 2], [0, 0, 0], 4, 1), "do not go together"),
         (lambda: sb.classify([1.5], [0], 4, 1), "whole numbers"),
-        (lambda: sb.classify([1], [0], 4, 0), r"final_side: must be \+1 or -1"),
+        (lambda: sb.classify([1], [0], 4, 0), r"final_well: must be \+1 or -1"),
         (lambda: MODEL.potential_energy(1.0), r"alpha of shape \(\)"),
         (lambda: MODEL.potential_energy([1.0, 2.0, 3.0]), r"alpha of shape \(3,\): must have the shape \(..., 2\)"),
         (lambda: MODEL.kinetic_energy([[1.0]]), "alpha_velocity of shape"),

@@ -89,10 +89,10 @@ def test_the_tip_touches_unless_a_gap_is_given() -> None:
 
 
 def test_a_column_that_is_the_systems_own_changes_nothing() -> None:
-    kernel_input = sb.Integration(cycles=2)
-    alone = make_ensemble(SYSTEM, kernel_input)
+    integration = sb.Integration(cycles=2)
+    alone = make_ensemble(SYSTEM, integration)
     for name in ("drive.frequency_ratio", "striker.location", "contact.stiffness", "drive.phase"):
-        same = make_ensemble(SYSTEM, kernel_input, {name: np.full(2, SYSTEM.get(name))})
+        same = make_ensemble(SYSTEM, integration, {name: np.full(2, SYSTEM.get(name))})
         assert same.size == 2
         for column in alone.runs.dtype.names:
             if column not in ("start_row",):

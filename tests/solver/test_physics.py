@@ -122,11 +122,9 @@ def test_flows_near_the_identity_keep_their_digits(x: float) -> None:
 @pytest.mark.parametrize(("omega", "zeta"), [(500.0, 0.005), (2.4e5, 0.005), (100.0, 0.9), (3.0, 0.0)])
 def test_rotation_is_the_exact_flow(omega: float, zeta: float) -> None:
     """The rows are the exponential of q' = p, p' = -omega^2 q - 2 zeta omega p."""
-    time, apply_contact_loss = 0.7 / omega, omega * math.sqrt(1.0 - zeta**2)
-    sine, _, less_one = sincos_cosm1(apply_contact_loss * time)
-    rows = rotation(
-        zeta * omega, omega**2, sine / apply_contact_loss, less_one, decay_less_one(zeta * omega * time)
-    )
+    time, damped = 0.7 / omega, omega * math.sqrt(1.0 - zeta**2)
+    sine, _, less_one = sincos_cosm1(damped * time)
+    rows = rotation(zeta * omega, omega**2, sine / damped, less_one, decay_less_one(zeta * omega * time))
     scale = np.diag([1.0, 1.0 / omega])
     exact = scipy.linalg.expm(time * np.array([[0.0, 1.0], [-(omega**2), -2.0 * zeta * omega]]))
     got = scale @ (np.reshape(rows, (2, 2)) + np.eye(2)) @ np.linalg.inv(scale)

@@ -26,10 +26,10 @@ MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=8)
 def run_of(pair: tuple[float, float], cycles: int, side: str = "below") -> tuple[sb.Run, sb.Run]:
     """A run, and the same one sampled densely and evenly."""
     shaker = sb.Shaker(frequency_ratio=pair[0], velocity_amplitude=pair[1], location=0.4, side=side)
-    system, kernel_input = sb.System(MODEL, default_values.CONTACT, shaker), sb.Integration(cycles=cycles)
+    system, integration = sb.System(MODEL, default_values.CONTACT, shaker), sb.Integration(cycles=cycles)
     end = cycles / (pair[0] * MODEL.reference_frequency)
-    return sb.simulate(system, kernel_input), sb.simulate(
-        system, kernel_input, sample_times=np.linspace(0.0, end, 60_001)
+    return sb.simulate(system, integration), sb.simulate(
+        system, integration, sample_times=np.linspace(0.0, end, 60_001)
     )
 
 
@@ -124,11 +124,11 @@ def test_a_map_has_the_statistics_of_its_runs() -> None:
     system = sb.System(
         MODEL, default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
     )
-    kernel_input = sb.Integration(cycles=4)
-    ds = sb.sweep(system, {"velocity_amplitude": [0.18, 0.3]}, kernel_input)
+    integration = sb.Integration(cycles=4)
+    ds = sb.sweep(system, {"velocity_amplitude": [0.18, 0.3]}, integration)
     assert set(STATISTICS) == set(ds.data_vars)
     for i, amplitude in enumerate(ds.velocity_amplitude.values):
-        run = sb.simulate(system.replace(**{"drive.velocity_amplitude": float(amplitude)}), kernel_input)
+        run = sb.simulate(system.replace(**{"drive.velocity_amplitude": float(amplitude)}), integration)
         assert list(run.summary) == list(STATISTICS)
         for name in STATISTICS:
             np.testing.assert_equal(ds[name].values[i], run.summary[name], err_msg=name)

@@ -25,7 +25,7 @@ TURNS = 16
 
 
 class Stages(NamedTuple):
-    """A composition as a integrate finds it in its memory: plain numbers, since passing arrays costs time."""
+    """A composition as it stands in memory: plain numbers, since passing arrays costs time."""
 
     flows: int
     """Flows of a step; there is one kick more."""

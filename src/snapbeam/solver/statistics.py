@@ -94,7 +94,7 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
     ("total_impulse", np.float64, 0.0),
     ("work", np.float64, 0.0),
     ("gross_work", np.float64, 0.0),
-    ("dissipated", np.float64, 0.0),  # integrated, where a energy balance is kept
+    ("dissipated", np.float64, 0.0),  # integrated, where an energy balance is computed
     ("lost", np.float64, 0.0),  # in contact
     ("base_work", np.float64, 0.0),  # of a moving base, on the beam in its frame
     ("circuit_energy", np.float64, 0.0),  # lost in a harvester's circuit, load included

@@ -1,4 +1,4 @@
-"""What is decided between steps, and kept of them: scalar functions that every engine's integrate is made of."""
+"""Step-size control, contact onset and statistics: scalar functions that the kernels of every engine call."""
 
 from __future__ import annotations
 
@@ -229,8 +229,8 @@ def first_contact_onset(inner_samples, pieces, piece):
 def refine_onset(clock, cut, whole, seen, least):
     """Where a step of *whole* ticks is to be cut that was cut at *cut*, where the gap has not just closed.
 
-    What was seen inside the step was seen by linear modes under a tension that changes evenly; a step that ends there
-    knows better.  *least*, a time, is as near as counts.
+    The samples inside the step follow from a linear flow with a tension that varies linearly; a step that ends there
+    is more accurate.  *least* is the smallest correction, s, that is made.
     """
     if seen.dv > 0.0:
         late = seen.d / seen.dv

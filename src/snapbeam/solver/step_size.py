@@ -376,15 +376,15 @@ def clocked(
     if isinstance(drive, RecordedMotion):
         turn = np.full(table.size, drive.duration)
         left = 1.0 - table["phase"] / (2.0 * math.pi)
-        kernel_input = _asked_cycles(drive, integration, periods, float(left.min()))
+        cycles_asked = _asked_cycles(drive, integration, periods, float(left.min()))
         steps = _whole_steps(turn, lengths, 1.0)
         table["period"] = steps * SUBDIVISION
         table["tick"] = turn / table["period"]
         held = drive.duration * drive.frequency
         table["landing"] = np.rint(table["period"] / held)
-        share = kernel_input / drive.frequency / drive.duration
+        share = cycles_asked / drive.frequency / drive.duration
         table["end"] = np.rint(
-            share * table["period"] if periods is None else kernel_input * table["landing"]
+            share * table["period"] if periods is None else cycles_asked * table["landing"]
         )
         table["end"] = np.minimum(table["end"], np.rint(left * table["period"]))
         cycles = float(table["end"][0] * table["tick"][0] * drive.frequency)
@@ -412,15 +412,15 @@ def _asked_cycles(
 ) -> float:
     """Cycles to integrate, of a record of which a share *left* is still to come."""
     held = drive.duration * drive.frequency * left
-    kernel_input = integration.cycles if periods is None else periods
-    if kernel_input is None and held > 0.0:
+    cycles_asked = integration.cycles if periods is None else periods
+    if cycles_asked is None and held > 0.0:
         return held
-    if kernel_input is None or kernel_input > held + 1e-6:  # states stand on ticks
+    if cycles_asked is None or cycles_asked > held + 1e-6:  # states stand on ticks
         of = "of" if left == 1.0 else "that are left of"
         raise InputError(
-            f"cycles = {kernel_input}: must be at most the {max(held, 0.0):.1f} cycles {of} the recorded drive"
+            f"cycles = {cycles_asked}: must be at most the {max(held, 0.0):.1f} cycles {of} the recorded drive"
         )
-    return min(float(kernel_input), held)
+    return min(float(cycles_asked), held)
 
 
 def require_resolved(system: System, integration: Integration, cycle: _Array) -> None:

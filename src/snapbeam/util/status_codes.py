@@ -116,11 +116,11 @@ def classify(
         shapes = ", ".join(f"{name} {array.shape}" for name, array in zip(given, arrays, strict=True))
         raise InputError(f"shapes that do not go together: {shapes}") from None
     if (total % 1.0 != 0.0).any() or (last % 1.0 != 0.0).any():
-        raise InputError("crossings: must be whole numbers")
+        raise InputError("zero_crossings, zero_crossings_last_quarter: must be whole numbers")
     if (np.abs(side) != 1.0).any():
-        raise InputError("final_side: must be +1 or -1")
+        raise InputError("final_well: must be +1 or -1")
     if (total < 0).any() or (last < 0).any() or (last > total).any():
-        raise InputError("crossings: must be at least zero_crossings_last_quarter, and both at least 0")
+        raise InputError("zero_crossings: must be at least zero_crossings_last_quarter, and both at least 0")
     if (duration <= 0).any():
         raise InputError(f"cycles = {duration.min()!r}: must be greater than 0")
     return class_of(total, last, duration, side)

@@ -27,7 +27,7 @@ def accept_step_by_law(
     outputs: Any,
 ) -> Any:
     """Where a run stands after a step, and the step that was taken; *outputs* are what is recorded, or None."""
-    raise TypeError("accept_any_step runs in compiled code only")
+    raise TypeError("accept_step_by_law runs in compiled code only")
 
 
 @overload(accept_step_by_law, jit_options=INLINE_HERE)

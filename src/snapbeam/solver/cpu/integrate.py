@@ -1,4 +1,4 @@
-"""The CPU engine's integrate: two trajectories at a time, each with steps that its own contacts decide.
+"""Integration on the CPU: two runs at a time, each with steps that follow from its own contacts.
 
 In free flight a trajectory takes steps of a fixed length, or of twice that while its energy is low, as many as
 a bound on the speed of the gap says are safe; near the tip it looks inside each step with a resolution finer
@@ -56,7 +56,7 @@ _NOTHING_DONE = StepIncrement(
 
 
 class KernelOutput(NamedTuple):
-    """Where a integrate of many puts what it finds."""
+    """The output arrays of the kernels."""
 
     accumulators_of_runs: Any
     """A record a run."""
@@ -207,7 +207,7 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
 
 
 # ----------------------------------------------------------------------------------------------------
-# The CPU engine's integrate of one run that is recorded: in slices, so that it can be watched, stopped and drained.
+# A single run that is recorded: in slices, so that it can be observed, stopped and emptied.
 
 
 @compiled

@@ -29,7 +29,7 @@ _SLOWEST = 1e-12
 """Stands for no damping, 1/s."""
 _ALIGNMENT = 64
 WORK_ROWS = 10
-"""Rows that a integrate works in: q, p, k at both ends of a step and of a look ahead, and G q."""
+"""Working rows of a run: q, p, k at both ends of a step and of a look ahead, and G q."""
 
 
 class Packed(NamedTuple):

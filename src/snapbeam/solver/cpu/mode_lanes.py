@@ -1,6 +1,6 @@
 """Operations on rows of modes, eight at a time: what the CPU engine's steps are made of.
 
-Everything a integrate needs stands in one flat array, *memory*; a row is the index at which it begins, a
+Everything that a kernel needs is in one flat array, *memory*; a row is the index at which it begins, a
 multiple of eight long, and holds the modes of one structure, each block of coupled modes padded with
 zeros.  The tension matrix G is stored block by block in strips of sixteen (last: eight) rows, each strip
 column by column, so that the product G q streams through it once.
@@ -372,23 +372,23 @@ def flow_coefficients(memory, layout, length, at):
     size = layout.size
     if abs(length) < layout.gentle:
         for row in range(0, size, WIDTH):
-            apply_contact_loss, sigma = (
+            omega_damped, sigma = (
                 load(memory, layout.omega_damped + row),
                 load(memory, layout.damping + row),
             )
             squared = load(memory, layout.omega_squared + row)
-            sine, _, less_one = sincos_cosm1(apply_contact_loss * length)
+            sine, _, less_one = sincos_cosm1(omega_damped * length)
             lost = decay_less_one(sigma * length)
-            a11, a12, a21, a22 = rotation(sigma, squared, sine / apply_contact_loss, less_one, lost)
+            a11, a12, a21, a22 = rotation(sigma, squared, sine / omega_damped, less_one, lost)
             store(memory, at + row, a11)
             store(memory, at + size + row, a12)
             store(memory, at + 2 * size + row, a21)
             store(memory, at + 3 * size + row, a22)
         return
     for j in range(size):
-        apply_contact_loss, sigma = memory[layout.omega_damped + j], memory[layout.damping + j]
-        sine, _, less_one = sincos_cosm1(apply_contact_loss * length)
-        over = sine / apply_contact_loss if apply_contact_loss > 0.0 else length
+        omega_damped, sigma = memory[layout.omega_damped + j], memory[layout.damping + j]
+        sine, _, less_one = sincos_cosm1(omega_damped * length)
+        over = sine / omega_damped if omega_damped > 0.0 else length
         squared = memory[layout.omega_squared + j]
         a11, a12, a21, a22 = rotation(sigma, squared, over, less_one, math.expm1(-sigma * length))
         memory[at + j] = a11

@@ -42,7 +42,7 @@ _MOST_IN_CONTACT = 96
 
 
 class Outputs(NamedTuple):
-    """Where a integrate writes what is asked of it, until it is full."""
+    """The arrays that a recorded run writes to, until they are full."""
 
     times: Any
     """Instants to record, s, ascending."""

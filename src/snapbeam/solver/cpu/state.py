@@ -102,7 +102,7 @@ class Rows(NamedTuple):
 
 
 class StepControl(NamedTuple):
-    """What a integrate keeps in mind from step to step."""
+    """The quantities that control the steps, kept from step to step."""
 
     touching: bool
     low_energy: bool

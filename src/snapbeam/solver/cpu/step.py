@@ -264,12 +264,15 @@ class Step(NamedTuple):
     """Argument of the drive at the beginning."""
     touching: bool
     q: int
+    """Row in memory of the modal displacements at the beginning; p: of the velocities, k: of the tension's acceleration."""
     p: int
     k: int
     q1: int
+    """The same rows at the end."""
     p1: int
     k1: int
     r: int
+    """Row of the product of the tension matrix with q."""
 
 
 class StepIncrement(NamedTuple):
@@ -413,7 +416,7 @@ def with_circuit_acceleration(memory, layout, spare, step):
 def take_step(memory, blocks, layout, stages, tip, step, with_energy):
     """Advance (q, p) with tension acceleration k by a step into (q1, p1, k1).
 
-    Dissipation is added up unless *energy balance* is None; nothing else depends on it, to the last bit.
+    Dissipation is added up unless *with_energy* is None; nothing else depends on it, to the last bit.
     """
     drive0 = _begin_push(step, stages, layout.size)
     push, gq, qr, dissipated, given = (

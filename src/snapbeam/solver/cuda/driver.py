@@ -136,7 +136,7 @@ class _Launch:
         self.pieces = _most_pieces(ensemble)
         self.blocks = 1
         self.kernel_output, self.work = self._room()
-        # a integrate of no steps: the kernel is compiled, and the driver knows how many blocks fit
+        # a launch of no steps: the kernel is compiled, and the driver knows how many blocks fit
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NumbaPerformanceWarning)
             self._call(self._runs(np.zeros(1, dtype=np.int64), empty_accumulators(1)), 0)

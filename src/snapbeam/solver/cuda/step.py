@@ -181,7 +181,7 @@ def functions(order: int, threads: int, columns: int) -> Functions:
 
     @device
     def sample_inside_step(block, mode, tip, at, pieces, piece, phase, q, p, k, k1):
-        """As :func:`snapbeam.solver.cpu.step.sample_inside_step`; *at* is the flow over one piece."""
+        """As :func:`snapbeam.solver.cpu.events.sample_inside_step`; *at* is the flow over one piece."""
         contact0, contact1, center0, center1 = sum_four(
             block, mode.contact * k, mode.contact * k1, mode.center * k, mode.center * k1
         )

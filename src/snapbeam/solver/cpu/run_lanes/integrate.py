@@ -1,4 +1,4 @@
-"""The integrate of few modes: eight runs in a register, each with its own time, step, contact and well.
+"""Integration of few modes: eight runs in a register, each with its own time, step, contact and well.
 
 In every pass each lane takes a step of its own.  One that is to be cut where the contact begins or ends takes that
 step in the next pass, while the others go on; so does one that has to be looked into for the deepest point of a

@@ -55,14 +55,14 @@ def flows_over(m, shape, length, place, which):
     """The exact flow of every mode over *length*, a time a lane, into the rows from *place* on of the lanes *which*."""
     for i in range(modes_of(shape)):
         mode = at.MODE + i * at.MODE_ROWS
-        apply_contact_loss, sigma = (
+        omega_damped, sigma = (
             broadcast_load(m, mode + at.OMEGA_DAMPED),
             broadcast_load(m, mode + at.DAMPING),
         )
-        sine, _, less_one = sincos_cosm1(apply_contact_loss * length)
+        sine, _, less_one = sincos_cosm1(omega_damped * length)
         lost = decay_less_one(sigma * length)
         squared = broadcast_load(m, mode + at.OMEGA_SQUARED)
-        a11, a12, a21, a22 = rotation(sigma, squared, sine / apply_contact_loss, less_one, lost)
+        a11, a12, a21, a22 = rotation(sigma, squared, sine / omega_damped, less_one, lost)
         row = mode + place
         store(m, row, pick(which, a11, load(m, row)))
         store(m, row + WIDTH, pick(which, a12, load(m, row + WIDTH)))
@@ -75,15 +75,15 @@ def prepare(m, shape, lane_settings, place, length, omega):
     """What a step of *length* needs, from *place* on: all modes' flows, and the turns of a drive of rate *omega*."""
     for group in range(groups_of(shape)):
         pairs = at.PAIRS + 4 * WIDTH * group
-        apply_contact_loss, sigma, squared = (
+        omega_damped, sigma, squared = (
             load(m, pairs),
             load(m, pairs + WIDTH),
             load(m, pairs + 2 * WIDTH),
         )
         part = load(m, pairs + 3 * WIDTH) * length
-        sine, _, less_one = sincos_cosm1(apply_contact_loss * part)
+        sine, _, less_one = sincos_cosm1(omega_damped * part)
         a11, a12, a21, a22 = rotation(
-            sigma, squared, sine / apply_contact_loss, less_one, decay_less_one(sigma * part)
+            sigma, squared, sine / omega_damped, less_one, decay_less_one(sigma * part)
         )
         store(m, place, a11)
         store(m, place + WIDTH, a12)

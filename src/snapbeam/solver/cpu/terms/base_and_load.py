@@ -1,4 +1,4 @@
-"""What a moving base and a changing axial load add to a integrate: forces on every mode that follow from time.
+"""Base excitation and axial load: forces on every mode that follow from time.
 
 In the frame of the ends an acceleration a(t) of the base is the modal acceleration a(t) b; a change dP(t) of the axial
 load is dP(t) (g + G q), that is dP more of both that the tension pulls with.  Both depend on position and time alone,

@@ -1,4 +1,4 @@
-"""A harvester's circuit in a integrate: one number beside the modes, exact within each kick.
+"""A harvester's circuit: one state variable beside the modes, exact within each kick.
 
 With t the coupling's row scaled so that y^2/2 is the energy in the circuit, lam its rate of loss and K the acceleration
 of a kick, at a fixed place

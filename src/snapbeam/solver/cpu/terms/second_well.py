@@ -1,6 +1,6 @@
-"""What unequal wells add to a integrate: a constant force on the far side of the mirror, and energies to go with it.
+"""Unequal wells: a constant force about the second well, and the energies that belong to it.
 
-*uneven* is an :class:`UnequalWells` or None, by type: of a beam with equal wells nothing of this is compiled.
+*unequal_wells* is an :class:`UnequalWells` or None, by type: of a beam with equal wells nothing of this is compiled.
 """
 
 from __future__ import annotations
