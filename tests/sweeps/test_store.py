@@ -179,6 +179,17 @@ def test_a_folder_that_is_no_store(tmp_path, work):
         Checkpoint(tmp_path / "none" / "store", work)
 
 
+def test_a_pipe_for_a_description_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "map.json")
+    with pytest.raises(InputError, match="must be a regular file"):
+        tables.read_description(tmp_path / "map.json")
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"task":' + "1" * 5000 + "}"])
+def test_a_record_that_cannot_be_parsed_counts_as_damaged(text):
+    assert Record.from_line(f"{text}\t{durable._check(text)}\n") is None
+
+
 def test_a_damaged_description_is_told(stored, work):
     path, _ = stored
     held = json.loads((path / "map.json").read_text(encoding="utf-8"))

@@ -247,7 +247,10 @@ class Record:
         text, tab, check = line.rstrip("\n").rpartition("\t")
         if not tab or check != _check(text):
             return None
-        values = json.loads(text)
+        try:
+            values = json.loads(text)
+        except (ValueError, RecursionError):  # nested too deep, or an integer of thousands of digits
+            return None
         kinds = {field.name: field.type for field in fields(cls)}
         if not isinstance(values, dict) or values.keys() != kinds.keys():
             return None

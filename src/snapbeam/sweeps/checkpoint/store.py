@@ -50,6 +50,7 @@ from snapbeam.sweeps.tasks import (
     differences,
     provenance_of,
 )
+from snapbeam.util.input_files import input_bytes
 from snapbeam.util.provenance import canonical_json, parameter_hash
 from snapbeam.util.validation import InputError, file_path, integer, shown
 
@@ -124,13 +125,14 @@ def read_description(file: Path) -> dict[str, Any]:
     CheckpointError
         If the file is damaged.
     InputError
-        If the file has another format.
+        If the file has another format, or is no regular file.
     """
     damaged = CheckpointError(
         f"checkpoint = {str(file.parent)!r}: map.json is damaged; restore it from a copy, or give another folder"
     )
+    data = input_bytes("checkpoint", file)
     try:
-        held = json.loads(file.read_bytes())
+        held = json.loads(data)
         described = {name: held[name] for name in FORMAT}
         sound = (
             isinstance(held["parameters"], dict)
