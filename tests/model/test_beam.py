@@ -79,7 +79,7 @@ def test_replace_keeps_what_was_given() -> None:
     loaded = BEAM.replace(axial_load=30.0)
     assert loaded.replace(width=20e-3).axial_load == 30.0
     assert loaded.replace(buckling_level=0.335e-3) == BEAM
-    with pytest.raises(InputError, match=r"thicknes: no parameter of a beam.*thickness"):
+    with pytest.raises(InputError, match=r"thicknes: is not a parameter of a beam.*thickness"):
         BEAM.replace(thicknes=1.0)
 
 

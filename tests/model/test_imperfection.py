@@ -204,7 +204,7 @@ def test_by_dotted_name_and_in_files(tmp_path) -> None:
         )
         == system
     )
-    with pytest.raises(InputError, match=r"imperfection.tilt: no parameter"):
+    with pytest.raises(InputError, match=r"imperfection.tilt: is not a parameter"):
         system.replace(**{"imperfection.tilt": 1.0})
     config = config_from_mapping(
         {

@@ -154,7 +154,7 @@ REFUSALS = [
     ),
     (
         {"sweep": {"beam.thicknes": "1e-4:2e-4:3"}},
-        "[sweep] beam.thicknes: no parameter; did you mean 'beam.thickness'",
+        "[sweep] beam.thicknes: is not a parameter; did you mean 'beam.thickness'",
     ),
     (
         {"sweep": {"beam.thickness": "0.4:0.5:3"}},

@@ -162,8 +162,8 @@ def test_starts_are_parameters_of_runs() -> None:
     ("name", "message"),
     [
         ("beam.thicknes", "did you mean 'beam.thickness'"),
-        ("initial_state.amplitude[0]", "no parameter"),
-        ("", "no parameter"),
+        ("initial_state.amplitude[0]", "is not a parameter"),
+        ("", "is not a parameter"),
         (3, "must be a name, such as 'drive.frequency_ratio'"),
     ],
 )

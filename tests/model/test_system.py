@@ -359,15 +359,18 @@ def test_another_number_of_modes_keeps_the_start() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"beam.thicknes": 1.0}, r"beam\.thicknes: no parameter of a beam; must be one of length, thickness"),
+        (
+            {"beam.thicknes": 1.0},
+            r"beam\.thicknes: is not a parameter of a beam; must be one of length, thickness",
+        ),
         (
             {"nothing.x": 1.0},
-            r"nothing\.x: no parameter of a system; its sections are beam, model, boundary, imperfection, contact",
+            r"nothing\.x: is not a parameter of a system; its sections are beam, model, boundary, imperfection, contact",
         ),
-        ({"modes": 3}, "modes: no parameter of a system"),
+        ({"modes": 3}, "modes: is not a parameter of a system"),
         (
             {"contact.coefficient": 0.5},
-            r"contact\.coefficient: no parameter of this system; must be one of stiffness",
+            r"contact\.coefficient: is not a parameter of this system; must be one of stiffness",
         ),
         (
             {"model.mass": 1.0},
@@ -410,7 +413,9 @@ def test_refusals(changes, message: str) -> None:
 
 
 def test_refusals_name_what_is_not_there() -> None:
-    with pytest.raises(InputError, match=r"beam\.thicknes: no parameter of this system; it has beam\.length"):
+    with pytest.raises(
+        InputError, match=r"beam\.thicknes: is not a parameter of this system; it has beam\.length"
+    ):
         PLAIN.get("beam.thicknes")
     with pytest.raises(InputError, match="drive: this system has none"):
         SYSTEMS["free"].replace(**{"drive.frequency_ratio": 1.0})

@@ -138,8 +138,11 @@ def frame(**columns) -> pd.DataFrame:
         ),
         ({"modes": 3}, "modes = 3: must be an array; put a single value into the system"),
         ({"modes": [1, 2], "model.modes": [1, 2]}, r"model\.modes: is given twice among the axes"),
-        ({"beam.thicknes": [1e-4, 2e-4]}, r"beam\.thicknes: no parameter; did you mean 'beam\.thickness'"),
-        ({3: [1, 2]}, "3: no parameter"),
+        (
+            {"beam.thicknes": [1e-4, 2e-4]},
+            r"beam\.thicknes: is not a parameter; did you mean 'beam\.thickness'",
+        ),
+        ({3: [1, 2]}, "3: is not a parameter"),
         ({"integration.engine": ["cpu", "cuda"]}, r"integration\.engine: cannot be swept"),
         ({"threads": [1, 2]}, "threads: cannot be swept"),
         ({"integration.tolerance": [1e-3, 1e-2]}, r"integration\.tolerance: cannot be swept"),

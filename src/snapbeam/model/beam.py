@@ -118,8 +118,9 @@ class Beam:
                 f"buckling_level = {shown(level)}, axial_load = {shown(load)}: "
                 "give exactly one of the two, the other follows from it"
             )
-        for name in ("length", "thickness", "width", "density", "young_modulus"):
-            self._set(name, _beam_quantities()[name].check(name, getattr(self, name)))
+        for name, item in _beam_quantities().items():
+            if name not in ("buckling_level", "axial_load"):
+                self._set(name, item.check(name, getattr(self, name)))
         try:
             level, load = self._completed(level, load)
         except (OverflowError, ZeroDivisionError):
@@ -162,12 +163,12 @@ class Beam:
         Raises
         ------
         InputError
-            For a name that is no parameter of a beam, and as for a new beam.
+            For a name that is not a parameter of a beam, and as for a new beam.
         """
         names = [field.name for field in dataclasses.fields(self) if field.init]
         for name in changes:
             if name not in names:
-                raise InputError(f"{name}: no parameter of a beam; must be one of {', '.join(names)}")
+                raise InputError(f"{name}: is not a parameter of a beam; must be one of {', '.join(names)}")
         kept = {name: getattr(self, name) for name in names if name not in ("buckling_level", "axial_load")}
         if not {"buckling_level", "axial_load"} & set(changes):
             kept[self._given] = getattr(self, self._given)
@@ -215,14 +216,14 @@ class Beam:
     @property
     def critical_load(self) -> float:
         """First critical load P_cr = E I k_1^2, N: 4 pi^2 E I / L^2 between clamps (Eq. 3)."""
-        if self.boundary.rotational_stiffness:
+        if self.boundary.is_elastic:
             return self.bending_stiffness * float(self.buckling_modes(1).wavenumber[0]) ** 2
         return self.bending_stiffness * (2.0 * math.pi / self.length) ** 2
 
     @property
     def second_critical_load(self) -> float:
         """Second critical load E I k_2^2, N, of the antisymmetric mode: 2.0457 P_cr between clamps."""
-        if self.boundary.rotational_stiffness:
+        if self.boundary.is_elastic:
             return self.bending_stiffness * float(self.buckling_modes(2).wavenumber[1]) ** 2
         return self.bending_stiffness * float(wavenumbers(2, self.length)[1]) ** 2
 

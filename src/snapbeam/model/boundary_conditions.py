@@ -45,8 +45,8 @@ class BoundaryConditions:
         check_fields(self)
 
     @property
-    def rotational_stiffness(self) -> bool:
-        """Whether an end gives way to rotation."""
+    def is_elastic(self) -> bool:
+        """Whether an end can rotate, against a spring or freely."""
         return self.left_rotational_stiffness is not None or self.right_rotational_stiffness is not None
 
     @property
@@ -57,7 +57,7 @@ class BoundaryConditions:
     @property
     def is_clamped(self) -> bool:
         """Whether both ends are clamped and rigid."""
-        return not self.rotational_stiffness and self.axial_support_stiffness is None
+        return not self.is_elastic and self.axial_support_stiffness is None
 
 
 CLAMPED = BoundaryConditions()
@@ -73,7 +73,7 @@ Modes = BucklingModes | SpringModes
 
 def modes_between(ends: BoundaryConditions, length: float, bending_stiffness: float, count: int) -> Modes:
     """The first *count* buckling modes of a beam of a length (m) and a bending stiffness (N m^2) between its ends."""
-    if not ends.rotational_stiffness:
+    if not ends.is_elastic:
         return BucklingModes(length, count)
     unit = bending_stiffness / length
     left, right = (

@@ -89,7 +89,9 @@ class Integration:
         known = quantities(Integration)
         for name in changes:
             if name not in known:
-                raise InputError(f"{name}: no parameter of an integration; must be one of {', '.join(known)}")
+                raise InputError(
+                    f"{name}: is not a parameter of an integration; must be one of {', '.join(known)}"
+                )
         return dataclasses.replace(self, **changes)
 
     @property

@@ -19,7 +19,7 @@ from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.quantity import quantities
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State, started
-from snapbeam.model.striker import ContactPair, Striker, numbered
+from snapbeam.model.striker import OF_FIRST_STRIKER, ContactPair, Striker, numbered
 from snapbeam.util.validation import InputError, mapping, shown
 
 __all__ = ["SECTIONS", "parts_from_mapping", "parts_to_mapping", "replaced"]
@@ -67,8 +67,9 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
     uniform = bool(np.all(damping == damping[0]))
     if model.beam is not None:
         beam = model.beam
-        names = ("length", "thickness", "width", "density", "young_modulus", beam.given)
-        sections["beam"] = {name: float(getattr(beam, name)) for name in names}
+        derived = {"buckling_level", "axial_load"} - {beam.given}
+        own = {name: getattr(beam, name) for name in quantities(Beam) if name not in derived}
+        sections["beam"] = {name: value for name, value in own.items() if value is not None}
         section["modes"] = model.modes
         if not beam.boundary.is_clamped:
             sections["boundary"] = _fields(beam.boundary)
@@ -94,7 +95,9 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
         sections["drive"] = {"type": striker.drive.name} | _fields(striker.drive)
     for number, each in enumerate(system.further_contacts, 2):
         sections[f"contact_{number}"] = {"type": each.contact.name} | _fields(each.contact)
-        own = {name: getattr(each.striker, name) for name in ("location", "side", "gap")}
+        own = {
+            name: getattr(each.striker, name) for name in quantities(Striker) if name not in OF_FIRST_STRIKER
+        }
         sections[f"striker_{number}"] = {name: value for name, value in own.items() if value is not None}
         sections[f"drive_{number}"] = {"type": each.striker.drive.name} | _fields(each.striker.drive)
     if system.base_excitation is not None:
@@ -247,7 +250,9 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
     for name, value in changes.items():
         section, dot, field = name.partition(".")
         if numbered(section)[0] not in SECTIONS:
-            raise InputError(f"{name}: no parameter of a system; its sections are {', '.join(SECTIONS)}")
+            raise InputError(
+                f"{name}: is not a parameter of a system; its sections are {', '.join(SECTIONS)}"
+            )
         if dot:
             inside.setdefault(section, {})[field] = value
         else:
@@ -336,7 +341,7 @@ def _changed(part: Any, section: str, values: Mapping[str, Any]) -> Any:
     for name in values:
         if name not in known:
             raise InputError(
-                f"{section}.{name}: no parameter of this system; must be one of {', '.join(known)}"
+                f"{section}.{name}: is not a parameter of this system; must be one of {', '.join(known)}"
             )
     return dataclasses.replace(part, **values)
 
@@ -406,7 +411,7 @@ def _model_replacing(
     known = [item.name for item in dataclasses.fields(model.beam) if item.init]
     for name in of_beam:
         if name not in known:
-            raise InputError(f"beam.{name}: no parameter of a beam; must be one of {', '.join(known)}")
+            raise InputError(f"beam.{name}: is not a parameter of a beam; must be one of {', '.join(known)}")
     damping: Any = model.damping_ratio
     if np.all(damping == damping[0]):
         damping = float(damping[0])

@@ -189,7 +189,7 @@ def exact_natural_frequencies(beam: Beam, count: int = 10) -> _Array:
     if not isinstance(beam, Beam):
         raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")
     count = integer("count", count, 1, _MAX_COUNT)
-    if beam.boundary.rotational_stiffness:
+    if beam.boundary.is_elastic:
         return _between_springs(beam, integer("count", count, 1, MAX_MODES // 4))
     unit = math.sqrt(beam.bending_stiffness / beam.mass_per_length) / beam.length**2
     if beam.is_buckled:

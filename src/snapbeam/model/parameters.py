@@ -27,7 +27,7 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import RUN, ParameterField, quantities
 from snapbeam.model.reduced_model import MODEL_QUANTITIES
 from snapbeam.model.state import START_NAME
-from snapbeam.model.striker import Striker, numbered
+from snapbeam.model.striker import OF_FIRST_STRIKER, Striker, numbered
 from snapbeam.util.validation import InputError, shown
 
 __all__ = ["Parameter", "lookup", "parameters", "row_of", "short_names"]
@@ -173,7 +173,6 @@ def _table(registered: tuple[tuple[tuple[str, type], ...], ...]) -> dict[str, Pa
 
 _OF_STRIKER = re.compile(r"(.+)_striker_([2-9])")
 _OF_TERM = re.compile(r"(.+)_([1-4])")
-_FIRST_ALONE = ("striker.mass", "striker.suspension_stiffness", "striker.suspension_damping")
 
 
 def row_of(name: str) -> Parameter | None:
@@ -190,7 +189,7 @@ def row_of(name: str) -> Parameter | None:
             row = dataclasses.replace(row, name=name, short=f"{row.short}_{found[2]}", quantity=own)
     if number == 1 or row is None:
         return row
-    if row.name in _FIRST_ALONE:
+    if row.section == "striker" and row.name.partition(".")[2] in OF_FIRST_STRIKER:
         return None
     words = f"{row.quantity.long_name}, of striker {number}"
     quantity = dataclasses.replace(row.quantity, long_name=words)
@@ -266,4 +265,4 @@ def lookup(name: str) -> Parameter:
         if close
         else f"; see {', '.join(list(table)[:6])}, ..."
     )
-    raise InputError(f"{name}: no parameter{hint}")
+    raise InputError(f"{name}: is not a parameter{hint}")

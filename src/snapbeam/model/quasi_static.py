@@ -46,7 +46,7 @@ def quasi_static_threshold(
         raise InputError(
             f"location of shape {x.shape}, frequency_ratio of shape {ratio.shape}: must go together"
         ) from None
-    if beam is not None and beam.boundary.rotational_stiffness:
+    if beam is not None and beam.boundary.is_elastic:
         shape = beam.buckling_modes(1).shape
         share = shape(x * beam.length)[0] / float(shape(0.5 * beam.length)[0])
         return np.asarray(ratio * share)

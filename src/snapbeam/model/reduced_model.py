@@ -667,9 +667,7 @@ class ReducedModel(Wells):
     # ------------------------------------------------------------------ linear modes about a well
 
     def _linear_modes(self) -> LinearModes:
-        if self.transverse_force is not None or (
-            self.beam is not None and self.beam.boundary.rotational_stiffness
-        ):
+        if self.transverse_force is not None or (self.beam is not None and self.beam.boundary.is_elastic):
             tangent = tangent_stiffness(self.stiffness, self.nonlinear_stiffness, self.well_amplitude)
             parity = None if self.beam is None else self.beam.buckling_modes(self.modes).parity
             return linear_modes_about(self.mass, tangent, parity)

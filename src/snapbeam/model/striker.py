@@ -16,10 +16,21 @@ from snapbeam.model.drive.sine import Sine
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
 from snapbeam.util.validation import InputError, InputTypeError, shown
 
-__all__ = ["SIDES", "ContactPair", "Shaker", "Striker", "check_others", "numbered", "parted"]
+__all__ = [
+    "OF_FIRST_STRIKER",
+    "SIDES",
+    "ContactPair",
+    "Shaker",
+    "Striker",
+    "check_others",
+    "numbered",
+    "parted",
+]
 
 
 SIDES = ("below", "above")
+OF_FIRST_STRIKER = ("mass", "suspension_stiffness", "suspension_damping")
+"""Fields that only the first of several strikers may set."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -221,7 +221,7 @@ class System:
         """
         found = self.parameters
         if instance("name", name, str, "text") not in found:
-            raise InputError(f"{name}: no parameter of this system; it has {', '.join(found)}")
+            raise InputError(f"{name}: is not a parameter of this system; it has {', '.join(found)}")
         return found[name]
 
     @cached_property
