@@ -22,9 +22,10 @@ from snapbeam.dynamics.periodic_orbits import (
     PeriodicOrbit,
     Return,
     Spot,
+    orbit_tolerance,
 )
 from snapbeam.util.diagnostics import tell, to_json
-from snapbeam.util.validation import InputError, checked, choice, integer, positive, shown
+from snapbeam.util.validation import InputError, checked, choice, integer, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -394,6 +395,8 @@ def grazing_end(corrector: Corrector, spots: list[Spot]) -> SpecialPoint | None:
 
 _Array = NDArray[np.float64]
 _TOLERANCE = 1e-10
+_SHORTEST, _LONGEST = 1e-8, 1.0
+"""Bounds of the distance between orbits that may be asked for."""
 _EASY, _HARD = 4, 9
 """Iterations up to which the step grows, and from which on it shrinks."""
 
@@ -414,7 +417,7 @@ def continuation(
 
     Folds, period doublings (flips), Neimark-Sacker bifurcations, branch points and grazing are located between the
     orbits that they are found between.  The branch ends at a limit of the parameter, when it closes, at *max_points* orbits,
-    or where no orbit is found, as under a law of restitution where it grazes; ``branch.end`` says which.
+    or where no orbit is found, as under a law of restitution where it grazes; ``branch.termination_reason`` says which.
 
     Parameters
     ----------
@@ -430,7 +433,7 @@ def continuation(
         Orbits at most.
     step, max_step : float
         First and greatest distance between orbits, in units of the well's amplitude for the state and of the range
-        for the parameter.
+        for the parameter; between 1e-8 and 1.
     tolerance : float
         Of the orbits, as in :func:`periodic_orbit`.
 
@@ -449,11 +452,12 @@ def continuation(
         raise InputError(f"bounds = ({low:g}, {high:g}): must contain the orbit's own {name} = {begun:g}")
     choice("direction", direction, ("up", "down"))
     count = integer("max_points", max_points, 2, 10**6)
-    length, max_step = positive("step", step), positive("max_step", max_step)
-    tell(orbit.diagnostics)
-    corrector = Corrector(
-        Family(orbit.flow, name), orbit.period, high - low, positive("tolerance", tolerance)
+    length, max_step = (
+        within(words, value, _SHORTEST, _LONGEST, closed="both")
+        for words, value in (("step", step), ("max_step", max_step))
     )
+    tell(orbit.diagnostics)
+    corrector = Corrector(Family(orbit.flow, name), orbit.period, high - low, orbit_tolerance(tolerance))
     y = np.append(orbit.coordinates, begun / corrector.span)
     came, slope = corrector.derivatives(y)
     sign = np.zeros(y.size)
@@ -481,7 +485,7 @@ def _follow(
     max_step: float,
 ) -> Branch:
     spots, events = [first], list[SpecialPoint]()
-    end = f"{max_points} orbits"
+    end = f"{max_points} orbits, the maximum (max_points)"
     shortest = 1e-7 * max_step
     limit = tuple(value / corrector.span for value in limits)
     while len(spots) < max_points:
@@ -547,7 +551,7 @@ def switch_branch(
     name, bounds
         Parameter and its limits, as in :func:`continuation`.
     size : float
-        Distance, in units of the well's amplitude.
+        Distance, in units of the well's amplitude; between 1e-8 and 1.
 
     Returns
     -------
@@ -571,6 +575,9 @@ def switch_branch(
     row = np.append(vector / np.linalg.norm(vector), 0.0)
     flow: Flow = orbit.flow
     corrector = Corrector(Family(flow, name), orbit.period * (2 if doubled else 1), span, _TOLERANCE)
-    guess = np.append(orbit.coordinates, special_point.value / span) + positive("size", size) * row
+    guess = (
+        np.append(orbit.coordinates, special_point.value / span)
+        + within("size", size, _SHORTEST, _LONGEST, closed="both") * row
+    )
     spot = corrector.correct(guess, row, row)
     return corrector.orbit(spot)

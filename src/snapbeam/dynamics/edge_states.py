@@ -26,6 +26,12 @@ __all__ = ["EdgeState", "edge_tracking", "kicked"]
 _Array = NDArray[np.float64]
 _PIECES = 16
 """States between the two that are tried at once."""
+_ROUNDS = 300
+"""Maximum number of rounds of one bisection; 16 to this power is more than the range of floating-point numbers."""
+_REPEATS = 1e-3
+"""Maximum change of a coordinate between periods that count as a repetition."""
+_FARTHEST = 0.1
+"""Maximum of diverge_threshold, over the distance of the first two states."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +45,8 @@ class EdgeState:
     """Between the two states that hold it, at each."""
     orbit: PeriodicOrbit | None
     """The unstable orbit that it comes to, if it comes to one."""
+    termination_reason: str
+    """Why the tracking stopped, whether the bisection reached its threshold, and why there is no orbit."""
 
     def to_dataset(self) -> xr.Dataset:
         """The motion, labelled."""
@@ -69,12 +77,16 @@ class EdgeState:
                 "multiplier_imag": ("multiplier", values.imag, {"units": "1", "long_name": "imaginary part"}),
             },
             {"coordinate": list(names)},
-            {"title": "edge state", "period": 0 if self.orbit is None else self.orbit.period},
+            {
+                "title": "edge state",
+                "period": 0 if self.orbit is None else self.orbit.period,
+                "termination_reason": self.termination_reason,
+            },
         )
 
     def __repr__(self) -> str:
         end = "on no orbit" if self.orbit is None else f"on {self.orbit!r}".replace("<", "").replace(">", "")
-        return f"<EdgeState over {len(self.states)} periods, {end}>"
+        return f"<EdgeState over {len(self.states)} periods, {end}, end: {self.termination_reason}>"
 
 
 @checked
@@ -105,7 +117,8 @@ def edge_tracking(
     horizon : int
         Periods after which the outcome is evaluated.
     bisect_threshold, diverge_threshold : float
-        In units of the well's amplitude.
+        In units of the well's amplitude.  The bisection also stops where rounding leaves no state between the two.
+        *diverge_threshold* must be at most a tenth of the distance between *u1* and *u2*.
     outcome : callable, optional
         ``outcome(flow, states, horizon) -> bool array``, in place of snapping.
     integration : Integration, optional
@@ -113,7 +126,7 @@ def edge_tracking(
     Returns
     -------
     EdgeState
-        With the unstable periodic orbit that it settles on, if it does.
+        With the unstable periodic orbit that it settles on, if it does; ``termination_reason`` says why it stopped.
 
     Raises
     ------
@@ -136,20 +149,46 @@ def edge_tracking(
             f"u1, u2: the outcomes within {ahead} periods are {bool(told[0])} and {bool(told[1])}; must be "
             "False and True"
         )
-    low, high = _bisect(flow, low, high, near, ahead, decide)
-    states, distances = [], []
-    for _ in range(total):
+    if not far <= _FARTHEST * float(np.abs(high - low).max()):
+        raise InputError(
+            f"diverge_threshold = {far:g}: must be at most {_FARTHEST:g} times the distance of u1 and u2, "
+            f"{float(np.abs(high - low).max()):.3g}"
+        )
+    states, distances, closest = [], [], 0.0
+    stopped = f"{total} periods"
+    begin = True
+    for period in range(total):
+        if begin:
+            bracket = _bisect(flow, low, high, near, ahead, decide)
+            if bracket is None:
+                stopped = (
+                    f"after {period} periods the two states have the same outcome within {ahead} periods; "
+                    "increase horizon"
+                )
+                break
+            low, high = bracket
+            closest = max(closest, float(np.abs(high - low).max()))
         both = flow.march(np.stack([low, high]), 1).states
         low, high = both[0], both[1]
         size = float(np.abs(high - low).max())
         if not np.isfinite(size):
-            raise InputError("a run failed on the border; use accuracy = 'reference'")
+            raise InputError("a run failed on the border; look at its status with sb.advance")
         states.append(0.5 * (low + high))
         distances.append(size)
-        if size > far:
-            low, high = _bisect(flow, low, high, near, ahead, decide)
-    path = np.array(states)
-    return EdgeState(flow, path, np.array(distances), _settled(flow, path))
+        if size == 0.0:
+            stopped = (
+                f"after {period + 1} periods the two states are equal to rounding; increase bisect_threshold"
+            )
+            break
+        begin = size > far
+    if closest > near:
+        stopped += (
+            f"; rounding stopped the bisection at a distance of {closest:.2g}, "
+            f"bisect_threshold = {near:g} was not reached"
+        )
+    path = np.array(states).reshape(-1, flow.dimension)
+    orbit, words = _settled(flow, path)
+    return EdgeState(flow, path, np.array(distances), orbit, f"{stopped}; {words}")
 
 
 def kicked(flow: Stroboscope, size: float | None, horizon: int) -> tuple[_Array, _Array]:
@@ -187,6 +226,8 @@ def _snaps(flow: Flow, states: _Array, horizon: int) -> NDArray[np.bool_]:
     marched = flow.march(states, horizon)
     if "zero_crossings" not in marched.statistics:
         raise InputError("outcome: is needed for a flow that is not a System")
+    if not np.isfinite(marched.states).all():
+        raise InputError("a run failed, so its outcome is unknown; look at its status with sb.advance")
     crossed = np.asarray(marched.statistics["zero_crossings"] > 0)
     if isinstance(flow, Stroboscope):
         # on the border's way some have crossed before they are looked at again
@@ -203,25 +244,39 @@ def _bisect(
     near: float,
     horizon: int,
     decide: Callable[[Flow, _Array, int], NDArray[np.bool_]],
-) -> tuple[_Array, _Array]:
-    """Two states on a line, *near* each other, the first quiet, the second not."""
-    while float(np.abs(high - low).max()) > near:
-        parts = np.arange(1, _PIECES) / _PIECES
+) -> tuple[_Array, _Array] | None:
+    """Two states on a line, *near* each other, the first quiet, the second not; None if the ends have one outcome.
+
+    It stops where rounding leaves no state between the two.
+    """
+    parts = np.linspace(0.0, 1.0, _PIECES + 1)
+    for _ in range(_ROUNDS):
+        size = float(np.abs(high - low).max())
         rows = low + parts[:, None] * (high - low)
-        told = np.concatenate([[False], decide(flow, rows, horizon), [True]])
+        rows[-1] = high
+        told = np.asarray(decide(flow, rows, horizon), dtype=bool)
+        if told[0] or not told[-1]:
+            return None
         at = int(np.argmax(told))
-        rows = np.concatenate([low[None], rows, high[None]])
         low, high = rows[at - 1], rows[at]
+        left = float(np.abs(high - low).max())
+        if left <= near or not left < size:
+            break
     return low, high
 
 
-def _settled(flow: Flow, path: _Array) -> PeriodicOrbit | None:
-    """The unstable orbit that the last periods repeat."""
+def _settled(flow: Flow, path: _Array) -> tuple[PeriodicOrbit | None, str]:
+    """The unstable orbit that the last periods repeat, and what was found."""
     tail = path[-max(4, len(path) // 3) :]
-    period = int(minimal_period(tail[None], 1e-3)[0])
+    if len(tail) < 4:
+        return None, "too few periods to look for an orbit"
+    period = int(minimal_period(tail[None], _REPEATS)[0])
     if period == 0:
-        return None
+        return None, (
+            f"no orbit: the last {len(tail)} periods do not repeat to {_REPEATS:g} after {len(tail) // 2} periods or "
+            "fewer; increase periods"
+        )
     try:
-        return shoot(flow, tail[-1], period, 1e-10, 40)
-    except OrbitNotFoundError:
-        return None
+        return shoot(flow, tail[-1], period, 1e-10, 40), f"it settled on an orbit of period {period}"
+    except OrbitNotFoundError as error:
+        return None, f"no orbit of period {period}: {error}"

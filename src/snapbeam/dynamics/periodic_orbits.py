@@ -24,14 +24,15 @@ from snapbeam.util.validation import (
     checked,
     finite_array,
     integer,
-    positive,
     shown,
+    within,
 )
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
+    "LARGEST_TOLERANCE",
     "Corrector",
     "Family",
     "OrbitNotFoundError",
@@ -42,6 +43,7 @@ __all__ = [
     "Spot",
     "jacobian",
     "newton",
+    "orbit_tolerance",
     "passage_of",
     "periodic_orbit",
     "shoot",
@@ -61,6 +63,10 @@ _SPLIT = 16
 """Tangents from which on they are shared among threads."""
 _LONGEST = 0.25
 """Longest step of Newton's method, in units of the well's amplitude."""
+_ROUNDING = 1e-10
+"""Residual below which Newton's method can only have stopped by rounding."""
+LARGEST_TOLERANCE = 1e-3
+"""Maximum tolerance of an orbit: with a larger one the guess itself would count as an orbit."""
 _SLOW = 0.25
 """Factor by which a step must lessen the residual, or else the derivative is computed again."""
 
@@ -200,9 +206,7 @@ def newton(
     size = float(np.abs(r).max())
     for count in range(iterations):
         if not np.isfinite(size):
-            raise OrbitNotFoundError(
-                "a run failed on the way; begin nearer to the orbit, or with accuracy = 'reference'"
-            )
+            raise OrbitNotFoundError("a run failed on the way; begin nearer to the orbit")
         if size <= tolerance and not (deflate and _near(x, deflate)):
             return Shot(x, slope, size, count, fresh)
         try:
@@ -231,15 +235,32 @@ def newton(
                 new = float(np.abs(found).max())
             else:
                 raise OrbitNotFoundError(
-                    f"Newton's method stands still at a residual of {size:.2g}, in units of the well's amplitude; "
-                    "begin nearer to the orbit (transient=..., another period), or with accuracy = 'reference'"
+                    f"Newton's method stopped after {count + 1} iterations, since no step reduces the residual of "
+                    f"{size:.2g}, in units of the well's amplitude; {_advice(size, tolerance)}"
                 )
         slope = slope + np.outer(found - r - slope @ step, step) / float(step @ step)
         x, r, size, fresh = x + step, found, new, False
     raise OrbitNotFoundError(
         f"no convergence in {iterations} iterations, the residual is {size:.2g} in units of the well's amplitude; "
-        "begin nearer to the orbit (transient=...), try another period, or more iterations"
+        f"{_advice(size, tolerance)}, or more iterations"
     )
+
+
+def _advice(residual: float, tolerance: float) -> str:
+    if residual <= _ROUNDING:
+        return f"this is rounding: increase tolerance = {tolerance:g} above the residual"
+    return "begin nearer to the orbit (a longer transient), try another period"
+
+
+def orbit_tolerance(value: float) -> float:
+    """The tolerance of an orbit.
+
+    Raises
+    ------
+    InputError
+        Unless it is between 0 and 1e-3.
+    """
+    return within("tolerance", value, 0.0, LARGEST_TOLERANCE, closed="right")
 
 
 def _near(x: _Array, known: tuple[_Array, ...]) -> bool:
@@ -487,8 +508,9 @@ def periodic_orbit(
     transient : int
         Periods to march from the guess first, which brings it to what attracts it.
     tolerance : float
-        Greatest coordinate that may remain, in units of the well's amplitude and of omega_1 times it.
+        Greatest coordinate that may remain, in units of the well's amplitude and of omega_1 times it; at most 1e-3.
     iterations : int
+        Maximum number of iterations of Newton's method.  It also stops where no step reduces the residual.
     deflate : sequence of PeriodicOrbit
         Orbits that are known and are not to be found again.
 
@@ -512,7 +534,7 @@ def periodic_orbit(
     elif phase is not None:
         raise InputError(f"phase = {shown(phase)}: is for a System")
     periods = integer("period", period, 1, 10_000)
-    allowed = positive("tolerance", tolerance)
+    allowed = orbit_tolerance(tolerance)
     x = _guess_of(flow, guess)
     before = integer("transient", transient, 0, 10**7)
     if before:
@@ -523,7 +545,12 @@ def periodic_orbit(
     if not all(isinstance(orbit, PeriodicOrbit) for orbit in deflate):
         raise InputTypeError(f"deflate = {shown(deflate)}: must be orbits, as periodic_orbit gives")
     known = tuple(point for orbit in deflate for point in orbit.points)
-    return shoot(flow, x, periods, allowed, integer("iterations", iterations, 1, 10_000), deflate=known)
+    try:
+        return shoot(flow, x, periods, allowed, integer("iterations", iterations, 1, 10_000), deflate=known)
+    except OrbitNotFoundError as error:
+        if not getattr(flow, "diagnostics", ()):
+            raise
+        raise OrbitNotFoundError(f"{error}, or use accuracy = 'reference'") from None
 
 
 def _guess_of(flow: Flow, guess: State | ArrayLike | PeriodicOrbit | None) -> _Array:
