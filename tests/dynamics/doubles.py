@@ -148,6 +148,30 @@ def pendulum(interval: float = 1.0, pieces: int = 40) -> KnownMap:
     return KnownMap(step, slope, 2, interval)
 
 
+def duffing(damping: float = 0.15, force: float = 0.2, pieces: int = 40) -> KnownMap:
+    """x'' + 0.15 x' - x + x^3 = 0.2 cos t over one period of the drive, by the classical Runge-Kutta method."""
+    h = 2.0 * math.pi / pieces
+
+    def rate(x, t):
+        return np.stack([x[:, 1], -damping * x[:, 1] + x[:, 0] - x[:, 0] ** 3 + force * math.cos(t)], axis=1)
+
+    def moved(x):
+        for i in range(pieces):
+            k1 = rate(x, i * h)
+            k2 = rate(x + 0.5 * h * k1, (i + 0.5) * h)
+            k3 = rate(x + 0.5 * h * k2, (i + 0.5) * h)
+            k4 = rate(x + h * k3, (i + 1.0) * h)
+            x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        return x
+
+    def slope(x, of):
+        small = 1e-6
+        columns = [(moved(x + e) - moved(x - e)) / (2.0 * small) for e in small * np.eye(2)]
+        return np.stack(columns, axis=2)
+
+    return KnownMap(lambda x, of: moved(x), slope, 2, 2.0 * math.pi)
+
+
 def turning_pendulum(longest: float = 8.0, step: float = 0.1) -> KnownMap:
     """The pendulum from a state to where its angle next comes upward through that of rest + pi, or *longest* after.
 

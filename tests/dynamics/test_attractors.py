@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+import warnings
 
 import numpy as np
 import pytest
-from doubles import grebogi, henon, logistic, pendulum, turning_pendulum
+from doubles import duffing, grebogi, henon, logistic, pendulum, turning_pendulum
+from scipy.integrate import solve_ivp
 from test_orbits import system_of
 
 import snapbeam as sb
+from snapbeam.dynamics.flow import Stroboscope, settling_periods
+from snapbeam.util import diagnostics
 
 
 def test_known_attractors() -> None:
@@ -124,6 +128,87 @@ def test_the_edge_between_snapping_and_not() -> None:
     )
     assert (edge.distance < 1e-3).all()
     assert edge.orbit is not None and edge.orbit.unstable == 1
+
+
+DUFFING = ((-0.779054, 0.027417), (1.210091, 0.055295))
+"""The two attractors of x'' + 0.15 x' - x + x^3 = 0.2 cos t at t = 0."""
+
+
+def test_the_double_well_has_two_attractors_and_a_slow_transient() -> None:
+    """After 40 periods some states are not near an attractor yet; after 220 periods every state is."""
+    states = np.random.default_rng(7).uniform(-2.0, 2.0, (120, 2))
+    found = sb.dynamics.find_attractors(duffing(), states, transient=220, max_periods=4)
+    assert [each.period for each in found.attractors] == [1, 1] and found.undecided == 0.0
+    np.testing.assert_allclose([each.points[0] for each in found.attractors], DUFFING, atol=2e-4)
+    size = math.exp(-0.15 * math.pi)
+    assert all(abs(each.orbit.multipliers[0]) == pytest.approx(size, abs=1e-3) for each in found.attractors)
+    bound = 1.0 - 0.05 ** (1.0 / 120)
+    assert found.unseen_share() == pytest.approx(bound) and found.unseen_share() < 3.0 / 120
+    assert found.to_dataset().attrs["unseen_share_95"] == pytest.approx(bound)
+    assert f"less than {100 * bound:.2g} %" in repr(found)
+    soon = sb.dynamics.find_attractors(duffing(), states, transient=40, max_periods=4, check_periods=20)
+    assert len(soon.attractors) == 2 and 0.0 < soon.undecided < 0.2
+    assert soon.unseen_share() > soon.undecided > found.unseen_share()
+
+
+@pytest.mark.slow
+def test_scipy_finds_no_third_attractor_of_the_double_well() -> None:
+    """Every one of 800 random states ends on one of two orbits; after 60 periods some are 0.4 away from both."""
+    draw = np.random.default_rng(11)
+    x = draw.uniform(-2.0, 2.0, (2, 800))
+
+    def rate(t, y):
+        return np.concatenate([y[800:], -0.15 * y[800:] + y[:800] - y[:800] ** 3 + 0.2 * math.cos(t)])
+
+    ends = solve_ivp(
+        rate,
+        (0.0, 400.0 * math.pi),
+        x.ravel(),
+        "DOP853",
+        [120.0 * math.pi, 400.0 * math.pi],
+        rtol=1e-8,
+        atol=1e-8,
+    ).y.reshape(2, 800, 2)
+    away = np.min([np.hypot(ends[0] - a, ends[1] - b) for a, b in DUFFING], axis=0)
+    assert 0.002 < (away[:, 0] > 0.4).mean() < 0.03, "a slow transient"
+    assert away[:, 1].max() < 1e-4, "no third attractor"
+
+
+def test_the_share_of_attractors_that_were_not_seen() -> None:
+    """The rule of three, and the bound of Clopper and Pearson with undecided states, cover a known share."""
+
+    def of(labels) -> sb.dynamics.Attractors:
+        return sb.dynamics.Attractors(logistic(), [], np.asarray(labels), 20, "")
+
+    assert of(np.zeros(200, dtype=int)).unseen_share() == pytest.approx(0.01487, abs=1e-5)
+    assert of(np.full(4, -1)).unseen_share() == 1.0
+    draw = np.random.default_rng(2)
+    share = 0.03
+    bounds = [of(np.where(draw.random(150) < share, -1, 0)).unseen_share() for _ in range(400)]
+    assert 0.93 < np.mean(np.array(bounds) >= share) <= 1.0
+    with pytest.raises(sb.InputError, match="confidence"):
+        of([0, 0]).unseen_share(1.5)
+
+
+def test_basins_choose_their_periods_from_the_damping(monkeypatch) -> None:
+    """At zeta = 0.02 200 periods are too few and say so; the default leaves less than 5 % undecided."""
+    monkeypatch.setattr(diagnostics, "_told", set())
+    system = system_of(1, 1.6, 0.03, 0.02)
+    found = sb.dynamics.find_attractors(system, 20)
+    grid = {"amplitude[1]": np.linspace(-1.6, 1.6, 10), "velocity[1]": np.linspace(-1.0, 1.0, 10)}
+    with pytest.warns(sb.DiagnosticWarning, match="undecided after 40 periods"):
+        short = sb.dynamics.basins_of_attraction(found, grid, periods=40)
+    assert short.attrs["undecided"] > 0.05
+    assert diagnostics.diagnostics_of(short)[0].code == "dynamics.basins_undecided"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ds = sb.dynamics.basins_of_attraction(found, grid)
+    rate = 0.02 * float(system.model.omega[0]) * found.flow.period
+    assert ds.attrs["periods"] == math.ceil(16.0 / rate) > 200
+    assert ds.attrs["undecided"] <= 0.05
+    lightly = system_of(1, 1.6, 0.03, 1e-5)
+    periods, rule = settling_periods(Stroboscope(lightly))
+    assert periods == 20_000 and "maximum of 20000" in rule
 
 
 def test_refusals() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -82,6 +83,59 @@ def test_integrity_of_known_shapes() -> None:
     assert stretched.factor == pytest.approx(0.5 * found.factor)
     rim = sb.dynamics.dynamical_integrity(np.ones((11, 11), dtype=int), 1)
     assert rim.factor == pytest.approx(6.0), "the rim of the window is a border"
+
+
+def test_undecided_points_are_left_out_with_bounds() -> None:
+    """The true value lies within the bounds wherever labels are taken away, and nothing is computed over -1."""
+    draw = np.random.default_rng(5)
+    x, y = np.meshgrid(np.arange(120), np.arange(120))
+    truth = ((np.sin(0.11 * x) + np.sin(0.07 * y + 0.02 * x)) > 0.1).astype(int) + (x + y > 170)
+    whole, slope = sb.dynamics.basin_entropy(truth, 6), sb.dynamics.uncertainty_exponent(truth)
+    assert whole.undecided == 0.0 and slope.bounds == pytest.approx((slope.exponent, slope.exponent))
+    assert whole.basin_bounds == pytest.approx((whole.basin, whole.basin))
+    assert whole.boundary_bounds == pytest.approx((whole.boundary, whole.boundary))
+    for share in (0.02, 0.3, 0.87):
+        holes = np.where(draw.random(truth.shape) < share, -1, truth)
+        found, line = sb.dynamics.basin_entropy(holes, 6), sb.dynamics.uncertainty_exponent(holes)
+        assert found.undecided == pytest.approx(share, abs=0.02) == line.undecided
+        for bounds, value in (
+            (found.basin_bounds, whole.basin), (found.boundary_bounds, whole.boundary), (line.bounds, slope.exponent)
+        ):  # fmt: skip
+            assert bounds[0] <= value <= bounds[1], (share, bounds, value)
+    uniform = np.where(draw.random((60, 60)) < 0.5, -1, 2)
+    one = sb.dynamics.basin_entropy(uniform, 5)
+    assert one.basin == 0.0 and one.boundary_boxes == 0, "undecided is not a label"
+    none = sb.dynamics.basin_entropy(np.full((20, 20), -1), 5)
+    assert math.isnan(none.basin) and none.boxes == 0 and none.undecided == 1.0 and not none.is_fractal
+    with pytest.raises(sb.InputError, match="no border"):
+        sb.dynamics.uncertainty_exponent(uniform)
+    assert sb.dynamics.dynamical_integrity(uniform, 2).undecided == pytest.approx(0.5, abs=0.05)
+
+
+def test_bounds_of_small_boxes_are_exact() -> None:
+    """Against all 3^u assignments of u undecided points of a box."""
+    draw = np.random.default_rng(9)
+    for _ in range(60):
+        grid = draw.integers(0, 3, (4, 6))
+        grid[0, :3] = (0, 1, 2)  # every label is present
+        holes = grid.copy()
+        holes.flat[draw.choice(np.arange(3, 24), 4, replace=False)] = -1
+        at = np.flatnonzero(holes.ravel() < 0)
+        found = sb.dynamics.basin_entropy(holes, 2)
+        values = []
+        for labels in itertools.product(range(3), repeat=4):
+            filled = holes.copy()
+            filled.flat[at] = labels
+            values.append(sb.dynamics.basin_entropy(filled, 2)[:2])
+        basin, border = np.array(values).T
+        assert (
+            found.basin_bounds[0] == pytest.approx(basin.min())
+            and found.basin_bounds[1] >= basin.max() - 1e-12
+        )
+        assert (
+            found.boundary_bounds[0] <= border.min() + 1e-12
+            and found.boundary_bounds[1] >= border.max() - 1e-12
+        )
 
 
 def test_classes_of_a_map_are_labels_too() -> None:

@@ -43,6 +43,25 @@ def test_a_section_at_a_level_is_on_it() -> None:
     assert (ds["midspan_velocity"].values > 0.0).all()
 
 
+def test_a_section_leaves_out_the_transient() -> None:
+    """A response of period 1 is one point; the transient that 100 periods leave at zeta = 0.01 is not part of it."""
+    system = system_of(1, 1.6, 0.03, 0.01)
+    ds = sb.dynamics.poincare_section(system, periods=30)
+    soon = sb.dynamics.poincare_section(system, periods=30, transient=100)
+    spread, before = (float(np.ptp(each["midspan_displacement"].values)) for each in (ds, soon))
+    assert spread < 1e-5 and before > 1e-3
+    assert ds.attrs["transient"] > 200 and "16 time constants" in ds.attrs["termination_reason"]
+
+
+def test_passages_say_how_near_they_are() -> None:
+    ds = sb.dynamics.poincare_section(
+        system_of(1, 1.6, 0.3), ("midspan_displacement", 0.0, "up"), 30, transient=0
+    )
+    assert "secant rule" in ds.attrs["termination_reason"]
+    assert np.abs(ds["midspan_displacement"].values).max() <= 1.01 * ds.attrs["level_error"] + 1e-15
+    assert ds.attrs["level_error"] < 1e-7
+
+
 def test_sweeps_meet_the_branch() -> None:
     """Both sweeps come back after a period, and one of them is on the orbit that is found from rest."""
     system = system_of(1, 1.6, 0.03, 0.02)

@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solve_discrete_lyapunov
 from scipy.spatial import cKDTree
+from scipy.stats import beta
 
 from snapbeam.dynamics.bifurcation import minimal_period
-from snapbeam.dynamics.flow import Flow, Marched, Stroboscope, flow_of
+from snapbeam.dynamics.flow import Flow, Marched, Stroboscope, flow_of, settling_periods
 from snapbeam.dynamics.lyapunov import lyapunov_spectrum
-from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, shoot
+from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, orbit_tolerance, shoot
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
-from snapbeam.util.validation import InputError, checked, finite_array, integer, positive
+from snapbeam.util.validation import InputError, checked, finite_array, integer, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -147,6 +148,8 @@ _REPEATS = 2e-3
 """Greatest coordinate by which states may differ that are taken to repeat before they are shot at."""
 _SAME = 1e-5
 _SIGMAS = 3.0
+_TRANSIENT = 1000
+"""Minimum number of periods to leave out."""
 _FEW = 8
 """Irregular runs of a group that exponents are taken of."""
 
@@ -192,6 +195,8 @@ class Attractors:
     """Of every state: number of its attractor, or :data:`UNDECIDED`."""
     check_periods: int
     """Periods over which a chaotic attractor was seen not to end."""
+    termination_reason: str
+    """After how many periods the search stopped, by which rule, and why states are undecided."""
 
     @property
     def shares(self) -> _Array:
@@ -203,8 +208,23 @@ class Attractors:
         """Share of the states that could not be told."""
         return float((self.labels == UNDECIDED).mean())
 
+    def unseen_share(self, confidence: float = 0.95) -> float:
+        """Upper bound of the share of initial states that go to attractors that were not found.
+
+        It is a bound of the basin volume in the sampled region, for states drawn at random from that region, and not
+        of the number of attractors.  If all *n* states are decided it is 1 - (1 - *confidence*)^(1/n), about 3/n at
+        95 % (the rule of three).  Undecided states count as states that may go to an attractor that was not found
+        (Clopper and Pearson).
+        """
+        level = within("confidence", confidence, 0.0, 1.0)
+        lost, count = int((self.labels == UNDECIDED).sum()), self.labels.size
+        return 1.0 if lost == count else float(beta.ppf(level, lost + 1, count - lost))
+
     def __repr__(self) -> str:
-        return f"<{len(self.attractors)} attractors, {100 * self.undecided:.3g} % of {self.labels.size} states undecided>"
+        return (
+            f"<{len(self.attractors)} attractors, {100 * self.undecided:.3g} % of {self.labels.size} states undecided, "
+            f"others have less than {100 * self.unseen_share():.2g} % of the sampled states at 95 %>"
+        )
 
     def to_dataset(self) -> xr.Dataset:
         """Kinds, periods, exponents, shares and points, labelled."""
@@ -233,7 +253,10 @@ class Attractors:
                 "label": ("state", self.labels, labels("attractor that a state goes to; -1: undecided")),
             },
             {"coordinate": list(names)},
-            {"title": "attractors", "undecided": self.undecided, "check_periods": self.check_periods},
+            {
+                "title": "attractors", "undecided": self.undecided, "check_periods": self.check_periods,
+                "unseen_share_95": self.unseen_share(), "termination_reason": self.termination_reason,
+            },
         )  # fmt: skip
 
 
@@ -264,7 +287,7 @@ def find_attractors(
     system: System | Flow,
     states: ArrayLike | int = 200,
     *,
-    transient: int = 1000,
+    transient: int | None = None,
     max_periods: int = 8,
     check_periods: int = 1000,
     seed: int = 0,
@@ -284,8 +307,9 @@ def find_attractors(
     system : System, or a Flow
     states : array_like of shape (states, d), or int
         Where to begin, or how many states to spread over both wells.
-    transient : int
-        Periods to leave out.
+    transient : int, optional
+        Periods to leave out; by default 16 time constants of the slowest mode, at least 1000 and at most
+        20,000 periods.
     max_periods : int
         Longest period, in periods of the drive, that is looked for.
     check_periods : int
@@ -301,15 +325,21 @@ def find_attractors(
     Returns
     -------
     Attractors
+        ``attractors.unseen_share()`` bounds the share of initial states that go to attractors that were not found;
+        ``attractors.termination_reason`` says why states are undecided.
     """
     flow = flow_of(system, integration)
-    leave = integer("transient", transient, 1, 10**7)
+    leave, rule = (
+        settling_periods(flow, least=_TRANSIENT)
+        if transient is None
+        else (integer("transient", transient, 1, 10**7), "as given")
+    )
     most, lasts = (
         integer("max_periods", max_periods, 1, 512),
         integer("check_periods", check_periods, 20, 10**7),
     )
     rows = _states_of(flow, states, seed)
-    allowed = positive("tolerance", tolerance)
+    allowed = orbit_tolerance(tolerance)
 
     def report(done: int) -> None:
         if progress is not None:
@@ -322,7 +352,7 @@ def find_attractors(
     assert seen.every is not None
     known = np.asarray(np.isfinite(seen.states).all(axis=1))
     repeats = np.where(known, minimal_period(np.where(known[:, None, None], seen.every, 0.0), _REPEATS), 0)
-    verified = _orbits(flow, seen, repeats, allowed)
+    verified, reasons = _orbits(flow, seen, repeats, allowed)
     orbits = [orbit for orbit, _ in verified]
     report(2)
     regular = [_periodic(orbit, verification) for orbit, verification in verified]
@@ -337,7 +367,33 @@ def find_attractors(
         labels[group] = len(regular) + number
     labels = np.where(labels >= 0, order[np.maximum(labels, 0)] if len(order) else UNDECIDED, UNDECIDED)
     report(4)
-    return Attractors(flow, found, labels, lasts)
+    return Attractors(flow, found, labels, lasts, _reason(labels, known, repeats, leave, rule, most, reasons))
+
+
+def _reason(
+    labels: NDArray[np.int64],
+    known: NDArray[np.bool_],
+    repeats: NDArray[np.int64],
+    leave: int,
+    rule: str,
+    most: int,
+    reasons: list[str],
+) -> str:
+    """Why the search stopped, and why states are undecided."""
+    lost = labels == UNDECIDED
+    words = [f"{leave} periods left out ({rule})"]
+    counts = (
+        (int((lost & ~known).sum()), "failed"),
+        (
+            int((lost & known & (repeats == 0)).sum()),
+            f"repeat after none of 1 to {most} periods and are not verified as chaotic",
+        ),
+        (
+            int((lost & (repeats > 0)).sum()),
+            f"repeat, but their orbit is not verified ({'; '.join(dict.fromkeys(reasons)) or 'another orbit is nearby'})",
+        ),
+    )
+    return "; ".join([*words, *(f"{count} states {text}" for count, text in counts if count)])
 
 
 def _states_of(flow: Flow, states: ArrayLike | int, seed: int) -> _Array:
@@ -353,30 +409,33 @@ def _states_of(flow: Flow, states: ArrayLike | int, seed: int) -> _Array:
 
 def _orbits(
     flow: Flow, seen: Marched, repeats: NDArray[np.int64], tolerance: float
-) -> list[tuple[PeriodicOrbit, PeriodicOrbit]]:
-    """The stable orbits that states which repeat are on, each once and with its verification."""
+) -> tuple[list[tuple[PeriodicOrbit, PeriodicOrbit]], list[str]]:
+    """The stable orbits that states which repeat are on, each once and with its verification; why others are none."""
     found: list[PeriodicOrbit] = []
     verifications: list[PeriodicOrbit] = []
     missed: list[_Array] = []
+    reasons: list[str] = []
     for s in np.flatnonzero(repeats > 0):
         x = seen.states[s]
         if _nearest(found, x) != UNDECIDED or any(np.abs(x - other).max() < _REPEATS for other in missed):
             continue
         try:
             orbit = shoot(flow, x, int(repeats[s]), tolerance, 40)
-        except OrbitNotFoundError:
+            if orbit.minimal_period != orbit.period:
+                orbit = shoot(flow, orbit.coordinates, orbit.minimal_period, tolerance, 40)
+        except OrbitNotFoundError as error:
             missed.append(x)
+            reasons.append(str(error))
             continue
-        if orbit.minimal_period != orbit.period:
-            orbit = shoot(flow, orbit.coordinates, orbit.minimal_period, tolerance, 40)
         near = np.abs(orbit.points - x).max(axis=1).min() < 10.0 * _REPEATS
         verification = _verify(orbit, tolerance) if near and orbit.is_stable else None
         if verification is None:
             missed.append(x)
+            reasons.append("it is unstable, far away, or not confirmed at accuracy = 'reference'")
         elif not any(_is_same(orbit, other) for other in found):
             found.append(orbit)
             verifications.append(verification)
-    return list(zip(found, verifications, strict=True))
+    return list(zip(found, verifications, strict=True)), reasons
 
 
 def _verify(orbit: PeriodicOrbit, tolerance: float) -> PeriodicOrbit | None:

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage, stats
 
 from snapbeam.dynamics.attractors import UNDECIDED, Attractors, Cloud
-from snapbeam.dynamics.flow import Flow, Stroboscope
+from snapbeam.dynamics.flow import Flow, Stroboscope, settling_periods
 from snapbeam.model.state import State
+from snapbeam.util.diagnostics import Diagnostic, tell, to_json
 from snapbeam.util.validation import InputError, InputTypeError, axis, checked, finite_array, integer, shown
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ __all__ = [
 _Array = NDArray[np.float64]
 _AMONG = 8
 """Looks in a row at which a state must lie among the points of a chaotic attractor."""
+_MANY = 0.05
+"""Share of undecided states from which on a warning is given."""
 
 
 @checked
@@ -39,7 +42,7 @@ def basins_of_attraction(
     grid: Mapping[str, ArrayLike],
     *,
     fixed_coordinates: State | ArrayLike | None = None,
-    periods: int = 200,
+    periods: int | None = None,
     every: int = 10,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.Dataset:
@@ -48,6 +51,7 @@ def basins_of_attraction(
     A state goes to a periodic attractor once it is in a ball about one of its points in which the flow contracts (see
     :class:`~snapbeam.dynamics.attractors.Ball`), and to a chaotic one if it lies among its points at eight looks in a row
     and at the end.  One that does neither within *periods* is undecided, -1.  The tip's mid-position is fixed in space.
+    If more than 5 % of the states are undecided, a warning says so.
 
     Parameters
     ----------
@@ -57,8 +61,10 @@ def basins_of_attraction(
         Two coordinates with their values, such as ``{"amplitude[1]": ..., "velocity[1]": ...}``, strictly increasing.
     fixed_coordinates : State or array_like of shape (d,), optional
         The other coordinates; a beam at rest in the well that a run starts in by default.
-    periods : int
-        Of the drive, at most.
+    periods : int, optional
+        Of the drive, at most.  By default 16 time constants of the slowest decay, at least 200 and at most 20,000
+        periods; the decay is that of the slowest mode, min(zeta_j omega_j), or of a perturbation of one of the
+        periodic attractors, if that is slower.
     every : int
         Periods between two looks.
     progress : callable, optional
@@ -67,7 +73,8 @@ def basins_of_attraction(
     Returns
     -------
     xarray.Dataset
-        ``basin`` over the two coordinates, the number of the attractor; ``captured_after``, in periods.
+        ``basin`` over the two coordinates, the number of the attractor; ``captured_after``, in periods.  The attribute
+        ``undecided`` is the share of undecided states, ``termination_reason`` the number of periods and its rule.
 
     Raises
     ------
@@ -79,10 +86,35 @@ def basins_of_attraction(
             f"attractors = {shown(attractors)}: must be Attractors, as sb.dynamics.find_attractors gives"
         )
     flow = attractors.flow
-    total, step = integer("periods", periods, 1, 10**6), integer("every", every, 1, 10**4)
+    step = integer("every", every, 1, 10**4)
+    rates = [-each.exponent for each in attractors.attractors if each.orbit is not None]
+    total, rule = (
+        settling_periods(flow, rates)
+        if periods is None
+        else (integer("periods", periods, 1, 10**6), "as given")
+    )
     names, columns, rows = _plane(flow, grid, fixed_coordinates)
     label, after = _labelled(attractors, flow, rows, total, step, progress)
-    return _dataset(attractors, names, columns, label, after, total)
+    dataset = _dataset(attractors, names, columns, label, after, total)
+    dataset.attrs["termination_reason"] = (
+        f"{total} periods ({rule})" if (label == UNDECIDED).any() else "every state is decided"
+    )
+    told = _diagnostics(dataset, attractors)
+    dataset.attrs["diagnostics"] = to_json(told)
+    tell(told)
+    return dataset
+
+
+def _diagnostics(dataset: xr.Dataset, attractors: Attractors) -> tuple[Diagnostic, ...]:
+    share, periods = float(dataset.attrs["undecided"]), int(dataset.attrs["periods"])
+    if share <= _MANY:
+        return ()
+    numbers = {"undecided": share, "periods": float(periods)}
+    message = (
+        f"basins: {100 * share:.3g} % of the states are undecided after {periods} periods; increase periods, or search "
+        f"for further attractors with more states (the search had {attractors.labels.size})"
+    )
+    return (Diagnostic("dynamics.basins_undecided", message, numbers),)
 
 
 def _plane(
@@ -210,23 +242,30 @@ _SIGMAS = 3.0
 
 
 class BasinEntropy(NamedTuple):
-    """How uncertain the outcome is in boxes of a grid."""
+    """How uncertain the outcome is in boxes of a grid, over the decided points."""
 
     basin: float
-    """Mean over all boxes of the entropy of the labels within, S_b."""
+    """Mean over the boxes of the entropy of the labels within, S_b; NaN if no point is decided."""
     boundary: float
     """Mean over the boxes that hold more than one label, S_bb; NaN where none does."""
     boxes: int
+    """Boxes with at least one decided point."""
     boundary_boxes: int
     basin_error: float
     """Standard error of S_b from counting, as if boxes were independent; moving or refining the grid moves it too."""
     boundary_error: float
     """The same of S_bb; NaN with fewer than two boxes."""
+    undecided: float
+    """Share of the points that are undecided; the means above leave them out."""
+    basin_bounds: tuple[float, float]
+    """S_b of all points is within these, whichever of the labels present the undecided points have."""
+    boundary_bounds: tuple[float, float]
+    """The same of S_bb; NaN where no box can hold a border."""
 
     @property
     def is_fractal(self) -> bool:
-        """Whether S_bb > ln 2 by three standard errors: enough, and not needed, for a fractal border."""
-        return bool(self.boundary - _SIGMAS * self.boundary_error > np.log(2.0))
+        """Whether the lower bound of S_bb > ln 2 by three standard errors: enough, and not needed, for a fractal border."""
+        return bool(self.boundary_bounds[0] - _SIGMAS * self.boundary_error > np.log(2.0))
 
 
 def _labels(labels: ArrayLike) -> NDArray[np.int64]:
@@ -248,12 +287,13 @@ def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
     """Basin entropy and boundary basin entropy (Daza et al., Sci. Rep. 6 (2016) 31416).
 
     The grid is cut into boxes of *box* points a side; in each, with shares p_j of the labels, the entropy is
-    S = -sum p_j ln p_j.  S_b is its mean over all boxes, S_bb over those that hold a border.
+    S = -sum p_j ln p_j.  S_b is its mean over all boxes, S_bb over those that hold a border.  Undecided points are left
+    out of the shares; the bounds hold for whichever of the labels present they have.
 
     Parameters
     ----------
     labels : array_like of int
-        A grid of any dimension, such as basins or the classes of a map.
+        A grid of any dimension, such as basins or the classes of a map; a negative label is undecided.
     box : int
         Points along a side; what does not fill a box is left out.
     """
@@ -263,14 +303,72 @@ def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
     shape = [part for n in cut.shape for part in (n // side, side)]
     boxes = cut.reshape(shape).transpose(*range(0, 2 * cut.ndim, 2), *range(1, 2 * cut.ndim, 2))
     boxes = boxes.reshape(-1, side**cut.ndim)
-    entropy, kinds = np.zeros(len(boxes)), np.zeros(len(boxes), dtype=int)
-    for label in np.unique(boxes):
-        share = (boxes == label).mean(axis=1)
-        kinds += share > 0.0
-        entropy -= np.where(share > 0.0, share * np.log(np.where(share > 0.0, share, 1.0)), 0.0)
-    mixed = kinds > 1
-    (basin, basin_error), (boundary, boundary_error) = _mean(entropy), _mean(entropy[mixed])
-    return BasinEntropy(basin, boundary, len(boxes), int(mixed.sum()), basin_error, boundary_error)
+    kinds = np.unique(boxes[boxes >= 0])
+    counts = (
+        np.stack([(boxes == kind).sum(axis=1) for kind in kinds], axis=1)
+        if kinds.size
+        else np.zeros((len(boxes), 1))
+    )
+    decided = counts.sum(axis=1)
+    lost = boxes.shape[1] - decided
+    entropy = _entropy(counts)
+    mixed = (counts > 0).sum(axis=1) > 1
+    (basin, basin_error), (boundary, boundary_error) = _mean(entropy[decided > 0]), _mean(entropy[mixed])
+    least, most, border = _extremes(counts, lost)
+    if kinds.size:
+        outer = float(least.mean()), float(most.mean())
+        inner = (
+            _border_bounds(least[mixed], border[~mixed & (lost > 0)], False),
+            _border_bounds(most[mixed], most[~mixed & (lost > 0)], True),
+        )
+    else:
+        outer = inner = float("nan"), float("nan")
+    return BasinEntropy(
+        basin, boundary, int((decided > 0).sum()), int(mixed.sum()), basin_error, boundary_error,
+        float((boxes < 0).mean()), outer, inner,
+    )  # fmt: skip
+
+
+def _entropy(counts: NDArray[Any]) -> _Array:
+    """Entropy of rows of counts; 0 where all are 0."""
+    share = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
+    return np.asarray(
+        -np.where(share > 0.0, share * np.log(np.where(share > 0.0, share, 1.0)), 0.0).sum(axis=1)
+    )
+
+
+def _extremes(counts: NDArray[Any], lost: NDArray[Any]) -> tuple[_Array, _Array, _Array]:
+    """Minimum and maximum entropy of boxes whose *lost* points have any of the labels, and that of one differing point."""
+    ordered = np.sort(counts.astype(np.float64), axis=1)
+    low = ordered.copy()
+    low[:, -1] += lost  # the entropy is least if all of them join the most frequent label
+    high = ordered.copy()
+    # it is greatest if they raise the rarest labels to one level
+    for i in range(1, high.shape[1] + 1):
+        before = ordered[:, :i].sum(axis=1)
+        level = (before + lost) / i
+        fits = (
+            (level >= ordered[:, i - 1])
+            & ((level <= ordered[:, i]) if i < high.shape[1] else True)
+            & (lost > 0)
+        )
+        high[fits, :i] = level[fits, None]
+    total = counts.sum(axis=1) + lost
+    one = np.stack([np.ones_like(total, dtype=np.float64), np.maximum(total - 1.0, 0.0)], axis=1)
+    return _entropy(low), _entropy(high), _entropy(one)
+
+
+def _border_bounds(certain: _Array, possible: _Array, greatest: bool) -> float:
+    """Extreme of the mean over boxes that hold a border and any of those that may hold one."""
+    possible = np.sort(possible)[:: -1 if greatest else 1]
+    if greatest:
+        possible = possible[possible > 0.0]
+    sums = np.append(0.0, np.cumsum(possible)) + certain.sum()
+    sizes = np.arange(possible.size + 1) + certain.size
+    means = sums[sizes > 0] / sizes[sizes > 0]
+    if not means.size:
+        return float("nan")
+    return float(means.max() if greatest else means.min())
 
 
 def _mean(values: _Array) -> tuple[float, float]:
@@ -281,7 +379,7 @@ def _mean(values: _Array) -> tuple[float, float]:
 
 
 class UncertaintyExponent(NamedTuple):
-    """How the share of uncertain points goes with the error of a start, f ~ epsilon^alpha."""
+    """How the share of uncertain points goes with the error of a start, f ~ epsilon^alpha, over the decided points."""
 
     exponent: float
     """alpha; the dimension of the border is that of the grid less alpha."""
@@ -290,7 +388,11 @@ class UncertaintyExponent(NamedTuple):
     size: _Array
     """epsilon, in cells."""
     share: _Array
-    """f(epsilon)."""
+    """f(epsilon): of the decided points, those with a decided neighbour of another label."""
+    undecided: float
+    """Share of the points that are undecided; the values above leave them out."""
+    bounds: tuple[float, float]
+    """alpha of all points is within these, whichever labels the undecided points have."""
 
 
 @checked
@@ -302,6 +404,7 @@ def uncertainty_exponent(labels: ArrayLike, sizes: ArrayLike | None = None) -> U
     Parameters
     ----------
     labels : array_like of int
+        A negative label is undecided.
     sizes : array_like of int, optional
         epsilon in cells; powers of two up to an eighth of the shortest side by default.
 
@@ -317,24 +420,44 @@ def uncertainty_exponent(labels: ArrayLike, sizes: ArrayLike | None = None) -> U
     steps = [integer("sizes", size, 1, most) for size in np.atleast_1d(sizes).tolist()]
     if len(set(steps)) < 2:
         raise InputError(f"sizes = {steps}: must be at least two different ones")
-    shares = np.array([_uncertain(grid, step) for step in steps])
+    shares, low, high = np.array([_uncertain(grid, step) for step in steps]).T
     if not (shares > 0.0).all():
         raise InputError("labels: no border is met at some of the sizes, so that there is no exponent")
-    line = stats.linregress(np.log(steps), np.log(shares))
+    away = np.log(steps)
+    line = stats.linregress(away, np.log(shares))
     error = float(line.stderr) if len(steps) > 2 else float("nan")
-    return UncertaintyExponent(float(line.slope), error, np.array(steps, dtype=float), shares)
+    weight = away - away.mean()
+    weight = weight / (weight @ weight)
+    with np.errstate(divide="ignore"):
+        below, above = np.log(low), np.log(high)
+    used = weight != 0.0
+    bounds = tuple(
+        float(np.sum(weight[used] * np.where(weight[used] > 0.0, rising[used], falling[used])))
+        for rising, falling in ((below, above), (above, below))
+    )
+    return UncertaintyExponent(
+        float(line.slope),
+        error,
+        np.array(steps, dtype=float),
+        shares,
+        float((grid < 0).mean()),
+        (bounds[0], bounds[1]),
+    )
 
 
-def _uncertain(grid: NDArray[np.int64], step: int) -> float:
-    """Share of the points, that far from the rim, that have another label that far away."""
+def _uncertain(grid: NDArray[np.int64], step: int) -> tuple[float, float, float]:
+    """Share of the decided points, that far from the rim, that have another label that far away; bounds of that of all."""
     inner = grid[tuple(slice(step, n - step) for n in grid.shape)]
-    other = np.zeros(inner.shape, dtype=bool)
+    other, unknown = np.zeros(inner.shape, dtype=bool), inner < 0
     for along in range(grid.ndim):
         for shift in (-step, step):
             window = [slice(step, n - step) for n in grid.shape]
             window[along] = slice(step + shift, grid.shape[along] - step + shift)
-            other |= grid[tuple(window)] != inner
-    return float(other.mean())
+            there = grid[tuple(window)]
+            other |= (there != inner) & (there >= 0) & (inner >= 0)
+            unknown |= there < 0
+    decided = int((inner >= 0).sum())
+    return float(other.sum()) / max(decided, 1), float(other.mean()), float((other | unknown).mean())
 
 
 class Integrity(NamedTuple):
@@ -348,6 +471,8 @@ class Integrity(NamedTuple):
     """IF: radius of the largest circle within it."""
     center: tuple[int, ...]
     """Of that circle."""
+    undecided: float
+    """Share of the window that is undecided; it counts as outside, so that every measure is a lower bound."""
 
 
 @checked
@@ -357,7 +482,7 @@ def dynamical_integrity(
     """Global and local integrity measure and integrity factor of one basin in a window.
 
     As of Soliman and Thompson (J. Sound Vib. 135 (1989) 453) and Rega and Lenci (Nonlinear Anal. 63 (2005) 902).  The
-    rim of the window counts as a border: what lies beyond is not known.
+    rim of the window counts as a border: what lies beyond is not known.  Undecided points count as outside the basin.
 
     Parameters
     ----------
@@ -388,4 +513,6 @@ def dynamical_integrity(
                 f"attractor = {shown(attractor)}: must be indices of a point of the grid {grid.shape}"
             )
         local = float(away[tuple(attractor)])
-    return Integrity(float((grid == int(label)).mean()), local, float(away.max()), center)
+    return Integrity(
+        float((grid == int(label)).mean()), local, float(away.max()), center, float((grid < 0).mean())
+    )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.dynamics.flow import InitialConditions, Stroboscope, starts_of
+from snapbeam.dynamics.flow import InitialConditions, Stroboscope, settling_periods, starts_of
 from snapbeam.dynamics.periodic_orbits import passage_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
@@ -38,7 +38,7 @@ def bifurcation_diagram(
     *,
     sweeps: Sequence[str] = SWEEPS,
     initial_conditions: InitialConditions | int = 0,
-    periods: tuple[int, int] = (100, 32),
+    periods: tuple[int | None, int] = (None, 32),
     grazing: bool = False,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.Dataset:
@@ -59,7 +59,8 @@ def bifurcation_diagram(
     initial_conditions : InitialConditions or int
         Initial conditions at every value, in addition to the sweeps; none by default.
     periods : pair of int
-        Periods to leave out at each value, and to keep.
+        Periods to leave out at each value, and to keep.  None leaves out 16 time constants of the slowest mode, at
+        least 200 and at most 20,000 periods.
     grazing : bool
         Whether to look at every approach within four of the kept periods: ``clearance``, ``min_penetration``.
     progress : callable, optional
@@ -85,7 +86,7 @@ def bifurcation_diagram(
         raise InputError(f"name = {shown(name)}: must be a parameter that is a number")
     points = axis(row.short, values, row.quantity.low, row.quantity.high, closed=row.quantity.closed)
     kinds = [choice("sweeps", kind, SWEEPS) for kind in sweeps]
-    leave, keep = _periods(periods)
+    given, keep = _periods(periods)
     flag("grazing", grazing)
     many = (
         starts_of(initial_conditions)
@@ -95,6 +96,7 @@ def bifurcation_diagram(
     if not kinds and many is None:
         raise InputError("sweeps = (): must be at least one, or initial_conditions at least 1")
     flow = Stroboscope(system, Integration() if integration is None else integration)
+    leave, rule = settling_periods(flow) if given is None else (given, "as given")
     diagram = _Diagram(flow, row.name, points, leave, keep)
     total = points.size * (bool(kinds) + (many.count if many is not None else 0))
     done = 0
@@ -110,17 +112,20 @@ def bifurcation_diagram(
     for number in range(0 if many is None else many.count):
         assert many is not None
         diagram.begin(f"start {number}", many, number, report)
-    return diagram.dataset(grazing)
+    dataset = diagram.dataset(grazing)
+    dataset.attrs["termination_reason"] = f"{leave} periods left out ({rule}) and {keep} kept at each value"
+    return dataset
 
 
-def _periods(periods: tuple[int, int]) -> tuple[int, int]:
+def _periods(periods: tuple[int | None, int]) -> tuple[int | None, int]:
     try:
         leave, keep = periods
     except (TypeError, ValueError):
         raise InputTypeError(
             f"periods = {shown(periods)}: must be a pair, periods to leave out and to keep"
         ) from None
-    return integer("periods[0]", leave, 0, 10**7), integer("periods[1]", keep, 2, 10**6)
+    left = None if leave is None else integer("periods[0]", leave, 0, 10**7)
+    return left, integer("periods[1]", keep, 2, 10**6)
 
 
 def minimal_period(rows: _Array, tolerance: float = 1e-4) -> NDArray[np.int64]:

@@ -39,6 +39,7 @@ __all__ = [
     "flow_of",
     "held_in_space",
     "leaving",
+    "settling_periods",
     "starts_of",
 ]
 
@@ -623,6 +624,40 @@ def flow_of(
     if integration is not None:
         raise InputTypeError("integration: is for a System; a Flow brings its own")
     return system
+
+
+TIME_CONSTANTS = 16.0
+"""Time constants of the slowest decay after which a motion counts as settled: free vibration has fallen to 1e-7."""
+_LONGEST = 20_000
+"""Maximum number of periods that the damping chooses."""
+
+
+def settling_periods(flow: Flow, rates: ArrayLike = (), least: int = 200) -> tuple[int, str]:
+    """The number of periods after which a motion of *flow* counts as settled, and the rule that gave it.
+
+    It is 16 time constants of the slowest mode, 1/min(zeta_j omega_j), but at least *least* and at most 20,000 periods.
+
+    Parameters
+    ----------
+    flow : Flow
+        Without modes, as a map has, *rates* alone count; without both the number is *least*.
+    rates : array_like
+        Further decay rates, 1/s (per period of a map), such as those towards known attractors.
+    """
+    known = [float(rate) for rate in np.ravel(np.asarray(rates, dtype=np.float64))]
+    if isinstance(flow, Stroboscope):
+        model = flow.system.model
+        known.append(float(np.min(model.damping_ratio * model.omega)))
+    if not known:
+        return least, f"{least} periods"
+    slowest = min(known)
+    wanted = TIME_CONSTANTS / (slowest * flow.period) if slowest > 0.0 else math.inf
+    rule = f"{TIME_CONSTANTS:g} time constants of the slowest decay"
+    if wanted > _LONGEST:
+        return _LONGEST, f"the maximum of {_LONGEST} periods; {rule} would be {wanted:.3g}"
+    if wanted < least:
+        return least, f"the minimum of {least} periods; {rule} are {wanted:.3g}"
+    return math.ceil(wanted), rule
 
 
 def _rows(states: ArrayLike) -> _Array:

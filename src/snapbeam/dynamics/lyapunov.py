@@ -9,20 +9,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.dynamics.flow import Flow, Marched, Stroboscope, flow_of
+from snapbeam.dynamics.flow import Flow, Marched, Stroboscope, flow_of, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.sweeps.points import Points, points_of
+from snapbeam.util.diagnostics import Diagnostic, tell, to_json
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
     checked,
     finite_array,
     integer,
-    positive,
     shown,
+    within,
 )
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ __all__ = ["largest_lyapunov", "lyapunov_spectrum"]
 _Array = NDArray[np.float64]
 _BLOCKS = 20
 """Means of as many stretches tell the standard error."""
+_DISTANCES = (1e-12, 1e-3)
+"""Bounds of the distance of two trajectories: rounding below, the curvature of the flow above."""
 
 
 @checked
@@ -42,7 +45,7 @@ def lyapunov_spectrum(
     k: int = 1,
     periods: int = 500,
     *,
-    transient: int = 100,
+    transient: int | None = None,
     states: State | ArrayLike | None = None,
     axes: Mapping[str, Any] | None = None,
     integration: Integration | None = None,
@@ -62,8 +65,8 @@ def lyapunov_spectrum(
         Exponents, from the largest on, at most the dimension of the state.
     periods : int
         Periods of the drive to go over.
-    transient : int
-        Periods before them.
+    transient : int, optional
+        Periods before them; by default 16 time constants of the slowest mode, at least 200 and at most 20,000.
     states : State or array_like of shape (runs, d), optional
         Where to begin; the system's start by default.
     axes : mapping, optional
@@ -88,7 +91,8 @@ def lyapunov_spectrum(
     """
     flow = flow_of(system, integration)
     count = integer("k", k, 1, flow.dimension)
-    total, before = integer("periods", periods, _BLOCKS, 10**7), integer("transient", transient, 0, 10**7)
+    total = integer("periods", periods, _BLOCKS, 10**7)
+    before, rule = _transient(flow, transient, 0)
     if not flow.smooth:
         raise InputError(
             "contact: its force jumps, so that the tangent flow does; use largest_lyapunov for the largest one"
@@ -105,7 +109,19 @@ def lyapunov_spectrum(
             crossed[period] = marched.statistics["zero_crossings"] > 0
         if progress is not None:
             progress(period + 1, total)
-    return _dataset(flow, growth, crossed, points, before)
+    dataset = _dataset(flow, growth, crossed, points, before)
+    dataset.attrs["termination_reason"] = _stopped(total, before, rule)
+    return dataset
+
+
+def _transient(flow: Flow, given: int | None, least: int) -> tuple[int, str]:
+    return (
+        settling_periods(flow) if given is None else (integer("transient", given, least, 10**7), "as given")
+    )
+
+
+def _stopped(total: int, before: int, rule: str) -> str:
+    return f"{total} periods after a transient of {before} periods ({rule})"
 
 
 def _runs(
@@ -215,7 +231,7 @@ def largest_lyapunov(
     system: System | Flow,
     periods: int = 500,
     *,
-    transient: int = 100,
+    transient: int | None = None,
     states: State | ArrayLike | None = None,
     distance: float = 1e-8,
     integration: Integration | None = None,
@@ -229,18 +245,20 @@ def largest_lyapunov(
     system, periods, transient, states, integration
         As in :func:`lyapunov_spectrum`.
     distance : float
-        To which they are brought back, in units of the well's amplitude.
+        To which they are brought back, in units of the well's amplitude; in [1e-12, 1e-3].
 
     Returns
     -------
     xarray.Dataset
-        ``exponent`` (1/s) and ``exponent_error`` over ``run``.
+        ``exponent`` (1/s) and ``exponent_error`` over ``run``.  An exponent is NaN, with a warning, if the two
+        trajectories become equal to rounding within a period; the attribute ``merged`` counts such runs.
     """
     import xarray as xr
 
     flow = flow_of(system, integration)
-    total, before = integer("periods", periods, _BLOCKS, 10**7), integer("transient", transient, 1, 10**7)
-    size = positive("distance", distance)
+    total = integer("periods", periods, _BLOCKS, 10**7)
+    before, rule = _transient(flow, transient, 1)
+    size = within("distance", distance, *_DISTANCES, closed="both")
     begun, _, _ = _runs(flow, states, None)
     here = flow.march(begun, before).states
     runs = here.shape[0]
@@ -251,16 +269,35 @@ def largest_lyapunov(
         here, apart = both[:runs], both[runs:] - both[:runs]
         away = np.sqrt((apart * apart).sum(axis=1))
         with np.errstate(divide="ignore", invalid="ignore"):
-            growth[period] = np.log(away / size)
+            growth[period] = np.where(away > 0.0, np.log(away / size), np.nan)
             along = np.where((away > 0.0)[:, None], apart / away[:, None], along)
     rate = growth / flow.period
     edges = np.linspace(0, total, _BLOCKS + 1).astype(int)
     means = np.array([_sums(rate[a:b]) / (b - a) for a, b in pairwise(edges)])
     unit = "1/s" if isinstance(flow, Stroboscope) else "1"
+    merged = int((growth_lost := np.isnan(growth).any(axis=0)).sum())
+    told = _merged(merged, growth_lost.size, size)
+    tell(told)
     return xr.Dataset(
         {
             "exponent": ("run", _sums(rate) / total, {"units": unit, "long_name": "largest Lyapunov exponent"}),
             "exponent_error": ("run", _error(means), {"units": unit, "long_name": "standard error"}),
         },
-        attrs={"title": "largest Lyapunov exponent from two trajectories", "periods": total, "period": flow.period},
+        attrs={
+            "title": "largest Lyapunov exponent from two trajectories", "periods": total, "period": flow.period,
+            "transient": before, "termination_reason": _stopped(total, before, rule), "merged": merged,
+            "diagnostics": to_json(told),
+        },
     )  # fmt: skip
+
+
+def _merged(lost: int, runs: int, size: float) -> tuple[Diagnostic, ...]:
+    if not lost:
+        return ()
+    message = (
+        f"distance = {size:g}: the two trajectories become equal to rounding within a period, or fail, in {lost} of {runs} "
+        "runs, whose exponents are NaN; increase distance, or use lyapunov_spectrum"
+    )
+    return (
+        Diagnostic("dynamics.trajectories_merged", message, {"merged": float(lost), "runs": float(runs)}),
+    )

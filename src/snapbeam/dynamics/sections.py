@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.dynamics.flow import Stroboscope
+from snapbeam.dynamics.flow import Stroboscope, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.simulation.simulate import simulate
@@ -31,6 +31,12 @@ _LEVELS = (
 _DIRECTIONS = ("up", "down", "both")
 _SAMPLES = 128
 """A period of the drive or, where that is shorter, of the first mode, to find passages in."""
+_ROUNDS = 40
+"""Maximum number of rounds of the secant rule that places a passage on its level."""
+_STALE = 2
+"""Rounds in a row without progress after which a passage counts as placed."""
+_ON_LEVEL = 1e-12
+"""Length of the bracket, over the period, at which a passage counts as placed."""
 _RATES = {"displacement_at_striker": "velocity_at_striker", "midspan_displacement": "midspan_velocity"}
 
 
@@ -40,7 +46,7 @@ def poincare_section(
     section: str | tuple[str, float, str] = "stroboscopic",
     periods: int = 500,
     *,
-    transient: int = 100,
+    transient: int | None = None,
     phase: float | None = None,
     integration: Integration | None = None,
 ) -> xr.Dataset:
@@ -55,8 +61,8 @@ def poincare_section(
         unit and ``"up"``, ``"down"`` or ``"both"``.
     periods : int
         Periods of the drive to look at.
-    transient : int
-        Periods before them.
+    transient : int, optional
+        Periods before them; by default 16 time constants of the slowest mode, at least 200 and at most 20,000.
     phase : float, optional
         Of the drive, rad, for the stroboscopic section; that at the start by default.
     integration : Integration, optional
@@ -66,7 +72,9 @@ def poincare_section(
     xarray.Dataset
         Over ``point``: ``time`` (s, since the transient), ``drive_phase`` (rad), displacements and velocities of the
         contact point and the centre as of a run, ``modal_amplitude`` and ``modal_velocity`` over ``mode``.  Passages of
-        a level are found between 128 samples a period and placed on it by the run itself, to 1e-9 of a period or so.
+        a level are found between 128 samples a period and placed on it by the run itself; the attribute ``level_error``
+        is the maximum distance from the level, in its unit.  The attribute ``termination_reason`` states the transient
+        that was left out and its rule, and why the search for passages stopped.
 
     Raises
     ------
@@ -77,9 +85,14 @@ def poincare_section(
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if system.primary_excitation is None:
         raise InputError("striker = None: a section needs a drive, a base excitation or an axial load")
-    total, before = integer("periods", periods, 1, 10**6), integer("transient", transient, 0, 10**7)
+    total = integer("periods", periods, 1, 10**6)
     flow = Stroboscope(system, Integration() if integration is None else integration, phase)
     level = _level(section)
+    before, rule = (
+        settling_periods(flow)
+        if transient is None
+        else (integer("transient", transient, 0, 10**7), "as given")
+    )
     begun = flow.coordinates()
     if before:
         begun = flow.march(begun, before).states
@@ -88,14 +101,20 @@ def poincare_section(
     held = flow.starting(flow.state(begun[0]))
     how = flow.integration.replace(cycles=total, early_termination=False)
     end = total * flow.period
+    reason, off = f"{total} periods after a transient of {before} periods ({rule})", None
     if section == "stroboscopic":
         times = np.arange(total + 1) * flow.period
     elif level is None:
         onset = simulate(held, how, sample_times=[0.0]).impacts["onset"].values
         times = np.unique(onset[(onset > 0.0) & (onset <= end)])
     else:
-        times = _passages(held, how, level, end, flow.period)
-    return _dataset(held, how, np.minimum(times, end), flow, section)
+        times, off, words = _passages(held, how, level, end, flow.period)
+        reason += f"; {words}"
+    result = _dataset(held, how, np.minimum(times, end), flow, section)
+    result.attrs |= {"transient": before, "termination_reason": reason}
+    if off is not None:
+        result.attrs["level_error"] = off
+    return result
 
 
 def _level(section: Any) -> tuple[str, float, str] | None:
@@ -114,8 +133,11 @@ def _level(section: Any) -> tuple[str, float, str] | None:
 
 def _passages(
     system: System, how: Integration, level: tuple[str, float, str], end: float, period: float
-) -> _Array:
-    """Instants at which a variable passes its level: between samples, then by the secant rule on the run itself."""
+) -> tuple[_Array, float, str]:
+    """Instants at which a variable passes its level, the maximum distance from it there, and why the search stopped.
+
+    They are found between samples, then by the secant rule (Illinois form) on the run itself.
+    """
     name, value, direction = level
     spacing = min(period, 1.0 / system.model.reference_frequency) / _SAMPLES
     grid = np.linspace(0.0, end, int(np.ceil(end / spacing)) + 1)
@@ -124,23 +146,30 @@ def _passages(
     falling = (seen[:-1] > 0.0) & (seen[1:] <= 0.0)
     at = np.flatnonzero({"up": rising, "down": falling, "both": rising | falling}[direction])
     if not at.size:
-        return np.empty(0)
+        return np.empty(0), 0.0, "no passage"
     low, high, f_low, f_high = grid[at], grid[at + 1], seen[at], seen[at + 1]
-    side = np.zeros(at.size)
-    middle = low
-    for _ in range(6):
+    side, stale = np.zeros(at.size), np.zeros(at.size, dtype=np.int64)
+    best, least = grid[at], np.abs(seen[at])
+    words = f"the maximum of {_ROUNDS} rounds of the secant rule"
+    for count in range(_ROUNDS):
         middle = np.where(f_high == f_low, high, (low * f_high - high * f_low) / (f_high - f_low))
         middle = np.clip(middle, low, high)
         order = np.argsort(middle, kind="stable")
         times, back = np.unique(middle[order], return_inverse=True)
         f = np.empty(at.size)
         f[order] = (simulate(system, how, sample_times=times).dataset[name].values - value)[back]
+        nearer = np.abs(f) < least
+        best, least = np.where(nearer, middle, best), np.where(nearer, np.abs(f), least)
         above = f * f_high > 0.0
         f_low = np.where(above & (side == 1), 0.5 * f_low, np.where(above, f_low, f))
         f_high = np.where(~above & (side == -1), 0.5 * f_high, np.where(above, f, f_high))
         low, high = np.where(above, low, middle), np.where(above, middle, high)
         side = np.where(above, 1, -1)
-    return np.unique(middle)
+        stale = np.where(nearer, 0, stale + 1)
+        if ((least == 0.0) | (high - low <= _ON_LEVEL * period) | (stale >= _STALE)).all():
+            words = f"{count + 1} rounds of the secant rule, until no passage came nearer to its level"
+            break
+    return np.unique(best), float(least.max()), words
 
 
 def _dataset(system: System, how: Integration, times: _Array, flow: Stroboscope, section: Any) -> xr.Dataset:
