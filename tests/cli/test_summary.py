@@ -41,6 +41,20 @@ def test_lowest_interwell_and_notch(synthetic_map):
     assert deepest_notch(synthetic_map.isel(frequency_ratio=0)) is None
 
 
+def test_points_of_unknown_class_are_not_taken_for_intrawell(synthetic_map):
+    said = text(map_summary(synthetic_map, []))
+    assert "unknown response class may be" not in said, (
+        "the unknown point lies above the lowest interwell run"
+    )
+    low = lowest_interwell(synthetic_map)
+    failed = synthetic_map.copy(deep=True)
+    failed.response_class.loc[{"frequency_ratio": low["frequency_ratio"]}][:2] = ResponseClass.UNKNOWN
+    assert "2 points of unknown response class may be interwell below it." in text(map_summary(failed, []))
+    assert deepest_notch(failed)["frequency_ratio"] != low["frequency_ratio"]
+    nothing = xr.full_like(synthetic_map, ResponseClass.UNKNOWN)
+    assert "1000 points of unknown response class may be interwell." in text(map_summary(nothing, []))
+
+
 def test_what_is_said(synthetic_map, tmp_path):
     path = tmp_path / "map.nc"
     path.write_bytes(bytes(200_000))

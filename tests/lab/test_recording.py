@@ -328,5 +328,5 @@ def test_a_missing_library_is_named_with_its_cure(tmp_path, monkeypatch):
 
     (tmp_path / "a.avi").write_bytes(b"RIFF")
     monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(InputError, match=r"a\.avi: reading it needs av \(pip install"):
+    with pytest.raises(InputError, match=r"a\.avi: reading it needs av; install it in .*: pip install"):
         open_recording(tmp_path / "a.avi", **SCALES)

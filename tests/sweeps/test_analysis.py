@@ -47,6 +47,11 @@ def test_comparing_maps(synthetic_map):
     assert (same.changed, same.snapped, same.share, same.threshold) == (0.0, 0.0, 0.0, 1.0)
     other = synthetic_map.copy(deep=True)
     other.response_class[5, 3] = ResponseClass.CONTINUOUS
-    assert compare_maps(synthetic_map, other).changed == pytest.approx(1 / 1000)
+    assert compare_maps(synthetic_map, other).changed == pytest.approx(1 / 999), "one is unknown"
+    failed = synthetic_map.copy(deep=True)
+    failed.response_class[:, 20] = ResponseClass.UNKNOWN
+    found = compare_maps(synthetic_map, failed)
+    assert (found.changed, found.snapped, found.share) == (0.0, 0.0, 0.0)
+    assert found.unknown == pytest.approx(0.041), "40 points, and one that is unknown in both maps"
     with pytest.raises(InputError, match="must have the same grid"):
         compare_maps(synthetic_map, other.isel(frequency_ratio=slice(5)))

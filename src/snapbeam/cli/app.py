@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperGroup
 
 from snapbeam.parts import PARTS, installed_parts
+from snapbeam.util.packages import needs
 
 __all__ = ["app", "main"]
 
@@ -78,9 +79,7 @@ def _load_command(name: str, place: str, part: str) -> Any:
     except ModuleNotFoundError as error:
         if not PARTS.get(part):
             raise
-        raise typer.BadParameter(
-            f'snapbeam {name} needs {error.name}; install it with: pip install ".[{PARTS[part]}]"'
-        ) from error
+        raise typer.BadParameter(needs(f"snapbeam {name}", error.name, PARTS[part])) from error
     if isinstance(found, typer.Typer):
         command: Any = typer.main.get_group(found)
     else:

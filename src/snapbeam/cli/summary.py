@@ -46,6 +46,7 @@ def map_summary(dataset: xr.Dataset, files: Sequence[Path], elapsed: float | Non
         head += f" in {duration(elapsed)} ({runs / max(elapsed, 1e-9):.3g} runs/s)"
     lines = [head]
     low = lowest_interwell(dataset)
+    failed = _failed_below(dataset, low)
     if low is None:
         lines_after = ["No run snapped through: raise the velocity amplitude."]
     else:
@@ -55,6 +56,10 @@ def map_summary(dataset: xr.Dataset, files: Sequence[Path], elapsed: float | Non
         if notch is not None:
             lines_after.append(f"Deepest notch of the threshold: {_where(notch, raised, attrs)}")
             low = notch
+    if failed:
+        lines_after.append(
+            f"{_count(failed, 'point')} of unknown response class may be interwell{' below it' if low else ''}."
+        )
     lines_after += status_lines(dataset)
     lines_after += [f"Written: {file_line(path)}" for path in files]
     lines_after += ["Next:", *(f"  {line}" for line in _suggestions(dataset, files, low))]
@@ -115,7 +120,8 @@ def class_table(dataset: xr.Dataset) -> Table:
 def lowest_interwell(dataset: xr.Dataset) -> dict[str, Any] | None:
     """Return the coordinates of the interwell run of least velocity amplitude, or None.
 
-    Of a map without that axis it is the least value of its last axis of numbers.
+    Of a map without that axis it is the least value of its last axis of numbers.  Points of unknown class are left
+    out; they may be interwell at a smaller value.
     """
     response, raised = dataset["response_class"], _raised(dataset)
     interwell = response.values >= ResponseClass.TRANSIENT_1
@@ -131,10 +137,20 @@ def lowest_interwell(dataset: xr.Dataset) -> dict[str, Any] | None:
     return {name: point[name].item() for name in names if name in point.coords}
 
 
+def _failed_below(dataset: xr.Dataset, low: dict[str, Any] | None) -> int:
+    """Return the number of points of unknown class that may be interwell below the lowest interwell run."""
+    response, raised = dataset["response_class"], _raised(dataset)
+    unknown = response == ResponseClass.UNKNOWN
+    if low is not None and raised in low:
+        unknown = unknown & (dataset[raised] < low[raised])
+    return int(unknown.sum())
+
+
 def deepest_notch(dataset: xr.Dataset) -> dict[str, float] | None:
     """Return where the interwell threshold over frequency dips deepest, or None if it has no dip.
 
-    The depth of a dip is its prominence: how far the threshold rises on both sides before it falls lower.
+    The depth of a dip is its prominence: how far the threshold rises on both sides before it falls lower.  Frequencies
+    at which a point of unknown class leaves the threshold open are left out.
     """
     from scipy.signal import find_peaks
 
@@ -143,13 +159,15 @@ def deepest_notch(dataset: xr.Dataset) -> dict[str, float] | None:
         return None
     velocity = dataset["velocity_amplitude"]
     interwell = response >= ResponseClass.TRANSIENT_1
-    threshold = velocity.where(interwell).min("velocity_amplitude").fillna(float(velocity.max())).values
+    lowest = velocity.where(interwell).min("velocity_amplitude").fillna(np.inf)
+    known = ~((response == ResponseClass.UNKNOWN) & (velocity < lowest)).any("velocity_amplitude").values
+    threshold = np.minimum(lowest.values, float(velocity.max()))[known]
     dips, shape = find_peaks(-threshold, prominence=float(np.ptp(velocity.values)) / 50.0)
     if not dips.size:
         return None
     at = dips[np.argmax(shape["prominences"])]
     place = {
-        "frequency_ratio": float(dataset["frequency_ratio"][at]),
+        "frequency_ratio": float(dataset["frequency_ratio"][known][at]),
         "velocity_amplitude": float(threshold[at]),
     }
     return place | {"location": float(dataset["location"].squeeze())}

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from snapbeam.lab.diagnostics import KINDS_RECORDING, LOSSY_ERROR
 from snapbeam.lab.photron import CameraHeader, check_pixels, read_header, read_mraw
 from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError
 
 __all__ = [
@@ -676,7 +677,7 @@ def open_source(path: Path) -> FrameSource:
     try:
         return _open_source(path)
     except ImportError as error:
-        raise InputError(f"{path}: reading it needs {error.name} (pip install 'snapbeam[lab]')") from error
+        raise InputError(needs(f"{path}: reading it", error.name, "lab")) from error
 
 
 def _open_source(path: Path) -> FrameSource:

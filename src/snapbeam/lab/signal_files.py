@@ -18,6 +18,7 @@ from snapbeam.lab.signal_formats import READERS, WRITERS, Channel, Told
 from snapbeam.lab.signals import check_signal, make_signal, parse_sensitivity, si_unit
 from snapbeam.util.diagnostics import DiagnosticWarning
 from snapbeam.util.files import atomic_path, check_writable
+from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError, InputTypeError, positive, shown
 
 if TYPE_CHECKING:
@@ -70,9 +71,7 @@ def read_channels(
     except InputError as error:
         raise InputError(error.args[0] if str(source) in str(error) else f"{source}: {error}") from error
     except ImportError as error:
-        raise InputError(
-            f"{source}: reading {source.suffix} files needs {error.name}; install snapbeam[lab]"
-        ) from error
+        raise InputError(needs(f"{source}: reading {source.suffix} files", error.name, "lab")) from error
     except MemoryError as error:
         raise InputError(f"{source}: the header asks for more memory than there is") from error
     except Exception as error:

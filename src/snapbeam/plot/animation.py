@@ -18,6 +18,7 @@ from snapbeam.model.reduced_model import displacement_along
 from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, caption, fix_ticks, house_style, new_figure
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.util.files import MADE_BY, atomic_path, check_writable
+from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError, integer, nonnegative, positive
 
 if TYPE_CHECKING:
@@ -166,7 +167,7 @@ def write_mp4(pictures: Iterable[NDArray[np.uint8]], path: Path, rate: float) ->
     try:
         import imageio_ffmpeg
     except ImportError as error:
-        raise InputError("an MP4 needs imageio-ffmpeg: pip install 'snapbeam[video]'") from error
+        raise InputError(needs("an MP4", "imageio-ffmpeg", "video")) from error
 
     writer: Any = None
     shown = max(rate, 5.0)  # players skip through files of less than a few frames a second

@@ -18,6 +18,7 @@ from snapbeam.sweeps.checkpoint.records import CheckpointError
 from snapbeam.sweeps.points import Columns
 from snapbeam.sweeps.tasks import PointWork, Provenance, ResultTable, Stage, provenance_of
 from snapbeam.util.input_files import read_toml
+from snapbeam.util.packages import needs
 from snapbeam.util.provenance import code_hash
 from snapbeam.util.validation import InputError, integer, shown
 
@@ -430,7 +431,7 @@ def open_client(cluster: Cluster) -> Iterator[Client]:
         import dask
         from distributed import Client
     except ImportError as error:
-        raise InputError("dask is needed for --cluster: install snapbeam[cluster]") from error
+        raise InputError(needs("--cluster", "dask", "cluster")) from error
     if cluster.kind == "address":
         try:
             client = Client(cluster.address, timeout="30s", set_as_default=False)
@@ -476,7 +477,7 @@ def _slurm(settings: dict[str, Any]) -> Any:
     try:
         from dask_jobqueue import SLURMCluster
     except ImportError as error:
-        raise InputError("dask-jobqueue is needed for a SLURM cluster: install dask-jobqueue") from error
+        raise InputError(needs("a SLURM cluster", "dask-jobqueue", "cluster")) from error
     made = SLURMCluster(**slurm_arguments(settings))
     made.scale(jobs=settings.get("jobs", 1))
     return made

@@ -282,6 +282,8 @@ class Difference:
     ``changed``: fraction of points with another class.  ``snapped``: fraction of points where only one response is
     interwell.  ``at_border``: fraction of the changed points that have a neighbour of another class in the first map.
     ``share``: maximum change of a class fraction.  ``threshold``: ratio of the mean thresholds, second over first.
+    ``unknown``: fraction of points whose class is unknown in at least one map; all other numbers leave them out.
+    They are NaN if no point is known in both maps.
     """
 
     changed: float
@@ -289,29 +291,32 @@ class Difference:
     at_border: float
     share: float
     threshold: float
+    unknown: float
 
 
 def compare_maps(first: xr.Dataset, second: xr.Dataset) -> Difference:
-    """Compare the classes of two maps over the same grid."""
+    """Compare the classes of two maps over the same grid, at the points whose class is known in both."""
     a, b = first["response_class"].values, second["response_class"].values
     if a.shape != b.shape or a.ndim != 2:
         raise InputError(f"maps of shapes {a.shape} and {b.shape}: must have the same grid with two axes")
-    changed = a != b
+    known = (a != ResponseClass.UNKNOWN) & (b != ResponseClass.UNKNOWN)
+    changed = known & (a != b)
     border = np.zeros_like(changed)
     for axis in (0, 1):
-        step = np.diff(a, axis=axis) != 0
         lower = [slice(None)] * 2
         upper = [slice(None)] * 2
         lower[axis], upper[axis] = slice(None, -1), slice(1, None)
+        step = (np.diff(a, axis=axis) != 0) & known[tuple(lower)] & known[tuple(upper)]
         border[tuple(lower)] |= step
         border[tuple(upper)] |= step
-    shares = [abs(class_fraction(a, kind) - class_fraction(b, kind)) for kind in ResponseClass]
+    shares = [abs(class_fraction(a, kind, known) - class_fraction(b, kind, known)) for kind in ResponseClass]
     curves = [interwell_threshold(ds) for ds in (first, second)]
     both = np.isfinite(curves[0]) & np.isfinite(curves[1])
     return Difference(
-        changed=float(changed.mean()),
-        snapped=float((is_interwell(a) != is_interwell(b)).mean()),
+        changed=float(changed[known].mean()) if known.any() else float("nan"),
+        snapped=float((is_interwell(a) != is_interwell(b))[known].mean()) if known.any() else float("nan"),
         at_border=float(border[changed].mean()) if changed.any() else float("nan"),
         share=max(shares),
         threshold=float(curves[1][both].mean() / curves[0][both].mean()) if both.any() else float("nan"),
+        unknown=float(1.0 - known.mean()),
     )

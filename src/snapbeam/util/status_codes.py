@@ -72,7 +72,7 @@ _ADVICE = {
     RunStatus.DIVERGED: "the state left the finite numbers; use a smaller step, and check that the "
     "contact stiffness, the damping and the drive are meant in SI units",
     RunStatus.STEP_LIMIT: "used more steps than allowed, as happens when the contact is far stiffer than the "
-    "default step expects; use a larger step or a softer contact",
+    "default step expects; increase max_steps, or use a larger step or a softer contact",
     RunStatus.NOT_RUN: "never started: the task that held this point failed or was skipped",
     RunStatus.ENERGY_ERROR: "ended with more energy than the striker put in, so that its steps were too long for what "
     "the beam did; use accuracy = 'reference' or a smaller step",

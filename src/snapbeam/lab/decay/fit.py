@@ -18,6 +18,7 @@ from scipy.integrate import cumulative_trapezoid
 from snapbeam.lab.decay.model import DampingLaw, ModeEstimate, envelope, law_priors
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import white_variance
+from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError
 
 __all__ = ["FitResult", "explain", "fit_decay"]
@@ -73,9 +74,7 @@ def fit_decay(
     try:
         import lmfit
     except ImportError as missing:
-        raise InputError(
-            f"the fit of a decay needs {missing.name} (pip install 'snapbeam[lab]')"
-        ) from missing
+        raise InputError(needs("the fit of a decay", missing.name, "lab")) from missing
 
     t = samples.time - samples.time[0]
     y = samples.values

@@ -25,6 +25,7 @@ from snapbeam.plot.style import (
 )
 from snapbeam.util.diagnostics import diagnostics_of, doubtful
 from snapbeam.util.files import atomic_path, check_writable
+from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError, integer, positive
 
 if TYPE_CHECKING:
@@ -215,9 +216,7 @@ def annotated_video(
         import cv2  # noqa: F401
         import imageio_ffmpeg  # noqa: F401
     except ImportError as error:
-        raise InputError(
-            f"path = {str(path)!r}: a video needs {error.name} (pip install 'snapbeam[lab,video]')"
-        ) from error
+        raise InputError(needs(f"path = {str(path)!r}: a video", error.name, "lab,video")) from error
     target = check_writable(path, "path", (".mp4", ".mov", ".avi"))
     rate = positive("play_rate", play_rate, "Hz")
     every = integer("every", every, 1)

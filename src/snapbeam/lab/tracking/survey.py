@@ -42,6 +42,7 @@ from snapbeam.lab.tracking.settings import (
     gather,
     spread_columns,
 )
+from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError
 
 __all__ = [
@@ -516,8 +517,7 @@ def otsu(frames: NDArray[np.floating]) -> float:
         import cv2
     except ImportError as error:
         raise InputError(
-            "threshold = None: an automatic threshold needs OpenCV (pip install 'snapbeam[lab]'); or give threshold "
-            "(--threshold)"
+            f"{needs('threshold = None: an automatic threshold', 'OpenCV', 'lab')}; or give threshold (--threshold)"
         ) from error
     low, high = (float(level) for level in np.percentile(frames[:, ::2, ::2], (0.05, 99.95)))
     if not high > low:

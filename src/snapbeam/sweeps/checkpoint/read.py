@@ -123,10 +123,8 @@ def _rows(folder: Path, work: PointWork, stage: Stage, done: dict[int, Record]) 
     points = 0
     if not done:
         return found, points
-    try:
-        import zarr
-    except ImportError as error:
-        raise InputError("zarr is needed to read a checkpoint; install snapbeam[cluster]") from error
+    import zarr
+
     try:
         arrays = [
             zarr.open_array(folder / "runs.zarr", path=f"{stage.name}/{name}", mode="r") for name in _TABLES

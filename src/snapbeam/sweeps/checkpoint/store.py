@@ -692,15 +692,9 @@ class CheckpointRows:
 # The Zarr arrays of a checkpoint: one row for each run, one chunk with a check sum for each task.
 
 
-_MISSING = "zarr is needed for --checkpoint: install snapbeam[cluster]"
-
-
 def open_tables(folder: Path, stage: Stage, work: PointWork, read_only: bool = False) -> dict[str, Any]:
     """Open the arrays of a stage; creates missing arrays and repairs damaged descriptions."""
-    try:
-        import zarr
-    except ImportError as error:
-        raise InputError(_MISSING) from error
+    import zarr
     from zarr.storage import MemoryStore
 
     held: dict[str, Buffer] = {}
