@@ -343,7 +343,7 @@ LOSSY_ERROR = 0.15
 
 KINDS_RECORDING = table(
     Kind(
-        "recording.rate_dependent", WARNING,
+        "recording.lossy", WARNING,
         "the compression of a video or of images",
         "the file's compression throws detail away: edges lie 0.06 to 0.14 px off however little they scatter; "
         "standard errors are raised to {error_px:.2f} px; save the recording uncompressed",

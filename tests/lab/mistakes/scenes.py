@@ -277,7 +277,7 @@ CASES = (
     light("grey levels that are light to the power of 2.2", "flagged", "camera.gamma", defects={"gamma": 2.2}),
     light("the same, undone", "right", sees="gamma (--gamma) 2.2 turns grey levels into light",
           defects={"gamma": 2.2}, gamma=2.2),
-    light("video with lossy compression", "flagged", "recording.rate_dependent", name="scene.mp4"),
+    light("video with lossy compression", "flagged", "recording.lossy", name="scene.mp4"),
     Case(AFTERWARDS, "each frame the mean of itself and the one before", changed(blended), "flagged",
          "camera.averaged"),
     Case(AFTERWARDS, "noise reduction in time", changed(denoised), "flagged", "camera.averaged"),

@@ -1,20 +1,20 @@
-"""A campaign: a folder of tests to one table, a page of pictures and a comparison with a map, taken up where it stopped."""
+"""A test series: a folder of tests to one table, a page of pictures and a comparison with a map, taken up where it stopped."""
 
 import csv
 import os
 
-import campaign_bench as bench
+import series_bench as bench
 import pytest
 from typer.testing import CliRunner
 
 from snapbeam import InputError
 from snapbeam.cli.app import app
-from snapbeam.lab.batch import COLUMNS, find_tests, load_settings, run_campaign
+from snapbeam.lab.batch import COLUMNS, find_tests, load_settings, run_test_series
 
 KNOWN = {
     "tracking": {"buckling_level": 0.335e-3, "location": 1.0 / 2.1, "beam_thickness": 0.4e-3},
     "signal": {"units": "m/s"},
-    "campaign": {"cycles": 20},
+    "test_series": {"cycles": 20},
 }
 OPTIONS = (
     "--buckling-level", "0.335e-3", "--location", "1/2.1", "--beam-thickness", "0.4e-3", "--units", "m/s",
@@ -61,27 +61,27 @@ def test_a_good_test_and_a_spoiled_one(tmp_path):
     done = command(folder, *OPTIONS)
     assert done.exit_code == 0, done.output
     assert "2 tests, 1 spoiled" in done.output
-    table = rows(folder / "campaign")
+    table = rows(folder / "test_series")
     is_measured(table["test05"], truth)
     assert table["test03"]["status"] == "spoiled"
     assert REASONS["test03"] in table["test03"]["comment"]
-    assert (folder / "campaign" / "tests.png").stat().st_size > 10_000
+    assert (folder / "test_series" / "tests.png").stat().st_size > 10_000
 
     # nothing has changed: nothing is measured again
-    before = dates(folder / "campaign")
+    before = dates(folder / "test_series")
     assert command(folder, *OPTIONS).exit_code == 0
-    assert dates(folder / "campaign") == before
+    assert dates(folder / "test_series") == before
     # another setting changes every test
     again = command(folder, *OPTIONS[:-1], "21")
     assert again.exit_code == 0, again.output
-    assert all(date > before[name] for name, date in dates(folder / "campaign").items())
+    assert all(date > before[name] for name, date in dates(folder / "test_series").items())
 
 
 @pytest.mark.slow
 def test_twelve_tests_three_of_them_spoiled_interrupted_and_resumed(tmp_path):
     folder, output = tmp_path / "tests", tmp_path / "results"
     folder.mkdir()
-    truth = bench.write_campaign(folder)
+    truth = bench.write_test_series(folder)
     bench.coarse_map().to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
 
     def interrupt(done, total, result):
@@ -90,7 +90,7 @@ def test_twelve_tests_three_of_them_spoiled_interrupted_and_resumed(tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_campaign(folder, load_settings(None, KNOWN), output, progress=interrupt)
+        run_test_series(folder, load_settings(None, KNOWN), output, progress=interrupt)
     assert len(rows(output)) == 5
     before = dates(output)
     done = command(folder, *OPTIONS, "-o", output, "--map", tmp_path / "map.nc")

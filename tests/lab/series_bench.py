@@ -1,4 +1,4 @@
-"""Files of a campaign of simulated tests, as camera and vibrometer would have written them, some spoiled."""
+"""Files of a series of simulated tests, as camera and vibrometer would have written them, some spoiled."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def write_test(folder, name, ratio, velocity, *, seed=0, spoiled=None):
     return {"frequency": frequency, "speed": speed, "response_class": clean}
 
 
-def write_campaign(folder, points=POINTS):
+def write_test_series(folder, points=POINTS):
     """Write all tests; what is true of them by name: frequency [Hz], speed [m/s] and response."""
     truth = {}
     for number, (ratio, velocity) in enumerate(points, start=1):
