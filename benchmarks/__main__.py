@@ -19,7 +19,7 @@ _PARTS = {
     "tried": "tried",
     "explorer": "explorer",
     "dynamics": "dynamics",
-    "worlds": "worlds",
+    "systems": "systems",
 }
 
 

@@ -270,7 +270,7 @@ for last in (2, 5, 10, 22):
 # %%
 # Many tests: dots on a map
 # -------------------------
-# A campaign of such tests ends as dots on a simulated map. So that this page is quick to make, the further tests go
+# A series of such tests ends as measured points on a simulated map. So that this page is quick to make, the further tests go
 # without pictures: their displacement is sampled as the camera would, with the error of the tracking found above.
 
 omega, speed = [], []

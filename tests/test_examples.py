@@ -16,7 +16,7 @@ DEAR = {
     "ex19_figB10_resonance",
     "ex21_sensitivity",
     "ex22_claims",
-    "ex23_other_worlds",
+    "ex23_extended_models",
     "ex24_dynamics",
     "ex25_design",
     "ex30_experiment",

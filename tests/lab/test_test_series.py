@@ -3,8 +3,8 @@
 import csv
 import os
 
-import series_bench as bench
 import pytest
+import series_bench as bench
 from typer.testing import CliRunner
 
 from snapbeam import InputError

@@ -1,6 +1,6 @@
 """Calls of every public function and command with arguments that nobody should give, made from their signatures.
 
-A new function or command is among them the day it is public.  Run as a program for a long campaign:
+A new function or command is among them the day it is public.  Run as a program for a long time:
 
     python fuzz.py CALLS SEED REPORT [SECONDS]
 """
@@ -286,7 +286,7 @@ def judged_command(words: list[str]) -> str:
     return "" if ended[0].exit_code in (0, 1, 2) else f"status {ended[0].exit_code}"
 
 
-def campaign(
+def fuzz_calls(
     calls: int, seed: int, share_of_commands: float = 0.1, seconds: float = math.inf
 ) -> tuple[int, dict[str, list[str]]]:
     """So many calls; returns how many were made, and examples of what went wrong, by what and where."""
@@ -330,10 +330,10 @@ def _short(given: Any) -> str:
 
 
 def main(calls: int, seed: int, report: Path, seconds: float = math.inf) -> None:
-    """A campaign whose result is written to a file: what is tried may close any stream."""
+    """Fuzzed calls whose result is written to a file: what is tried may close any stream."""
     report = report.absolute()
     start = time.monotonic()
-    made, wrong = campaign(calls, seed, seconds=seconds)
+    made, wrong = fuzz_calls(calls, seed, seconds=seconds)
     seen = {"calls": made, "kinds": len(wrong), "wrong": sum(map(len, wrong.values()))}
     lines = [json.dumps(seen | {"seconds": round(time.monotonic() - start)})]
     for name, examples in sorted(wrong.items(), key=lambda item: -len(item[1])):

@@ -15,7 +15,7 @@ from snapbeam.util.validation import InputError
 
 CALLS = 2000
 _MOST_LOOSE = 0.001
-"""Share of calls that may end in an error of Python's own; it may only fall.  A campaign of 100,000 found less."""
+"""Share of calls that may end in an error of Python's own; it may only fall.  A run of 100,000 found less."""
 
 
 def test_new_functions_and_commands_are_included():
@@ -31,7 +31,7 @@ def test_new_functions_and_commands_are_included():
 @pytest.mark.slow
 def test_two_thousand_calls(tried):
     """None takes long or ends the process; what is raised is a refusal, but for a counted rest that may only fall."""
-    calls, wrong = fuzz.campaign(CALLS, 1)
+    calls, wrong = fuzz.fuzz_calls(CALLS, 1)
     slow = [name for name in wrong if "over 10 s" in name]  # a machine at work elsewhere
     count = sum(len(found) for name, found in wrong.items() if name not in slow)
     tried("fuzzed calls", calls)

@@ -1,4 +1,4 @@
-"""A whole campaign: every test of a folder measured, kept, and written to one table."""
+"""A test series: every test of a folder measured, kept, and written to one table."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "COLUMNS",
-    "CampaignSettings",
+    "SeriesSettings",
     "Test",
     "TestResult",
     "find_tests",
     "kept_result",
     "load_settings",
-    "run_campaign",
     "run_test",
+    "run_test_series",
     "write_table",
 ]
 
@@ -119,7 +119,7 @@ def find_tests(folder: Path, table: Path | None = None, besides: Path | None = N
             continue
         if suffix in RECORDING_SUFFIXES:
             _put(recordings, path, path.stem)
-        elif suffix in _SIGNALS and path.name not in ("tests.csv", "campaign.csv"):
+        elif suffix in _SIGNALS and path.name not in ("tests.csv", "test_series.csv"):
             _put(signals, path, path.stem)
     if not recordings:
         raise InputError(
@@ -195,7 +195,7 @@ def _number(cell: str | None, mark: str, where: str, column: str) -> float | Non
 
 
 # ----------------------------------------------------------------------------------------------------
-# What all tests of a campaign have in common, from a TOML file or by name.
+# What all tests of a test series have in common, from a TOML file or by name.
 
 
 _CAMERA = ("frame_rate", "pixel_size", "region")
@@ -203,7 +203,7 @@ _SIGNAL = ("channel", "units", "sensitivity", "sampling_frequency", "columns")
 
 
 @dataclass(frozen=True)
-class CampaignSettings:
+class SeriesSettings:
     """Settings of every test.
 
     Attributes
@@ -235,7 +235,7 @@ class CampaignSettings:
                 "buckling_level (--buckling-level): must be given, in m, or no response can be told"
             )
         if not self.tracking.shaker:
-            raise InputError("shaker: must be followed in a campaign")
+            raise InputError("shaker: must be followed in a test series")
 
     def fingerprint(self, *files: Path) -> str:
         """A number that changes with any setting and any of the files."""
@@ -258,8 +258,8 @@ class CampaignSettings:
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:24]
 
 
-def load_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -> CampaignSettings:
-    """Settings from a TOML file with sections camera, tracking, signal and campaign, and changes to them.
+def load_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -> SeriesSettings:
+    """Settings from a TOML file with sections camera, tracking, signal and test_series, and changes to them.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ def load_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -
     InputError
         If the file cannot be read or holds an unknown section or name.
     """
-    sections: dict[str, dict[str, Any]] = {"camera": {}, "tracking": {}, "signal": {}, "campaign": {}}
+    sections: dict[str, dict[str, Any]] = {"camera": {}, "tracking": {}, "signal": {}, "test_series": {}}
     if path is not None:
         read = read_toml("settings", path)
         for name, values in read.items():
@@ -282,20 +282,20 @@ def load_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -
             sections[name] |= values
     for name, given in changes.items():
         sections[name] |= {key: value for key, value in given.items() if value is not None}
-    for key in sections["campaign"]:
+    for key in sections["test_series"]:
         if key != "cycles":
-            raise InputError(f"[campaign] {key}: unknown; must be cycles")
+            raise InputError(f"[test_series] {key}: unknown; must be cycles")
     region = sections["camera"].get("region")
     if region is not None:
         sections["camera"]["region"] = tuple(region)
     tracking = TrackingSettings().changed(**sections["tracking"])
-    return CampaignSettings(
-        sections["camera"], tracking, sections["signal"], sections["campaign"].get("cycles", 200)
+    return SeriesSettings(
+        sections["camera"], tracking, sections["signal"], sections["test_series"].get("cycles", 200)
     )
 
 
 # ----------------------------------------------------------------------------------------------------
-# One test of a campaign: tracked, aligned with its vibrometer, classed; what went wrong said, never raised.
+# One test of a test series: tracked, aligned with its vibrometer, classed; what went wrong said, never raised.
 
 
 _NAN = math.nan
@@ -352,7 +352,7 @@ def kept_result(path: Path, fingerprint: str) -> TestResult | None:
         return None
 
 
-def run_test(test: Test, settings: CampaignSettings, folder: Path, fingerprint: str) -> TestResult:
+def run_test(test: Test, settings: SeriesSettings, folder: Path, fingerprint: str) -> TestResult:
     """Measure one test and keep its tracked run and its result in *folder*."""
     diagnostics: list[Diagnostic] = []
     try:
@@ -394,7 +394,7 @@ def _wrong(diagnostics: list[Diagnostic]) -> str:
 
 
 def _measured(
-    test: Test, settings: CampaignSettings, folder: Path, diagnostics: list[Diagnostic]
+    test: Test, settings: SeriesSettings, folder: Path, diagnostics: list[Diagnostic]
 ) -> TestResult:
     """The row of a test; *diagnostics* is filled as they come, for a test that ends half way."""
     tracking = settings.tracking
@@ -471,9 +471,9 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def run_campaign(
+def run_test_series(
     folder: Path,
-    settings: CampaignSettings,
+    settings: SeriesSettings,
     output: Path,
     *,
     table: Path | None = None,
@@ -484,7 +484,7 @@ def run_campaign(
 
     Each test's tracked run (NetCDF) and result (JSON) are kept in ``output/tests`` as soon as they are there,
     and ``output/tests.csv`` is written again after each; a test whose files and settings have not changed since
-    is not measured again, so an interrupted campaign goes on where it was.
+    is not measured again, so an interrupted test series goes on where it was.
 
     Parameters
     ----------

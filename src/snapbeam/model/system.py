@@ -31,7 +31,7 @@ from snapbeam.util.input_files import read_toml
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.validation import InputError, InputTypeError, instance, shown
 
-__all__ = ["System", "check_world"]
+__all__ = ["System", "check_environment"]
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -45,7 +45,7 @@ _A = {
 }
 
 
-def check_world(system: Any) -> None:
+def check_environment(system: Any) -> None:
     """Refuse surroundings that are none, or that do not go with the rest of a :class:`~snapbeam.System`."""
     base, load, harvester = system.base_excitation, system.axial_load, system.harvester
     for name, part, kind in (
@@ -174,7 +174,7 @@ class System:
             raise InputError(
                 "contact = None: a striker needs a law of contact, such as HertzContact(stiffness)"
             )
-        check_world(self)
+        check_environment(self)
         check_others(self)
         if model.length_scale is None:
             model.require_bistable("a run")

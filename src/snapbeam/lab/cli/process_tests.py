@@ -36,7 +36,7 @@ def process_tests(
     settings: Annotated[
         Path | None,
         typer.Option(
-            help="TOML file with sections camera, tracking, signal and campaign, as for Python.", metavar="FILE",
+            help="TOML file with sections camera, tracking, signal and test_series, as for Python.", metavar="FILE",
             rich_help_panel=_TESTS,
         ),
     ] = None,
@@ -63,7 +63,7 @@ def process_tests(
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output", "-o", help="Folder of the results; FOLDER/campaign by default.", metavar="FOLDER",
+            "--output", "-o", help="Folder of the results; FOLDER/test_series by default.", metavar="FOLDER",
             rich_help_panel=_OUTPUT,
         ),
     ] = None,
@@ -71,14 +71,14 @@ def process_tests(
 ) -> None:  # fmt: skip
     """Track, align and class every test of a folder, and write one table of them.
 
-    Each test is kept as soon as it is measured; begun again, the campaign goes on where it was, and measures
+    Each test is kept as soon as it is measured; begun again, the test series goes on where it was, and measures
     only what has changed.  A test that cannot be measured is a row that says why.  With --strict a test with
     any doubtful diagnostic counts as spoiled.
 
     Example: snapbeam process-tests tests/ --buckling-level 0.331e-3 --location 0.47619 --pixel-size 12e-6 --map
     map.nc
     """
-    from snapbeam.lab.batch import load_settings, run_campaign
+    from snapbeam.lab.batch import load_settings, run_test_series
     from snapbeam.util.files import check_writable
 
     wanted = load_settings(
@@ -90,26 +90,26 @@ def process_tests(
                 "side": side,
             },
             "signal": {"units": units, "sensitivity": sensitivity, "sampling_frequency": sampling_frequency},
-            "campaign": {"cycles": cycles},
+            "test_series": {"cycles": cycles},
         },
     )  # fmt: skip
-    target = folder / "campaign" if output is None else output
+    target = folder / "test_series" if output is None else output
     console = out()
     for name in ("tests.png", "map.png"):
         if target.is_dir():
             check_writable(target / name)
-    results = run_campaign(folder, wanted, target, table=table, strict=strict, progress=_tell)
+    results = run_test_series(folder, wanted, target, table=table, strict=strict, progress=_tell)
     spoiled = [result for result in results if result.status != "measured"]
     console.print(f"{len(results)} tests, {len(spoiled)} spoiled")
     import matplotlib
 
     matplotlib.use("Agg")
-    from snapbeam.lab.plot.process_tests import plot_campaign
+    from snapbeam.lab.plot.process_tests import plot_test_series
     from snapbeam.plot.style import save_figure
 
     files = [
         target / "tests.csv",
-        save_figure(plot_campaign(results, target / "tests"), target / "tests.png"),
+        save_figure(plot_test_series(results, target / "tests"), target / "tests.png"),
     ]
     if simulated is not None and len(spoiled) < len(results):
         files.append(_on_map(target, simulated))

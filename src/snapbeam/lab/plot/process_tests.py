@@ -1,4 +1,4 @@
-"""A campaign at a glance: a small picture of every test, the spoiled ones with their reason."""
+"""A test series at a glance: a small picture of every test, the spoiled ones with their reason."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from snapbeam.util.validation import InputError
 if TYPE_CHECKING:
     from snapbeam.lab.batch import TestResult
 
-__all__ = ["plot_campaign"]
+__all__ = ["plot_test_series"]
 
 
 _ACROSS = 4
@@ -25,13 +25,13 @@ _LINES = 6  # of a reason in a picture; the table has all of it
 _LABELS = {kind.label: kind for kind in ResponseClass}
 
 
-def plot_campaign(results: list[TestResult], folder: Path) -> Figure:
+def plot_test_series(results: list[TestResult], folder: Path) -> Figure:
     """Draw beam and shaker of every test over time, in a frame of the colour of its class.
 
     Parameters
     ----------
     results : list of TestResult
-        What :func:`snapbeam.lab.batch.run_campaign` returned.
+        What :func:`snapbeam.lab.batch.run_test_series` returned.
     folder : path
         Where the tracked runs are kept, ``<test>.nc``.
     """

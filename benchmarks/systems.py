@@ -102,7 +102,7 @@ def _time(ensemble: Ensemble, repeats: int) -> tuple[float, float]:
 
 
 def run(folder: Path, quick: bool) -> None:
-    """Measure and write ``worlds``."""
+    """Measure and write ``systems``."""
     size, cycles, repeats = (4, 4, 1) if quick else (48, 60, 7)
     plain = _ensemble({}, size, cycles)
     records: list[dict[str, Any]] = []
@@ -124,4 +124,4 @@ def run(folder: Path, quick: bool) -> None:
         "the paper's, after over before",
     )
     data = {"modes": _MODES, "runs": size, "cycles": cycles, "seed": _SEED, "records": records}
-    save(folder, "worlds", quick, data, table(head, rows))
+    save(folder, "systems", quick, data, table(head, rows))

@@ -1,6 +1,6 @@
 """
-Other worlds
-============
+Extended models
+===============
 
 The paper's shaker moves as prescribed and its contact loses nothing.  Here are a shaker with a mass on a suspension,
 which comes and goes in a burst and loses energy in contact, and a sphere that is thrown at the beam, each drawn from
