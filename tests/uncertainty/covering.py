@@ -88,7 +88,7 @@ def _indices(given: bool) -> Counted:
             one = sb.uncertainty.sobol_indices_from_samples(ranks, ishigami(ranks.T), seed=seed)
             held.append(np.concatenate([(one.low <= FIRST) & (FIRST <= one.high)]))
             continue
-        both = sb.uncertainty.sobol_indices(ishigami, 3, 16, seed=seed)
+        both = sb.uncertainty.sobol_indices(ishigami, 3, 64, seed=seed)
         parts = ((both.first, FIRST), (both.total, TOTAL))
         held.append(np.concatenate([(each.low <= truth) & (truth <= each.high) for each, truth in parts]))
     names = [f"{kind} {i + 1}" for kind in (("first",) if given else ("first", "total")) for i in range(3)]

@@ -25,7 +25,7 @@ def ishigami(ranks):
 def test_ishigami() -> None:
     """0.314, 0.442 and 0, within the intervals of both estimates; at 99 %, since there are nine of them."""
     np.testing.assert_allclose(FIRST, [0.314, 0.442, 0.0], atol=5e-4)
-    found = sb.uncertainty.sobol_indices(ishigami, 3, 128, confidence=0.99)
+    found = sb.uncertainty.sobol_indices(ishigami, 3, 2048, confidence=0.99)
     for indices, truth in ((found.first, FIRST), (found.total, TOTAL)):
         assert (indices.low <= truth).all() and (truth <= indices.high).all()
         assert (indices.high - indices.low < 0.2).all()
@@ -33,6 +33,22 @@ def test_ishigami() -> None:
     given = sb.uncertainty.sobol_indices_from_samples(ranks, ishigami(ranks.T), confidence=0.99)
     assert (given.low <= FIRST).all() and (FIRST <= given.high).all()
     assert (given.high - given.low < 0.2).all()
+
+
+def test_the_default_split_has_less_than_half_the_error_of_many_short_sequences() -> None:
+    """At 4096 points of a matrix: four sequences have a median error of 1.8e-3, sixteen one of 4.7e-3."""
+    truth = np.concatenate([FIRST, TOTAL])
+
+    def error(samples: int, **split: int) -> float:
+        found = [sb.uncertainty.sobol_indices(ishigami, 3, samples, seed=seed, **split) for seed in range(30)]
+        assert {each.runs for each in found} == {5 * 4096}
+        return float(
+            np.median(
+                [np.abs(np.concatenate([each.first.estimate, each.total.estimate]) - truth) for each in found]
+            )
+        )
+
+    assert error(1024) < 0.5 * error(256, replicates=16)
 
 
 @pytest.mark.slow

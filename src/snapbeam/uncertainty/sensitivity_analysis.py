@@ -62,7 +62,7 @@ class Indices(NamedTuple):
 def sobol_indices_from_samples(
     inputs: ArrayLike, output: ArrayLike, *, confidence: float = 0.95, bins: int | None = None, seed: int = 0
 ) -> Indices:
-    """First-order indices Var(E[y | x_j])/Var(y) of a sample, however it was drawn, of correlated inputs too.
+    """First-order indices Var(E[y | x_j])/Var(y) of a sample, however it was sampled, of correlated inputs too.
 
     Inputs are cut into bins of equal numbers of runs; the index is the variance of the means of the bins over that of
     the output, less what chance alone makes of it: Kelley's epsilon squared (Plischke, Borgonovo and Smith, Eur. J.
@@ -145,9 +145,9 @@ class Sobol(NamedTuple):
 def sobol_indices(
     function: Callable[[_Array], _Array],
     inputs: int,
-    samples: int = 64,
+    samples: int = 128,
     *,
-    replicates: int = 16,
+    replicates: int = 4,
     confidence: float = 0.95,
     seed: int = 0,
 ) -> Sobol:
@@ -155,6 +155,7 @@ def sobol_indices(
 
     A sequence is so even that resampling its points says too much of the error; *replicates* sequences, each scrambled
     by itself, are independent, and their scatter is the error (Owen's scrambling; Student's interval of their mean).
+    At equal cost, few long sequences have a smaller error than many short ones.
 
     Parameters
     ----------
@@ -164,7 +165,7 @@ def sobol_indices(
     samples : int
         Points of a sequence, a power of 2; *replicates* times *samples* times (*inputs* + 2) points in all.
     replicates : int
-        At least 4.
+        At least 4; use more points rather than more replicates.
     confidence : float
     seed : int
 
@@ -239,13 +240,13 @@ class QuantityOfInterest(Protocol):
         ...
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
-        """The numbers of draws with the given scores and starts; NaN where there is none."""
+        """The numbers of samples with the given scores and starts; NaN where there is none."""
         ...
 
 
 @dataclass(frozen=True)
 class StatisticQoI:
-    """A statistic of the run of each draw, such as ``peak_force``.
+    """A statistic of the run of each sample, such as ``peak_force``.
 
     Parameters
     ----------
@@ -272,7 +273,7 @@ class StatisticQoI:
         return STATISTICS[self.name].long_name if self.name in STATISTICS else OUTCOMES[self.name].long_name
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
-        """One run a draw."""
+        """One run a sample."""
         require_held([self.name], trials.system)
         found = trials.statistics({}, numbers, scores=scores)
         values = found[self.name] if self.name in STATISTICS else OUTCOMES[self.name].happened(found)
@@ -281,7 +282,7 @@ class StatisticQoI:
 
 @dataclass(frozen=True, kw_only=True)
 class ThresholdQoI:
-    """The least value of a parameter at which a draw snaps, on a row of values and then by halving.
+    """The least value of a parameter at which a sample snaps, on a row of values and then by halving.
 
     Parameters
     ----------
@@ -328,7 +329,7 @@ class ThresholdQoI:
         return (self.bounds[1] - self.bounds[0]) / (self.values - 1) / 2.0 ** (self.halvings + 1)
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
-        """All draws at once: every value, then as many rounds as there are halvings."""
+        """All samples at once: every value, then as many rounds as there are halvings."""
         row, size = lookup(self.parameter).name, numbers.size
         tried = np.linspace(*self.bounds, self.values)
         each = np.repeat(np.arange(size), tried.size)
@@ -423,12 +424,12 @@ def _vertex(x: _Array, y: _Array) -> tuple[float, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class LifetimeQoI:
-    """How long snapping lasts, from many starts of each draw, in cycles.
+    """How long snapping lasts, from many starts of each sample, in cycles.
 
     Parameters
     ----------
     initial_conditions : InitialConditions
-        The same for every draw.
+        The same for every sample.
     settings : LifetimeSettings, optional
     """
 
@@ -446,7 +447,7 @@ class LifetimeQoI:
         return "lifetime of snapping, in cycles"
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
-        """A lifetime map over the draws."""
+        """A lifetime map over the samples."""
         columns = trials.columns({}, numbers, scores)
         if any(name.startswith("initial_state.") for name in columns):
             raise InputError(
@@ -488,8 +489,8 @@ def quantity_of_interest(given: QuantityOfInterest | str) -> QuantityOfInterest:
 
 _Array = NDArray[np.float64]
 METHODS = ("local", "sobol", "given_data")
-_DEFAULT = {"local": 16, "sobol": 32, "given_data": 1000}
-_REPLICATES = 16
+_DEFAULT = {"local": 16, "sobol": 128, "given_data": 1000}
+_REPLICATES = 4
 PARAMETER = "parameter"
 
 
@@ -517,11 +518,11 @@ def sensitivity(
         At least one uncertain parameter.
     method : {"local", "sobol", "given_data"}
         ``"local"``: half the difference of the quantities with a parameter one standard normal score up and down, the
-        others and the start as in *samples* draws (common random numbers).  ``"sobol"``: indices of the first order and
-        in total over sixteen scrambled sequences of *samples* points, all from one start.  ``"given_data"``: indices of
-        the first order from *samples* plain draws, which may be correlated.
+        others and the start as in *samples* samples (common random numbers).  ``"sobol"``: indices of the first order and
+        in total over four scrambled sequences of *samples* points, all from one start.  ``"given_data"``: indices of
+        the first order from *samples* plain samples, which may be correlated.
     samples : int, optional
-        16, 32 and 1000 by default.
+        16, 128 and 1000 by default.
     confidence : float
     integration : Integration, optional
     checkpoint : path or CheckpointOptions, optional
