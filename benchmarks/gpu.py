@@ -80,7 +80,7 @@ def timed(function: Callable[[], Any]) -> tuple[float, Any]:
     return time.perf_counter() - began, result
 
 
-def march(ensemble: Ensemble, warps: int | None = None) -> tuple[float, dict[str, Any]]:
+def integrate(ensemble: Ensemble, warps: int | None = None) -> tuple[float, dict[str, Any]]:
     """Seconds and statistics of an integration on the device; the kernel must have been compiled before."""
     simulated = cuda_engine.simulated()
     options = Options(warps=warps) if not simulated else Options(most_blocks=1, fewest_threads=1)
@@ -135,7 +135,7 @@ def conformance(smoke: bool) -> dict[str, Any]:
     for modes in (1,) if smoke else (1, 2, 8, 32, 128):
         for ratio, velocity in PAIRS[5:] if smoke else PAIRS:
             ensemble = ensemble_of(modes, [ratio], [velocity], 1)
-            _, found = march(ensemble)
+            _, found = integrate(ensemble)
             expected = measured(ensemble, cpu_engine.run_ensemble(ensemble))
             error = max(abs(float(found[name][0] / expected[name][0]) - 1.0) for name in COMPARED)
             same = all(int(found[name][0]) == int(expected[name][0]) for name in COUNTED)
@@ -148,7 +148,7 @@ def conformance(smoke: bool) -> dict[str, Any]:
     ratio, velocity = (x.ravel() for x in np.meshgrid(np.linspace(0.1, 4, 40), np.linspace(0.01, 0.65, 26)))
     ensemble = ensemble_of(32, ratio, velocity, 200, early_termination=True)
     shares = []
-    for found in (march(ensemble)[1], statistics_of(ensemble, cpu_engine.run_ensemble(ensemble))):
+    for found in (integrate(ensemble)[1], statistics_of(ensemble, cpu_engine.run_ensemble(ensemble))):
         classes = found["response_class"]
         shares.append([float(np.mean(classes == kind)) for kind in ResponseClass])
     table = []
@@ -169,8 +169,8 @@ def throughput(smoke: bool, facts: dict[str, Any]) -> dict[str, Any]:
     for early in (False,) if smoke else (False, True):
         for warps in (None,) if smoke else (8, 12, 16):
             ensemble = ensemble_of(modes, *sample(runs, slowest), cycles, early_termination=early)
-            compiling, _ = timed(lambda warps=warps: march(ensemble_of(modes, [4.0], [0.1], 1), warps))
-            seconds, found = march(ensemble, warps)
+            compiling, _ = timed(lambda warps=warps: integrate(ensemble_of(modes, [4.0], [0.1], 1), warps))
+            seconds, found = integrate(ensemble, warps)
             steps = float(found["steps"].sum())
             rate = steps * flops_per_step(ensemble) / seconds
             row = {
@@ -190,9 +190,9 @@ def scaling(smoke: bool) -> dict[str, Any]:
     runs, cycles = (1, 1) if smoke else (8192, 50)
     for modes in (1,) if smoke else (1, 2, 4, 8, 16, 32, 64, 128):
         if not smoke:
-            march(ensemble_of(modes, [2.0], [0.1], 1))
+            integrate(ensemble_of(modes, [2.0], [0.1], 1))
         ensemble = ensemble_of(modes, *sample(runs, slowest), cycles)
-        seconds, found = march(ensemble)
+        seconds, found = integrate(ensemble)
         steps = float(found["steps"].sum())
         by_modes.append(
             {
@@ -203,7 +203,7 @@ def scaling(smoke: bool) -> dict[str, Any]:
             }
         )
     for count in (1, 2) if smoke else (1_000, 10_000, 100_000, 1_000_000):
-        seconds, _ = march(ensemble_of(1 if smoke else 32, *sample(count, slowest), 1 if smoke else 2))
+        seconds, _ = integrate(ensemble_of(1 if smoke else 32, *sample(count, slowest), 1 if smoke else 2))
         by_runs.append({"runs": count, "seconds": seconds, "us_per_run": 1e6 * seconds / count})
     return {"by_modes": by_modes, "by_runs": by_runs, "cycles": cycles}
 
@@ -218,7 +218,7 @@ def fig_7b(smoke: bool, output: Path) -> dict[str, Any]:
     }
     results = []
     if not smoke:
-        march(ensemble_of(modes, [2.0], [0.1], 1))
+        integrate(ensemble_of(modes, [2.0], [0.1], 1))
     for early in (False,) if smoke else (True, False):
         seconds, dataset = timed(
             lambda early=early: sb.sweep(

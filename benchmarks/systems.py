@@ -91,12 +91,12 @@ def _ensemble(parts: Parts, size: int, cycles: int) -> Ensemble:
 
 def _time(ensemble: Ensemble, repeats: int) -> tuple[float, float]:
     """Seconds of simulated time cost, per simulated second and per step."""
-    march: Callable[[], Any] = lambda: cpu_engine.run_ensemble(ensemble, 1)  # noqa: E731
+    integrate: Callable[[], Any] = lambda: cpu_engine.run_ensemble(ensemble, 1)  # noqa: E731
     # the layout of few modes is chosen once so much was asked for
     for _ in range(1 + int(cpu_engine.FEWEST_STEPS / ensemble.work.sum())):
-        march()
-    seconds = measure(march, repeats).seconds
-    accumulators_of_runs = march()
+        integrate()
+    seconds = measure(integrate, repeats).seconds
+    accumulators_of_runs = integrate()
     simulated = float(np.sum(ensemble.runs["tick"] * ensemble.runs["end"]))
     return seconds / simulated, seconds / float(accumulators_of_runs["steps"].sum())
 

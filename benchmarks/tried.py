@@ -67,7 +67,7 @@ def run(folder: Path, quick: bool) -> None:
         for name, (composition, steps) in _SPLITTINGS.items()
         for step in steps
     ]
-    ledgers = [_ledger(step, 20 if quick else 200) for step in _STEPS]
+    energy_errors = [_energy_error(step, 20 if quick else 200) for step in _STEPS]
     products = _products()
     text = table(
         ("splitting", "kicks a step", "step, us", "e5", "ms per 200 cycles"),
@@ -84,13 +84,19 @@ def run(folder: Path, quick: bool) -> None:
     )
     text += "\n" + table(
         ("step of SRKN_6^b, us", "energy residual over gross work"),
-        [[f"{1e6 * r['step']:.3g}", f"{r['residual']:.0e}"] for r in ledgers],
+        [[f"{1e6 * r['step']:.3g}", f"{r['residual']:.0e}"] for r in energy_errors],
     )
     text += "\n" + table(
         ("product of two 16 x 16 blocks with a vector", "ns"),
         [[name, f"{value:.3g}"] for name, value in products.items()],
     )
-    save(folder, "tried", quick, {"splittings": splittings, "ledgers": ledgers, "products": products}, text)
+    save(
+        folder,
+        "tried",
+        quick,
+        {"splittings": splittings, "energy_errors": energy_errors, "products": products},
+        text,
+    )
 
 
 def _splitting_record(
@@ -115,7 +121,7 @@ def _splitting_record(
     }
 
 
-def _ledger(step: float, cycles: int) -> dict[str, float]:
+def _energy_error(step: float, cycles: int) -> dict[str, float]:
     """Greatest residual of the energy of a run over its gross work, the shaker's transfers without sign."""
     worst = 0.0
     for point in (_POINT, (1.625, 0.3), (0.7, 0.4)):

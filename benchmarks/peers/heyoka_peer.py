@@ -65,7 +65,7 @@ def _prepare(case: Case, tolerance: float) -> Solver:
             )
         )
 
-    def march(times: _Array | None, end: float) -> _Array | None:
+    def integrate(times: _Array | None, end: float) -> _Array | None:
         values = None if times is None else np.empty((times.size, count))
         state, at, touching, row = np.zeros(2 * count), 0.0, False, 0
         stops = np.array([end]) if times is None else times
@@ -92,12 +92,12 @@ def _prepare(case: Case, tolerance: float) -> Solver:
         return values
 
     def sample(times: _Array) -> _Array:
-        values = march(times, float(times[-1]))
+        values = integrate(times, float(times[-1]))
         assert values is not None
         return values @ e.read_out
 
     def advance(end: float) -> None:
-        march(None, end)
+        integrate(None, end)
 
     return Solver(sample, advance)
 

@@ -2,7 +2,7 @@
 
 ``python -m benchmarks.peers.scipy_page map.nc MODES CYCLES`` serves it on the loopback address.  It is what one writes
 with the usual tools: an image, a stream of taps, a curve that follows them.  The equations are those of the other
-peers, compiled once by Numba, and marched by LSODA (``odeint``) at the tolerance that keeps e5 below 1e-3 in the bench.
+peers, compiled once by Numba, and integrated by LSODA (``odeint``) at the tolerance that keeps e5 below 1e-3 in the bench.
 Models have the names that the explorer's have, so that both pages are timed by the same script.
 """
 

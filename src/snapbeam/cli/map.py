@@ -79,22 +79,22 @@ def compute_map(
     asked = opt.sweep_options(keeping)
     total = setup.points.size
     start = time.monotonic()
-    tally = SweepReport()
+    counts = SweepReport()
     with opt.report(total, keeping["log"], keeping["checkpoint"]) as say:
         kept = CheckpointOptions(
             keeping["checkpoint"], keeping["check_checkpoint"], keeping["points_per_task"], opt.kept_config(settings, keeping),
-            say.note, tally,
+            say.note, counts,
         )  # fmt: skip
         dataset = compute_sweep(
             setup, kept, output=output if opt.is_long(keeping) and not kept.check_checkpoint else None,
             progress=say.progress, **asked,
         )  # fmt: skip
-        lines = opt.tally_lines(tally, keeping["checkpoint"], time.monotonic() - start)
+        lines = opt.sweep_report_lines(counts, keeping["checkpoint"], time.monotonic() - start)
         for line in lines:
             say.log(line)
     if keeping["check_checkpoint"]:
         out().print(*lines, sep="\n", markup=False)
-        raise typer.Exit(FAILED if tally.failed else 0)
+        raise typer.Exit(FAILED if counts.failed else 0)
     elapsed = time.monotonic() - start
     if not opt.is_long(keeping):
         from snapbeam.cli.console import write_map
@@ -106,7 +106,7 @@ def compute_map(
     add_json(**map_facts(dataset), seconds=elapsed, files=files)
     out().print(map_summary(dataset, files, None if opt.is_long(keeping) else elapsed))
     out().print(*lines, sep="\n", markup=False, end="\n" if lines else "")
-    if tally.failed:
+    if counts.failed:
         raise typer.Exit(FAILED)
 
 

@@ -43,7 +43,7 @@ __all__ = [
     "report",
     "resumed",
     "sweep_options",
-    "tally_lines",
+    "sweep_report_lines",
     "with_checkpoint",
     "with_parameters",
 ]
@@ -685,20 +685,20 @@ def report(total: int, log: Path | None, store: Path | None) -> Iterator[LongRep
             raise
 
 
-def tally_lines(tally: SweepReport, store: Path | None, elapsed: float) -> list[str]:
+def sweep_report_lines(counts: SweepReport, store: Path | None, elapsed: float) -> list[str]:
     """Return what happened, in words."""
     lines = []
     if store is not None:
-        lines.append(f"{tally.runs} runs computed in {duration(elapsed)}")
+        lines.append(f"{counts.runs} runs computed in {duration(elapsed)}")
         lines.append(
-            f"Checkpoint {store}: {tally.tasks} tasks, {tally.resumed} resumed, {tally.computed} computed, "
-            f"{len(tally.damaged)} damaged, {len(tally.failed)} failed"
+            f"Checkpoint {store}: {counts.tasks} tasks, {counts.resumed} resumed, {counts.computed} computed, "
+            f"{len(counts.damaged)} damaged, {len(counts.failed)} failed"
         )
-    if tally.missing:
+    if counts.missing:
         lines.append(
-            f"{tally.missing} tasks are not computed yet; run without --check-checkpoint to compute them"
+            f"{counts.missing} tasks are not computed yet; run without --check-checkpoint to compute them"
         )
-    lines += [f"failed: {stage} task {task} {reason}" for stage, task, reason in tally.failed]
+    lines += [f"failed: {stage} task {task} {reason}" for stage, task, reason in counts.failed]
     return lines
 
 

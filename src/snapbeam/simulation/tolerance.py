@@ -155,8 +155,8 @@ def steps_for(system: System, integration: Integration) -> tuple[Plan, ErrorEsti
         level: plans_of(system, whole.replace(accuracy=level), run_columns(system, {}))[0]
         for level in ACCURACIES
     }
-    rungs = _FINE if limit < _CHEAP else (*_ROUGH, *_FINE[1:])
-    levels = [steps[level]._replace(step=length * steps[level].step) for level, length in rungs]
+    refinements = _FINE if limit < _CHEAP else (*_ROUGH, *_FINE[1:])
+    levels = [steps[level]._replace(step=length * steps[level].step) for level, length in refinements]
     times = _instants(system, make_ensemble(system, whole, plan=steps["standard"]))
     coarse = _watch(system, make_ensemble(system, whole, plan=levels[0]), times)
     for plan in levels[1:]:

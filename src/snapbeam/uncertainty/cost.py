@@ -234,7 +234,7 @@ def _trial(trials: Trials, point: Point, limit: float) -> tuple[int, float, dict
     parts: list[dict[str, NDArray[Any]]] = []
     while spent < limit:
         numbers = np.arange(begun, begun + size)
-        ranks = np.modf((numbers // 4) * _GOLDEN)[0]  # four draws a point
+        ranks = np.modf((numbers // 4) * _GOLDEN)[0]  # four samples a point
         clock = time.perf_counter()
         parts.append(trials.statistics(point(ranks), numbers))
         clock = time.perf_counter() - clock

@@ -29,7 +29,7 @@ class DifferentialEvolution:
     population : int
         At least 6.
     seed : int
-        Generation g draws from its number and the seed alone.
+        Generation g samples from its number and the seed alone.
     weight, crossover : float
         F in (0, 2) and CR in [0, 1].
 
@@ -173,7 +173,7 @@ def _ranked(objectives: _Array, broken: _Array) -> NDArray[np.int64]:
 
 
 def _crowding(objectives: _Array) -> _Array:
-    """Distance of the neighbours of each member of a front, along every goal; the ends are infinitely far."""
+    """Distance of the neighbours of each member of a front, along every objective; the ends are infinitely far."""
     found = np.zeros(len(objectives))
     if objectives.shape[1] == 1:
         return found

@@ -323,7 +323,7 @@ class ParameterUncertainty:
         return self.displacement > 0.0 or "drive.phase" in self.of
 
     def normals(self, numbers: NDArray[np.int64]) -> _Array:
-        """Standard normal scores of the draws of the given numbers, of shape (draws, parameters)."""
+        """Standard normal scores of the samples of the given numbers, of shape (samples, parameters)."""
         which, back = np.unique(numbers, return_inverse=True)
         names = sorted(self.of)
         scores = np.empty((which.size, len(names)))

@@ -57,7 +57,7 @@ def score_measurements(
     measurements : MeasuredPoints
         As :func:`snapbeam.sweeps.measured_points.read_measured_points` reads them; points of unknown class are left out.
     samples : int
-        Sets of responses drawn from the map, with which the measured ones are compared.
+        Sets of responses sampled from the map, with which the measured ones are compared.
     seed : int
 
     Returns

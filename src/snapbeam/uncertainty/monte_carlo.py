@@ -76,9 +76,9 @@ class _DrawnSetup(SweepSetup):
 
 @dataclass
 class Trials:
-    """Draws of a system, run where they are asked for.
+    """Samples of a system, run where they are asked for.
 
-    What a run gives hangs on its point and the number of its draw alone.  Rounds are kept in a folder each of the
+    What a run gives hangs on its point and the number of its sample alone.  Rounds are kept in a folder each of the
     store, in the order in which they are asked for: a question that asks the same again reads them instead.
     """
 
@@ -92,21 +92,21 @@ class Trials:
     """Runs asked for so far."""
     rounds: int = 0
     made: dict[tuple[Any, ...], System] = field(default_factory=dict, repr=False)
-    """Systems of the structures that were drawn so far."""
+    """Systems of the structures that were sampled so far."""
 
     def columns(
         self, points: Columns, numbers: _Numbers, scores: NDArray[np.float64] | None = None
     ) -> Columns:
-        """The parameters of the draws: those of the points, and those that are drawn about them.
+        """The parameters of the samples: those of the points, and those that are sampled around them.
 
         Parameters
         ----------
         points : dict of str to array of shape (runs,)
             Nominal values by dotted name.
         numbers : int array of shape (runs,)
-            Which draw each is.
+            Which sample each is.
         scores : array of shape (runs, parameters), optional
-            Standard normal scores of the parameters, in place of those of the draws; the start is that of the draw.
+            Standard normal scores of the parameters, in place of those of the samples; the start is that of the sample.
         """
         uncertainty, found = self.uncertainty, dict(points)
         if scores is None:
@@ -128,9 +128,9 @@ class Trials:
         progress: Progress | None = None,
         scores: NDArray[np.float64] | None = None,
     ) -> dict[str, NDArray[Any]]:
-        """Run the draws and return every statistic of the table, arrays of shape (runs,)."""
+        """Run the samples and return every statistic of the table, arrays of shape (runs,)."""
         columns = self.columns(points, numbers, scores)
-        if not columns:  # nothing is drawn and nothing varies: the system as it stands
+        if not columns:  # nothing is sampled and nothing varies: the system as it stands
             columns = {name: np.full(numbers.size, self._nominal(name)) for name in self._any_parameter()}
         return self.of_columns(columns, progress)
 
@@ -138,7 +138,7 @@ class Trials:
         return ("striker.location",)
 
     def of_columns(self, columns: Columns, progress: Progress | None = None) -> dict[str, NDArray[Any]]:
-        """Run points as they are, without a draw."""
+        """Run points as they are, without sampling."""
         setup = self._setup(columns)
         keeping = self.keeping
         if keeping.path is not None:
@@ -222,7 +222,7 @@ class Trials:
             yield _made(self.made, self.system, dict(zip(names, key, strict=True))), which
 
     def _ringing(self, columns: Columns, numbers: _Numbers) -> Columns:
-        """The start of every draw, as columns; one that would press the tip is turned about, so that it leaves it."""
+        """The start of every sample, as columns; one that would press the tip is turned about, so that it leaves it."""
         given = [name for name in columns if name.startswith("initial_state.")]
         if given:
             raise InputError(
@@ -273,7 +273,7 @@ def _folder(path: Path) -> Path:
 
 
 def _require_allowed(name: str, values: NDArray[np.float64]) -> None:
-    """Refuse draws that no system can have, with the advice to draw from something else."""
+    """Refuse samples that no system can have, with the advice to sample from something else."""
     for value in (values.min(), values.max()):
         try:
             lookup(name).quantity.check(name, float(value))
@@ -292,7 +292,7 @@ def trials_of(
     cluster: str | None = None,
     early: bool = True,
 ) -> Trials:
-    """Check what is drawn of a system.
+    """Check what is sampled of a system.
 
     Raises
     ------
@@ -325,7 +325,7 @@ def trials_of(
 
 
 Ask = Callable[[_Numbers, _Numbers], dict[str, NDArray[Any]]]
-"""Given points and draws, by number, the statistics of their runs."""
+"""Given points and samples, by number, the statistics of their runs."""
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -62,7 +62,7 @@ __all__ = [
 
 
 # ----------------------------------------------------------------------------------------------------
-# What a design is judged by: quantities of its runs or of itself, goals to make small, limits to keep.
+# What a design is judged by: quantities of its runs or of itself, objectives to make small, constraints to satisfy.
 
 
 Values = dict[str, NDArray[Any]]
@@ -307,7 +307,7 @@ class Constraint:
 
 
 def require_kinds(objectives: Any, constraints: Any) -> tuple[tuple[Objective, ...], tuple[Constraint, ...]]:
-    """Goals and limits as tuples.
+    """Objectives and constraints as tuples.
 
     Raises
     ------
@@ -342,26 +342,26 @@ class Worth(NamedTuple):
     """What some designs are worth, by the runs that were made of them."""
 
     objectives: _Array
-    """Of shape (designs, goals), to be made small: a goal that is to be large is negated; infinite where not known."""
+    """Of shape (designs, objectives), to be made small: maxima are negated; infinite where not known."""
     violation: _Array
-    """Of shape (designs,): 0 where every limit is kept by the share of the runs that it asks for, and a margin."""
+    """Of shape (designs,): 0 where every constraint is kept by the share of the runs that it asks for, and a margin."""
     runs: NDArray[np.int64]
 
 
 class Estimate(NamedTuple):
-    """What one design is worth on fresh draws, with intervals."""
+    """What one design is worth on independent validation samples, with intervals."""
 
     objectives: _Array
-    """Value, lower and upper limit, of shape (goals, 3), in their own signs."""
+    """Value, lower and upper limit, of shape (objectives, 3), in their own signs."""
     constraints: _Array
-    """Share of the runs that keep each limit with its interval, of shape (limits, 3)."""
+    """Share of the runs that keep each constraint with its interval, of shape (constraints, 3)."""
     runs: int
     failed: int
 
 
 @dataclass
 class DesignProblem:
-    """Variables with bounds, goals and limits, judged by numbered draws of a system.
+    """Variables with bounds, objectives and constraints, judged by numbered samples of a system.
 
     Made by :func:`snapbeam.uncertainty.design_problem`; ``evaluate`` is all that an optimiser needs.
     """
@@ -372,9 +372,9 @@ class DesignProblem:
     objectives: tuple[Objective, ...]
     constraints: tuple[Constraint, ...]
     samples: int = 64
-    """Runs of a design while it is sought, the same draws for every one."""
+    """Runs of a design while it is sought, the same samples for every one."""
     margin: float = 0.5
-    """Share of the misses that a limit allows which is not used up while designs are sought."""
+    """Share of the misses that a constraint allows which is not used up while designs are sought."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -382,10 +382,10 @@ class DesignProblem:
         return tuple(self.bounds)
 
     def evaluate(self, designs: ArrayLike) -> Worth:
-        """What designs are worth on the common draws 0, 1, ..., the same for each.
+        """What designs are worth on the common samples 0, 1, ..., the same for each.
 
-        A design that breaks a limit by what it is itself is not run.  Of the others a quarter of the runs is made
-        first, and the rest of those that may still keep every limit.
+        A design that breaks a constraint by what it is itself is not run.  Of the others a quarter of the runs is made
+        first, and the rest of those that may still keep every constraint.
 
         Parameters
         ----------
@@ -403,7 +403,7 @@ class DesignProblem:
         runs = np.zeros(len(x), dtype=np.int64)
         alive = np.flatnonzero(violation == 0.0)
         if not self._needs_runs:
-            objectives[alive] = self._own_goals(x[alive])
+            objectives[alive] = self._own_objectives(x[alive])
             return Worth(objectives, violation, runs)
         first = max(4, self.samples // 4)
         parts: dict[int, list[dict[str, NDArray[Any]]]] = {int(i): [] for i in alive}
@@ -420,36 +420,36 @@ class DesignProblem:
                     violation[i] = self._missing(joined[i])
             if last:
                 for i in alive[violation[alive] == 0.0].tolist():
-                    objectives[i] = self._goals_of(x[i : i + 1], joined[i])
+                    objectives[i] = self._objectives_of(x[i : i + 1], joined[i])
             alive = alive[violation[alive] == 0.0]
         return Worth(objectives, violation, runs)
 
     def estimate(self, design: ArrayLike, numbers: NDArray[np.int64], confidence: float = 0.95) -> Estimate:
-        """What one design is worth on the draws of the given numbers, with intervals."""
+        """What one design is worth on the samples of the given numbers, with intervals."""
         x = finite_array("design", design, 1)[None]
         found = self.runs_of(x, numbers)[0]
         good = reached(found)
         failed = int((~good).sum())
         objectives = np.empty((len(self.objectives), 3))
-        for row, goal in zip(objectives, self.objectives, strict=True):
-            if goal._quantity.kind == "design":
-                row[:] = self._own(goal, x)[0]
+        for row, objective in zip(objectives, self.objectives, strict=True):
+            if objective._quantity.kind == "design":
+                row[:] = self._own(objective, x)[0]
             else:
-                values = goal._quantity.of(self.trials.system, found)[good]
-                row[:] = goal.estimate(values, failed, confidence)
+                values = objective._quantity.of(self.trials.system, found)[good]
+                row[:] = objective.estimate(values, failed, confidence)
         constraints = np.ones((len(self.constraints), 3))
-        for row, limit in zip(constraints, self.constraints, strict=True):
-            if limit._quantity.kind == "design":
-                row[:] = float(limit.excess(self._own(limit, x))[0] == 0.0)
+        for row, constraint in zip(constraints, self.constraints, strict=True):
+            if constraint._quantity.kind == "design":
+                row[:] = float(constraint.excess(self._own(constraint, x))[0] == 0.0)
                 continue
-            kept = limit.kept(limit._quantity.of(self.trials.system, found)) & good
+            kept = constraint.kept(constraint._quantity.of(self.trials.system, found)) & good
             row[0] = kept.sum() / max(int(good.sum()), 1)
             row[1] = float(wilson(int(kept.sum()), good.size, confidence)[1])
             row[2] = float(wilson(int(kept.sum()) + failed, good.size, confidence)[2])
         return Estimate(objectives, constraints, int(good.size), failed)
 
     def runs_of(self, x: _Array, numbers: NDArray[np.int64]) -> list[dict[str, NDArray[Any]]]:
-        """Statistics and columns of the runs of designs, each on the same draws."""
+        """Statistics and columns of the runs of designs, each on the same samples."""
         each = np.repeat(np.arange(len(x)), numbers.size)
         points: Columns = {name: x[each, j] for j, name in enumerate(self.bounds)}
         columns = self.trials.columns(points, np.tile(numbers, len(x)))
@@ -461,8 +461,8 @@ class DesignProblem:
         }
         whole = fixed | columns | found
         if "cycles_to_settle" in {
-            *(goal.quantity for goal in self.objectives),
-            *(limit.quantity for limit in self.constraints),
+            *(objective.quantity for objective in self.objectives),
+            *(constraint.quantity for constraint in self.constraints),
         }:
             whole[CYCLE] = self.trials.cycles(columns)
         return [{name: values[each == i] for name, values in whole.items()} for i in range(len(x))]
@@ -470,8 +470,8 @@ class DesignProblem:
     @property
     def _needs_runs(self) -> bool:
         kinds = {
-            *(goal._quantity.kind for goal in self.objectives),
-            *(limit._quantity.kind for limit in self.constraints),
+            *(objective._quantity.kind for objective in self.objectives),
+            *(constraint._quantity.kind for constraint in self.constraints),
         }
         return kinds != {"design"}
 
@@ -488,49 +488,51 @@ class DesignProblem:
         return values
 
     def _own_excess(self, x: _Array) -> _Array:
-        own = [limit for limit in self.constraints if limit._quantity.kind == "design"]
+        own = [constraint for constraint in self.constraints if constraint._quantity.kind == "design"]
         found = np.zeros(len(x))
-        for limit in own:
-            found += limit.excess(self._own(limit, x))
+        for constraint in own:
+            found += constraint.excess(self._own(constraint, x))
         # beyond what any share of runs can break: such a design is never run
         return np.where(found > 0.0, found + len(self.constraints), 0.0)
 
-    def _own_goals(self, x: _Array) -> _Array:
-        return np.stack([self._sign(goal) * self._own(goal, x) for goal in self.objectives], axis=1)
+    def _own_objectives(self, x: _Array) -> _Array:
+        return np.stack(
+            [self._sign(objective) * self._own(objective, x) for objective in self.objectives], axis=1
+        )
 
     @staticmethod
-    def _sign(goal: Objective) -> float:
-        return -1.0 if goal.maximize else 1.0
+    def _sign(objective: Objective) -> float:
+        return -1.0 if objective.maximize else 1.0
 
-    def _goals_of(self, x: _Array, found: dict[str, NDArray[Any]]) -> _Array:
+    def _objectives_of(self, x: _Array, found: dict[str, NDArray[Any]]) -> _Array:
         good = reached(found)
         values = []
-        for goal in self.objectives:
-            if goal._quantity.kind == "design":
-                values.append(float(self._own(goal, x)[0]))
+        for objective in self.objectives:
+            if objective._quantity.kind == "design":
+                values.append(float(self._own(objective, x)[0]))
             else:
-                runs = goal._quantity.of(self.trials.system, found)[good]
-                values.append(goal.estimate(runs, 0, 0.95)[0] if runs.size else np.inf)
+                runs = objective._quantity.of(self.trials.system, found)[good]
+                values.append(objective.estimate(runs, 0, 0.95)[0] if runs.size else np.inf)
         signed = np.array(
-            [self._sign(goal) * value for goal, value in zip(self.objectives, values, strict=True)]
+            [self._sign(objective) * value for objective, value in zip(self.objectives, values, strict=True)]
         )
         return np.where(np.isfinite(signed), signed, np.inf)
 
     def _missing(self, found: dict[str, NDArray[Any]], *, hopeful: bool = False) -> float:
-        """By how much the shares of runs that keep the limits are too small; failed runs keep none.
+        """By how much the shares of runs that keep the constraints are too small; failed runs keep none.
 
         *hopeful*: by how much they are too small even if they are as great as the runs let hope, without a margin.
         """
         good = reached(found)
         total = 0.0
-        for limit in self.constraints:
-            if limit._quantity.kind == "design":
+        for constraint in self.constraints:
+            if constraint._quantity.kind == "design":
                 continue
-            kept = limit.kept(limit._quantity.of(self.trials.system, found)) & good
+            kept = constraint.kept(constraint._quantity.of(self.trials.system, found)) & good
             share = float(kept.mean())
-            wanted = limit.required + self.margin * (1.0 - limit.required)
+            wanted = constraint.required + self.margin * (1.0 - constraint.required)
             if hopeful:
-                share, wanted = float(wilson(int(kept.sum()), kept.size, _SURE)[2]), limit.required
+                share, wanted = float(wilson(int(kept.sum()), kept.size, _SURE)[2]), constraint.required
             total += max(0.0, wanted - share)
         return total
 
@@ -569,7 +571,10 @@ def problem_of(
             raise InputError(f"{name}: is given twice among the variables")
         bounds[row.name] = (low, high)
     made, kept = require_kinds(objectives, constraints)
-    require_held([*(goal.quantity for goal in made), *(limit.quantity for limit in kept)], trials.system)
+    require_held(
+        [*(objective.quantity for objective in made), *(constraint.quantity for constraint in kept)],
+        trials.system,
+    )
     integer("samples", samples, 8, 10**6)
     if trials.uncertainty.is_empty:
         raise InputError("uncertainty: nothing is uncertain, so every probability is 0 or 1; give tolerances")
@@ -581,7 +586,7 @@ def problem_of(
 
 _Array = NDArray[np.float64]
 CHECK, REPORT = 10**9, 2 * 10**9
-"""First numbers of the draws by which candidates are chosen, and of those by which the chosen are reported."""
+"""First numbers of the samples by which candidates are chosen, and of those by which the chosen are reported."""
 SATISFIED = ("violated", "undecided", "satisfied")
 
 
@@ -624,7 +629,7 @@ class OptimizerSettings:
 
     @property
     def max_runs(self) -> int:
-        """Runs that a design takes at most, of one goal."""
+        """Runs that a design takes at most, of one objective."""
         return (
             self.generations * self.population * self.samples
             + (self.candidates + 1) * self.validation_samples
@@ -648,13 +653,13 @@ def design_problem(
     Returns
     -------
     DesignProblem
-        Its ``evaluate(designs)`` gives goals and violations of rows of designs, on the same draws each time; its
-        ``estimate(design, numbers)`` intervals on draws of any numbers.
+        Its ``evaluate(designs)`` gives objectives and violations of rows of designs, on the same samples each time; its
+        ``estimate(design, numbers)`` intervals on samples of any numbers.
 
     Raises
     ------
     InputError
-        For variables, goals and limits that cannot be, and an uncertainty without uncertain parameters.
+        For variables, objectives and constraints that cannot be, and an uncertainty without uncertain parameters.
     """
     trials = trials_of(
         system, uncertainty, integration, checkpoint=checkpoint, early=_early(objectives, constraints)
@@ -702,16 +707,16 @@ def optimize_design(
     Returns
     -------
     xarray.Dataset
-        Along ``design``, one, or a front by its first goal: a variable a parameter; ``objective_...`` with ``_low`` and
+        Along ``design``, one, or a front by its first objective: a variable a parameter; ``objective_...`` with ``_low`` and
         ``_high`` and, as the search saw it, ``_sought``; ``satisfied_...``, the fraction of systems that satisfy
         a constraint, with ``_low`` and ``_high``, and ``required_...``; ``constraints_satisfied``: whether every lower
         limit is at least the required fraction, some upper limit is less, or neither is known.  Along ``tried``: every design that was looked at,
-        its goals and ``violation``.
+        its objectives and ``violation``.
 
     Raises
     ------
     InputError
-        For bad input, and if no design that was tried keeps the limits.
+        For bad input, and if no design that was tried keeps the constraints.
 
     Examples
     --------
@@ -746,10 +751,10 @@ def optimize_design(
         search.tell(worth.objectives, worth.violation)
         if report is not None:
             report(generation + 1, settings.generations)
-    x, goal_values, violation = (np.concatenate(parts) for parts in zip(*tried, strict=True))
-    chosen = _chosen(problem, settings, x, goal_values, violation)
+    x, objective_values, violation = (np.concatenate(parts) for parts in zip(*tried, strict=True))
+    chosen = _chosen(problem, settings, x, objective_values, violation)
     found = [_fresh(problem, settings, x[i], REPORT) for i in chosen]
-    return _dataset(problem, settings, (x, goal_values, violation), chosen, found)
+    return _dataset(problem, settings, (x, objective_values, violation), chosen, found)
 
 
 def _early(objectives: Any, constraints: Any) -> bool:
@@ -767,7 +772,7 @@ def _fresh(problem: DesignProblem, effort: OptimizerSettings, x: _Array, begin: 
 def _chosen(
     problem: DesignProblem, effort: OptimizerSettings, x: _Array, objectives: _Array, violation: _Array
 ) -> list[int]:
-    """Designs to be reported: the best that holds on fresh draws, or the front."""
+    """Designs to be reported: the best that holds on independent validation samples, or the front."""
     good = np.flatnonzero(violation == 0.0)
     if not good.size:
         best = int(np.argmin(violation))
@@ -800,9 +805,9 @@ def _chosen(
 
 
 def _holds(problem: DesignProblem, found: Estimate) -> tuple[int, float]:
-    """Whether limits hold for certain (2), fail for certain (0) or neither (1), and by how much they may lack."""
-    required = np.array([limit.required for limit in problem.constraints])
-    own = np.array([limit._quantity.kind == "design" for limit in problem.constraints], dtype=bool)
+    """Whether constraints hold for certain (2), fail for certain (0) or neither (1), and by how much they may lack."""
+    required = np.array([constraint.required for constraint in problem.constraints])
+    own = np.array([constraint._quantity.kind == "design" for constraint in problem.constraints], dtype=bool)
     wanted = np.where(own, 1.0, required)
     short = float(np.maximum(wanted - found.constraints[:, 1], 0.0).sum()) if required.size else 0.0
     if short == 0.0:
@@ -836,28 +841,30 @@ def _dataset(
         labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": name}
         dataset[row.short] = (("design",), x[chosen, j], labels)
         dataset[f"tried_{row.short}"] = (("tried",), x[:, j], labels)
-    for k, goal in enumerate(problem.objectives):
-        sign = -1.0 if goal.maximize else 1.0
-        own = {"units": goal._quantity.unit, "long_name": goal.long_name}
+    for k, objective in enumerate(problem.objectives):
+        sign = -1.0 if objective.maximize else 1.0
+        own = {"units": objective._quantity.unit, "long_name": objective.long_name}
         for end, values in zip(
             ("", "_low", "_high"), np.array([each.objectives[k] for each in found]).T, strict=True
         ):
-            dataset[f"objective_{goal.label}{end}"] = (("design",), values, own)
-        dataset[f"objective_{goal.label}_sought"] = (("design",), sign * objectives[chosen, k], own)
+            dataset[f"objective_{objective.label}{end}"] = (("design",), values, own)
+        dataset[f"objective_{objective.label}_sought"] = (("design",), sign * objectives[chosen, k], own)
         seen = np.where(np.isfinite(objectives[:, k]), sign * objectives[:, k], np.nan)
-        dataset[f"tried_objective_{goal.label}"] = (("tried",), seen, own)
-    for k, limit in enumerate(problem.constraints):
+        dataset[f"tried_objective_{objective.label}"] = (("tried",), seen, own)
+    for k, constraint in enumerate(problem.constraints):
         own = {
             "units": "1",
-            "long_name": f"fraction of systems that satisfy the constraint of {limit.quantity}",
+            "long_name": f"fraction of systems that satisfy the constraint of {constraint.quantity}",
         }
-        own |= {name: value for name in ("lower", "upper") if (value := getattr(limit, name)) is not None}
+        own |= {
+            name: value for name in ("lower", "upper") if (value := getattr(constraint, name)) is not None
+        }
         for end, values in zip(
             ("", "_low", "_high"), np.array([each.constraints[k] for each in found]).T, strict=True
         ):
-            dataset[f"satisfied_{limit.label}{end}"] = (("design",), values, own)
-        required = 1.0 if limit._quantity.kind == "design" else limit.required
-        dataset[f"required_{limit.label}"] = (
+            dataset[f"satisfied_{constraint.label}{end}"] = (("design",), values, own)
+        required = 1.0 if constraint._quantity.kind == "design" else constraint.required
+        dataset[f"required_{constraint.label}"] = (
             (),
             required,
             {"units": "1", "long_name": "required fraction"},

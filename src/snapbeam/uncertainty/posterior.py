@@ -596,7 +596,7 @@ def class_likelihood(
 ) -> _Array:
     """Log likelihood of measured classes under every sample of a posterior, for :meth:`Posterior.updated`.
 
-    The class of a measured point is one outcome of *runs* and one more draw from the same unknown chances: with c of m runs of its
+    The class of a measured point is one outcome of *runs* and one more sample from the same unknown chances: with c of m runs of its
     class, a Dirichlet-multinomial of Jeffreys' prior gives it (c + 1/2)/(m + 2).  So a class that no run had is
     unlikely, not impossible, and few runs say little.
 

@@ -35,7 +35,7 @@ __all__ = ["Counts", "SamplingPlan", "allocate", "allocation_of", "probability_m
 _Array = NDArray[np.float64]
 _Index = NDArray[np.int64]
 Ask = Callable[[_Index, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]
-"""Given points and numbers of draws, what happened, of shape (outcomes, runs), and which runs failed."""
+"""Given points and numbers of samples, what happened, of shape (outcomes, runs), and which runs failed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,7 +211,7 @@ def probability_map(
     system : System
         The nominal one.
     axes : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
-        As in :func:`snapbeam.sweep`: a grid, or a list of points.  A parameter that is drawn too is drawn about the
+        As in :func:`snapbeam.sweep`: a grid, or a list of points.  A parameter that is sampled too is sampled around the
         value of the point.
     uncertainty : ParameterUncertainty
         Uncertain parameters and initial state.
@@ -242,7 +242,7 @@ def probability_map(
     Notes
     -----
     The intervals are those of a fixed number of runs.  Stopping where they are narrow costs them nothing that is
-    seen: over probabilities drawn from (0, 1) they hold the truth in 95 % of cases.  The share itself leans towards
+    seen: over probabilities sampled from (0, 1) they hold the truth in 95 % of cases.  The share itself leans towards
     0 and 1 by at most 0.006 at a half width of 0.05.
 
     Examples

@@ -152,7 +152,7 @@ def rises(values: ArrayLike, hits: ArrayLike, *, bins: int = 12, samples: int = 
     """Probability of so much falling in the shares of hits if the probability of a hit rises.
 
     The runs are put into bins of equal numbers; twice the log likelihood that the isotonic regression of the bins lacks
-    is compared with that of sets of coins drawn from that regression.
+    is compared with that of sets of coins sampled from that regression.
 
     Returns
     -------
@@ -250,7 +250,7 @@ def local_crossing(
 
 _Index = NDArray[np.int64]
 Ask = Callable[[_Index, _Array, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]
-"""Given columns, values and numbers of draws: which runs hit, and which failed."""
+"""Given columns, values and numbers of samples: which runs hit, and which failed."""
 _WIDER = 0.5
 """Of an interval, by which the next round reaches beyond it on either side."""
 _SURE = 0.99
@@ -316,7 +316,7 @@ def search(
     """Make the runs of every column.
 
     Every run has a value of its own, one in each of as many equal parts of what is looked at as there are runs, so that
-    no grid hides anything; and a draw of its own.  Columns share the numbers of draws.
+    no grid hides anything; and a sample of its own.  Columns share the numbers of samples.
     """
     found = [Runs() for _ in range(columns)]
     share = np.diff(np.linspace(0, options.runs, options.rounds + 1).astype(np.int64))

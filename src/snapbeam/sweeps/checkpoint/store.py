@@ -525,7 +525,7 @@ class Checkpoint:
             )
 
     def open_stage(self, stage: Stage) -> None:
-        """Check every finished task of a stage against the ledger, and drop those that are damaged."""
+        """Check every finished task of a stage against the task log, and drop those that are damaged."""
         member(stage.name)
         try:
             self._arrays[stage.name] = open_tables(
