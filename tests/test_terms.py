@@ -1,11 +1,13 @@
-"""No name that the glossary replaced is left in the public interface: names, arguments, options, keys, variables."""
+"""No name that the glossary replaced is left in the public interface and on the pages of the documentation."""
 
 from __future__ import annotations
 
 import dataclasses
 import inspect
+import re
 import types
 import typing
+from pathlib import Path
 
 import pytest
 import typer
@@ -118,6 +120,19 @@ OPTIONS = set(
     """.split()
 )
 COMMANDS = {"draw", "paper", "wells", "identify", "campaign"}
+WORDS = re.compile(
+    r"\b(march(es|ed|ing)?|ledgers?|worlds?|doors?|house|anew|tall(y|ies)|rungs?|campaigns?|goals?|early decisions?)\b",
+    re.IGNORECASE,
+)
+"""Words that have a term in the glossary, and no other meaning on a page of this documentation."""
+ROOT = Path(__file__).parents[1]
+PAGES = [*sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs" / "data").glob("*.md"))]
+PAGES += [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    ROOT / "benchmarks" / "README.md",
+    *sorted((ROOT / "examples").glob("*.py")),
+]
 
 
 def public_objects() -> dict[str, object]:
@@ -197,6 +212,12 @@ def test_commands_and_options() -> None:
         for words, command in found.items()
     }
     assert {words: options for words, options in left.items() if options} == {}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_pages(page: Path) -> None:
+    lines = page.read_text(encoding="utf-8").splitlines()
+    assert [line for line in lines if WORDS.search(line)] == []
 
 
 def test_parts_are_found() -> None:

@@ -121,7 +121,7 @@ def test_small_motions_follow_the_linear_response() -> None:
 
 
 @pytest.mark.slow
-def test_never_decided_by_energy() -> None:
+def test_never_ended_early_by_energy() -> None:
     """A shaken beam may cross at any time: nothing is final, and only a continuous response is certain early."""
     system = sb.System(
         model(1),

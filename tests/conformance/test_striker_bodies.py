@@ -170,7 +170,7 @@ def test_going_on_and_mirror() -> None:
     )
 
 
-def test_early_decision_is_off_and_refusals() -> None:
+def test_early_termination_is_off_and_refusals() -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
     drive = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.25)
     with pytest.raises(InputError, match=r"must be less than .* the critical damping"):

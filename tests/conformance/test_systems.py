@@ -106,7 +106,7 @@ def test_every_parameter_swept_killed_and_resumed(name) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("modes", [1, 8])
 @pytest.mark.parametrize("name", [name for name, extended in SYSTEMS.items() if extended.decides])
-def test_never_decided_wrongly(name, modes) -> None:
+def test_never_ended_early_wrongly(name, modes) -> None:
     """4,000 random runs with and without early decision."""
     extended = SYSTEMS[name]
     if modes > 1 and extended.modes == 1:

@@ -234,7 +234,7 @@ def random_runs(modes: int, count: int, seed: int, cycles: int) -> tuple[int, in
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("modes", "count", "cycles"), [(2, 240, 24), (1, 4000, 60), (8, 4000, 60)])
-def test_early_decisions(modes, count, cycles) -> None:
+def test_early_terminations(modes, count, cycles) -> None:
     decided, wrong, classes = random_runs(modes, count, 10 * modes, cycles)
     assert wrong == 0
     assert decided > count // 10

@@ -72,7 +72,7 @@ def test_recipes_of_one_size_share_a_grid(results):
         assert (ds.response_class.values[snapped] > ResponseClass.INTRAWELL).all()
 
 
-def test_dots_lie_where_they_were_measured(tmp_path, results):
+def test_points_lie_where_they_were_measured(tmp_path, results):
     table = tmp_path / "dots.csv"
     table.write_text(
         "frequency_ratio,velocity_amplitude,location,response_class\n1.625,0.3,0.3,intrawell\n",

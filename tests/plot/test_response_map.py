@@ -94,7 +94,7 @@ def test_threshold_line(synthetic_map):
         plot_response_map(nameless, quasi_static_line=True)
 
 
-def test_dots_lie_where_they_were_measured(synthetic_map):
+def test_points_lie_where_they_were_measured(synthetic_map):
     dots = MeasuredPoints(
         np.array([1.0, 2.0, 3.0]),
         np.array([0.2, 0.3, 0.4]),
@@ -110,7 +110,7 @@ def test_dots_lie_where_they_were_measured(synthetic_map):
     assert legend_texts(ax)[-1] == "measured, 2"
 
 
-def test_dots_outside_are_told(synthetic_map):
+def test_points_outside_are_reported(synthetic_map):
     dots = MeasuredPoints(np.array([9.0]), np.array([0.2]), np.array([np.nan]), np.array([0], dtype=np.int8))
     with pytest.warns(UserWarning, match="1 of 1 measured points lie outside the map"):
         plot_response_map(synthetic_map, measurements=dots)

@@ -32,7 +32,7 @@ def test_a_run_with_steps_too_long_for_it_says_so() -> None:
     assert abs(fine.dataset.attrs["energy_error"]) < 1e-7
 
 
-def test_the_error_is_that_of_the_ledger_in_the_dataset() -> None:
+def test_the_error_is_that_of_the_energy_balance_in_the_dataset() -> None:
     system = VIOLENT.replace(**{"drive.frequency_ratio": 1.4, "drive.velocity_amplitude": 0.3})
     data = sb.simulate(system, sb.Integration(cycles=20)).dataset
     stored = data.energy_beam + data.energy_contact + data.energy_dissipated - data.striker_work

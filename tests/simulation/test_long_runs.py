@@ -21,7 +21,7 @@ SYSTEM = sb.System(
 )
 
 
-def test_one_march_a_run(monkeypatch) -> None:
+def test_one_integration_a_run(monkeypatch) -> None:
     """Samples, impacts and statistics come from the same march."""
     steps = []
     record = driver.record

@@ -57,7 +57,7 @@ def test_the_whole_record_is_the_default_and_more_is_refused(model):
         sb.simulate(sb.System(model, default_values.CONTACT, drive), sb.Integration(cycles=9))
 
 
-def test_the_ledger_closes(model):
+def test_the_energy_balance_closes(model):
     drive = sine_record(model, 1.21, 0.18, 6)
     ds = sb.simulate(sb.System(model, default_values.CONTACT, drive), sb.Integration(cycles=6)).dataset
     residual = ds.energy_beam + ds.energy_contact + ds.energy_dissipated - ds.striker_work

@@ -43,7 +43,7 @@ def test_free_mass_rebounds_with_its_coefficient():
 
 @pytest.mark.parametrize("coefficient", [0.0, 0.3, 0.9, 1.0])
 @pytest.mark.parametrize(("ratio", "amplitude"), [(1.21, 0.18), (0.5, 0.3)])
-def test_ledger_closes_and_the_tip_stays_outside(one_mode, coefficient, ratio, amplitude):
+def test_energy_balance_closes_and_the_tip_stays_outside(one_mode, coefficient, ratio, amplitude):
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=amplitude)
     run = sb.simulate(sb.System(one_mode, sb.Restitution(coefficient), shaker), sb.Integration(cycles=20))
     assert run.summary.status is sb.RunStatus.OK
@@ -110,7 +110,7 @@ def test_no_force_is_told_of_an_impact_that_lasts_no_time(one_mode):
 
 
 @pytest.mark.parametrize("coefficient", [0.3, 0.9])
-def test_early_decision_is_kept_and_told(one_mode, coefficient):
+def test_early_termination_is_kept_and_reported(one_mode, coefficient):
     """The class is that of the whole run, and the attribute says what was asked."""
     decided = 0
     for amplitude in np.linspace(0.2, 0.6, 9):

@@ -124,7 +124,7 @@ def ledger_error(run: sb.Run) -> float:
 
 @pytest.mark.parametrize("modes", [1, 8, 32])
 @pytest.mark.parametrize("pair", REGULAR + ELSEWHERE)
-def test_energy_ledger(modes: int, pair: tuple[float, float]) -> None:
+def test_energy_balance(modes: int, pair: tuple[float, float]) -> None:
     """Measured: at most 2.5e-6 on the regular runs and 4e-5 elsewhere, over the first five cycles."""
     error = ledger_error(simulate(modes, *pair, 5))
     assert error < (1e-4 if pair in REGULAR else 1e-3)
@@ -136,13 +136,13 @@ def test_energy_ledger(modes: int, pair: tuple[float, float]) -> None:
     ("modes", "pair"),
     [(n, pair) for n in (1, 8, 32) for pair in REGULAR + ELSEWHERE],
 )
-def test_energy_ledger_of_a_full_run(modes: int, pair: tuple[float, float]) -> None:
+def test_energy_balance_of_a_full_run(modes: int, pair: tuple[float, float]) -> None:
     assert ledger_error(simulate(modes, *pair, 200)) < (1e-4 if pair in REGULAR else 1e-3)
 
 
 @pytest.mark.parametrize("modes", [1, 8, 32])
 @pytest.mark.parametrize("pair", REGULAR)
-def test_order_of_the_energy_ledger(modes: int, pair: tuple[float, float]) -> None:
+def test_order_of_the_energy_balance(modes: int, pair: tuple[float, float]) -> None:
     """The mean order over three halvings; measured 2.4 to 4.3."""
     step = simulate(modes, *pair, 1).dataset.attrs["step"]
     errors = [ledger_error(simulate(modes, *pair, 3, step=step / 2**i)) for i in (0, 3)]
@@ -366,7 +366,7 @@ def test_class_is_told_by_the_end(start: float) -> None:
         )
 
 
-def test_early_decision_ends_the_recording() -> None:
+def test_early_termination_ends_the_recording() -> None:
     full, early = (simulate(1, 1.21, 0.36, 60, early_termination=flag) for flag in (False, True))
     assert early.summary.status == RunStatus.EARLY_STOP
     assert early.summary.response_class == full.summary.response_class
@@ -374,7 +374,7 @@ def test_early_decision_ends_the_recording() -> None:
     assert early.dataset.time[-1] <= early.summary.early_stop_time
 
 
-def test_instants_after_an_early_decision() -> None:
+def test_instants_after_an_early_termination() -> None:
     full = simulate(1, 1.21, 0.36, 60, early_termination=True)
     late = [full.summary.early_stop_time + 0.01]
     run = simulate(1, 1.21, 0.36, 60, early_termination=True, sample_times=late)

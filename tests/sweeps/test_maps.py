@@ -121,7 +121,7 @@ def test_reference_frequency() -> None:
     np.testing.assert_allclose(half.peak_force, whole.peak_force, rtol=1e-6)
 
 
-def test_early_decision_keeps_the_classes() -> None:
+def test_early_termination_keeps_the_classes() -> None:
     ratio, velocity = np.linspace(0.4, 3.5, 16), np.linspace(0.05, 0.6, 12)
     full, early = (
         make(frequency_ratio=ratio, velocity_amplitude=velocity, cycles=24, early_termination=flag)

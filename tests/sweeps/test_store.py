@@ -128,7 +128,7 @@ def test_descriptions_of_arrays_are_written_again(stored, work, whole):
         assert store.reader(stage).read(0, 20).content_hash() == whole.content_hash()
 
 
-def test_done_is_what_the_ledger_says(stored, work, tmp_path):
+def test_done_is_what_the_task_log_says(stored, work, tmp_path):
     path, stage = stored
     lines = (path / "tasks.jsonl").read_text(encoding="utf-8").splitlines(keepends=True)
     assert len(lines) == 4
@@ -288,7 +288,7 @@ def test_a_full_disk_loses_nothing(tmp_path, work, whole, monkeypatch, where, wr
         assert store.reader(stage).read(0, 20).content_hash() == whole.content_hash()
 
 
-def test_a_torn_line_of_the_ledger_stays_apart(tmp_path):
+def test_a_torn_line_of_the_task_log_stays_apart(tmp_path):
     file = tmp_path / "ledger"
     append_line(file, "one")
     with file.open("ab") as stream:

@@ -182,7 +182,7 @@ KINDS: dict[str, tuple[str, Callable[[], Counted]]] = {
     "thresholds": ("quantile thresholds", thresholds),
     "sobol": ("Sobol's indices of Ishigami's function", lambda: _indices(False)),
     "given": ("indices of given data", lambda: _indices(True)),
-    "goals": ("goals of designs", goals),
+    "goals": ("objectives of designs", goals),
     "lifetimes": ("lifetimes", lifetimes),
     "posterior": ("posterior, frequencies", posterior),
     "waveforms": ("posterior, a tracked waveform", lambda: waveforms(100)),

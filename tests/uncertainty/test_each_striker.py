@@ -41,7 +41,7 @@ def test_a_statistic_of_one() -> None:
 
 
 @pytest.mark.slow
-def test_a_goal_and_a_limit_of_one() -> None:
+def test_an_objective_and_a_constraint_of_one() -> None:
     """The estimate is the mean over the draws of that striker's peak force, not of the greater of both."""
     goal, limit = (
         sb.uncertainty.Objective(quantity="peak_force_striker_2"),

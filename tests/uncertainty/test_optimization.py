@@ -147,7 +147,7 @@ def test_limits_of_the_design_itself_cost_no_run() -> None:
         )  # fmt: skip
 
 
-def test_intervals_of_goals_cover() -> None:
+def test_intervals_of_objectives_cover() -> None:
     """Mean and quantile of normal numbers: 95 % intervals hold the truth in 93 to 97 % of 2000 trials."""
     generator = np.random.default_rng(5)
     for goal, truth in (

@@ -163,7 +163,7 @@ def test_refusals(change, words: str) -> None:
         sb.uncertainty.probability_map(**given)
 
 
-def test_dots_are_judged_by_their_likelihood() -> None:
+def test_measurements_are_judged_by_their_likelihood() -> None:
     """Dots drawn from a map agree with it, dots of one class everywhere do not."""
     ds = sb.uncertainty.probability_map(small_system(), AXES, SPREAD, 60, integration=HOW)
     counts = class_counts(ds)

@@ -39,14 +39,14 @@ def compare(march, model, given, cycles: int) -> tuple[int, set[int]]:
 @pytest.mark.parametrize(
     ("modes", "runs", "cycles"), [(1, 1500, 20), (2, 300, 20), (8, 120, 16), (32, 40, 12)]
 )
-def test_early_decisions(march, model_of, draw, modes, runs, cycles) -> None:
+def test_early_terminations(march, model_of, draw, modes, runs, cycles) -> None:
     decided, classes = compare(march, model_of(modes), draw(runs, 100 + modes), cycles)
     assert decided > runs // 20
     if runs > 100:
         assert classes == {0, 1, 2, 3}
 
 
-def test_early_decisions_of_every_law_and_drive(march, model_of, draw, kind) -> None:
+def test_early_termination_of_every_law_and_drive(march, model_of, draw, kind) -> None:
     """Newton's impacts decide early too; what a run decides never changes its class."""
     model, cycles = model_of(kind.modes), 16
     given = kind.given(model, draw(60, 300), cycles)
@@ -56,7 +56,7 @@ def test_early_decisions_of_every_law_and_drive(march, model_of, draw, kind) -> 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("modes", "runs", "cycles"), [(1, 5000, 100), (8, 800, 60), (32, 300, 60)])
-def test_many_early_decisions(march, model_of, draw, modes, runs, cycles) -> None:
+def test_many_early_terminations(march, model_of, draw, modes, runs, cycles) -> None:
     decided, classes = compare(march, model_of(modes), draw(runs, 200 + modes), cycles)
     assert decided > runs // 10
     assert classes == {0, 1, 2, 3}
