@@ -23,7 +23,7 @@ WORDS = {"scene": "scenes", "drive": "vibrometer records", "decay": "free decays
 FILE = Path(__file__).parents[2] / "docs" / "data" / "random_defects.md"
 HEAD = (
     "| | good | of these doubted | largest error of good ones, in standard errors | with a defect | of these flagged "
-    "or refused | of all off by more than 5 standard errors in silence |\n|---|---|---|---|---|---|---|\n"
+    "or refused | of all off by more than 5 standard errors without a message |\n|---|---|---|---|---|---|---|\n"
 )
 MAKERS = {
     "scene": (
