@@ -106,6 +106,79 @@ def test_the_quasi_static_optimum(tmp_path) -> None:
     assert fresh.constraints[0, 0] >= 0.87
 
 
+def test_a_design_is_brought_to_its_constraint() -> None:
+    """P = 0.8 is asked: the design has 0.84 to 0.86, whose lower limit is 0.8, where it had 0.91; the distance is told."""
+    system = small_system(frequency_ratio=0.02, location=0.3)
+    effort = sb.uncertainty.OptimizerSettings(
+        generations=40, population=8, samples=40, validation_samples=400, candidates=4
+    )
+    wide = sb.uncertainty.ParameterUncertainty(
+        of={"velocity_amplitude": sb.uncertainty.Normal(0.1, relative=True)}
+    )
+    ds = sb.uncertainty.optimize_design(
+        system, {"velocity_amplitude": (0.005, 0.03)}, "velocity_amplitude",
+        sb.uncertainty.Constraint(quantity="snap", lower=0.8), wide, effort, integration=HOW,
+    )  # fmt: skip
+    share, low, high = (float(ds[f"satisfied_snap{end}"][0]) for end in ("", "_low", "_high"))
+    assert low <= share <= high and high - low < 0.045, "1600 samples"
+    assert float(ds["distance_snap"][0]) == pytest.approx(share - 0.8)
+    assert 0.0 < float(ds["distance_snap"][0]) < 0.07
+    # of the threshold at P = 0.8 it exceeds no more than the validation samples ask for
+    exact = float(sb.model.quasi_static_threshold(0.3, 0.02)) * (1.0 + 0.1 * 0.8416)
+    assert 0.99 < float(ds["velocity_amplitude"][0]) / exact < 1.035
+    reason = str(ds.attrs["termination_reason"])
+    assert "generations" in reason and "refined" in reason
+    assert "without progress" in reason and ds.sizes["tried"] < 40 * 8
+
+
+def test_refinement_is_bisection_towards_better_designs() -> None:
+    """Known shares: the design ends where the lower limit of its share is the required one, from either side."""
+    from snapbeam.uncertainty import optimization
+
+    class Known:
+        """A problem whose share is a logistic curve of the first variable, which is also the objective."""
+
+        objectives = (sb.uncertainty.Objective(quantity="velocity_amplitude"),)
+        constraints = (sb.uncertainty.Constraint(quantity="snap", lower=0.8),)
+        bounds = {"a": (0.0, 1.0), "b": (0.0, 1.0)}  # noqa: RUF012
+        names = ("a", "b")
+
+        @staticmethod
+        def estimate(x, numbers, confidence):
+            share = 1.0 / (1.0 + np.exp(-20.0 * (x[0] - 0.4)))
+            hits = int(np.round(share * numbers.size))
+            _, low, high = (float(each) for each in wilson(hits, numbers.size, confidence))
+            return optimization.Estimate(
+                np.array([[x[0]] * 3]), np.array([[share, low, high]]), numbers.size, 0
+            )
+
+    from snapbeam.uncertainty.monte_carlo import wilson
+
+    needed = optimization._share_for(0.8, 400)
+    assert wilson(int(needed * 400) - 1, 400)[1] < 0.8 <= wilson(round(needed * 400), 400)[1]
+    exact = 0.4 + np.log(needed / (1.0 - needed)) / 20.0
+    effort = sb.uncertainty.OptimizerSettings(refinements=14)
+    # the search found a design that is too dear; the others violate the constraint
+    x = np.array([[0.7, 0.5], [0.3, 0.5], [0.9, 0.1]])
+    made = optimization._refined(
+        Known(), effort, x, np.array([[0.7], [np.inf], [0.9]]), np.array([0.0, 0.4, 0.0])
+    )
+    chosen = np.concatenate([x, made.x])[made.chosen]
+    assert exact - 1e-3 <= chosen[0] < exact + 2e-3 and "to a constraint" in made.reason
+    # the best of the search does not hold on validation samples, the next one does
+    x = np.array([[0.42, 0.5], [0.8, 0.5]])
+    made = optimization._refined(Known(), effort, x, x[:, :1], np.zeros(2))
+    assert exact - 1e-3 <= np.concatenate([x, made.x])[made.chosen][0] < exact + 2e-3
+    # a limit of checked designs is kept and told
+    few = sb.uncertainty.OptimizerSettings(refinements=2)
+    made = optimization._refined(Known(), few, x, x[:, :1], np.zeros(2))
+    assert len(made.x) == 2 and "the maximum" in made.reason
+    # nothing holds: the one that lacks least is reported, and that is said
+    x = np.array([[0.30, 0.5], [0.35, 0.5]])
+    made = optimization._refined(Known(), effort, x, x[:, :1], np.zeros(2))
+    assert made.chosen == 1 and "none of 2" in made.reason
+
+
 def test_an_optimiser_of_ones_own() -> None:
     """Any that asks and is told: here SciPy's, with violations as a penalty."""
     from scipy.optimize import minimize_scalar

@@ -373,8 +373,11 @@ class DesignProblem:
     constraints: tuple[Constraint, ...]
     samples: int = 64
     """Runs of a design while it is sought, the same samples for every one."""
-    margin: float = 0.5
-    """Share of the misses that a constraint allows which is not used up while designs are sought."""
+    validation_samples: int = 400
+    """Number of samples on which a design is checked later.
+
+    The search asks for the share of runs whose lower 95 % limit, on that many samples, is the required one.
+    """
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -487,6 +490,13 @@ class DesignProblem:
             values[i] = float(np.ravel(of._quantity.of(system, plain))[0])
         return values
 
+    def room(self, constraint: Constraint, x: _Array) -> _Array:
+        """Distance of a quantity of designs themselves from the nearest limit of a constraint, negative beyond it."""
+        values = self._own(constraint, x)
+        low = -np.inf if constraint.lower is None else constraint.lower
+        high = np.inf if constraint.upper is None else constraint.upper
+        return np.asarray(np.minimum(values - low, high - values))
+
     def _own_excess(self, x: _Array) -> _Array:
         own = [constraint for constraint in self.constraints if constraint._quantity.kind == "design"]
         found = np.zeros(len(x))
@@ -530,11 +540,18 @@ class DesignProblem:
                 continue
             kept = constraint.kept(constraint._quantity.of(self.trials.system, found)) & good
             share = float(kept.mean())
-            wanted = constraint.required + self.margin * (1.0 - constraint.required)
+            wanted = _share_for(constraint.required, self.validation_samples)
             if hopeful:
                 share, wanted = float(wilson(int(kept.sum()), kept.size, _SURE)[2]), constraint.required
             total += max(0.0, wanted - share)
         return total
+
+
+def _share_for(required: float, runs: int, confidence: float = 0.95) -> float:
+    """The smallest share of *runs* whose lower limit is at least *required*; 1 if there is none."""
+    low = np.asarray(wilson(np.arange(runs + 1), np.full(runs + 1, runs), confidence)[1])
+    enough = np.flatnonzero(low >= required)
+    return float(enough[0] / runs) if enough.size else 1.0
 
 
 def _joined(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
@@ -542,7 +559,7 @@ def _joined(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
 
 
 def problem_of(
-    trials: Trials, variables: Any, objectives: Any, constraints: Any, samples: int, margin: float = 0.5
+    trials: Trials, variables: Any, objectives: Any, constraints: Any, samples: int, validation_samples: int
 ) -> DesignProblem:
     """Check what may be chosen and what is asked of it.
 
@@ -578,13 +595,20 @@ def problem_of(
     integer("samples", samples, 8, 10**6)
     if trials.uncertainty.is_empty:
         raise InputError("uncertainty: nothing is uncertain, so every probability is 0 or 1; give tolerances")
-    return DesignProblem(trials, bounds, made, kept, samples, margin)
+    integer("validation_samples", validation_samples, 20, 10**7)
+    return DesignProblem(trials, bounds, made, kept, samples, validation_samples)
 
 
 # ----------------------------------------------------------------------------------------------------
 
 
 _Array = NDArray[np.float64]
+_REPORT_FACTOR = 4
+"""Samples from which a single design is reported, over validation_samples."""
+_STALLED, _IMPROVED = 10, 1e-4
+"""Generations without an improvement of the best design by more than this share after which the search stops."""
+_CLOSE = 1e-3
+"""Distance of two designs, over the range of each variable, below which they are not refined."""
 CHECK, REPORT = 10**9, 2 * 10**9
 """First numbers of the samples by which candidates are chosen, and of those by which the chosen are reported."""
 SATISFIED = ("violated", "undecided", "satisfied")
@@ -603,9 +627,13 @@ class OptimizerSettings:
     samples : int
         Runs of a design while it is sought, at least 8.
     validation_samples : int
-        Validation samples of a design that is checked, and again of one that is reported.
+        Validation samples of a design that is checked, and again of one of a front that is reported.  A single design
+        is reported from four times as many.
     candidates : int
         Designs that are checked at most, the best first, until one holds.
+    refinements : int
+        Further designs that are checked at most, between the one that holds and better ones that do not: they bring
+        the design to its constraints.
     confidence : float
     seed : int
     """
@@ -615,6 +643,7 @@ class OptimizerSettings:
     samples: int = 64
     validation_samples: int = 400
     candidates: int = 8
+    refinements: int = 12
     confidence: float = 0.95
     seed: int = 0
 
@@ -624,6 +653,7 @@ class OptimizerSettings:
         integer("samples", self.samples, 8, 10**6)
         integer("validation_samples", self.validation_samples, 20, 10**7)
         integer("candidates", self.candidates, 1, 10**4)
+        integer("refinements", self.refinements, 0, 10**4)
         within("confidence", self.confidence, 0.0, 1.0)
         integer("seed", self.seed, 0, 2**63 - 1)
 
@@ -632,7 +662,7 @@ class OptimizerSettings:
         """Runs that a design takes at most, of one objective."""
         return (
             self.generations * self.population * self.samples
-            + (self.candidates + 1) * self.validation_samples
+            + (self.candidates + self.refinements + _REPORT_FACTOR) * self.validation_samples
         )
 
 
@@ -645,6 +675,7 @@ def design_problem(
     uncertainty: ParameterUncertainty,
     *,
     samples: int = 64,
+    validation_samples: int = 400,
     integration: Integration | None = None,
     checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
 ) -> DesignProblem:
@@ -664,7 +695,7 @@ def design_problem(
     trials = trials_of(
         system, uncertainty, integration, checkpoint=checkpoint, early=_early(objectives, constraints)
     )
-    return problem_of(trials, variables, objectives, constraints, samples)
+    return problem_of(trials, variables, objectives, constraints, samples, validation_samples)
 
 
 @checked
@@ -683,8 +714,9 @@ def optimize_design(
     """Minimise objectives under constraints that hold with a stated probability.
 
     Generalised differential evolution searches designs on common samples.  The best designs are checked on validation
-    samples until one satisfies its constraints for certain.  The result is reported from further samples, so that the
-    search does not bias the intervals.
+    samples until one satisfies its constraints for certain.  Bisection between it and better designs that violate a
+    constraint then brings it to its constraints.  The result is reported from further samples, so that the search does
+    not bias the intervals.  The search stops early after ten generations without progress.
 
     Parameters
     ----------
@@ -710,8 +742,10 @@ def optimize_design(
         Along ``design``, one, or a front by its first objective: a variable a parameter; ``objective_...`` with ``_low`` and
         ``_high`` and, as the search saw it, ``_sought``; ``satisfied_...``, the fraction of systems that satisfy
         a constraint, with ``_low`` and ``_high``, and ``required_...``; ``constraints_satisfied``: whether every lower
-        limit is at least the required fraction, some upper limit is less, or neither is known.  Along ``tried``: every design that was looked at,
-        its objectives and ``violation``.
+        limit is at least the required fraction, some upper limit is less, or neither is known; ``distance_...``: that of
+        the fraction from the required one, or of a quantity of the design from its limit.  Along ``tried``: every design
+        that was looked at, its objectives and ``violation``.  The attribute ``termination_reason`` says why the search
+        and the refinement stopped.
 
     Raises
     ------
@@ -738,23 +772,53 @@ def optimize_design(
         constraints,
         uncertainty,
         samples=settings.samples,
+        validation_samples=settings.validation_samples,
         integration=integration,
         checkpoint=checkpoint,
     )
     report = counting(progress, "design", "generations")
     search = DifferentialEvolution(list(problem.bounds.values()), settings.population, settings.seed)
     tried: list[tuple[_Array, _Array, _Array]] = []
+    stopped, stalled, before = f"{settings.generations} generations", 0, None
     for generation in range(settings.generations):
         asked = search.ask()
         worth = problem.evaluate(asked)
         tried.append((asked, worth.objectives, worth.violation))
         search.tell(worth.objectives, worth.violation)
+        stalled = stalled + 1 if before is not None and not _improved(search, before) else 0
+        before = search.violation[0], search.objectives.copy()
         if report is not None:
             report(generation + 1, settings.generations)
+        if stalled >= _STALLED:
+            stopped = f"{generation + 1} generations, the last {_STALLED} without progress"
+            break
     x, objective_values, violation = (np.concatenate(parts) for parts in zip(*tried, strict=True))
-    chosen = _chosen(problem, settings, x, objective_values, violation)
-    found = [_fresh(problem, settings, x[i], REPORT) for i in chosen]
-    return _dataset(problem, settings, (x, objective_values, violation), chosen, found)
+    if len(problem.objectives) > 1:
+        chosen, factor = _front(problem, x, objective_values, violation), 1
+    else:
+        kept = _refined(problem, settings, x, objective_values, violation)
+        x, objective_values, violation = (
+            np.concatenate([known, np.array(more)]) if more else known
+            for known, more in (
+                (x, kept.x), (objective_values, kept.objectives), (violation, kept.violation)
+            )
+        )  # fmt: skip
+        chosen, factor, stopped = [kept.chosen], _REPORT_FACTOR, f"{stopped}; {kept.reason}"
+    numbers = np.arange(REPORT, REPORT + factor * settings.validation_samples)
+    found = [problem.estimate(x[i], numbers, settings.confidence) for i in chosen]
+    dataset = _dataset(problem, settings, (x, objective_values, violation), chosen, found)
+    return dataset.assign_attrs(termination_reason=stopped)
+
+
+def _improved(search: DifferentialEvolution, before: tuple[float, _Array]) -> bool:
+    """Whether a generation made progress: of one objective the best design, of several any of the population."""
+    violation, objectives = before
+    if search.violation[0] != violation:
+        return True
+    if objectives.shape[1] > 1 or violation > 0.0:
+        return not np.array_equal(search.objectives, objectives)
+    best, now = float(objectives[0, 0]), float(search.objectives[0, 0])
+    return bool(now < best - _IMPROVED * abs(best))
 
 
 def _early(objectives: Any, constraints: Any) -> bool:
@@ -765,14 +829,8 @@ def _early(objectives: Any, constraints: Any) -> bool:
     return all(getattr(each, "quantity", None) is not None and each._quantity.kind != "run" for each in made)
 
 
-def _fresh(problem: DesignProblem, effort: OptimizerSettings, x: _Array, begin: int) -> Estimate:
-    return problem.estimate(x, np.arange(begin, begin + effort.validation_samples), effort.confidence)
-
-
-def _chosen(
-    problem: DesignProblem, effort: OptimizerSettings, x: _Array, objectives: _Array, violation: _Array
-) -> list[int]:
-    """Designs to be reported: the best that holds on independent validation samples, or the front."""
+def _require_good(problem: DesignProblem, x: _Array, violation: _Array) -> NDArray[np.int64]:
+    """Designs that the search found to satisfy the constraints."""
     good = np.flatnonzero(violation == 0.0)
     if not good.size:
         best = int(np.argmin(violation))
@@ -781,12 +839,43 @@ def _chosen(
             f"constraints: none of {len(x)} designs satisfies them; {where} violates them least.  Widen the bounds, "
             "loosen a constraint or use more generations"
         )
-    if len(problem.objectives) > 1:
-        front = good[front_of(objectives[good])]
-        _, unique = np.unique(objectives[front], axis=0, return_index=True)
-        return front[np.sort(unique)][
-            np.argsort(objectives[front[np.sort(unique)], 0], kind="stable")
-        ].tolist()
+    return good
+
+
+def _front(problem: DesignProblem, x: _Array, objectives: _Array, violation: _Array) -> list[int]:
+    """The front, by its first objective."""
+    good = _require_good(problem, x, violation)
+    front = good[front_of(objectives[good])]
+    _, unique = np.unique(objectives[front], axis=0, return_index=True)
+    kept = front[np.sort(unique)]
+    return [int(i) for i in kept[np.argsort(objectives[kept, 0], kind="stable")]]
+
+
+@dataclass
+class _Refined:
+    """The design that is reported, and designs that were checked beyond those of the search."""
+
+    chosen: int
+    reason: str
+    x: list[_Array]
+    objectives: list[_Array]
+    violation: list[float]
+
+
+def _refined(
+    problem: DesignProblem, effort: OptimizerSettings, x: _Array, objectives: _Array, violation: _Array
+) -> _Refined:
+    """The best design that holds on independent validation samples, brought to its constraints."""
+    sign = -1.0 if problem.objectives[0].maximize else 1.0
+    numbers = np.arange(CHECK, CHECK + effort.validation_samples)
+
+    def check(design: _Array) -> tuple[bool, float, float]:
+        """Whether a design holds, its signed objective, and what its constraints lack."""
+        found = problem.estimate(design, numbers, effort.confidence)
+        state, short = _holds(problem, found)
+        return state == 2, sign * float(found.objectives[0, 0]), short
+
+    good = _require_good(problem, x, violation)
     order = good[np.argsort(objectives[good, 0], kind="stable")]
     ranked: list[int] = []
     for i in order.tolist():  # a population that has converged holds the same design many times over
@@ -794,14 +883,52 @@ def _chosen(
             ranked.append(i)
     # ever further down the list, where designs cost more and promise more
     steps = np.unique(np.geomspace(1, len(ranked), min(effort.candidates, len(ranked))).astype(np.int64)) - 1
-    ranked = [ranked[k] for k in steps.tolist()]
-    seen: list[tuple[float, int]] = []
-    for i in ranked:
-        state, short = _holds(problem, _fresh(problem, effort, x[i], CHECK))
-        if state == 2:
-            return [i]
-        seen.append((short, i))
-    return [min(seen)[1]]
+    lacking: list[tuple[float, int]] = []
+    best, value, beyond = -1, np.inf, None
+    for i in (ranked[k] for k in steps.tolist()):
+        holds, value, short = check(x[i])
+        if holds:
+            best = i
+            break
+        lacking.append((short, i))
+        beyond = x[i]
+    if best < 0:
+        words = f"none of {len(lacking)} checked designs satisfies the constraints; the one that lacks least is reported"
+        return _Refined(min(lacking)[1], words, [], [], [])
+    low, high = np.array(list(problem.bounds.values())).T
+    inside, chosen = x[best], best
+    made = _Refined(best, "", [], [], [])
+    broken = np.flatnonzero(violation > 0.0)
+    distance = np.abs((x[broken] - inside) / (high - low)).max(axis=1)
+    targets = broken[np.argsort(distance, kind="stable")].tolist()
+    checked = 0
+    while checked < effort.refinements:
+        if beyond is None:
+            if not targets:
+                made.reason = f"refined until no design was left to compare, after {checked} checked designs"
+                break
+            tried = x[targets.pop(0)]
+        else:
+            tried = 0.5 * (inside + beyond)
+        if np.abs((tried - inside) / (high - low)).max() < _CLOSE:
+            if beyond is None:
+                continue
+            made.reason = f"refined to a constraint, after {checked} checked designs"
+            break
+        checked += 1
+        holds, found, short = check(tried)
+        made.x.append(tried)
+        made.objectives.append(np.array([found]))
+        made.violation.append(short)
+        if holds and found < value:
+            inside, value, chosen = tried, found, len(x) + len(made.x) - 1
+        elif not holds and found < value:
+            beyond = tried
+        else:  # nothing is gained in this direction
+            beyond = None
+    made.reason = made.reason or f"refined with {checked} checked designs, the maximum (refinements)"
+    made.chosen = chosen
+    return made
 
 
 def _holds(problem: DesignProblem, found: Estimate) -> tuple[int, float]:
@@ -829,7 +956,7 @@ def _dataset(
         "title": "designs of a struck bistable beam", "system": trials.system.hash,
         "uncertainty": canonical_json(trials.uncertainty.describe()), "samples": effort.samples, "validation_samples": effort.validation_samples,
         "generations": effort.generations, "population": effort.population, "confidence": effort.confidence,
-        "seed": effort.seed, "uncertainty_seed": trials.uncertainty.seed, "runs_made": trials.runs,
+        "refinements": effort.refinements, "seed": effort.seed, "uncertainty_seed": trials.uncertainty.seed, "runs_made": trials.runs,
         "cycles": trials.integration.cycles_or_default, "modes": trials.system.model.modes,
     }  # fmt: skip
     attrs |= {f"fixed_{lookup(name).short}": value for name, value in trials.system.parameters.items()
@@ -868,6 +995,17 @@ def _dataset(
             (),
             required,
             {"units": "1", "long_name": "required fraction"},
+        )
+        if constraint._quantity.kind == "design":
+            distance, unit = problem.room(constraint, x[chosen]), constraint._quantity.unit
+            about = f"distance of {constraint.quantity} from its limit"
+        else:
+            distance, unit = np.array([each.constraints[k, 0] - required for each in found]), "1"
+            about = f"distance of the fraction that satisfies the constraint of {constraint.quantity} from the required one"
+        dataset[f"distance_{constraint.label}"] = (
+            ("design",),
+            distance,
+            {"units": unit, "long_name": f"{about}; negative: violated"},
         )
     states = np.array([_holds(problem, each)[0] for each in found], dtype=np.int8)
     flags = {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": " ".join(SATISFIED)}
