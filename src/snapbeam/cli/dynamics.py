@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
+from typer.core import TyperGroup
 
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import add_json, cli_command, duration, file_line, out, progress
@@ -25,11 +27,37 @@ from snapbeam.cli.parameter_options import (
 if TYPE_CHECKING:
     import xarray as xr
 
+    from snapbeam.dynamics.basins import BasinEntropy
+
 __all__ = ["dynamics"]
 
 
+class _Analyses(TyperGroup):
+    """The commands, with a suggestion for a name that is part of a command or a word of its description."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Suggest a command where none has the name."""
+        if args and self.get_command(ctx, args[0]) is None and not ctx.resilient_parsing:
+            near = self._near(args[0])
+            if near:
+                ctx.fail(f"No such command {args[0]!r}. Did you mean {' or '.join(map(repr, near))}?")
+        return super().resolve_command(ctx, args)
+
+    def _near(self, name: str) -> list[str]:
+        words = name.lower().replace("_", "-")
+        named = [each for each in self.commands if words in each or each in words]
+        first = {
+            each: str(command.help or "").partition("\n")[0].lower()
+            for each, command in self.commands.items()
+        }
+        described = [each for each, text in first.items() if words.rstrip("s") in text]
+        return named or get_close_matches(words, self.commands) or (described if len(words) > 3 else [])
+
+
 dynamics = typer.Typer(
-    help="Nonlinear dynamics: lifetimes, diagrams, exponents, sections, branches, basins and edge states.",
+    cls=_Analyses,
+    help="Nonlinear dynamics: lifetimes, bifurcation diagrams, Lyapunov spectra, Poincare sections, branches, basins "
+    "and edge states.",
     no_args_is_help=True,
     rich_markup_mode="markdown",
 )
@@ -38,6 +66,7 @@ _AXES = ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location"
 _OWN = "Analysis"
 _FEW = 4000
 """Maximum size of a variable in the JSON output."""
+_SETTLING = "16 time constants of the slowest mode"
 Output = Annotated[
     Path,
     typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE"),
@@ -57,10 +86,18 @@ def _checked(output: Path, plot: Path | None) -> None:
     check_pictures(("plot", plot))
 
 
+def _plain(found: object) -> str:
+    """The representation of a result, without its angle brackets."""
+    return repr(found).removeprefix("<").removesuffix(">")
+
+
 def _finish(dataset: xr.Dataset, output: Path, plot: Path | None, picture: str, lines: list[str]) -> None:
     """Write the results, draw them, and say what they are."""
     from snapbeam.cli.console import draw_dynamics, write_map
 
+    reason = dataset.attrs.get("termination_reason")
+    if reason and not any(str(reason) in line for line in lines):
+        lines = [*lines, f"stopped: {reason}"]
     files = [write_map(dataset, output)]
     if plot is not None:
         files.append(draw_dynamics(dataset, plot, picture))
@@ -140,10 +177,10 @@ def lifetimes(
     _finish(dataset, output, plot, "survival" if dataset["lifetime"].ndim == 0 else "lifetimes", lines)
 
 
-@dynamics.command("diagram")
+@dynamics.command("bifurcation-diagram")
 @cli_command
 @with_parameters(*_ALL)
-def diagram(
+def bifurcation_diagram(
     given: Any,
     parameter: Parameter = "velocity_amplitude",
     values: Values = "0.01:0.6:200",
@@ -153,27 +190,27 @@ def diagram(
     ] = None,
     periods: Annotated[int | None, opt.count_option("Periods to record at each value (32).", _OWN)] = None,
     transient: Annotated[
-        int | None, opt.count_option("Transient periods to discard at each value (100).", _OWN)
+        int | None, opt.count_option(f"Transient periods to discard at each value ({_SETTLING}).", _OWN)
     ] = None,
-    output: Output = Path("diagram.nc"),
+    output: Output = Path("bifurcation_diagram.nc"),
     plot: opt.Plot = None,
     threads: opt.Threads = None,
 ) -> None:
     """Compute a bifurcation diagram with an upward and a downward sweep; each value starts from the last state.
 
-    Example: snapbeam dynamics diagram --modes 8 --frequency-ratio 1.4 --values 0.01:0.3:400 --plot diagram.png
+    Example: snapbeam dynamics bifurcation-diagram --modes 8 --frequency-ratio 1.4 --values 0.01:0.3:400 --plot diagram.png
     """
-    from snapbeam.dynamics.bifurcation import bifurcation_diagram
+    from snapbeam.dynamics.bifurcation import bifurcation_diagram as diagram_of
     from snapbeam.model.parameter_axes import parse_axis
 
     settings = configured(given)
     _checked(output, plot)
     points = np.atleast_1d(parse_axis(parameter, values))
     begun = time.monotonic()
-    with progress(None, "diagram", "values") as report:
-        dataset = bifurcation_diagram(
+    with progress(None, "bifurcation diagram", "values") as report:
+        dataset = diagram_of(
             settings.system, parameter, points, settings.integration.replace(threads=threads), initial_conditions=initial_conditions or 0,
-            periods=(100 if transient is None else transient, 32 if periods is None else periods), progress=report,
+            periods=(transient, 32 if periods is None else periods), progress=report,
         )  # fmt: skip
     lines = [f"{points.size} values in {duration(time.monotonic() - begun)}"]
     for sweep in dataset["sweep"].values[:2]:
@@ -183,33 +220,35 @@ def diagram(
     _finish(dataset, output, plot, "diagram", lines)
 
 
-@dynamics.command("exponents")
+@dynamics.command("lyapunov-spectrum")
 @cli_command
 @with_parameters(*_ALL, axes=_AXES[:3])
-def exponents(
+def lyapunov_spectrum(
     given: Any,
     k: Annotated[
         int | None, opt.count_option("Number of Lyapunov exponents, largest first (1).", _OWN)
     ] = None,
     periods: Annotated[int | None, opt.count_option("Periods to average over (500).", _OWN)] = None,
-    transient: Annotated[int | None, opt.count_option("Transient periods to discard (100).", _OWN)] = None,
-    output: Output = Path("exponents.nc"),
+    transient: Annotated[
+        int | None, opt.count_option(f"Transient periods to discard ({_SETTLING}).", _OWN)
+    ] = None,
+    output: Output = Path("lyapunov_spectrum.nc"),
     plot: opt.Plot = None,
     threads: opt.Threads = None,
 ) -> None:
     """Compute Lyapunov exponents by the tangent flow, or a map of the largest exponent.
 
-    Example: snapbeam dynamics exponents --modes 8 --frequency-ratio 1.4 --velocity-amplitude 0.01 --k 4
+    Example: snapbeam dynamics lyapunov-spectrum --modes 8 --frequency-ratio 1.4 --velocity-amplitude 0.01 --k 4
     """
-    from snapbeam.dynamics.lyapunov import lyapunov_spectrum
+    from snapbeam.dynamics.lyapunov import lyapunov_spectrum as spectrum_of
 
     settings = configured(given)
     _checked(output, plot)
     begun = time.monotonic()
-    with progress(None, "exponents", "periods") as report:
-        dataset = lyapunov_spectrum(
+    with progress(None, "Lyapunov spectrum", "periods") as report:
+        dataset = spectrum_of(
             settings.system, 1 if k is None else k, 500 if periods is None else periods,
-            transient=100 if transient is None else transient, axes=settings.axes() or None,
+            transient=transient, axes=settings.axes() or None,
             integration=settings.integration.replace(threads=threads), progress=report,
         )  # fmt: skip
     lines = [f"in {duration(time.monotonic() - begun)}"]
@@ -220,30 +259,33 @@ def exponents(
     _finish(dataset, output, plot, "exponents", lines)
 
 
-@dynamics.command("section")
+@dynamics.command("poincare-section")
 @cli_command
 @with_parameters(*_ALL)
-def section(
+def poincare_section(
     given: Any,
     at: Annotated[
         str, typer.Option(help="Section: stroboscopic or impact.", rich_help_panel=_OWN, metavar="KIND")
     ] = "stroboscopic",
     periods: Annotated[int | None, opt.count_option("Periods to record (1000).", _OWN)] = None,
-    transient: Annotated[int | None, opt.count_option("Transient periods to discard (100).", _OWN)] = None,
-    output: Output = Path("section.nc"),
+    transient: Annotated[
+        int | None, opt.count_option(f"Transient periods to discard ({_SETTLING}).", _OWN)
+    ] = None,
+    output: Output = Path("poincare_section.nc"),
     plot: opt.Plot = None,
 ) -> None:
     """Compute a Poincare section: one state per period, or one at the onset of each impact.
 
-    Example: snapbeam dynamics section --modes 1 --frequency-ratio 1.625 --velocity-amplitude 0.3 --plot section.png
+    Example: snapbeam dynamics poincare-section --modes 1 --frequency-ratio 1.625 --velocity-amplitude 0.3
+    --plot section.png
     """
-    from snapbeam.dynamics.sections import poincare_section
+    from snapbeam.dynamics.sections import poincare_section as section_of
 
     settings = configured(given)
     _checked(output, plot)
-    dataset = poincare_section(
+    dataset = section_of(
         settings.system, at, 1000 if periods is None else periods,
-        transient=100 if transient is None else transient, integration=settings.integration,
+        transient=transient, integration=settings.integration,
     )  # fmt: skip
     _finish(dataset, output, plot, "section", [f"{dataset.sizes['point']} points"])
 
@@ -296,11 +338,8 @@ def branch(
     found = continuation(
         orbit, parameter, limits, direction=direction, max_points=500 if max_points is None else max_points
     )
-    lines = [
-        f"{found!r} in {duration(time.monotonic() - begun)}",
-        *(f"{event!r}" for event in found.special_points),
-    ]
-    _finish(found.to_dataset(), output, plot, "branch", [line.strip("<>") for line in lines])
+    lines = [_plain(found), *map(_plain, found.special_points), f"in {duration(time.monotonic() - begun)}"]
+    _finish(found.to_dataset(), output, plot, "branch", lines)
 
 
 @dynamics.command("basins")
@@ -315,7 +354,10 @@ def basins(
         str, typer.Option(help="Values of velocity[1], start:stop:count.", rich_help_panel=_OWN)
     ] = "-1:1:200",
     periods: Annotated[
-        int | None, opt.count_option("Periods after which a state counts as undecided (200).", _OWN)
+        int | None,
+        opt.count_option(
+            "Periods after which a state counts as undecided (16 time constants of the slowest decay).", _OWN
+        ),
     ] = None,
     states: Annotated[
         int | None, opt.count_option("Initial states of the search for attractors (200).", _OWN)
@@ -346,18 +388,35 @@ def basins(
         integration=settings.integration.replace(threads=threads),
     )
     with progress(None, "basins", "periods") as report:
-        dataset = basins_of(found, grid, periods=200 if periods is None else periods, progress=report)
+        dataset = basins_of(found, grid, periods=periods, progress=report)
     lines = [f"{len(found.attractors)} attractors in {duration(time.monotonic() - begun)}"]
     for number, each in enumerate(found.attractors):
         share = 100.0 * float((dataset["basin"] == number).mean())
-        lines.append(f"{number}: {repr(each).strip('<>')}, {share:.3g} % of the plane")
-    lines.append(f"undecided: {100 * dataset.attrs['undecided']:.3g} %")
-    entropy = basin_entropy(dataset["basin"].values, 5)
+        lines.append(f"{number}: {_plain(each)}, {share:.3g} % of the plane")
     lines.append(
-        f"basin entropy {entropy.basin:.3f} +- {entropy.basin_error:.1g}, at borders {entropy.boundary:.3f} +- "
-        f"{entropy.boundary_error:.1g}{': fractal' if entropy.is_fractal else ''}"
+        f"attractors that were not found: less than {100 * found.unseen_share():.2g} % of the {found.labels.size} states "
+        "of the search, at 95 %"
     )
+    if found.undecided > 0.0:
+        lines.append(f"search for attractors: {found.termination_reason}")
+    lines.append(f"undecided: {100 * dataset.attrs['undecided']:.3g} %")
+    lines += _entropy_lines(basin_entropy(dataset["basin"].values, 5))
     _finish(dataset, output, plot, "basins", lines)
+
+
+def _entropy_lines(entropy: BasinEntropy) -> list[str]:
+    over = "" if entropy.undecided == 0.0 else " over the decided states"
+    lines = [
+        f"basin entropy{over} {entropy.basin:.3f} +- {entropy.basin_error:.1g}, at borders {entropy.boundary:.3f} +- "
+        f"{entropy.boundary_error:.1g}{': fractal' if entropy.is_fractal else ''}"
+    ]
+    if over:
+        (low, high), (least, most) = entropy.basin_bounds, entropy.boundary_bounds
+        lines.append(
+            f"basin entropy over all states: {low:.3f} to {high:.3f}, at borders {least:.3f} to {most:.3f}, whichever of "
+            "these attractors the undecided states go to"
+        )
+    return lines
 
 
 @dynamics.command("edge")
@@ -382,7 +441,7 @@ def edge(
 ) -> None:
     """Track the edge between snapping and non-snapping motion, and find the unstable orbit on it.
 
-    Example: snapbeam dynamics edge --modes 1 --damping-ratio 0.05 --frequency-ratio 1.6 --velocity-amplitude 0.03
+    Example: snapbeam dynamics edge --modes 1 --damping-ratio 0.05 --frequency-ratio 0.7 --velocity-amplitude 0.14
     --plot edge.png
     """
     from snapbeam.dynamics.edge_states import edge_tracking, kicked
@@ -403,7 +462,5 @@ def edge(
         periods=60 if periods is None else periods,
         horizon=ahead,
     )
-    lines = [f"{found!r}".strip("<>") + f", in {duration(time.monotonic() - begun)}"]
-    if found.orbit is None:
-        lines.append("the edge state does not converge to an orbit within these periods; increase --periods")
+    lines = [_plain(found), f"in {duration(time.monotonic() - begun)}"]
     _finish(found.to_dataset(), output, plot, "edge", lines)

@@ -237,8 +237,21 @@ def _lines(dataset: xr.Dataset, elapsed: float) -> list[str]:
                 f"  {head} {float(one[name]):.4g} ({low:.4g} to {high:.4g} at {share:g} %)"
                 f"{'' if unit == '1' else ' ' + unit}"
             )
+            if kind == "satisfied":
+                lines.append(f"  {_distance(one, of)}")
         lines.append(f"  constraints on validation samples: {words[int(one['constraints_satisfied'])]}")
+    lines.append(f"stopped: {dataset.attrs['termination_reason']}")
     return lines
+
+
+def _distance(one: xr.Dataset, label: str) -> str:
+    """The distance of a design from a constraint, as text."""
+    distance = one[f"distance_{label}"]
+    value, unit = float(distance), str(distance.attrs["units"])
+    size = f"{abs(value):.3g}{'' if unit == '1' else ' ' + unit}"
+    if unit != "1" or float(one[f"required_{label}"]) == 1.0:
+        return f"distance from the limit: {size}{', violated' if value < 0.0 else ''}"
+    return f"{size} {'above' if value >= 0.0 else 'below'} the required fraction {float(one[f'required_{label}']):.4g}"
 
 
 # ----------------------------------------------------------------------------------------------------

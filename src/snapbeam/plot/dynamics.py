@@ -409,7 +409,10 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
 
 
 def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
-    """Draw an edge state: the first coordinate once a period, and the unstable orbit that it settles on."""
+    """Draw an edge state: the first coordinate once a period, and the unstable orbit that it settles on.
+
+    The right axis, which is logarithmic, has the distance between the two states of different outcome.
+    """
     if "orbit_state" not in dataset or "state" not in dataset:
         raise InputError(f"no edge state among {list(map(str, dataset.variables))}")
     name = str(dataset["coordinate"].values[0])
@@ -420,8 +423,8 @@ def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             if name == "amplitude[1]" and values.min() - 0.3 < at < values.max() + 0.3:
                 ax.axhline(at, color="0.75", linewidth=0.5, zorder=0)
                 ax.annotate(
-                    words, (1.0, at), (2.0, 0.0), xycoords=("axes fraction", "data"), textcoords="offset points",
-                    va="center", fontsize=6, color="0.4",
+                    words, (0.0, at), (2.0, 1.0), xycoords=("axes fraction", "data"), textcoords="offset points",
+                    va="bottom", fontsize=6, color="0.4",
                 )  # fmt: skip
         period = np.arange(1, values.size + 1)
         ax.plot(
@@ -442,7 +445,24 @@ def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             )
         figure = ax.get_figure(root=True)
         assert figure is not None
-        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=1)
+        apart = ax.twinx()
+        apart.semilogy(
+            period,
+            np.where(dataset["distance"].values > 0.0, dataset["distance"].values, np.nan),
+            color=_STARTS,
+            linewidth=0.7,
+            label="distance of the two states (right)",
+        )
+        apart.set_ylabel("Distance of the two states")
+        ax.set_zorder(apart.get_zorder() + 1)
+        ax.patch.set_visible(False)
+        handles, labels = (
+            left + right
+            for left, right in zip(
+                ax.get_legend_handles_labels(), apart.get_legend_handles_labels(), strict=True
+            )
+        )
+        figure.legend(handles, labels, loc="outside lower center", ncols=1)
         ax.set(xlabel="Period of the drive", ylabel=_coordinate(name))
         fix_ticks(ax)
     return ax
