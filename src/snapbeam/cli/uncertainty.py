@@ -327,6 +327,7 @@ def _lines_probability(dataset: xr.Dataset, elapsed: float) -> list[str]:
         lines.append(f"{name}: lower limit above 0.95 at {sure} points, upper limit below 0.05 at {never}")
     if not bool(dataset["reached"].all()):
         lines.append(f"interval wider than requested at {int((~dataset['reached']).sum())} points")
+    lines.append(f"stopped: {dataset.attrs['termination_reason']}")
     failed = int(dataset["runs_failed"].sum())
     return (
         [*lines, f"{failed} runs failed; the intervals include every possible outcome of these runs"]

@@ -17,7 +17,7 @@ from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, trials_of, wilson
 from snapbeam.uncertainty.optimization import OptimizerSettings, optimize_design
 from snapbeam.uncertainty.probability import SamplingPlan, allocation_of, probability_map
 from snapbeam.uncertainty.quantiles import QuantileSearchSettings, quantile_threshold
-from snapbeam.util.validation import InputError, checked, positive
+from snapbeam.util.validation import InputError, checked, within
 
 __all__ = ["LONG", "CostEstimate", "estimate_cost"]
 
@@ -30,6 +30,8 @@ _KEPT_BYTES = 320
 """Disk space of a run in a checkpoint."""
 _GOLDEN = 0.6180339887498949
 _BATCH = 32
+_LONGEST, _MOST_RUNS = 600.0, 100_000
+"""Maximum of the seconds and of the runs of a trial."""
 Point = Callable[[NDArray[np.float64]], Columns]
 
 
@@ -85,7 +87,7 @@ def estimate_cost(
     *arguments, **options
         Its arguments; nothing is written to a checkpoint.
     trial : float
-        Seconds that the trial may take, after compilation.
+        Seconds that the trial may take, after compilation; at most 600.  The trial also stops at 100,000 runs.
 
     Raises
     ------
@@ -96,7 +98,7 @@ def estimate_cost(
     --------
     >>> print(sb.uncertainty.estimate_cost(sb.uncertainty.probability_map, system, axes, uncertainty))  # doctest: +SKIP
     """
-    positive("trial", trial, "s")
+    within("trial", trial, 0.0, _LONGEST, closed="right", unit="s")
     if question is sweep:
         return _of_sweep(trial, *arguments, **options)
     if question is probability_map:
@@ -232,7 +234,7 @@ def _trial(trials: Trials, point: Point, limit: float) -> tuple[int, float, dict
     """Runs in growing batches until the time is spent; the first batch, in which kernels are made, is not timed."""
     size, begun, made, spent = _BATCH, 0, 0, 0.0
     parts: list[dict[str, NDArray[Any]]] = []
-    while spent < limit:
+    while spent < limit and made < _MOST_RUNS:
         numbers = np.arange(begun, begun + size)
         ranks = np.modf((numbers // 4) * _GOLDEN)[0]  # four samples a point
         clock = time.perf_counter()

@@ -277,6 +277,8 @@ _Array = NDArray[np.float64]
 _FREEDOM = 5.0
 """Degrees of freedom of the proposals: their tails are wider than those of what is sought."""
 _STAGES = 3
+_EVALUATIONS = 200
+"""Maximum number of evaluations of the search for the most likely beam."""
 _FEWEST = 100.0
 """Samples that weighted ones must be worth."""
 _BEAM = ("thickness", "young_modulus", "density", "length", "buckling_level")
@@ -298,11 +300,14 @@ class Posterior:
         SI.
     weights : array of shape (samples,)
         Add up to 1.
+    termination_reason : str
+        Why the search for the most likely beam stopped, and how many samples the weighted ones are worth.
     """
 
     parameters: tuple[str, ...]
     values: _Array
     weights: _Array
+    termination_reason: str = ""
 
     @property
     def effective_sample_size(self) -> float:
@@ -354,7 +359,9 @@ class Posterior:
         generator = np.random.Generator(np.random.Philox(key=[integer("seed", seed, 0, 2**63 - 1), 0]))
         ranks = (np.arange(count) + generator.random()) / count
         which = np.minimum(np.searchsorted(np.cumsum(self.weights), ranks), self.weights.size - 1)
-        return Posterior(self.parameters, self.values[which], np.full(count, 1.0 / count))
+        return Posterior(
+            self.parameters, self.values[which], np.full(count, 1.0 / count), self.termination_reason
+        )
 
     def uncertainty(self, **more: Any) -> ParameterUncertainty:
         """Return the parameter uncertainty: the distributions of the samples, with the correlations of their ranks.
@@ -382,6 +389,7 @@ class Posterior:
             attrs={
                 "title": "posterior samples of the parameters of a beam",
                 "effective_sample_size": self.effective_sample_size,
+                "termination_reason": self.termination_reason,
             }
         )
         for name, column in zip(self.parameters, self.values.T, strict=True):
@@ -464,7 +472,7 @@ def estimate_posterior(
         found += [waveform.misfit(dotted) for waveform in tracked]
         return np.concatenate(found)
 
-    logs, weights = _population(terms, begin, samples, seed, _STEP if tracked else None)
+    logs, weights, reason = _population(terms, begin, samples, seed, _STEP if tracked else None)
     values, listed = np.exp(logs), [_dotted(name) for name in names]
     if measured is not None:
         for column, (name, given, errors) in enumerate(_known_by_themselves(measured)):
@@ -472,7 +480,7 @@ def estimate_posterior(
                 generator = np.random.Generator(np.random.Philox(key=[seed, 10**6 + column]))
                 values = np.column_stack([values, _positive(name, given, errors, samples, generator)])
                 listed.append(name)
-    return Posterior(tuple(listed), values, weights)
+    return Posterior(tuple(listed), values, weights, reason)
 
 
 def _known_by_themselves(measured: Measurements) -> list[tuple[str, Any, Any]]:
@@ -532,9 +540,12 @@ def _checked_prior(
 
 def _population(
     terms: Callable[[_Array], _Array], begin: _Array, draws: int, seed: int, step: float | None = None
-) -> tuple[_Array, _Array]:
-    """Samples and weights of exp(-|terms|^2/2); *step* is the relative one of differences."""
-    found = optimize.least_squares(terms, begin, x_scale="jac", diff_step=step)
+) -> tuple[_Array, _Array, str]:
+    """Samples and weights of exp(-|terms|^2/2), and why the search stopped; *step* is the relative one of differences."""
+    found = optimize.least_squares(terms, begin, x_scale="jac", diff_step=step, max_nfev=_EVALUATIONS)
+    words = f"least squares stopped after {found.nfev} evaluations: {found.message.rstrip('.')}"
+    if found.status <= 0:
+        raise InputError(f"measured: {words}; give a beam nearer to the measured one, or a narrower prior")
     middle, cover = found.x, np.linalg.inv(found.jac.T @ found.jac)
     logs, weights = np.empty((0, begin.size)), np.empty(0)
     for stage in range(_STAGES):
@@ -547,7 +558,8 @@ def _population(
         weights = special.softmax(target - density)
         middle = weights @ logs
         cover = (logs - middle).T @ ((logs - middle) * weights[:, None]) + 1e-12 * np.diag(np.diag(cover))
-    return logs, weights
+    worth = 1.0 / float(np.sum(weights**2))
+    return logs, weights, f"{words}; {_STAGES} stages of samples, the last worth {worth:.0f} of {draws}"
 
 
 def _positive(name: str, given: Any, errors: Any, draws: int, generator: np.random.Generator) -> _Array:

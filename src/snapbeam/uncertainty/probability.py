@@ -303,6 +303,21 @@ def _counted(
     return allocate(ask, points.size, allocation, more)
 
 
+def _reason(counts: Counts, allocation: SamplingPlan) -> str:
+    """Why no further runs were made."""
+    still = int(counts.open.sum())
+    if allocation.half_width is None:
+        return f"{allocation.initial_runs} runs of every point, as given"
+    if not still:
+        return f"the interval of every point is as narrow as half_width = {allocation.half_width:g}"
+    made = counts.runs + counts.failed
+    full = int((made[counts.open] >= allocation.max_runs).sum())
+    total = "" if full == still else f" and total_runs = {allocation.total_runs}"
+    return f"the interval of {still} points is wider than half_width = {allocation.half_width:g}; " + (
+        f"{full} have max_runs = {allocation.max_runs}{total}"
+    )
+
+
 def _dataset(setup: SweepSetup, trials: Trials, counts: Counts, allocation: SamplingPlan) -> xr.Dataset:
     import xarray as xr
 
@@ -316,6 +331,7 @@ def _dataset(setup: SweepSetup, trials: Trials, counts: Counts, allocation: Samp
         "watched_outcome": allocation.outcome,
         "rounds": counts.rounds,
         "runs_made": int(counts.runs.sum() + counts.failed.sum()),
+        "termination_reason": _reason(counts, allocation),
     }
     if allocation.half_width is not None:
         more["half_width"] = allocation.half_width

@@ -215,7 +215,7 @@ def local_crossing(
     Returns
     -------
     float
-        NaN if the curve does not rise there.
+        NaN if the curve does not rise there, or the fit does not converge within 60 steps.
     """
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), 1e-300)
     distance = (values - middle) / half
@@ -239,6 +239,8 @@ def local_crossing(
         beta = beta + step / max(1.0, size / 2.0)
         if size < _SMALL:
             break
+    else:
+        return float("nan")
     if not beta[1] > 0.0:
         return float("nan")
     return float(middle + half * (special.logit(probability) - beta[0]) / beta[1])
@@ -427,7 +429,8 @@ def quantile_threshold(
     -------
     xarray.Dataset
         ``threshold`` with ``threshold_low`` and ``threshold_high`` over the axes and ``quantile``; infinite limits
-        where no run bounds it, NaN where ``outcome_of_search`` says why.  ``is_monotonic``, with the probability
+        where no run bounds it, NaN where ``outcome_of_search`` says why.  ``is_fitted``: whether the threshold is that
+        of the fitted curve, and not of the isotonic regression alone.  ``is_monotonic``, with the probability
         ``monotonicity_p_value`` of so much falling if it rises; ``runs``, ``runs_failed``.
 
     Raises
@@ -467,6 +470,7 @@ def quantile_threshold(
     more = {
         "parameter": row.short, "bounds": [low, high], "confidence": options.confidence, "watched_outcome": options.outcome,
         "uncertainty": canonical_json(trials.uncertainty.describe()), "rounds": options.rounds, "runs_made": trials.runs,
+        "termination_reason": f"{options.runs} runs of every column in {options.rounds} rounds, the maximum (runs, rounds)",
         "seed": trials.uncertainty.seed, "search_seed": options.seed,
     }  # fmt: skip
     dataset = _labelled(
@@ -515,7 +519,7 @@ def _column(runs: Runs, options: QuantileSearchSettings, bounds: tuple[float, fl
     """Thresholds of one column, with their intervals."""
     size = len(options.probabilities)
     table = np.full((3, size), np.nan)
-    codes = np.zeros(size, dtype=np.int8)
+    codes, curve = np.zeros(size, dtype=np.int8), np.zeros(size, dtype=bool)
     p = rises(runs.values, runs.hits, seed=options.seed) if runs.values.size else np.nan
     monotone = not p < _FALLS
     for i, probability in enumerate(options.probabilities):
@@ -530,9 +534,10 @@ def _column(runs: Runs, options: QuantileSearchSettings, bounds: tuple[float, fl
         if codes[i] == 0:
             ends = max(low, bounds[0]), min(high, bounds[1])
             near = local_crossing(runs.values, runs.hits, probability, *ends, _REACH)
-            value = near if monotone and not _is_step(runs) and low <= near <= high else value
+            curve[i] = monotone and not _is_step(runs) and low <= near <= high
+            value = near if curve[i] else value
         table[:, i] = value if np.isfinite(value) else np.nan, low, high
-    return {"table": table, "codes": codes, "p": p, "monotone": monotone, "runs": runs}
+    return {"table": table, "codes": codes, "curve": curve, "p": p, "monotone": monotone, "runs": runs}
 
 
 def _is_step(runs: Runs) -> bool:
@@ -564,6 +569,14 @@ def _labelled(
         (*points.dims, LEVEL),
         codes,
         {"units": "1", "long_name": "what was found"} | flags,
+    )
+    dataset["is_fitted"] = (
+        (*points.dims, LEVEL),
+        points.arranged(np.array([column["curve"] for column in columns])),
+        {
+            "units": "1",
+            "long_name": "whether the threshold is that of the fitted curve; else of the isotonic regression",
+        },
     )
     plain = {
         "is_monotonic": (
