@@ -86,7 +86,7 @@ def test_undecided_states_are_reported(tmp_path) -> None:
     result = CliRunner().invoke(app, ["dynamics", "basins", *BEAM, *grid, "-o", str(tmp_path / "b.nc")])
     assert result.exit_code == 0, result.output
     assert "over the decided states" in result.output and "basin entropy over all states" in result.output
-    assert "of the 12 states of the search, at 95 %" in result.output
+    assert "% of the sampled region, at 95 % (12 states)" in result.output
     assert (
         "are undecided after 10 periods" in result.output
         and "stopped: 10 periods (as given)" in result.output

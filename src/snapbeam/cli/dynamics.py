@@ -394,8 +394,8 @@ def basins(
         share = 100.0 * float((dataset["basin"] == number).mean())
         lines.append(f"{number}: {_plain(each)}, {share:.3g} % of the plane")
     lines.append(
-        f"attractors that were not found: less than {100 * found.unseen_share():.2g} % of the {found.labels.size} states "
-        "of the search, at 95 %"
+        f"attractors that were not found have less than {100 * found.unseen_share():.2g} % of the sampled region, at 95 % "
+        f"({found.labels.size} states)"
     )
     if found.undecided > 0.0:
         lines.append(f"search for attractors: {found.termination_reason}")
