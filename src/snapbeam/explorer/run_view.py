@@ -636,6 +636,12 @@ dot.data = {w: [source.data.w[a]], v: [source.data.v[a]]};
 """
 
 
+_SIGNALS = {
+    "midspan": ("midspan_displacement", "midspan_velocity"),
+    "striker": ("displacement_at_striker", "velocity_at_striker"),
+}
+
+
 class Phase(RunPanel):
     """Displacement against velocity, all of it and once a cycle."""
 
@@ -647,7 +653,7 @@ class Phase(RunPanel):
         self.run: Run | None = None
         self.span = (0.0, 1.0)
         self.where = pn.widgets.RadioButtonGroup(
-            name="Of", options={"centre": "center_", "at the striker": ""}, value="center_", button_type="default"
+            name="Of", options={"mid-span": "midspan", "at the striker": "striker"}, value="midspan", button_type="default"
         )  # fmt: skip
         self.phase = pn.widgets.FloatSlider(
             name="Section at the phase (cycles)", start=0.0, end=1.0, step=0.01, value=0.0, width=240
@@ -684,13 +690,11 @@ class Phase(RunPanel):
     def _draw(self) -> None:
         if self.run is None:
             return
-        dataset, before = self.run.dataset, self.where.value
+        dataset = self.run.dataset
         x, _ = across(self.run)
         inside = within(x, *self.span)
         step = max(1, -(-(inside.stop - inside.start) // _MOST_PHASE))
-        w, v = (
-            dataset[f"{before}{name}"].values for name in ("displacement_at_striker", "velocity_at_striker")
-        )
+        w, v = (dataset[name].values for name in _SIGNALS[self.where.value])
         part = slice(inside.start, inside.stop, step)
         for axis_range, values in ((self.section.x_range, w[inside]), (self.section.y_range, v[inside])):
             good = values[np.isfinite(values)]
