@@ -251,3 +251,35 @@ def test_refusals() -> None:
         sb.sweep(two, {"striker_2.gap": [1e-5]}, sb.Integration(cycles=1, engine="cuda"))
     with pytest.raises(sb.InputError, match="2 strikers"):
         two.replace(**{"striker_3.gap": 1e-5})
+
+
+def test_a_run_that_goes_on_shows_every_tip_where_it_is() -> None:
+    """From a state within a cycle: displacements, forces and penetrations are those of one run."""
+    second = sb.Striker(
+        drive=sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.05, phase=0.6),
+        location=0.3,
+        side="above",
+        gap=GAP,
+    )
+    system = sb.System(model(3), default_values.CONTACT, [FIRST, second])
+    period = 1.0 / (1.21 * system.model.reference_frequency)
+    times = np.linspace(0.0, 0.999 * period, 301)
+    how = sb.Integration(cycles=3, accuracy="reference")
+    whole = sb.simulate(system, how, sample_times=1.0 * period + times).dataset
+    state = sb.simulate(system, how.replace(cycles=1)).final_state
+    later = sb.simulate(
+        system.replace(initial_state=state), how.replace(cycles=1), sample_times=times
+    ).dataset
+    for name in ("striker_displacements", "striker_penetrations"):
+        np.testing.assert_allclose(later[name], whole[name], rtol=0.0, atol=1e-9, err_msg=name)
+
+
+def test_a_phase_of_several_motions_is_refused() -> None:
+    """They share a clock: a phase that is given with a start is that of none of them."""
+    start = sb.State(amplitude=model(3).well_amplitude, phase=0.7)
+    second = sb.Striker(
+        drive=sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.05), location=0.3, side="above", gap=GAP
+    )
+    system = sb.System(model(3), default_values.CONTACT, [FIRST, second], start)
+    with pytest.raises(sb.InputError, match=r"state phase = .*0\.7.*: must not be given if several"):
+        sb.simulate(system, sb.Integration(cycles=1))

@@ -230,7 +230,7 @@ def _summary_text(summary: Any, elapsed: float) -> str:
         f"[bold]{kind.label}[/] (in {duration(elapsed)}; {status.advice})",
         f"  zero crossings        {crossings}",
         f"  at the end            in the {well} well{final}",
-        f"  centre displacement   {center}",
+        f"  centre displacement   {center}; the other well was {'' if summary.other_well_reached else 'not '}reached",
         f"  at the striker        {summary.min_displacement:.4g} to {summary.max_displacement:.4g} b",
         f"  impacts               {contact}",
         f"  peak contact force    {force}",

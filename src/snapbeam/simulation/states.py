@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.state import ModalState, State
-from snapbeam.solver.assemble import FAR_AWAY
-from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.ensemble import FAR_AWAY, Ensemble
 
 __all__ = ["circuit_unit", "states_of"]
 

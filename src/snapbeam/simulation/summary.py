@@ -23,7 +23,9 @@ class RunSummary(Mapping[str, Any]):
     units of b omega_1.  A run that failed has the ``response_class`` UNKNOWN, and the ``advice`` of its ``status``
     gives the reason.  If a run ends early (``early_stop_time`` in seconds, NaN otherwise), its class is certain, but
     its extremes and counts stop at that time.  ``final_well`` is the sign of w(1/2) at the end; ``final_well_proven``
-    is True if the run provably stays in that well.
+    is True if the run provably stays in that well.  ``other_well_reached`` is True if the centre came more than half of
+    the way from the border of the wells to the other well; with unequal wells or without a striker, only such a run is
+    interwell.
     """
 
     response_class: ResponseClass
@@ -32,6 +34,7 @@ class RunSummary(Mapping[str, Any]):
     zero_crossings_last_quarter: int
     last_zero_crossing: float
     final_well: int
+    other_well_reached: bool
     final_well_proven: bool
     min_displacement: float
     max_displacement: float

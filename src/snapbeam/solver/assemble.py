@@ -23,15 +23,14 @@ from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State, rest_state
 from snapbeam.model.striker import numbered
 from snapbeam.model.system import System
-from snapbeam.solver.ensemble import RUN, CircuitCoupling, Ensemble, FurtherContactTable
+from snapbeam.solver.ensemble import FAR_AWAY, RUN, CircuitCoupling, Ensemble, FurtherContactTable
 from snapbeam.solver.excitation import tip_motion
 from snapbeam.solver.further_contacts import LAW, NUMBERS, OFFSET, REST, SIGN, SPEED
 from snapbeam.solver.step_size import Clocked, Plan, choose_base_step, clocked, most_steps
 from snapbeam.solver.structure import Structure, structure_of
-from snapbeam.util.validation import InputError
+from snapbeam.util.validation import InputError, shown
 
 __all__ = [
-    "FAR_AWAY",
     "Driven",
     "begun_at",
     "cycles_of",
@@ -253,11 +252,11 @@ def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, t
     return found
 
 
-def tip_of(system: System, number: int, times: _Array) -> tuple[_Array, _Array]:
+def tip_of(ensemble: Ensemble, system: System, number: int, times: _Array) -> tuple[_Array, _Array]:
     """Displacement from its mid-position (m) and velocity (m/s) of a striker of several, the first being 1.
 
-    Seen from its own side, in the frame of the ends but without what a base does to it.  Of systems whose run begins
-    with their drives.
+    Seen from its own side, in the frame of the ends but without what a base does to it.  *ensemble* is that of the one
+    run, which may begin in the middle of its drives.
     """
     striker = system.further_contacts[number - 2].striker if number > 1 else system.striker
     assert striker is not None
@@ -265,6 +264,8 @@ def tip_of(system: System, number: int, times: _Array) -> tuple[_Array, _Array]:
     own = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
     numbers, kind = drive.numbers(own, system.scale), drive.integrated_as or type(drive)
     table = kind.numbers_type()(*(float(numbers[name][0]) for name in kind.number_names))
+    clock = float(ensemble.drive_numbers[0, ensemble.drive.number_names.index("omega")])
+    times = times + float(ensemble.runs["phase"][0]) / clock
     arguments = numbers["omega"][0] * times + float(getattr(drive, "phase", 0.0))
     pairs = np.array([tip_motion(table, np.empty(0), at) for at in arguments.tolist()]).reshape(-1, 2)
     return pairs[:, 0], pairs[:, 1]
@@ -296,8 +297,6 @@ _RESOLVED = 24.0
 _TAPPED = {"standard": 0.35, "reference": 0.1}
 """Longest step with a harvester, over the reciprocal of the maximum angular frequency with an open circuit. It
 is in the kicks, and at 0.5 a run of one or three modes still loses up to 5e-3 of its gross work."""
-FAR_AWAY = -1e30
-"""Penetration, m, of a tip that is not there."""
 
 
 def make_ensemble(
@@ -343,6 +342,7 @@ def make_ensemble(
     plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
     if step_factor != 1.0:
         plans = [each._replace(step=step_factor * each.step) for each in plans]
+    _require_clock(system, state)
     driven = driven_of(system, columns, runs)
     table = np.zeros(runs, dtype=RUN)
     places = _places(structure, table, columns.get("striker.location", np.full(runs, 0.5)))
@@ -381,6 +381,23 @@ def make_ensemble(
         harvester=system.harvester,
         others=others_of(system, structure, columns, runs),
     )
+
+
+_LONGEST_CLOCK = 2.0 * math.pi * 2.0**16 / HORIZON
+"""Phase of the clock that several motions share, after 65,536 cycles."""
+
+
+def _require_clock(system: System, state: State) -> None:
+    """Refuse a phase of one drive in a start of several motions, which share a clock and have their own phases."""
+    if len(system.moving) < 2 or state.modal is not None:
+        return
+    given = state.phase[~np.isnan(state.phase)]
+    if ((given < 0.0) | (given > _LONGEST_CLOCK)).any():
+        names = ", ".join(f"{section}.phase" for section, _ in system.moving)
+        raise InputError(
+            f"state phase = {shown(given[(given < 0.0) | (given > _LONGEST_CLOCK)][0])}: must not be given if several "
+            f"motions act; give each motion its own phase ({names})"
+        )
 
 
 def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Array]:
@@ -611,7 +628,9 @@ def _decisions(
     properties = system.contact is None or system.contact.properties.energy_bound
     if not integration.early_termination or not properties or system.further_contacts:
         return
-    table["decide_crossings"] = int(time.cycles / 20.0)
+    if system.striker is not None and structure.unequal_wells is None:
+        # elsewhere the class also depends on whether the other well is reached
+        table["decide_crossings"] = int(time.cycles / 20.0)
     table["decide_reach"] = np.maximum(highest, 0.0)
     if structure.unequal_wells is not None:
         table["decide_reach"] = passed_heights(structure.model, location, highest)

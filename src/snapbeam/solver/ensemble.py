@@ -13,7 +13,11 @@ from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.harvester import Harvester
 from snapbeam.solver.structure import Structure
 
-__all__ = ["RUN", "CircuitCoupling", "Ensemble", "FurtherContactTable"]
+__all__ = ["FAR_AWAY", "RUN", "CircuitCoupling", "Ensemble", "FurtherContactTable"]
+
+
+FAR_AWAY = -1e30
+"""Penetration, m, of a tip that is not there."""
 
 
 _Array = NDArray[np.float64]
@@ -78,6 +82,11 @@ class Ensemble:
     tapped: CircuitCoupling | None = None
     harvester: Harvester | None = None
     others: FurtherContactTable | None = None
+
+    @property
+    def struck(self) -> bool:
+        """Whether there is a striker."""
+        return bool((self.runs["offset"] > FAR_AWAY).any())
 
     @property
     def forced(self) -> bool:

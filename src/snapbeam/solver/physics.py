@@ -17,6 +17,7 @@ from snapbeam.solver.simd import fma, select_less, vfloor
 __all__ = [
     "decay_less_one",
     "mode_energy",
+    "mode_power",
     "rotation",
     "shaker_motion",
     "sincos",
@@ -61,6 +62,12 @@ def mode_energy(omega, q, p):
     """Energy of linear modes, (p^2 + omega^2 q^2) / 2."""
     oq = omega * q
     return 0.5 * fma(p, p, oq * oq)
+
+
+@inlined
+def mode_power(damping, k, c, force, p):
+    """Rate of change of the energy of linear modes: by the acceleration *k*, a contact force along *c*, and damping."""
+    return p * (fma(force, c, k) - (2.0 * damping) * p)
 
 
 @inlined

@@ -15,11 +15,14 @@ __all__ = [
     "RELEASE",
     "STRETCHED",
     "TRUST",
+    "TWELFTH",
     "Clock",
     "ContactKinematics",
     "accumulate_displacement",
     "accumulate_energy",
     "accumulate_open_contact",
+    "begin_energy",
+    "begin_other_well",
     "begin_statistics",
     "clock_of",
     "close_impact",
@@ -31,7 +34,10 @@ __all__ = [
     "low_energy_limit",
     "refine_onset",
     "safe_interval",
+    "square_of_rate",
+    "square_of_signal",
     "ticks_of",
+    "time_beyond",
 ]
 
 
@@ -90,6 +96,7 @@ STRETCHED = 4.0
 _QUIET = 0.2
 # Pieces per period of the fastest mode when a step is looked into.
 PIECES = 5.0
+_THIRD, _SIXTH, TWELFTH = 1.0 / 3.0, 1.0 / 6.0, 1.0 / 12.0
 
 
 @inlined
@@ -194,6 +201,13 @@ def low_energy_limit(gamma, stretch_at_rest):
     return _QUIET * 0.25 * gamma * stretch_at_rest * stretch_at_rest
 
 
+@inlined
+def time_beyond(time, crossing, step):
+    """How long before *time* the centre last crossed the border of the wells; 0 if that is not one of the last steps."""
+    span = time - crossing
+    return select_less(span, 2.0 * step, span, 0.0 * step)
+
+
 @compiled
 def ticks_of(clock, level):
     """Length of the step of a level, in ticks: halvings of the flight step, or -1 for twice its length."""
@@ -284,15 +298,68 @@ def accumulate_displacement(accumulators, seen, seen1, length):
     )
     accumulators.peak_velocity = max(accumulators.peak_velocity, abs(seen1.wv))
     accumulators.peak_midspan_velocity = max(accumulators.peak_midspan_velocity, abs(seen1.cv))
-    half = 0.5 * length
-    accumulators.square_displacement += half * (seen.w * seen.w + seen1.w * seen1.w)
-    accumulators.square_center += half * (seen.c * seen.c + seen1.c * seen1.c)
-    accumulators.square_velocity += half * (seen.wv * seen.wv + seen1.wv * seen1.wv)
-    accumulators.square_midspan_velocity += half * (seen.cv * seen.cv + seen1.cv * seen1.cv)
+    if length > 0.0:
+        inverse = 1.0 / length
+        accumulators.square_displacement += square_of_signal(seen.w, seen.wv, seen1.w, seen1.wv, length)
+        accumulators.square_center += square_of_signal(seen.c, seen.cv, seen1.c, seen1.cv, length)
+        accumulators.square_velocity += square_of_rate(seen.w, seen.wv, seen1.w, seen1.wv, length, inverse)
+        accumulators.square_midspan_velocity += square_of_rate(
+            seen.c, seen.cv, seen1.c, seen1.cv, length, inverse
+        )
 
 
-@compiled
-def accumulate_energy(accumulators, whole, high, span):
-    """Add to the energy of the modes over time, all of them and those above a frequency."""
-    accumulators.energy_time += whole * span
-    accumulators.high_energy_time += high * span
+@inlined
+def square_of_signal(u0, v0, u1, v1, length):
+    """Integral of the square of a signal over a step, of its values *u* and its rates *v* at both ends.
+
+    The trapezoidal rule with the correction by the slopes at the ends.  Over steps of equal length the corrections
+    cancel, so that a mode that swings fast within a step is averaged without bias.
+    """
+    return (0.5 * length) * (u0 * u0 + u1 * u1) + (_SIXTH * (length * length)) * (u0 * v0 - u1 * v1)
+
+
+@inlined
+def square_of_rate(u0, v0, u1, v1, length, inverse):
+    """Integral of the square of the rate *v* of a signal *u* over a step; *inverse* is 1 / *length*.
+
+    From the rates at both ends and their mean, which the values of the signal give without error: with half the
+    difference a of the rates and the distance b of their average from the mean, mean^2 + a^2 / 3 + g b^2.  The rule has
+    order four with any g.  With g = 3/5 its error over many steps has order six: of a sine of 2 rad in a step the
+    mean square is 0.15 % low, of one of 3 rad 1.5 %, of one of 4 rad 6 %.
+    """
+    mean = (u1 - u0) * inverse
+    a, b = 0.5 * (v1 - v0), 0.5 * (v0 + v1) - mean
+    return length * (mean * mean + _THIRD * (a * a) + 0.6 * (b * b))
+
+
+@inlined
+def begin_energy(accumulators, whole, high, rate, high_rate):
+    """Begin to add up the energy of the modes at a state with this energy and this rate, high modes separately."""
+    accumulators.modal_energy, accumulators.high_energy = whole, high
+    accumulators.modal_power, accumulators.high_power = rate, high_rate
+
+
+@inlined
+def accumulate_energy(accumulators, whole, high, rate, high_rate, span):
+    """Add to the energy of the modes over time, up to a state with this energy and this rate, *span* after the last."""
+    half, twelfth = 0.5 * span, TWELFTH * (span * span)
+    accumulators.energy_time += half * (accumulators.modal_energy + whole) + twelfth * (
+        accumulators.modal_power - rate
+    )
+    accumulators.high_energy_time += half * (accumulators.high_energy + high) + twelfth * (
+        accumulators.high_power - high_rate
+    )
+    begin_energy(accumulators, whole, high, rate, high_rate)
+
+
+@inlined
+def begin_other_well(accumulators, whole, high, rate, high_rate, span):
+    """Begin to add up the energy of the modes about the other well, into which the centre came *span* ago."""
+    half = 0.5 * (span * span)
+    accumulators.energy_time += (whole - accumulators.modal_energy) * span - half * (
+        rate - accumulators.modal_power
+    )
+    accumulators.high_energy_time += (high - accumulators.high_energy) * span - half * (
+        high_rate - accumulators.high_power
+    )
+    begin_energy(accumulators, whole, high, rate, high_rate)

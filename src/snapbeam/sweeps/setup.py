@@ -418,6 +418,8 @@ def variable_attributes(name: str) -> dict[str, Any]:
     """Return the attributes of a variable: unit, long name, and the meanings of codes."""
     row = STATISTICS[name]
     labels: dict[str, Any] = {"units": row.unit, "long_name": row.long_name}
+    if row.comment:
+        labels["comment"] = row.comment
     if name == "response_class":
         labels |= code_flags(ResponseClass)
     elif name == "status":

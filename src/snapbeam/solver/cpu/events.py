@@ -11,16 +11,14 @@ from snapbeam.solver.compilation import INLINE_HERE, compiled, inlined
 from snapbeam.solver.contact_force import felt_force, jumps, zero_force_crossing
 from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.mode_lanes import (
-    beam_energy,
     flow_coefficients,
-    modal_energies,
     modal_energy,
     propagate_free,
     signals,
     speed_bound,
 )
 from snapbeam.solver.cpu.recording import record_aside, record_contact, record_instants
-from snapbeam.solver.cpu.state import IntegratorState, Rows, StepControl, cut_slot, look_slot
+from snapbeam.solver.cpu.state import IntegratorState, Rows, StepControl, cut_slot, look_slot, sample_energy
 from snapbeam.solver.cpu.step import (
     Step,
     accumulate_environment_work,
@@ -53,6 +51,7 @@ from snapbeam.solver.cpu.terms.second_well import (
     at_center,
     relative_to_nearest_well,
 )
+from snapbeam.solver.cpu.terms.step_across import mark_at_jump, taken_across
 from snapbeam.solver.excitation import seen_from, turned_motion
 from snapbeam.solver.interpolation import (
     cubic,
@@ -68,7 +67,6 @@ from snapbeam.solver.step_control import (
     TRUST,
     ContactKinematics,
     accumulate_displacement,
-    accumulate_energy,
     close_impact,
     count_zero_crossings_in_step,
     first_contact_onset,
@@ -136,6 +134,7 @@ def _deepest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, s
         with_energy = None if outputs is None else True
         short = aside(step, run, part, size)
         here = take_step(memory, blocks, layout, stages, tip, short, with_energy)
+        here = taken_across(memory, blocks, layout, stages, run, tip, now.t, short, here, with_energy)
         there = step.phase + tip.drive.omega * part
         about = observe(memory, layout, tip, there, run.spare, run.spare + size)
         if outputs is not None:
@@ -170,6 +169,7 @@ def _greatest_force(
         with_energy = None if outputs is None else True
         short = aside(step, run, part, size)
         here = take_step(memory, blocks, layout, stages, tip, short, with_energy)
+        here = taken_across(memory, blocks, layout, stages, run, tip, now.t, short, here, with_energy)
         there = step.phase + tip.drive.omega * part
         about = observe(memory, layout, tip, there, run.spare, run.spare + size)
         if outputs is not None:
@@ -340,9 +340,11 @@ def swap_rows(rows):
 def monitor_energy(
     memory, layout, run, now, t, state, seen1, control, event, status, accumulators, kernel_input
 ):
-    """Evaluate the energy every eighth step and after a release; update the step control and the status.
+    """Evaluate the energy every eighth step and after a release, every step where some modes count as high.
 
-    *state* contains the locations of q and p, and the values of g.q and q.Gq.  The energy decides whether long steps
+    Updates the step control and the status.
+
+    *state* contains the locations of q, p and k, and the values of g.q and q.Gq.  The energy decides whether long steps
     are permitted and whether early termination is possible.  Returns the step control and the status.
     """
     clock, steps_since_start, low_energy, last = (
@@ -351,21 +353,21 @@ def monitor_energy(
         control.low_energy,
         control.energy_tick,
     )
+    q, p, k, gq, qr = state
     released = event and not control.touching
-    if released or (steps_since_start & 7) == 0:
-        q, p, gq, qr = state
-        high = 0.0
+    looked_at, linear = released or (steps_since_start & 7) == 0, 0.0
+    if run.high:
+        pressed = control.touching and not event
+        span, last = (t - last) * clock.tick, t
+        linear = sample_energy(
+            memory, layout, run, now.well_sign, (q, p, k), seen1, pressed, accumulators, span
+        )
+    elif looked_at:
         near = relative_to_nearest_well(
             memory, layout.size, layout.unequal_wells, now.well_sign, q, run.spare
         )
-        if kernel_input.high:
-            linear, high = modal_energies(memory, layout, near, p)
-        else:
-            linear = modal_energy(memory, layout, near, p)
-        accumulate_energy(
-            accumulators, beam_energy(memory, layout, near, p, linear), high, (t - last) * clock.tick
-        )
-        last = t
+        linear = modal_energy(memory, layout, near, p)
+    if looked_at:
         if not control.touching:
             energy = linear + tension_energy(layout.gamma, gq, qr)
             if layout.unequal_wells is not None:
@@ -406,6 +408,7 @@ def accept_step(
     rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center
     t, seen, touching = now.t, now.seen, now.control.touching
     omega = tip.drive.omega
+    done = taken_across(memory, blocks, layout, stages, run, tip, t, step, done, with_energy)
     about = observe(memory, layout, tip, step.phase + omega * step.length, step.q1, step.p1)
     if not math.isfinite(about.d + about.dv):
         return (
@@ -453,6 +456,7 @@ def accept_step(
         step = cut_step(step, run, cut, cut * tick)
         prepare(memory, layout, stages, run.struck.drive, step.length, step.at)
         done = take_step(memory, blocks, layout, stages, tip, step, with_energy)
+        done = taken_across(memory, blocks, layout, stages, run, tip, t, step, done, with_energy)
         there = step.phase + omega * step.length
         about = observe(memory, layout, tip, there, step.q1, step.p1)
         observe_further_contacts(memory, layout.size, layout.others, tip.drive, there, step.q1, step.p1)
@@ -472,6 +476,9 @@ def accept_step(
 
     # statistics of the step
     if touching:
+        accumulators.deepest = mark_at_jump(
+            memory, blocks, layout, stages, run, tip, t, step, accumulators.deepest
+        )
         accumulators.deepest, sample = locate_peak_force(
             memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
         )
@@ -517,7 +524,7 @@ def accept_step(
     control = StepControl(
         touching, low_energy, safe_gap, safe_center, now.control.energy_tick, now.control.steps_since_start
     )
-    state = step.q1, step.p1, done.gq, done.qr
+    state = step.q1, step.p1, step.k1, done.gq, done.qr
     control, status = monitor_energy(
         memory,
         layout,

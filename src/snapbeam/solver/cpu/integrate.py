@@ -24,7 +24,9 @@ from snapbeam.solver.cpu.state import (
     StepControl,
     Workspace,
     begin,
+    change_energy_origin,
     change_origin,
+    close_energy,
     cut_slot,
     finish,
     phase_at,
@@ -42,7 +44,7 @@ from snapbeam.solver.cpu.terms.further_contact_events import (
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, mirror_further_contacts
 from snapbeam.solver.cpu.terms.second_well import has_crossed_to_other_well
 from snapbeam.solver.excitation import seen_from
-from snapbeam.solver.step_control import contact_level, flight_level, ticks_of
+from snapbeam.solver.step_control import contact_level, flight_level, ticks_of, time_beyond
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["KernelOutput", "integrate_ensemble", "integrate_recorded", "propose_step"]
@@ -72,7 +74,7 @@ class KernelOutput(NamedTuple):
 def propose_step(memory, blocks, workspace, run, now, accumulators):
     """The next step of a run, and where it stands: about the other well, if it has crossed over."""
     layout, clock, well_sign, stretch, t = workspace.layout, run.clock, now.well_sign, now.stretch, now.t
-    rows, seen, control = now.rows, now.seen, now.control
+    rows, seen, control, energy_tick = now.rows, now.seen, now.control, now.control.energy_tick
     r = layout.work + 9 * layout.size
     if layout.stretch > 0.0 and has_crossed_to_other_well(
         layout.unequal_wells, seen.c, well_sign, run.rest_center
@@ -81,7 +83,13 @@ def propose_step(memory, blocks, workspace, run, now, accumulators):
         enter_forces(layout.forced, memory, run.struck.drive, there)
         evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, there, rows.q, 0.0, False)
         mirror_further_contacts(memory, layout.others, -well_sign)
+        if run.high:
+            close_energy(memory, layout, run, now, accumulators)
+            energy_tick = t
         stretch = change_origin(memory, blocks, layout, well_sign, rows.q, rows.k, r)
+        if run.high:
+            beyond = time_beyond(t * clock.tick, accumulators.last_zero_crossing, run.step_time)
+            change_energy_origin(memory, layout, run, now, accumulators, beyond)
         well_sign = -well_sign
     accumulators.steps += 1
     level = flight_level(clock, control.low_energy, stretch, layout.stretch)
@@ -101,19 +109,27 @@ def propose_step(memory, blocks, workspace, run, now, accumulators):
         ticks, at, length, phase, control.touching, rows.q, rows.p, rows.k, rows.q1, rows.p1, rows.k1, r
     )
     return IntegratorState(
-        t, well_sign, stretch, rows, seen, _with_one_more_step(control), now.sample, now.landed, now.status
+        t,
+        well_sign,
+        stretch,
+        rows,
+        seen,
+        _with_one_more_step(control, energy_tick),
+        now.sample,
+        now.landed,
+        now.status,
     ), step
 
 
 @inlined
-def _with_one_more_step(control):
-    """One step more."""
+def _with_one_more_step(control, energy_tick):
+    """One step more, and where the energy was last looked at."""
     return StepControl(
         control.touching,
         control.low_energy,
         control.safe_gap,
         control.safe_center,
-        control.energy_tick,
+        energy_tick,
         control.steps_since_start + 1,
     )
 
@@ -131,6 +147,8 @@ def store_state(memory, blocks, layout, run, now, accumulators, i, kernel_output
     kernel_output.wells[i, landed, 1] = now.t - accumulators.onset if now.control.touching else -1
     if now.status != _RUNNING:
         return now
+    if run.high:
+        close_energy(memory, layout, run, now, accumulators)
     again, _ = restart_from_state(
         memory, blocks, layout, run, now.t, now.well_sign, rows, now.control.touching, landed + 1, now.sample
     )

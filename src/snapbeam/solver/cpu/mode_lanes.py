@@ -16,10 +16,11 @@ from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.terms.base_and_load import add_base_acceleration
 from snapbeam.solver.cpu.terms.circuit import without_circuit
 from snapbeam.solver.cpu.terms.further_contacts import struck
-from snapbeam.solver.cpu.terms.second_well import add_static_load
+from snapbeam.solver.cpu.terms.second_well import add_static_load, towards_well
 from snapbeam.solver.physics import (
     decay_less_one,
     mode_energy,
+    mode_power,
     rotation,
     sincos_cosm1,
     tension_acceleration,
@@ -31,6 +32,7 @@ __all__ = [
     "Layout",
     "acceleration_rows",
     "beam_energy",
+    "beam_power",
     "beam_signals",
     "dot",
     "flow_coefficients",
@@ -271,15 +273,28 @@ def modal_energy(memory, layout, q, p):
 
 
 @inlined
-def modal_energies(memory, layout, q, p):
-    """As :func:`modal_energy`, and the part of it in the modes above a frequency."""
-    total, high = splat(0.0), splat(0.0)
+def modal_energies(memory, layout, q, near, p, k, force):
+    """As :func:`modal_energy` of *near*, the part of it in the modes above a frequency, and the rates of both.
+
+    *q* is measured from the origin at hand, which the acceleration *k* belongs to; *force* is that of the contact.
+    """
+    total, high, power, high_power = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
     for row in range(0, layout.size, WIDTH):
-        omega = load(memory, layout.omega + row)
-        energy = mode_energy(omega, load(memory, q + row), load(memory, p + row))
-        total = total + energy
-        high = fma(load(memory, layout.high + row), energy, high)
-    return lanes_sum(total), lanes_sum(high)
+        omega, p_row, mask = (
+            load(memory, layout.omega + row),
+            load(memory, p + row),
+            load(memory, layout.high + row),
+        )
+        energy = mode_energy(omega, load(memory, near + row), p_row)
+        k_row = towards_well(
+            memory, layout.unequal_wells, layout.omega_squared, q, near, row, load(memory, k + row)
+        )
+        change = mode_power(
+            load(memory, layout.damping + row), k_row, load(memory, layout.contact + row), force, p_row
+        )
+        total, power = total + energy, power + change
+        high, high_power = fma(mask, energy, high), fma(mask, change, high_power)
+    return lanes_sum(total), lanes_sum(high), lanes_sum(power), lanes_sum(high_power)
 
 
 @inlined
@@ -333,6 +348,22 @@ def _without_energy_of(memory, body, omega, q, p, energy):
     if body is None:
         return energy
     return energy - mode_energy(memory[omega + body], memory[q + body], memory[p + body])
+
+
+@inlined
+def beam_power(memory, layout, p, k, force, power, high):
+    """The part of the rates of the modal energies that is the beam's; 0 with a circuit, whose force is not in *k*."""
+    if layout.circuit is not None:
+        return 0.0, 0.0
+    return _without_power_of(memory, layout, layout.body, p, k, force, power), high
+
+
+@inlined
+def _without_power_of(memory, layout, body, p, k, force, power):
+    if body is None:
+        return power
+    c, damping = memory[layout.contact + body], memory[layout.damping + body]
+    return power - mode_power(damping, memory[k + body], c, force, memory[p + body])
 
 
 @inlined

@@ -13,6 +13,7 @@ from snapbeam.solver.cpu.step import Step, observe, prepare, take_step
 from snapbeam.solver.cpu.sticking import held_for, hold
 from snapbeam.solver.cpu.terms.further_contact_events import any_touches
 from snapbeam.solver.cpu.terms.second_well import add_potential_energy
+from snapbeam.solver.cpu.terms.step_across import taken_across
 from snapbeam.solver.physics import tension_energy
 from snapbeam.solver.step_control import ContactKinematics
 
@@ -154,6 +155,7 @@ def record_instants(memory, blocks, layout, stages, run, tip, now, step, accumul
             q2, p2, run.spare + 2 * size, step.r
         )  # fmt: skip
         here = take_step(memory, blocks, layout, stages, tip, short, True)
+        here = taken_across(memory, blocks, layout, stages, run, tip, now.t, short, here, True)
         about = observe(memory, layout, tip, step.phase + tip.drive.omega * part, q2, p2)
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, here.gq, here.qr)
         energy = add_potential_energy(memory, size, layout.unequal_wells, q2, energy)

@@ -152,7 +152,7 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
     next_control = StepControl(
         touching, control.low_energy, t, t, control.energy_tick, control.steps_since_start
     )
-    state = rows.q, rows.p, gq, qr
+    state = rows.q, rows.p, rows.k, gq, qr
     next_control, status = monitor_energy(
         memory, layout, run, now, t, state, seen1, next_control, released, status, accumulators, kernel_input
     )
@@ -498,7 +498,7 @@ def accept_step_restitution(
     next_control = StepControl(
         together, control.low_energy, safe_gap, safe_center, control.energy_tick, control.steps_since_start
     )
-    state = rows.q, rows.p, gq, qr
+    state = rows.q, rows.p, rows.k, gq, qr
     next_control, status = monitor_energy(
         memory, layout, run, now, t, state, seen1, next_control, hit, status, accumulators, kernel_input
     )

@@ -6,11 +6,14 @@ import math
 from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import called, compiled, inlined
-from snapbeam.solver.contact_force import contact_energy, is_impulsive
+from snapbeam.solver.contact_force import contact_energy, felt_force, is_impulsive
 from snapbeam.solver.cpu.mode_lanes import (
     Layout,
     acceleration_rows,
+    beam_energy,
+    beam_power,
     flow_coefficients,
+    modal_energies,
     modal_energy,
     tension_rows,
 )
@@ -19,7 +22,13 @@ from snapbeam.solver.cpu.terms.base_and_load import changed_load, enter_forces
 from snapbeam.solver.cpu.terms.circuit import disable_long_steps, put_rate
 from snapbeam.solver.cpu.terms.further_contact_events import begin_further_contacts
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, with_further_contact_energy
-from snapbeam.solver.cpu.terms.second_well import about_level, above_own_well, add_potential_energy, put
+from snapbeam.solver.cpu.terms.second_well import (
+    about_level,
+    above_own_well,
+    add_potential_energy,
+    put,
+    relative_to_nearest_well,
+)
 from snapbeam.solver.excitation import Tip, drive_rate, numbers_of, seen_from
 from snapbeam.solver.physics import tension_energy, tension_factors
 from snapbeam.solver.splitting import TURNS, Stages
@@ -27,7 +36,9 @@ from snapbeam.solver.step_control import (
     PIECES,
     Clock,
     ContactKinematics,
+    accumulate_energy,
     accumulate_open_contact,
+    begin_other_well,
     begin_statistics,
     clock_of,
     close_impact,
@@ -44,9 +55,12 @@ __all__ = [
     "StepControl",
     "Workspace",
     "begin",
+    "change_energy_origin",
     "change_origin",
+    "close_energy",
     "finish",
     "restart_from_state",
+    "sample_energy",
 ]
 
 
@@ -143,6 +157,8 @@ class Run(NamedTuple):
     """Rows for a look ahead: q, p, k."""
     lowest: float
     """Height of a flight that is too low to be seen, m: under Newton's law, where chatter ends."""
+    high: bool
+    """Whether some modes count as high, so that the energy of the modes is added up."""
 
 
 class IntegratorState(NamedTuple):
@@ -217,9 +233,54 @@ def run_of(memory, layout, stages, kernel_input, i):
         slot,
         work + 6 * size,
         record.lowest,
+        kernel_input.high,
     )
     flow_coefficients(memory, layout, step_time / step_pieces, look_slot(run))
     return run
+
+
+@inlined
+def _energies_at(memory, layout, run, well_sign, rows, seen, touching):
+    """Energy of all linear modes, of those of the beam, of the high ones, and the rates of the last two.
+
+    *rows* are the locations of q, p and k.  Modes are those about the well that the beam is near.
+    """
+    q, p, k = rows
+    near = relative_to_nearest_well(memory, layout.size, layout.unequal_wells, well_sign, q, run.spare)
+    force = felt_force(run.struck.law, seen.d, seen.dv) if touching else 0.0
+    linear, high, power, high_power = modal_energies(memory, layout, q, near, p, k, force)
+    whole = beam_energy(memory, layout, near, p, linear)
+    power, high_power = beam_power(memory, layout, p, k, force, power, high_power)
+    return linear, whole, high, power, high_power
+
+
+@inlined
+def sample_energy(memory, layout, run, well_sign, rows, seen, touching, accumulators, span):
+    """Add to the energy of the modes over time, up to where q, p and k stand; returns that of all linear modes."""
+    linear, whole, high, power, high_power = _energies_at(
+        memory, layout, run, well_sign, rows, seen, touching
+    )
+    accumulate_energy(accumulators, whole, high, power, high_power, span)
+    return linear
+
+
+@called
+def close_energy(memory, layout, run, now, accumulators):
+    """The same where a run stands now, between two steps."""
+    rows, control = now.rows, now.control
+    span = (now.t - control.energy_tick) * run.clock.tick
+    places = rows.q, rows.p, rows.k
+    sample_energy(memory, layout, run, now.well_sign, places, now.seen, control.touching, accumulators, span)
+
+
+@called
+def change_energy_origin(memory, layout, run, now, accumulators, span):
+    """Begin to add up the energy of the modes about the other well, which was entered *span* ago."""
+    rows = now.rows.q, now.rows.p, now.rows.k
+    _, whole, high, power, high_power = _energies_at(
+        memory, layout, run, -now.well_sign, rows, now.seen, now.control.touching
+    )
+    begin_other_well(accumulators, whole, high, power, high_power, span)
 
 
 @called
@@ -293,7 +354,10 @@ def begin(memory, blocks, workspace, kernel_input, i, accumulators):
         with_further_contact_energy(memory, layout.others, energy + contact_energy(run.struck.law, seen.d)),
     )
     control = StepControl(touching, now.control.low_energy, 0, 0, 0, 0)
-    return run, IntegratorState(0, now.well_sign, now.stretch, rows, seen, control, 0, 0, now.status)
+    begun = IntegratorState(0, now.well_sign, now.stretch, rows, seen, control, 0, 0, now.status)
+    if run.high:
+        close_energy(memory, layout, run, begun, accumulators)
+    return run, begun
 
 
 @compiled
@@ -328,6 +392,8 @@ def finish(memory, blocks, layout, run, now, accumulators, impacts, before, goes
             close_impact(accumulators, impacts, before, run.struck.law, now.t, tick)
     if now.status == _EARLY_STOP:
         accumulators.early_stop_time = now.t * tick
+    if run.high:
+        close_energy(memory, layout, run, now, accumulators)
     gq, qr = tension_rows(memory, blocks, layout, q, layout.work + 9 * layout.size)
     stored = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
     stored = add_potential_energy(memory, layout.size, layout.unequal_wells, q, stored)

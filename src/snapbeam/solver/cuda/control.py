@@ -6,15 +6,16 @@ import math
 from typing import Any, NamedTuple
 
 from snapbeam.solver.cuda.layout import device, shared
-from snapbeam.solver.cuda.state import Held, Standing
+from snapbeam.solver.cuda.state import Held, Standing, energies_function
 from snapbeam.solver.cuda.step import Functions
 from snapbeam.solver.excitation import seen_from
 from snapbeam.solver.interpolation import first_downcrossing, turning_point, update_extrema
-from snapbeam.solver.physics import mode_energy, tension_acceleration, tension_energy, tension_factors
+from snapbeam.solver.physics import tension_acceleration, tension_energy, tension_factors
 from snapbeam.solver.step_control import (
     ContactKinematics,
     accumulate_displacement,
     accumulate_energy,
+    begin_other_well,
     close_impact,
     contact_level,
     count_zero_crossings_in_step,
@@ -24,6 +25,7 @@ from snapbeam.solver.step_control import (
     refine_onset,
     safe_interval,
     ticks_of,
+    time_beyond,
 )
 from snapbeam.util.status_codes import RunStatus
 
@@ -41,11 +43,13 @@ _first_entry, _count_in_step, _entry_again = (
     shared(count_zero_crossings_in_step),
     shared(refine_onset),
 )
-_finish_impact, _track, _track_energy = (
+_finish_impact, _track, _track_energy, _track_other_well = (
     shared(close_impact),
     shared(accumulate_displacement),
     shared(accumulate_energy),
+    shared(begin_other_well),
 )
+_time_beyond = shared(time_beyond)
 _safe_for, _is_quiet, _ticks_of = shared(safe_interval), shared(is_low_energy), shared(ticks_of)
 _flight_level, _contact_level, _seen_from = shared(flight_level), shared(contact_level), shared(seen_from)
 _first_fall, _turning_point, _widened = (
@@ -79,18 +83,33 @@ def _watching(functions: Functions) -> tuple[Any, Any, Any]:
     """Device functions of what is watched for: a change of well, how long nothing can happen, what is in a step."""
     sum_four, tension = functions.sum_four, functions.tension
     sample_inside_step, flow_into = functions.sample_inside_step, functions.flow_into
+    energies = energies_function(functions)
 
     @device
-    def home_again(block, fixed, held):
-        """The other well becomes the origin, if the centre has crossed over; see change_well."""
+    def home_again(block, fixed, held, accumulators):
+        """The other well becomes the origin, if the centre has crossed over; see change_well.
+
+        Returns the state, the well, and the tick at which the energy was last looked at.
+        """
         own, well_sign = held.own, held.well_sign
         if not (fixed.rest_stretch > 0.0 and held.seen.c * (well_sign * fixed.rest_center) < 0.0):
-            return own, well_sign
+            return own, well_sign, held.energy_tick
+        pressed, seen = held.touching, held.seen
+        linear, high, power, high_power = energies(block, fixed, own, seen, pressed)
+        if block.lane == 0:
+            span = (held.t - held.energy_tick) * fixed.clock.tick
+            _track_energy(accumulators, linear, high, power, high_power, span)
         q, well_sign = own.q - well_sign * fixed.shift, -well_sign
         g, r = well_sign * fixed.g, tension(block, q)
         gq, qr, _, _ = sum_four(block, g * q, r * q, 0.0, 0.0)
         along_g, along_r = tension_factors(fixed.gamma, gq, qr)
-        return Standing(q, own.p, tension_acceleration(along_g, along_r, g, r), gq, qr), well_sign
+        own = Standing(q, own.p, tension_acceleration(along_g, along_r, g, r), gq, qr)
+        linear, high, power, high_power = energies(block, fixed, own, seen, pressed)
+        if block.lane == 0:
+            crossing = accumulators.last_zero_crossing
+            span = _time_beyond(held.t * fixed.clock.tick, crossing, fixed.step_time)
+            _track_other_well(accumulators, linear, high, power, high_power, span)
+        return own, well_sign, held.t
 
     @device
     def safe_until(block, fixed, held, own, after):
@@ -218,7 +237,7 @@ def _taking(functions: Functions, safe_until: Any, inner_samples: Any) -> Any:
 
 def _keeping(functions: Functions) -> tuple[Any, Any]:
     """Device functions of what is kept of a step."""
-    sum_four = functions.sum_four
+    energies = energies_function(functions)
 
     @device
     def keep(block, fixed, held, well_sign, step, counted, accumulators):
@@ -238,21 +257,20 @@ def _keeping(functions: Functions) -> tuple[Any, Any]:
 
     @device
     def weigh(block, fixed, held, step, t, well_sign, touching, released, status, accumulators):
-        """After some steps, or a release, the energy is looked at."""
-        low_energy, energy_tick, own = held.low_energy, held.energy_tick, step.own
-        if released or (held.steps & 7) == 0:
-            energy = mode_energy(fixed.mode.omega, own.q, own.p)
-            linear, high, _, _ = sum_four(block, energy, fixed.mode.high * energy, 0.0, 0.0)
-            if block.lane == 0:
-                _track_energy(accumulators, linear, high, (t - energy_tick) * fixed.clock.tick)
-            energy_tick = t
-            if not touching:
-                energy = linear + tension_energy(fixed.gamma, own.gq, own.qr)
-                low_energy = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
-                far = well_sign < 0.0 and step.seen.w > fixed.clock.decide_reach and step.seen.c > 0.0
-                if not step.event and far and (held.steps & 15) == 0 and energy < fixed.clock.decide_energy:
-                    status = _EARLY_STOP
-        return low_energy, energy_tick, status
+        """Add up the energy of the modes; after some steps, or a release, it decides about the next ones."""
+        low_energy, own = held.low_energy, step.own
+        pressed = touching and not step.event
+        linear, high, power, high_power = energies(block, fixed, own, step.seen, pressed)
+        if block.lane == 0:
+            span = (t - held.energy_tick) * fixed.clock.tick
+            _track_energy(accumulators, linear, high, power, high_power, span)
+        if not touching and (released or (held.steps & 7) == 0):
+            energy = linear + tension_energy(fixed.gamma, own.gq, own.qr)
+            low_energy = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
+            far = well_sign < 0.0 and step.seen.w > fixed.clock.decide_reach and step.seen.c > 0.0
+            if not step.event and far and (held.steps & 15) == 0 and energy < fixed.clock.decide_energy:
+                status = _EARLY_STOP
+        return low_energy, t, status
 
     return keep, weigh
 
@@ -268,7 +286,7 @@ def step_function(functions: Functions) -> Any:
     def further(block, fixed, held, accumulators):
         """The run after one more step."""
         clock = fixed.clock
-        own, well_sign = home_again(block, fixed, held)
+        own, well_sign, energy_tick = home_again(block, fixed, held, accumulators)
         steps = held.steps + 1
         level = _flight_level(clock, held.low_energy, 2.0 * own.gq + own.qr, fixed.rest_stretch)
         if held.touching:
@@ -286,7 +304,7 @@ def step_function(functions: Functions) -> Any:
                 accumulators.touching, accumulators.onset = 1, held.t
             return Held(
                 held.t, well_sign, own, held.seen, held.touching or step.entered, held.low_energy, step.safe_gap,
-                step.safe_center, onset, held.deepest, held.energy_tick, steps, status,
+                step.safe_center, onset, held.deepest, energy_tick, steps, status,
             )  # fmt: skip
         counted = held.touching or held.t + step.span > step.safe_center
         keep(block, fixed, held, well_sign, step, counted, accumulators)
@@ -308,7 +326,7 @@ def step_function(functions: Functions) -> Any:
                     accumulators.touching, accumulators.onset = 1, t
         counting = Held(
             held.t, held.well_sign, held.own, held.seen, held.touching, held.low_energy, held.safe_gap, held.safe_center,
-            held.onset, held.deepest, held.energy_tick, steps, held.status,
+            held.onset, held.deepest, energy_tick, steps, held.status,
         )  # fmt: skip
         low_energy, energy_tick, status = weigh(
             block, fixed, counting, step, t, well_sign, touching, released, status, accumulators

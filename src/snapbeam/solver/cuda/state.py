@@ -5,15 +5,22 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from snapbeam.solver.contact_force import contact_energy
+from snapbeam.solver.contact_force import contact_energy, contact_force
 from snapbeam.solver.cuda.layout import device, shared
 from snapbeam.solver.cuda.step import Functions, Mode
 from snapbeam.solver.excitation import Tip, numbers_of, seen_from
-from snapbeam.solver.physics import mode_energy, tension_acceleration, tension_energy, tension_factors
+from snapbeam.solver.physics import (
+    mode_energy,
+    mode_power,
+    tension_acceleration,
+    tension_energy,
+    tension_factors,
+)
 from snapbeam.solver.step_control import (
     PIECES,
     Clock,
     ContactKinematics,
+    accumulate_energy,
     begin_statistics,
     clock_of,
     close_impact,
@@ -21,13 +28,14 @@ from snapbeam.solver.step_control import (
 )
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = ["Fixed", "Held", "Standing", "run_functions"]
+__all__ = ["Fixed", "Held", "Standing", "energies_function", "run_functions"]
 
 
 _OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
 _TWO_PI = 2.0 * math.pi
 
 _finish_impact, _open_book = shared(close_impact), shared(begin_statistics)
+_track_energy = shared(accumulate_energy)
 _clock_of, _seen_from, _is_quiet = shared(clock_of), shared(seen_from), shared(is_low_energy)
 
 
@@ -81,6 +89,20 @@ class Held(NamedTuple):
     status: int
 
 
+def energies_function(functions: Functions) -> Any:
+    """The device function of the energy of the modes, of the high ones, and of the rates of both."""
+    sum_four = functions.sum_four
+
+    @device
+    def energies(block, fixed, own, seen, pressed):
+        force = contact_force(fixed.struck.law, seen.d) if pressed else 0.0
+        energy = mode_energy(fixed.mode.omega, own.q, own.p)
+        power = mode_power(fixed.mode.damping, own.k, fixed.mode.contact, force, own.p)
+        return sum_four(block, energy, fixed.mode.high * energy, power, fixed.mode.high * power)
+
+    return energies
+
+
 def run_functions(functions: Functions, threads: int, finest: int) -> tuple[Any, Any, Any, Any, Any]:
     """Device functions: fixed_of, begin, take_up, lay_down, finish."""
     begin, finish = _ends(functions)
@@ -130,7 +152,7 @@ def _fixing(functions: Functions, threads: int, finest: int) -> Any:
 def _ends(functions: Functions) -> tuple[Any, Any]:
     """Device functions: how a run begins, and how it ends."""
     sum_one, sum_four, tension = functions.sum_one, functions.sum_four, functions.tension
-    observe = functions.observe
+    observe, energies = functions.observe, energies_function(functions)
 
     @device
     def tensioned(block, fixed, well_sign, q, p):
@@ -158,7 +180,9 @@ def _ends(functions: Functions) -> tuple[Any, Any]:
         )
         low_energy = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
         touching = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
+        linear, high, power, high_power = energies(block, fixed, own, seen, touching)
         if lane == 0:
+            _track_energy(accumulators, linear, high, power, high_power, 0.0)
             accumulators.status, accumulators.touching, accumulators.onset = _RUNNING, int(touching), 0
             _open_book(
                 accumulators,
@@ -171,9 +195,11 @@ def _ends(functions: Functions) -> tuple[Any, Any]:
 
     @device
     def finish(block, fixed, held, accumulators):
-        linear = sum_one(block, mode_energy(fixed.mode.omega, held.own.q, held.own.p))
+        linear, high, power, high_power = energies(block, fixed, held.own, held.seen, held.touching)
         if block.lane == 0:
             clock, law = fixed.clock, fixed.struck.law
+            span = (held.t - held.energy_tick) * clock.tick
+            _track_energy(accumulators, linear, high, power, high_power, span)
             if held.touching:
                 _finish_impact(accumulators, None, 0, law, held.t, clock.tick)
             if held.status == _EARLY_STOP:

@@ -6,10 +6,17 @@ from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import compiled, inlined
 from snapbeam.solver.cpu.run_lanes import layout as at
-from snapbeam.solver.cpu.run_lanes.state import TWO_PI, flows_over, prepare, slot_of
+from snapbeam.solver.cpu.run_lanes.state import (
+    TWO_PI,
+    change_energy_origin,
+    close_energy,
+    flows_over,
+    prepare,
+    sample_energy,
+    slot_of,
+)
 from snapbeam.solver.cpu.run_lanes.step import (
     at_hand,
-    beam_energy,
     bounds,
     modal_energy,
     modes_of,
@@ -55,6 +62,9 @@ from snapbeam.solver.step_control import (
     low_energy_limit,
     refine_onset,
     safe_interval,
+    square_of_rate,
+    square_of_signal,
+    time_beyond,
 )
 
 __all__ = ["About", "accept", "cut_again", "end_contact", "fetch", "look_at", "meet", "probe", "propose_step"]
@@ -65,9 +75,11 @@ _CUSTOM = -99.0
 
 
 @compiled
-def _change_wells(m, shape, lane_settings, which):
+def _change_wells(m, n, shape, lane_settings, kernel_input, which):
     """Take the other well as the origin, in some lanes."""
     well_sign, mask = load(m, at.HOME), mask_of(which)
+    if kernel_input.high:
+        close_energy(m, shape, kernel_input, n[at.TOUCHING], which)
     for i in range(modes_of(shape)):
         mode = at.MODE + i * at.MODE_ROWS
         q, well = load(m, mode + at.Q), load(m, mode + at.SEEN_WELL)
@@ -76,6 +88,10 @@ def _change_wells(m, shape, lane_settings, which):
     store(m, at.HOME, pick(mask, 0.0 - well_sign, well_sign))
     gq, qr = tension(m, shape, lane_settings.gamma, mask, at.Q)
     store(m, at.STRETCH, pick(mask, 2.0 * gq + qr, load(m, at.STRETCH)))
+    if kernel_input.high:
+        now = load(m, at.T) * load(m, at.TICK)
+        span = time_beyond(now, load(m, at.CROSSING), load(m, at.STEP_TIME))
+        change_energy_origin(m, shape, kernel_input, span, n[at.TOUCHING], which)
 
 
 @inlined
@@ -100,14 +116,14 @@ def _in_contact(m, level, touching):
 
 
 @inlined
-def propose_step(m, n, shape, lane_settings):
+def propose_step(m, n, shape, lane_settings, kernel_input):
     """The length of the next step of every lane that begins one; returns those."""
     fresh = n[at.LIVE] & ~(n[at.CUTTING] | n[at.ASIDE] | n[at.PROBED])
     if lane_settings.stretch > 0.0:
         across = load(m, at.C) * (load(m, at.HOME) * load(m, at.REST_CENTER))
         crossed = bits(less(across, 0.0)) & fresh
         if crossed:
-            _change_wells(m, shape, lane_settings, crossed)
+            _change_wells(m, n, shape, lane_settings, kernel_input, crossed)
     which = mask_of(fresh)
     one = pick(which, splat(1.0), splat(0.0))
     store(m, at.STEPS, load(m, at.STEPS) + one)
@@ -393,15 +409,16 @@ def _track(m, seen1, length, which):
     """Extremes and mean squares, as :func:`~snapbeam.solver.step_control.accumulate_displacement` keeps them."""
     _extremes(m, at.MIN_W, at.MAX_W, at.W, at.WV, seen1.w, seen1.wv, length, which)
     _extremes(m, at.MIN_C, at.MAX_C, at.C, at.CV, seen1.c, seen1.cv, length, which)
-    mask, half = mask_of(which), 0.5 * length
+    mask = mask_of(which)
     peak, center_peak = load(m, at.PEAK_WV), load(m, at.PEAK_CV)
     store(m, at.PEAK_WV, pick(mask, vmax(peak, vabs(seen1.wv)), peak))
     store(m, at.PEAK_CV, pick(mask, vmax(center_peak, vabs(seen1.cv)), center_peak))
     w, wv, c, cv = load(m, at.W), load(m, at.WV), load(m, at.C), load(m, at.CV)
-    _add(m, at.SQUARE_W, mask, half * (w * w + seen1.w * seen1.w))
-    _add(m, at.SQUARE_C, mask, half * (c * c + seen1.c * seen1.c))
-    _add(m, at.SQUARE_WV, mask, half * (wv * wv + seen1.wv * seen1.wv))
-    _add(m, at.SQUARE_CV, mask, half * (cv * cv + seen1.cv * seen1.cv))
+    inverse = 1.0 / length
+    _add(m, at.SQUARE_W, mask, square_of_signal(w, wv, seen1.w, seen1.wv, length))
+    _add(m, at.SQUARE_C, mask, square_of_signal(c, cv, seen1.c, seen1.cv, length))
+    _add(m, at.SQUARE_WV, mask, square_of_rate(w, wv, seen1.w, seen1.wv, length, inverse))
+    _add(m, at.SQUARE_CV, mask, square_of_rate(c, cv, seen1.c, seen1.cv, length, inverse))
 
 
 @compiled
@@ -425,6 +442,7 @@ def _count(m, n, lane_settings, kernel_input, accumulators_of_runs, c1, cv1, whi
             accumulators, clock, start, length, seen, seen1, inner_samples, rest, pieces, piece
         )
         m[at.SIDE + lane], m[at.LATE + lane] = accumulators.side, accumulators.zero_crossings_last_quarter
+        m[at.CROSSING + lane] = accumulators.last_zero_crossing
 
 
 @inlined
@@ -471,24 +489,29 @@ def _events(m, n, kernel_input, accumulators_of_runs, which):
 
 
 @inlined
-def _weigh(m, n, shape, lane_settings, seen1, released, events, which):
+def _every(steps, share, many):
+    """Lanes whose number of steps is a multiple of *many*, 1 / *share*."""
+    return bits(less(steps - many * vfloor(share * steps), 0.5))
+
+
+@inlined
+def _weigh(m, n, shape, lane_settings, kernel_input, law, seen1, released, events, which):
     """After some steps, or a release, look at the energy; returns the lanes whose future is certain."""
     steps_since_start = load(m, at.BEAT)
-    eighth = bits(less(steps_since_start - 8.0 * vfloor(0.125 * steps_since_start), 0.5))
-    due = (released | eighth) & which
+    due = (released | _every(steps_since_start, 0.125, 8.0)) & which
+    linear = splat(0.0)
+    if kernel_input.high:
+        pressed = n[at.TOUCHING] & which & ~events
+        linear = sample_energy(m, shape, law, at.Q1, at.P1, at.K1, seen1.d, pressed, load(m, at.T), which)
     if due == 0:
         return 0
-    mask, t = mask_of(due), load(m, at.T)
-    linear, high = modal_energy(m, shape, at.Q1, at.P1)
-    span = (t - load(m, at.WEIGHED)) * load(m, at.TICK)
-    _add(m, at.ENERGY_TIME, mask, beam_energy(m, shape, linear) * span)
-    _add(m, at.HIGH_TIME, mask, high * span)
-    store(m, at.WEIGHED, pick(mask, t, load(m, at.WEIGHED)))
+    if not kernel_input.high:
+        linear = modal_energy(m, shape, at.Q1, at.P1)
     apart = due & ~n[at.TOUCHING]
     energy = linear + tension_energy(lane_settings.gamma, load(m, at.GQ), load(m, at.QR))
     low_energy = bits(less(energy, low_energy_limit(lane_settings.gamma, lane_settings.stretch)))
     n[at.QUIET] = (n[at.QUIET] & ~apart) | (low_energy & apart)
-    sixteenth = bits(less(steps_since_start - 16.0 * vfloor(0.0625 * steps_since_start), 0.5))
+    sixteenth = _every(steps_since_start, 0.0625, 16.0)
     sure = apart & ~events & sixteenth & bits(less(load(m, at.HOME), 0.0))
     if sure:
         sure &= bits(less(load(m, at.DECIDE_REACH), seen1.w)) & bits(less(0.0, seen1.c))
@@ -498,7 +521,7 @@ def _weigh(m, n, shape, lane_settings, seen1, released, events, which):
 
 @inlined
 def accept(
-    m, n, shape, lane_settings, kernel_input, accumulators_of_runs, about, given, which, inner_samples
+    m, n, shape, lane_settings, kernel_input, accumulators_of_runs, law, about, given, which, inner_samples
 ):
     """Take the steps of the lanes *which*; returns those that are decided."""
     mask, length = mask_of(which), load(m, at.LENGTH)
@@ -533,7 +556,7 @@ def accept(
         _events(m, n, kernel_input, accumulators_of_runs, events)
     for bit in (at.CUTTING, at.EVENT, at.LOOKS, at.PROBED):
         n[bit] &= ~which
-    sure = _weigh(m, n, shape, lane_settings, seen1, released, events, which)
+    sure = _weigh(m, n, shape, lane_settings, kernel_input, law, seen1, released, events, which)
     many = load(m, at.DECIDE_CROSSINGS)
     sure |= bits(less(-0.5, many)) & bits(less(many, load(m, at.LATE))) & which
     for i in range(modes_of(shape)):

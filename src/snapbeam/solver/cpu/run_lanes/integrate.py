@@ -23,7 +23,7 @@ from snapbeam.solver.cpu.run_lanes.control import (
     probe,
     propose_step,
 )
-from snapbeam.solver.cpu.run_lanes.state import seat
+from snapbeam.solver.cpu.run_lanes.state import close_energy, seat
 from snapbeam.solver.cpu.run_lanes.step import beam_signals, modal_energy, signals, take, tension
 from snapbeam.solver.excitation import numbers_of
 from snapbeam.solver.physics import shaker_motion, sincos, tension_energy
@@ -76,8 +76,10 @@ def _finish(m, n, shape, lane_settings, kernel_input, lane, accumulators, status
             end_contact(m, kernel_input, i, lane, accumulators, t)
     if status == _EARLY_STOP:
         accumulators.early_stop_time = t * tick
+    if kernel_input.high:
+        close_energy(m, shape, kernel_input, n[at.TOUCHING], 1 << lane)
     gq, qr = tension(m, shape, lane_settings.gamma, mask_of(0), at.Q)
-    linear, _ = modal_energy(m, shape, at.Q, at.P)
+    linear = modal_energy(m, shape, at.Q, at.P)
     store(m, at.TEMP, linear + tension_energy(lane_settings.gamma, gq, qr))
     accumulators.energy = m[at.TEMP + lane] + contact_energy(law, m[at.D + lane])
     accumulators.displacement, accumulators.center = m[at.W + lane], m[at.C + lane]
@@ -96,6 +98,8 @@ def _finish(m, n, shape, lane_settings, kernel_input, lane, accumulators, status
         m[at.SQUARE_CV + lane],
     )
     accumulators.energy_time, accumulators.high_energy_time = m[at.ENERGY_TIME + lane], m[at.HIGH_TIME + lane]
+    accumulators.modal_energy, accumulators.high_energy = m[at.ENERGY + lane], m[at.HIGH_ENERGY + lane]
+    accumulators.modal_power, accumulators.high_power = m[at.POWER + lane], m[at.HIGH_POWER + lane]
     accumulators.work, accumulators.gross_work = m[at.WORK + lane], m[at.GROSS + lane]
     accumulators.steps = int(m[at.STEPS + lane])
     accumulators.time, accumulators.status = t, status
@@ -117,7 +121,7 @@ def _begin_at_once(m, n, accumulators_of_runs, which):
 @inlined
 def _pass(m, n, shape, lane_settings, kernel_input, accumulators_of_runs, inner_samples):
     """A step of every lane; returns the lanes that are not finite, decided, over, and at their limit of steps."""
-    fresh = propose_step(m, n, shape, lane_settings)
+    fresh = propose_step(m, n, shape, lane_settings, kernel_input)
     fetch(m, n, shape, lane_settings)
     live = n[at.LIVE]
     touching = n[at.TOUCHING] & live
@@ -149,7 +153,17 @@ def _pass(m, n, shape, lane_settings, kernel_input, accumulators_of_runs, inner_
     sure, over = 0, 0
     if going:
         sure = accept(
-            m, n, shape, lane_settings, kernel_input, accumulators_of_runs, about, given, going, inner_samples
+            m,
+            n,
+            shape,
+            lane_settings,
+            kernel_input,
+            accumulators_of_runs,
+            law,
+            about,
+            given,
+            going,
+            inner_samples,
         )
         over = going & ~bits(less(load(m, at.T), load(m, at.END)))
     spent = (going | at_once) & ~bits(less(load(m, at.STEPS), load(m, at.MAX_STEPS)))

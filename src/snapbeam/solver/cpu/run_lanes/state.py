@@ -6,11 +6,13 @@ import math
 from typing import NamedTuple
 
 from snapbeam.solver.compilation import called, compiled, inlined
-from snapbeam.solver.contact_force import contact_energy, is_impulsive
+from snapbeam.solver.contact_force import contact_energy, contact_force, is_impulsive
 from snapbeam.solver.cpu.run_lanes import layout as at
 from snapbeam.solver.cpu.run_lanes.step import (
+    beam_energies,
     beam_signals,
     groups_of,
+    modal_energies,
     modal_energy,
     modes_of,
     signals,
@@ -25,12 +27,23 @@ from snapbeam.solver.physics import (
     sincos_cosm1,
     tension_energy,
 )
-from snapbeam.solver.simd import WIDTH, broadcast_load, load, mask_of, pick, store
+from snapbeam.solver.simd import WIDTH, broadcast_load, lanes_tuple, load, mask_of, pick, splat, store
 from snapbeam.solver.splitting import TURNS, Stages
-from snapbeam.solver.step_control import PIECES, ContactKinematics, begin_statistics, is_low_energy
+from snapbeam.solver.step_control import PIECES, TWELFTH, ContactKinematics, begin_statistics, is_low_energy
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = ["TWO_PI", "LaneSettings", "flows_over", "prepare", "seat", "slot_of", "stand"]
+__all__ = [
+    "TWO_PI",
+    "LaneSettings",
+    "change_energy_origin",
+    "close_energy",
+    "flows_over",
+    "prepare",
+    "sample_energy",
+    "seat",
+    "slot_of",
+    "stand",
+]
 
 
 TWO_PI = 2.0 * math.pi
@@ -123,7 +136,7 @@ def stand(m, shape, lane_settings, lane):
     which = mask_of(1 << lane)
     gq, qr = tension(m, shape, lane_settings.gamma, which, at.Q)
     w, wv, c, cv = signals(m, shape, at.Q, at.P)
-    linear, _ = modal_energy(m, shape, at.Q, at.P)
+    linear = modal_energy(m, shape, at.Q, at.P)
     phase = load(m, at.PHASE0) + TWO_PI * (load(m, at.WITHIN) / load(m, at.PERIOD))
     sine, cosine = sincos(phase)
     motion, velocity = shaker_motion(load(m, at.AMPLITUDE), load(m, at.OMEGA), sine, cosine)
@@ -139,6 +152,68 @@ def stand(m, shape, lane_settings, lane):
     store(m, at.STRETCH, pick(which, 2.0 * gq + qr, load(m, at.STRETCH)))
     store(m, at.TEMP, linear + tension_energy(lane_settings.gamma, gq, qr))
     return m[at.TEMP + lane]
+
+
+@inlined
+def _energies_at(m, shape, law, q, p, k, d, pressed):
+    """Energy of all linear modes, of those of the beam, of the high ones, and the rates of the last two."""
+    force = pick(mask_of(pressed), contact_force(law, d), splat(0.0))
+    linear, high, power, high_power = modal_energies(m, shape, q, p, k, force)
+    whole, power = beam_energies(m, shape, q, p, k, force, linear, power)
+    return linear, whole, high, power, high_power
+
+
+@inlined
+def _keep_energies(m, whole, high, power, high_power, mask):
+    """What was found last."""
+    for row, value in (
+        (at.ENERGY, whole),
+        (at.HIGH_ENERGY, high),
+        (at.POWER, power),
+        (at.HIGH_POWER, high_power),
+    ):
+        store(m, row, pick(mask, value, load(m, row)))
+
+
+@inlined
+def sample_energy(m, shape, law, q, p, k, d, pressed, t, which):
+    """Add to the energy of the modes over time, in the lanes *which*; returns that of all linear modes.
+
+    *d* is the penetration in the lanes *pressed*; *t* is the present tick.
+    """
+    linear, whole, high, power, high_power = _energies_at(m, shape, law, q, p, k, d, pressed)
+    mask, zero = mask_of(which), splat(0.0)
+    span = (t - load(m, at.WEIGHED)) * load(m, at.TICK)
+    half, twelfth = 0.5 * span, TWELFTH * (span * span)
+    more = half * (load(m, at.ENERGY) + whole) + twelfth * (load(m, at.POWER) - power)
+    store(m, at.ENERGY_TIME, load(m, at.ENERGY_TIME) + pick(mask, more, zero))
+    more = half * (load(m, at.HIGH_ENERGY) + high) + twelfth * (load(m, at.HIGH_POWER) - high_power)
+    store(m, at.HIGH_TIME, load(m, at.HIGH_TIME) + pick(mask, more, zero))
+    store(m, at.WEIGHED, pick(mask, t, load(m, at.WEIGHED)))
+    _keep_energies(m, whole, high, power, high_power, mask)
+    return linear
+
+
+@called
+def close_energy(m, shape, kernel_input, touching, which):
+    """The same where the lanes *which* stand now, between two steps."""
+    law = lanes_tuple(kernel_input.law, m, at.LAW)
+    sample_energy(m, shape, law, at.Q, at.P, at.K, load(m, at.D), touching & which, load(m, at.T), which)
+
+
+@called
+def change_energy_origin(m, shape, kernel_input, span, touching, which):
+    """Begin to add up the energy of the modes about the other well, which was entered *span* ago."""
+    law, mask, zero = lanes_tuple(kernel_input.law, m, at.LAW), mask_of(which), splat(0.0)
+    _, whole, high, power, high_power = _energies_at(
+        m, shape, law, at.Q, at.P, at.K, load(m, at.D), touching & which
+    )
+    half = 0.5 * (span * span)
+    more = (whole - load(m, at.ENERGY)) * span - half * (power - load(m, at.POWER))
+    store(m, at.ENERGY_TIME, load(m, at.ENERGY_TIME) + pick(mask, more, zero))
+    more = (high - load(m, at.HIGH_ENERGY)) * span - half * (high_power - load(m, at.HIGH_POWER))
+    store(m, at.HIGH_TIME, load(m, at.HIGH_TIME) + pick(mask, more, zero))
+    _keep_energies(m, whole, high, power, high_power, mask)
 
 
 @compiled
@@ -205,9 +280,12 @@ def seat(m, n, shape, lane_settings, kernel_input, lane, i, accumulators):
         accumulators.side,
         accumulators.deepest,
     )
+    m[at.CROSSING + lane] = accumulators.last_zero_crossing
     m[at.MIN_W + lane], m[at.MAX_W + lane] = accumulators.min_displacement, accumulators.max_displacement
     m[at.MIN_C + lane], m[at.MAX_C + lane] = accumulators.min_center, accumulators.max_center
-    for row in range(at.PEAK_WV, at.DEEPEST, WIDTH):
+    for row in range(at.PEAK_WV, at.CROSSING, WIDTH):
+        m[row + lane] = 0.0
+    for row in range(at.IMPULSE, at.DEEPEST, WIDTH):
         m[row + lane] = 0.0
     for row in (at.SAFE_GAP, at.SAFE_CENTER, at.WEIGHED, at.BEAT, at.STEPS, at.LATE):
         m[row + lane] = 0.0
@@ -216,6 +294,8 @@ def seat(m, n, shape, lane_settings, kernel_input, lane, i, accumulators):
     n[at.LIVE] |= bit
     if touching:
         n[at.TOUCHING] |= bit
+    if kernel_input.high:
+        close_energy(m, shape, kernel_input, n[at.TOUCHING], bit)
     if is_low_energy(energy, lane_settings.gamma, lane_settings.stretch):
         n[at.QUIET] |= bit
     return _RUNNING if record.end > 0 else _OK

@@ -18,6 +18,7 @@ from snapbeam.solver.cpu.run_lanes import layout as at
 from snapbeam.solver.interpolation import hermite_overshoot_bound
 from snapbeam.solver.physics import (
     mode_energy,
+    mode_power,
     shaker_motion,
     sincos,
     tension_acceleration,
@@ -44,11 +45,12 @@ __all__ = [
     "TEXTS",
     "Modes",
     "at_hand",
-    "beam_energy",
+    "beam_energies",
     "beam_signals",
     "bounds",
     "groups_of",
     "made",
+    "modal_energies",
     "modal_energy",
     "modes_of",
     "propagate_free",
@@ -60,7 +62,7 @@ __all__ = [
 
 _KNOWN = {
     "__name__": __name__, "both": both, "hermite_overshoot_bound": hermite_overshoot_bound, "contact_force": contact_force, "fma": fma, "less": less,
-    "load": load, "move": move, "mode_energy": mode_energy, "pick": pick, "shaker_motion": shaker_motion,
+    "load": load, "move": move, "mode_energy": mode_energy, "mode_power": mode_power, "pick": pick, "shaker_motion": shaker_motion,
     "sincos": sincos, "splat": splat, "broadcast_load": broadcast_load, "store": store,
     "tension_acceleration": tension_acceleration, "tension_factors": tension_factors, "turned": turned, "vabs": vabs,
     "vmax": vmax,
@@ -251,14 +253,28 @@ def _bounds(modes: Modes) -> list[str]:
 
 
 def _energies(modes: Modes) -> list[str]:
-    """Quadratic part of the energy, and the part of it in modes that count as high."""
+    """Quadratic part of the energy."""
     lines = ["def modal_energy(m, shape, q, p):"]
     for i in modes.each():
         omega = modes.number(i, at.OMEGA_I)
         lines += [f"    u{i} = mode_energy({omega}, {modes.row(i, 'q')}, {modes.row(i, 'p')})"]
     total = modes.plain_total(lambda i: f"u{i}")
+    return [*lines, f"    return {total}"]
+
+
+def _energies_and_powers(modes: Modes) -> list[str]:
+    """Quadratic part of the energy, the part of it in modes that count as high, and the rates of both."""
+    lines = ["def modal_energies(m, shape, q, p, k, force):"]
+    for i in modes.each():
+        omega, damping = modes.number(i, at.OMEGA_I), modes.number(i, at.DAMPING)
+        lines += [f"    p{i} = {modes.row(i, 'p')}"]
+        lines += [f"    u{i} = mode_energy({omega}, {modes.row(i, 'q')}, p{i})"]
+        contact = modes.row(i, at.CONTACT)
+        lines += [f"    v{i} = mode_power({damping}, {modes.row(i, 'k')}, {contact}, force, p{i})"]
+    total, power = modes.plain_total(lambda i: f"u{i}"), modes.plain_total(lambda i: f"v{i}")
     high = modes.total(lambda i: (modes.number(i, at.HIGH), f"u{i}"))
-    return [*lines, f"    return {total}, {high}"]
+    high_power = modes.total(lambda i: (modes.number(i, at.HIGH), f"v{i}"))
+    return [*lines, f"    return {total}, {high}, {power}, {high_power}"]
 
 
 def _glide(modes: Modes) -> list[str]:
@@ -349,7 +365,7 @@ def _at_hand(modes: Modes) -> list[str]:
 
 TEXTS = {
     "at_hand": _at_hand, "take": _take, "signals": _signals, "tension": _tension_at, "bounds": _bounds,
-    "modal_energy": _energies,    "glide": _glide,
+    "modal_energy": _energies, "modal_energies": _energies_and_powers, "glide": _glide,
 }  # fmt: skip
 
 
@@ -408,20 +424,22 @@ def _beam_signals_of(m, shape, q, p, w, wv):
     return without_body
 
 
-def beam_energy(m: Any, shape: Any, energy: Any) -> Any:
-    """Modal energy of the beam without the striker's mass, at the ends of the steps."""
-    raise TypeError("beam_energy runs in compiled code only")
+def beam_energies(m: Any, shape: Any, q: int, p: int, k: int, force: Any, energy: Any, power: Any) -> Any:
+    """Modal energy of the beam without the striker's mass, and its rate."""
+    raise TypeError("beam_energies runs in compiled code only")
 
 
-@overload(beam_energy, jit_options=INLINE_HERE)
-def _beam_energy_of(m, shape, energy):
+@overload(beam_energies, jit_options=INLINE_HERE)
+def _beam_energies_of(m, shape, q, p, k, force, energy, power):
     if shape.instance_class.body is None:
-        return lambda m, shape, energy: energy
+        return lambda m, shape, q, p, k, force, energy, power: (energy, power)
     body = at.MODE + shape.instance_class.body * at.MODE_ROWS
 
-    def without_body(m, shape, energy):
-        omega = broadcast_load(m, body + at.OMEGA_I)
-        return energy - mode_energy(omega, load(m, body + at.Q1), load(m, body + at.P1))
+    def without_body(m, shape, q, p, k, force, energy, power):
+        omega, damping = broadcast_load(m, body + at.OMEGA_I), broadcast_load(m, body + at.DAMPING)
+        own = mode_energy(omega, load(m, body + q), load(m, body + p))
+        given = mode_power(damping, load(m, body + k), load(m, body + at.CONTACT), force, load(m, body + p))
+        return energy - own, power - given
 
     return without_body
 
@@ -449,7 +467,7 @@ def _bounds_of(m, shape):
 
 
 def modal_energy(m: Any, shape: Any, q: int, p: int) -> Any:
-    """Quadratic part of the energy, and the part of it in modes that count as high."""
+    """Quadratic part of the energy."""
     raise TypeError("modal_energy runs in compiled code only")
 
 
@@ -457,6 +475,17 @@ def modal_energy(m: Any, shape: Any, q: int, p: int) -> Any:
 def _energy_of(m, shape, q, p):
     written = _function("modal_energy", shape.instance_class)
     return lambda m, shape, q, p: written(m, shape, q, p)
+
+
+def modal_energies(m: Any, shape: Any, q: int, p: int, k: int, force: Any) -> Any:
+    """The same, the part of it in modes that count as high, and the rates of both under a contact force."""
+    raise TypeError("modal_energies runs in compiled code only")
+
+
+@overload(modal_energies, jit_options=INLINE_HERE)
+def _energies_of(m, shape, q, p, k, force):
+    written = _function("modal_energies", shape.instance_class)
+    return lambda m, shape, q, p, k, force: written(m, shape, q, p, k, force)
 
 
 def propagate_free(m: Any, shape: Any, look: int, which: Any, with_center: bool, most: int) -> Any:

@@ -1,7 +1,8 @@
 """Where the velocity of a drive jumps, as at the end of a shock: no step may go across, or it loses its order.
 
 A drive names the times of its jumps (:attr:`~snapbeam.model.drive.base.Drive.discontinuities`).  Of one that does not, as the
-paper's, nothing of this is compiled.
+paper's, nothing of this is compiled.  Steps end a few ticks before a jump and after it.  The step between is taken in
+two parts, of which one ends at the jump and the other begins there.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from numba.extending import overload
 
 from snapbeam.solver.compilation import INLINE_HERE, inlined
 
-__all__ = ["Jump", "jumps_of", "up_to_discontinuity"]
+__all__ = ["APART", "Jump", "discontinuity_within", "jumps_of", "up_to_discontinuity"]
 
 
 _TWO_PI = 2.0 * math.pi
 _MARGIN = 2
-"""Ticks on either side of a jump, between which one step goes across it: far less than any error of a run."""
+"""Ticks on either side of a jump, between which one step goes across it."""
+APART = 8e-15
+"""Of the argument of a drive, rad: so far from the jump both parts of that step read the motion, beyond rounding."""
 
 
 class Jump(NamedTuple):
@@ -62,13 +65,39 @@ def _later(own: Any, phase: int, omega: int) -> Any:
     return later
 
 
+@inlined
+def _ticks(time, omega, phase, period):
+    """The tick of a jump, not a whole number."""
+    return (time * omega - phase) / _TWO_PI * period
+
+
+def _within(jumps: list[Jump], fields: tuple[str, ...]) -> Any:
+    """A function that finds the first jump within some ticks."""
+    time, rest = _time_of(jumps[0], fields), _within(jumps[1:], fields) if len(jumps) > 1 else None
+
+    @inlined
+    def one(drive, phase, period, t, ticks):
+        after = _ticks(time(drive), drive.omega, phase, period) - t
+        return after if 0.0 < after < ticks else -1.0
+
+    if rest is None:
+        return one
+
+    @inlined
+    def all_of_them(drive, phase, period, t, ticks):
+        first, other = one(drive, phase, period, t, ticks), rest(drive, phase, period, t, ticks)
+        return first if other < 0.0 or 0.0 < first < other else other
+
+    return all_of_them
+
+
 def _limited(jumps: list[Jump], fields: tuple[str, ...]) -> Any:
     """A function that ends a step at the first border of any jump."""
     time, rest = _time_of(jumps[0], fields), _limited(jumps[1:], fields) if len(jumps) > 1 else None
 
     @inlined
     def one(drive, phase, period, t, limit):
-        ticks = (time(drive) * drive.omega - phase) / _TWO_PI * period
+        ticks = _ticks(time(drive), drive.omega, phase, period)
         if ticks > t - _MARGIN and ticks < limit + _MARGIN:
             before, behind = int(ticks) - _MARGIN, int(ticks) + 1 + _MARGIN
             if before > t:
@@ -110,3 +139,20 @@ def _up_to_discontinuity(drive, phase, period, t, limit):
         return lambda drive, phase, period, t, limit: limit
     limited = _limited(jumps, tuple(drive.fields))
     return lambda drive, phase, period, t, limit: limited(drive, phase, period, t, limit)
+
+
+def discontinuity_within(drive: Any, phase: float, period: int, t: int, ticks: float) -> float:
+    """How many ticks after tick *t* the drive jumps first, within less than *ticks*; -1 if it does not.
+
+    Other parameters are those of :func:`up_to_discontinuity`.
+    """
+    raise TypeError("discontinuity_within runs in compiled code only")
+
+
+@overload(discontinuity_within, jit_options=INLINE_HERE)
+def _discontinuity_within(drive, phase, period, t, ticks):
+    jumps = jumps_of(drive.instance_class.owner)
+    if not jumps:
+        return lambda drive, phase, period, t, ticks: -1.0
+    within = _within(jumps, tuple(drive.fields))
+    return lambda drive, phase, period, t, ticks: within(drive, phase, period, t, ticks)

@@ -46,6 +46,7 @@ from snapbeam.solver.step_control import TRUST, ContactKinematics, contact_level
 
 __all__ = [
     "accumulate_further_contacts",
+    "add_stored_contacts",
     "any_touches",
     "begin_further_contacts",
     "close_further_contacts",
@@ -265,6 +266,17 @@ def store_further_contacts(memory, others):
     for j in range(count_of(others.kinds)):
         at = block(others, j)
         memory[at + KEPT], memory[at + WORKED] = memory[at + IMPULSE], memory[at + WORK]
+
+
+@inlined
+def add_stored_contacts(memory, others):
+    """Add what :func:`store_further_contacts` kept of the first part of a step to what the second part gave."""
+    if others is None:
+        return
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        memory[at + IMPULSE] += memory[at + KEPT]
+        memory[at + WORK] += memory[at + WORKED]
 
 
 @inlined

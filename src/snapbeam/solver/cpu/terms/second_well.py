@@ -22,6 +22,7 @@ __all__ = [
     "pushed_along",
     "put",
     "relative_to_nearest_well",
+    "towards_well",
 ]
 
 
@@ -98,6 +99,15 @@ def relative_to_nearest_well(memory, size, unequal_wells, well_sign, q, spare):
     for row in range(0, size, WIDTH):
         store(memory, spare + row, load(memory, q + row) - load(memory, unequal_wells.second + row))
     return spare
+
+
+@inlined
+def towards_well(memory, unequal_wells, omega_squared, q, near, row, k):
+    """An acceleration that belongs to *q*, for the energy of *near*: with the linear force of the difference."""
+    if unequal_wells is None:
+        return k
+    shift = load(memory, near + row) - load(memory, q + row)
+    return fma(load(memory, omega_squared + row), shift, k)
 
 
 @inlined

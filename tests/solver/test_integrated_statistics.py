@@ -1,0 +1,155 @@
+"""Root mean squares and the share of the energy in high modes, against dense recordings of random runs."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam.model import default_values
+from snapbeam.solver.cpu import driver
+from snapbeam.solver.statistics import Statistic, accumulators_dtype, register, unregister
+
+ROOTS = {
+    "displacement": "displacement_at_striker",
+    "midspan_displacement": "midspan_displacement",
+    "velocity": "velocity_at_striker",
+    "midspan_velocity": "midspan_velocity",
+}
+DISPLACEMENT = {"standard": 2e-5, "reference": 5e-7}
+VELOCITY = {"standard": 5e-4, "reference": 3e-6}
+SHARE = {"standard": 1e-3, "reference": 2e-5}
+SAMPLES = 100_001
+
+
+def mean(values: np.ndarray) -> float:
+    """Of samples at even distances, the first and the last counted half."""
+    return float(values.sum() - 0.5 * (values[0] + values[-1])) / (values.size - 1)
+
+
+def share(run: sb.Run, wells: tuple[np.ndarray, np.ndarray], level: float) -> float:
+    """High share of the energy of the linear modes about the well on the side of the centre."""
+    model, data = run.system.model, run.dataset
+    back = model.mass @ model.linear_modes
+    lower, upper = sorted(wells, key=lambda each: float(each @ model.midspan_shape))
+    above = data.midspan_displacement.values * model.length_scale > level
+    q = (data.modal_amplitude.values - np.where(above[:, None], upper, lower)) @ back
+    p = data.modal_velocity.values @ back
+    energy = 0.5 * (p**2 + (model.omega * q) ** 2)
+    high = model.natural_frequencies > run.integration.high_frequency_ratio * model.reference_frequency
+    return mean(energy[:, high].sum(axis=1)) / mean(energy.sum(axis=1))
+
+
+def assert_integrated(system: sb.System, how: sb.Integration, period: float) -> sb.Run:
+    end = how.cycles * period
+    run = sb.simulate(system, how, sample_times=np.linspace(0.0, end * (1.0 - 1e-13), SAMPLES))
+    for name, variable in ROOTS.items():
+        wanted = math.sqrt(mean(run.dataset[variable].values ** 2))
+        bound = (VELOCITY if "velocity" in name else DISPLACEMENT)[how.accuracy]
+        assert run.summary[f"rms_{name}"] == pytest.approx(wanted, rel=bound), (name, system)
+    return run
+
+
+@pytest.mark.parametrize("accuracy", ["standard", "reference"])
+@pytest.mark.parametrize("modes", [1, 3, 8, pytest.param(32, marks=pytest.mark.slow)])
+def test_random_runs_with_contact(modes: int, accuracy: str) -> None:
+    rng = np.random.default_rng(modes)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, damping_ratio=0.005)
+    for _ in range(4):
+        ratio, ratio_of_high = rng.uniform(0.7, 1.8), rng.uniform(2.0, 6.0)
+        drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=rng.uniform(0.05, 0.6))
+        system = sb.System(
+            model, default_values.CONTACT, sb.Striker(drive=drive, location=rng.uniform(0.3, 0.5))
+        )
+        how = sb.Integration(cycles=5, accuracy=accuracy, high_frequency_ratio=ratio_of_high)
+        run = assert_integrated(system, how, 1.0 / (ratio * model.reference_frequency))
+        assert run.summary.impacts > 1
+        if (model.natural_frequencies > ratio_of_high * model.reference_frequency).any():
+            wanted = share(run, (model.well_amplitude, -model.well_amplitude), 0.0)
+            assert run.summary.high_frequency_energy_fraction == pytest.approx(wanted, rel=SHARE[accuracy])
+
+
+@pytest.mark.parametrize("accuracy", ["standard", "reference"])
+def test_unequal_wells(accuracy: str) -> None:
+    model = sb.ReducedModel.from_beam(
+        default_values.BEAM, modes=4, imperfection=sb.Imperfection(midspan_amplitude=2e-6)
+    )
+    assert model.landscape is not None
+    wells = model.landscape.lower.amplitude, model.landscape.upper.amplitude
+    reached = 0
+    for ratio, velocity in ((1.1, 0.5), (1.4, 0.1)):
+        drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity)
+        system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, location=0.45))
+        how = sb.Integration(cycles=5, accuracy=accuracy, high_frequency_ratio=2.0)
+        run = assert_integrated(system, how, 1.0 / (ratio * model.reference_frequency))
+        wanted = share(run, wells, model.dividing_height)
+        assert run.summary.high_frequency_energy_fraction == pytest.approx(wanted, rel=SHARE[accuracy])
+        reached += run.summary.zero_crossings > 0
+    assert reached, "a run that passes from one well to the other"
+
+
+def test_a_statistic_that_is_registered_after_a_run_has_its_own_kernels() -> None:
+    """No record is taken for one of another layout: Numba says nothing, and the results are the same."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
+    striker = sb.Striker(drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.2))
+    system, how = sb.System(model, default_values.CONTACT, striker), sb.Integration(cycles=3)
+    before = sb.simulate(system, how).summary
+    row = Statistic(
+        "steps_counted", "float64", "1", "steps of the run", lambda reading, held: held, update=lambda held, _: held + 1.0
+    )  # fmt: skip
+    register(row)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with_row = sb.simulate(system, how).summary
+    finally:
+        unregister("steps_counted")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        after = sb.simulate(system, how).summary
+    assert with_row.steps_counted > 100.0 and "steps_counted" not in after
+    for name, value in before.items():
+        np.testing.assert_equal((with_row[name], after[name]), (value, value), err_msg=name)
+
+
+def test_no_layout_of_records_begins_as_another_one_does() -> None:
+    """Numba would take such a record for one of the shorter kind."""
+    rows = [
+        Statistic(f"own_{i}", "float64", "1", "own", lambda _, held: held, update=lambda held, _: held)
+        for i in range(2)
+    ]
+    layouts = []
+    for count in range(3):
+        for row in rows[:count]:
+            register(row)
+        try:
+            layouts += [accumulators_dtype(others) for others in range(3)]
+        finally:
+            for row in rows[:count]:
+                unregister(row.name)
+    fields = [list(each.fields.items()) for each in layouts]
+    for i, one in enumerate(fields):
+        for j, other in enumerate(fields):
+            assert i == j or one[: len(other)] != other
+
+
+def test_the_layouts_of_the_processor_agree_on_integrated_statistics(monkeypatch) -> None:
+    """Eight modes of a run in a register, or eight runs: the same bits."""
+    from snapbeam.solver.assemble import make_ensemble
+
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
+    striker = sb.Striker(drive=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.2), location=0.4)
+    how = sb.Integration(cycles=8, high_frequency_ratio=1.5)
+    points = {"drive.velocity_amplitude": np.linspace(0.05, 0.8, 9)}
+    ensemble = make_ensemble(sb.System(model, default_values.CONTACT, striker), how, points)
+    monkeypatch.setattr(driver, "FEWEST_STEPS", 0.0)
+    found = []
+    for most in (0, 12):
+        monkeypatch.setattr(driver, "FEW_MODES", most)
+        found.append(driver.run_ensemble(ensemble, 1))
+    assert (found[0]["zero_crossings"] > 0).any() and (found[0]["high_energy_time"] > 0.0).all()
+    for name in found[0].dtype.names:
+        np.testing.assert_array_equal(found[0][name], found[1][name], err_msg=name)
