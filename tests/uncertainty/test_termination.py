@@ -42,9 +42,7 @@ def trial(seconds: float) -> str:
 
 def beam_of(relative: float) -> str:
     beam = default_values.BEAM
-    measured = Measurements(
-        straight_frequencies=(100.0,), straight_frequencies_se=(1.0,)
-    )
+    measured = Measurements(straight_frequencies=(100.0,), straight_frequencies_se=(1.0,))
     return sb.uncertainty.estimate_posterior(
         measured, beam, {"thickness": relative}, modes=2, samples=200
     ).termination_reason
