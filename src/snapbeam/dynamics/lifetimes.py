@@ -410,12 +410,10 @@ def lifetime_map(
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
-    if system.striker is None or system.has_environment:
+    if not system.moving:
         raise InputError(
-            "base_excitation, axial_load, harvester: initial conditions differ by the phase of a striker, and what else moves has a phase to it; "
-            "integrate a batch of states by sb.advance(system, save_every_period=True) and count"
-            if system.has_environment
-            else "striker = None: a beam that nothing strikes does not go on snapping"
+            "striker = None: a beam that nothing strikes or shakes does not go on snapping; give a striker, a "
+            "base_excitation or an axial_load"
         )
     integration = Integration() if integration is None else integration
     if not isinstance(integration, Integration):
@@ -449,13 +447,22 @@ def _after(after: ArrayLike | None, cycles: int, settings: LifetimeSettings) -> 
 
 def _setup(system: System, axes: Any, integration: Integration) -> SweepSetup:
     if axes is None:
-        assert system.striker is not None
-        axes = PointList({"striker.location": np.array([system.striker.location])})
+        axes = PointList(_own_point(system))
     return sweep_setup(system, axes, integration)
 
 
+def _own_point(system: System) -> dict[str, NDArray[np.float64]]:
+    """One parameter of the system with its own value: a sweep of one point."""
+    if system.striker is not None:
+        return {"striker.location": np.array([system.striker.location])}
+    section, drive = system.moving[0]
+    name, value = next(iter(drive.values().items()))
+    return {f"{section}.{name}": np.array([value])}
+
+
 def _single(setup: SweepSetup, dataset: xr.Dataset) -> xr.Dataset:
-    one = isinstance(setup.points, PointList) and tuple(setup.points.columns) == ("striker.location",)
+    own = tuple(_own_point(setup.system))
+    one = isinstance(setup.points, PointList) and tuple(setup.points.columns) == own
     return dataset.isel(point=0) if one and setup.points.size == 1 else dataset
 
 

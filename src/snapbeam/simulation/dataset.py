@@ -229,7 +229,7 @@ def strikers_of(
     for j, each in enumerate(system.further_contacts):
         numbers, row = others.numbers[0, j], others.rows[others.places[0, j]]
         reached = recorded.q @ row
-        motion, _ = tip_of(system, j + 2, recorded.times)
+        motion, _ = tip_of(ensemble, system, j + 2, recorded.times)
         motion = motion + numbers[SIGN] * _follows(ensemble, system, recorded)
         pressed = numbers[OFFSET] + motion - reached
         contact: Any = each.contact
