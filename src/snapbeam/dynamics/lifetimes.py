@@ -37,6 +37,7 @@ __all__ = [
     "lifetime_map",
     "proportion",
     "refit",
+    "require_excitation",
 ]
 
 
@@ -410,11 +411,7 @@ def lifetime_map(
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
-    if not system.moving:
-        raise InputError(
-            "striker = None: a beam that nothing strikes or shakes does not go on snapping; give a striker, a "
-            "base_excitation or an axial_load"
-        )
+    require_excitation(system)
     integration = Integration() if integration is None else integration
     if not isinstance(integration, Integration):
         raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
@@ -430,6 +427,20 @@ def lifetime_map(
     table, made = compute_table(work, keeping, cluster=cluster, progress=progress)
     dataset = _runs(work, table, made)
     return _single(setup, refit(dataset, settings, cycles_after))
+
+
+def require_excitation(system: System) -> None:
+    """Refuse a system that nothing drives.
+
+    Raises
+    ------
+    InputError
+    """
+    if not system.moving:
+        raise InputError(
+            "striker = None: a beam that nothing strikes or shakes does not go on snapping; give a striker, a "
+            "base_excitation or an axial_load"
+        )
 
 
 def _after(after: ArrayLike | None, cycles: int, settings: LifetimeSettings) -> NDArray[np.int64]:
