@@ -87,6 +87,17 @@ def test_what_does_not_repeat_is_refused(system, words):
         sb.dynamics.lyapunov_spectrum(system, periods=20, transient=5)
 
 
+def test_a_map_at_a_phase_of_the_base():
+    """It is the map of the base that begins at this phase, also beside a stop."""
+    flow = Stroboscope(SHAKEN["base"], phase=1.0)
+    shifted = Stroboscope(SHAKEN["base"].replace(**{"base_excitation.phase": 1.0}))
+    x = shifted.coordinates()
+    np.testing.assert_allclose(flow.march(x, 3).states, shifted.march(x, 3).states, atol=1e-12)
+    stop = sb.Striker(drive=sb.FixedStop(), gap=5e-5)
+    beside = Stroboscope(sb.System(MODEL, default_values.CONTACT, stop, base_excitation=BASE), phase=1.0)
+    assert float(beside.starting(beside.state(x[0])).initial_state.phase) == 1.0
+
+
 def test_a_start_with_a_tip_of_its_own_keeps_all_parts():
     """Holding the tip where the start says takes nothing else away: the base goes on moving, the load changing."""
     start = sb.State(amplitude=MODEL.well_amplitude, striker_position=-1.2 * MODEL.length_scale)

@@ -442,7 +442,8 @@ class Stroboscope:
     def starting(self, state: State) -> System:
         """The system with *state* as its start, at the phase at which the map takes states."""
         changes: dict[str, Any] = {"initial_state": state}
-        if self.phase is not None and self._turns == 1 and hasattr(self.system.striker, "drive"):
+        section, drive = self.system.primary_excitation or ("", None)
+        if self.phase is not None and self._turns == 1 and section == "drive" and hasattr(drive, "phase"):
             changes["drive.phase"] = self.phase
         return self.system.replace(**changes)
 
