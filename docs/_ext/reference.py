@@ -1,6 +1,6 @@
-"""Generated reference pages: commands, keys of parameter files, variables and codes.
+"""Generated reference pages: commands, keys of parameter files, variables and codes, supported combinations.
 
-The text comes from the program itself: its commands, its table of parameters and its table of statistics.
+The text comes from the program itself: its commands, its tables of parameters and statistics, and its refusals.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-__all__ = ["command_line", "parameter_tables", "setup", "variable_tables", "write_pages"]
+__all__ = ["command_line", "parameter_tables", "setup", "support_tables", "variable_tables", "write_pages"]
 
 _SECTIONS = {
     "beam": "Geometry and material. Give one of `buckling_level` and `axial_load`.",
@@ -182,10 +182,230 @@ def _options_as_code(text: str) -> str:
     return re.sub(r"(?<![\w`-])(--[a-z][\w-]*)", r"`\1`", text)
 
 
+def support_tables() -> str:
+    """Return which parts of a system work with which question, and every reason for a refusal.
+
+    Each cell is found by asking: a part that is refused raises an error, whose text is the reason.
+    """
+    from snapbeam.util.validation import InputError
+
+    questions = _questions()
+    reasons: list[str] = []
+    rows: list[list[str]] = []
+    for name, system in _parts().items():
+        row = [name]
+        for ask in questions.values():
+            try:
+                row.append(ask(system) or "yes")
+            except InputError as error:
+                reason = _without_names(str(error))
+                reasons += [reason] if reason not in reasons else []
+                row.append(f"no ({reasons.index(reason) + 1})")
+        rows.append(row)
+    refused = []
+    for words, make in _refused_systems().items():
+        try:
+            make()
+        except InputError as error:
+            refused.append((words, str(error)))
+        else:
+            raise AssertionError(f"{words}: no longer refused; remove it from this table")
+    listed = "\n".join(f"{i}. {_plain_text(reason)}" for i, reason in enumerate(reasons, 1))
+    return (
+        _table(("system", *questions), rows)
+        + f"\nThe numbers are those of the reasons:\n\n{listed}\n\n"
+        + "These systems are refused as a whole:\n\n"
+        + _table(("system", "reason"), [(words, _plain_text(reason)) for words, reason in refused])
+    )
+
+
+def _without_names(text: str) -> str:
+    """A reason that many systems share: without the section and the type that the message names."""
+    text = re.sub(r"^(drive|base_excitation|axial_load): a motion", "a motion", text)
+    text = re.sub(r"(type|law of contact|drive) '[\w+]+'", r"\1 '...'", text)
+    return re.sub(r"contact = \w+\([^)]*\)", "contact = ...", text)
+
+
+def _plain_text(text: str) -> str:
+    """A message as text of a page: no mark-up in it."""
+    return re.sub(r"([*_<>$])", r"\\\1", text)
+
+
+def _questions() -> dict[str, Any]:
+    """Functions of a system that return a word, or None for yes, and raise an InputError for no."""
+    import snapbeam as sb
+    from snapbeam.dynamics.flow import Stroboscope
+    from snapbeam.dynamics.lifetimes import require_excitation
+    from snapbeam.simulation.advance import require_tangent
+    from snapbeam.solver.assemble import make_ensemble
+    from snapbeam.solver.registry import resolve
+
+    def advance(system: Any) -> None:
+        make_ensemble(system, sb.Integration(early_termination=False), periods=1)
+
+    def map_of(system: Any) -> None:
+        Stroboscope(system)
+
+    def ends_early(system: Any) -> str | None:
+        how = sb.Integration(cycles=1, early_termination=True)
+        energy = make_ensemble(system, how).runs["decide_energy"][0]
+        return None if energy > float("-inf") else "never"
+
+    def on_cuda(system: Any) -> None:
+        ensemble = make_ensemble(system, sb.Integration(cycles=1))
+        try:
+            resolve(
+                "cuda", modes=system.model.modes, law=ensemble.law, drive=ensemble.drive,
+                body=ensemble.structure.body_mass is not None,
+                unequal_wells=ensemble.structure.unequal_wells is not None,
+                around=system.has_environment, several=bool(system.further_contacts),
+            )  # fmt: skip
+        except sb.InputError as error:
+            if "by the CPU engine alone" in str(error):
+                raise
+
+    return {
+        "`advance`": advance,
+        "tangents, all exponents": require_tangent,
+        "orbits, sections, attractors, basins": map_of,
+        "lifetimes": require_excitation,
+        "early termination": ends_early,
+        "CUDA": on_cuda,
+    }
+
+
+def _parts() -> dict[str, Any]:
+    """Systems, each with one part that differs from the paper's."""
+    import numpy as np
+
+    import snapbeam as sb
+    from snapbeam.model import default_values
+
+    beam, hertz = default_values.BEAM, default_values.CONTACT
+    model = sb.ReducedModel.from_beam(beam, modes=2)
+    sine = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1)
+    chirp = sb.Chirp(start_ratio=0.8, stop_ratio=1.2, velocity_amplitude=0.1, sweep_cycles=9.0)
+    stop = sb.FixedStop()
+
+    def struck(drive: Any = sine, contact: Any = hertz, of: Any = model, **parts: Any) -> Any:
+        striker = {name: parts.pop(name) for name in ("gap", "mass", "suspension_stiffness") if name in parts}
+        return sb.System(of, contact, sb.Striker(drive=drive, **striker), **parts)
+
+    def several(ratio: float, contact: Any = hertz) -> Any:
+        other = sb.Sine(frequency_ratio=ratio, velocity_amplitude=0.1)
+        strikers = [sb.Striker(drive=sine), sb.Striker(drive=other, location=0.3, side="above", gap=5e-5)]
+        return sb.System(model, [contact, hertz], strikers)
+
+    def based(motion: Any) -> Any:
+        return struck(stop, gap=5e-5, base_excitation=sb.BaseExcitation(motion=motion))
+
+    time = np.arange(400) / 2e4
+    record = sb.RecordedMotion(
+        displacement=5e-5 * np.sin(200.0 * np.pi * time), velocity=5e-5 * 200.0 * np.pi * np.cos(200.0 * np.pi * time),
+        sampling_frequency=2e4, frequency=100.0,
+    )  # fmt: skip
+    burst = sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.1, duration_cycles=9.0)
+    noise = sb.BandLimitedNoise(low_ratio=0.8, high_ratio=1.4, velocity_rms=0.1, seed=1)
+    second = {"second_ratio": 1.8, "second_amplitude": 0.02}
+    ends = beam.replace(
+        boundary=sb.BoundaryConditions(left_rotational_stiffness=50.0, right_rotational_stiffness=50.0)
+    )
+    uneven = sb.ReducedModel.from_beam(beam, modes=2, imperfection=sb.Imperfection(midspan_amplitude=1e-6))
+    piezo = sb.PiezoelectricHarvester(
+        moment_per_volt=4e-3, capacitance=60e-9, resistance=2e4, patch_start=0.05, patch_end=0.4
+    )
+    return {
+        "the paper's": struck(),
+        "a gap": struck(gap=5e-5),
+        "contact `power`": struck(contact=sb.PowerLaw.from_stiffness(1e13, 2.0)),
+        "contact `hunt_crossley`": struck(contact=sb.HuntCrossley(4e8, 1.0)),
+        "contact `kelvin_voigt`": struck(contact=sb.KelvinVoigt(1e5, 1.0)),
+        "contact `restitution`": struck(contact=sb.Restitution(0.9), of=sb.ReducedModel.from_beam(beam, modes=1)),
+        "drive `two_tone`, in a ratio of small whole numbers": struck(
+            sb.TwoTone(frequency_ratio=1.2, velocity_amplitude=0.1, **second)
+        ),
+        "drive `sine+sine`, in such a ratio": struck(sine + sb.Sine(frequency_ratio=1.8, velocity_amplitude=0.1)),
+        "drive `burst`": struck(burst),
+        "drive `chirp`": struck(chirp),
+        "drive `half_sine`": struck(sb.HalfSine(displacement_amplitude=0.5, duration=0.5)),
+        "drive `band_limited_noise`": struck(noise),
+        "drive `constant_velocity`": struck(sb.ConstantVelocity(speed=0.1)),
+        "drive `recorded_motion`": struck(record),
+        "drive `fixed`": struck(stop, gap=5e-5),
+        "a striker with a mass": struck(mass=2e-3, suspension_stiffness=1e3),
+        "several strikers of one frequency, or in such a ratio": several(1.8),
+        "several strikers of other frequencies": several(1.2345678),
+        "several strikers, the first with `hunt_crossley`": several(1.2, sb.HuntCrossley(4e8, 1.0)),
+        "unequal wells": struck(of=uneven),
+        "other ends": struck(of=sb.ReducedModel.from_beam(ends, modes=2)),
+        "a base with a sine": based(sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25)),
+        "a base with a chirp": based(chirp),
+        "a base with noise": based(noise),
+        "a load with a sine": struck(
+            axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.4, amplitude=3.0))
+        ),
+        "a load with a ramp": struck(axial_load=sb.AxialLoadModulation(motion=sb.LoadRamp(change=1.0, duration=3.0))),
+        "a harvester": struck(harvester=piezo),
+    }  # fmt: skip
+
+
+def _refused_systems() -> dict[str, Any]:
+    """Functions that make systems whose parts do not go together."""
+    import snapbeam as sb
+    from snapbeam.model import default_values
+
+    hertz, newton, lossy = default_values.CONTACT, sb.Restitution(0.9), sb.HuntCrossley(4e8, 1.0)
+    one, model = (sb.ReducedModel.from_beam(default_values.BEAM, modes=modes) for modes in (1, 2))
+    parts = _parts()
+    record = parts["drive `recorded_motion`"].striker
+    load, harvester = parts["a load with a sine"].axial_load, parts["a harvester"].harvester
+    base = parts["a base with a sine"].base_excitation
+    first = parts["the paper's"].striker
+    stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5)
+    heavy = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5, mass=2e-3)
+    matrices = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0)
+    chirp = parts["drive `chirp`"].striker.drive
+    half = parts["drive `half_sine`"].striker.drive
+
+    def free(of: Any = model, **around: Any) -> Any:
+        return sb.System(of, **around)
+
+    return {
+        "contact `restitution` with two modes": lambda: sb.System(model, newton, first),
+        "contact `restitution` with several strikers": lambda: sb.System(one, [newton, hertz], [first, stop]),
+        "contact `restitution` with a base": lambda: sb.System(one, newton, first, base_excitation=base),
+        "contact `restitution` with a changing load": lambda: sb.System(one, newton, first, axial_load=load),
+        "contact `restitution` with a harvester": lambda: sb.System(one, newton, first, harvester=harvester),
+        "contact `restitution` with a striker with a mass": lambda: sb.System(one, newton, heavy),
+        "a contact that loses energy with a harvester": lambda: sb.System(
+            model, lossy, first, harvester=harvester
+        ),
+        "a further contact that loses energy": lambda: sb.System(model, [hertz, lossy], [first, stop]),
+        "a further striker with a mass": lambda: sb.System(model, hertz, [first, heavy]),
+        "several strikers, the first with a record": lambda: sb.System(model, hertz, [record, stop]),
+        "several strikers, another with a record": lambda: sb.System(model, hertz, [first, record]),
+        "a record with a base": lambda: sb.System(model, hertz, record, base_excitation=base),
+        "a record with a changing load": lambda: sb.System(model, hertz, record, axial_load=load),
+        "a base with a half sine": lambda: sb.BaseExcitation(motion=half),
+        "a base with a chirp that does not carry the striker": lambda: sb.BaseExcitation(
+            motion=chirp, striker_on_base=False
+        ),
+        "a base under a structure given by matrices": lambda: free(matrices, base_excitation=base),
+        "a changing load on a structure given by matrices": lambda: free(matrices, axial_load=load),
+        "a suspension without a mass": lambda: sb.Striker(drive=sb.FixedStop(), suspension_stiffness=1e3),
+        "an overdamped suspension": lambda: sb.Striker(
+            drive=sb.FixedStop(), mass=1e-3, suspension_stiffness=1.0, suspension_damping=1.0
+        ),
+    }
+
+
 def write_pages(folder: Path) -> None:
     """Write the generated pages into a folder; unchanged files are not rewritten."""
     folder.mkdir(parents=True, exist_ok=True)
-    pages = {"parameters": parameter_tables, "variables": variable_tables, "command_line": command_line}
+    pages = {
+        "parameters": parameter_tables, "variables": variable_tables, "command_line": command_line,
+        "support": support_tables,
+    }  # fmt: skip
     bench = folder.parent / "images" / "rivals.inc"
     pages["rivals"] = lambda: (
         bench.read_text(encoding="utf-8")

@@ -221,7 +221,9 @@ STATE_ARRAYS = (
 
 def state_row(state: sb.State, index: tuple[Any, ...], prefix: str = "") -> Row:
     """One state of a batch."""
-    row = {f"{prefix}{name}": digest(getattr(state, name)[index]) for name in STATE_ARRAYS}
+    arrays = {name: getattr(state, name) for name in STATE_ARRAYS}
+    arrays["contact_time"] = state.contact_time[..., 0]  # of the first striker
+    row = {f"{prefix}{name}": digest(values[index]) for name, values in arrays.items()}
     if state.modal is not None:
         modal = state.modal._asdict()
         del modal["structure"]

@@ -246,8 +246,6 @@ def test_refusals() -> None:
         sb.System(model(1), default_values.CONTACT, [FIRST, *[stop()] * 4])
     two = sb.System(model(1), default_values.CONTACT, [FIRST, stop()])
     with pytest.raises(sb.InputError, match="several strikers"):
-        sb.advance(two)
-    with pytest.raises(sb.InputError, match="several strikers"):
         sb.sweep(two, {"striker_2.gap": [1e-5]}, sb.Integration(cycles=1, engine="cuda"))
     with pytest.raises(sb.InputError, match="2 strikers"):
         two.replace(**{"striker_3.gap": 1e-5})

@@ -141,3 +141,27 @@ def test_options_in_the_page_of_commands_are_code():
     bare = re.findall(r"(?<![\w`-])--[a-z][\w-]*", re.sub(r"`[^`]*`", "", words))
     assert not bare
     assert "`--checkpoint`" in words and "mathrm" not in words
+
+
+@pytest.mark.slow  # the step sizes of thirty systems
+def test_supported_combinations():
+    """Every row has an answer to each question; every refusal has a reason and a remedy."""
+    text = runpy.run_path(str(ROOT / "docs" / "_ext" / "reference.py"))["support_tables"]()
+    first, second = (
+        [line.strip("| ").split(" | ") for line in part.splitlines() if line.startswith("| ")]
+        for part in text.split("These systems are refused as a whole:")
+    )
+    answers = {row[0]: dict(zip(first[0][1:], row[1:], strict=True)) for row in first[2:]}
+    assert {value for row in answers.values() for value in row.values()} >= {"yes", "never", "no (1)"}
+    assert all(row["`advance`"] == row["lifetimes"] == "yes" for row in answers.values())
+    several = answers["several strikers of one frequency, or in such a ratio"]
+    assert several["tangents, all exponents"] == several["orbits, sections, attractors, basins"] == "yes"
+    reasons = re.findall(r"^\d+\. (.*)$", text, flags=re.MULTILINE)
+    numbers = {
+        int(number)
+        for row in answers.values()
+        for number in re.findall(r"no \((\d+)\)", " ".join(row.values()))
+    }
+    assert numbers == set(range(1, len(reasons) + 1))
+    assert all(";" in reason for reason in reasons)
+    assert len(second) > 15 and all(len(row) == 2 and len(row[1]) > 20 for row in second[2:])

@@ -22,7 +22,8 @@ def test_what_is_not_given() -> None:
     state = sb.State(amplitude=[1.0, 2.0])
     assert (state.modes, state.batch) == (2, ())
     np.testing.assert_array_equal(state.velocity, [0.0, 0.0])
-    assert math.isnan(state.phase) and math.isnan(state.striker_position) and math.isnan(state.contact_time)
+    assert math.isnan(state.phase) and math.isnan(state.striker_position)
+    assert state.contact_time.shape == (1,) and np.isnan(state.contact_time).all()
     with pytest.raises(ValueError):
         state.amplitude[0] = 3.0
 
@@ -63,6 +64,12 @@ def test_a_batch_and_its_states() -> None:
         ),
         ({"amplitude": [1.0], "phase": "late"}, InputError, "state phase = 'late': must be finite numbers"),
         (
+            {"amplitude": [1.0], "contact_time": [0.1, np.nan]},
+            InputError,
+            "state contact_time = .*: must be given for every striker, or be NaN for all of them",
+        ),
+        ({"amplitude": [1.0], "contact_time": []}, InputError, "must have one number for each striker"),
+        (
             {"amplitude": np.zeros((4, 1)), "phase": [0.0, 1.0]},
             InputError,
             r"state phase of shape \(2,\): must have the shape \(4,\) of the batch",
@@ -84,6 +91,22 @@ def test_more_modes_are_still_and_none_that_moves_is_lost() -> None:
     np.testing.assert_array_equal(more.with_modes(2).amplitude, [[1.0, 0.5]])
     with pytest.raises(InputError, match="modes = 1: a state of 5 modes cannot be cut to fewer without loss"):
         more.with_modes(1)
+
+
+def test_contact_times_of_several_strikers() -> None:
+    """One for each striker, along the last dimension; a number alone is that of a single striker."""
+    one = sb.State(amplitude=np.zeros((4, 2)), contact_time=0.1)
+    np.testing.assert_array_equal(one.contact_time, np.full((4, 1), 0.1))
+    two = sb.State(amplitude=np.zeros((4, 2)), contact_time=[[0.1, -1.0]])
+    assert two.contact_time.shape == (4, 2) and two.flat().contact_time.shape == (4, 2)
+    np.testing.assert_array_equal(two[2].contact_time, [0.1, -1.0])
+    np.testing.assert_array_equal(two.contact_times(2), two.contact_time)
+    np.testing.assert_array_equal(two.with_modes(3).contact_time, two.contact_time)
+    assert np.isnan(sb.State(amplitude=[0.0]).contact_times(3)).all()
+    with pytest.raises(
+        InputError, match=r"state contact_time of 2 strikers: must have one number for each of the 3"
+    ):
+        two.contact_times(3)
 
 
 # ---------------------------------------------------------------------- starts

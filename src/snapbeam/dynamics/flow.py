@@ -10,6 +10,7 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
@@ -23,7 +24,7 @@ from snapbeam.model.state import State, amplitude_scale, rest_state
 from snapbeam.model.system import System
 from snapbeam.simulation.request import cycle_of
 from snapbeam.simulation.states import states_of
-from snapbeam.solver.assemble import make_ensemble, phases_of, run_columns
+from snapbeam.solver.assemble import cycles_of, make_ensemble, phases_of, run_columns
 from snapbeam.solver.registry import resolve
 from snapbeam.solver.statistics import statistics_of
 from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates, perturbed_start
@@ -36,9 +37,11 @@ __all__ = [
     "InitialConditions",
     "Marched",
     "Stroboscope",
+    "common_cycles",
     "flow_of",
     "held_in_space",
     "leaving",
+    "require_map",
     "settling_periods",
     "starts_of",
 ]
@@ -62,7 +65,7 @@ class InitialConditions:
         into the tip begins on the other side of its rest: the overlap would hold energy that nothing put there.
     phase : bool
         Whether the drive begins at any phase of the half of its cycle in which the tip is drawn back, so that none
-        presses a beam at rest.
+        presses a beam at rest.  For a single striker with a sinusoidal motion.
     seed : int
         Chooses them: start s comes from Philox with the key (seed, s).
     """
@@ -107,6 +110,11 @@ class InitialConditions:
             found = leaving(system, found, rung, location)
         if not self.phase:
             return found
+        if len(system.moving) != 1 or system.striker is None or not system.striker.drive.harmonic:
+            raise InputError(
+                "phase = True: the half of a cycle in which no tip presses the beam is known for a single striker with a "
+                "sinusoidal motion; leave phase out"
+            )
         generator = np.random.Generator(np.random.Philox(key=[self.seed, number]).jumped())
         phase = math.pi * (1.0 + generator.random())
         return dataclasses.replace(
@@ -120,7 +128,7 @@ class InitialConditions:
 
 
 def leaving(system: System, rest: State, begun: State, location: ArrayLike | None = None) -> State:
-    """A state beside *rest*, turned about it where it would move the beam towards the tip.
+    """A state beside *rest*, turned about it where it would move the beam towards the first tip.
 
     *location* is x_s/L, or that of each of several runs; then the state is a batch.
     """
@@ -160,65 +168,82 @@ def starts_of(given: InitialConditions | int) -> InitialConditions:
 
 
 def held_in_space(system: System) -> System:
-    """The system with its tip's mid-position fixed in space, where it is at its own start.
+    """The system with the mid-position of its first tip fixed in space, where it is at its own start.
 
-    A tip that touches the beam wherever that is makes another system of every start.
-
-    Raises
-    ------
-    InputError
-        For a recorded drive, whose periods differ.
+    A tip that touches the beam wherever that is makes another system of every start.  Further tips are fixed already.
     """
-    striker = system.striker
-    if system.further_contacts:
-        raise InputError(
-            "striker: the tools of dynamics know where one striker stands and since when it touches; of several "
-            "strikers ask for whole runs, by simulate or a sweep"
-        )
-    if system.harvester is not None:
-        raise InputError(
-            "harvester: has a state of its own, which the dynamics tools do not include; integrate such a system by "
-            "sb.advance(system, save_every_period=True), which returns the state after each cycle"
-        )
-    _require_common_period(system)
-    if striker is None:
+    if system.striker is None:
         return system
-    if striker.mass is not None:
-        raise InputError(
-            f"striker.mass = {striker.mass:g}: the tools of dynamics know a tip that moves as prescribed; "
-            "integrate a system with a striker of its own mass by sb.advance(system, save_every_period=True)"
-        )
-    if not striker.drive.harmonic:
-        raise InputError(
-            "striker.drive: is recorded; the dynamics tools need a periodic drive, such as a Sine"
-        )
-    from snapbeam.model.integration import Integration
-    from snapbeam.solver.assemble import make_ensemble
-
     offset = float(make_ensemble(system, Integration()).runs["offset"][0])
     held = system.replace(**{"striker.gap": -offset + 0.0})
     start = system.initial_state
     if start is None or np.isnan(start.striker_position).all():
         return held
-    free = State(amplitude=start.amplitude, velocity=start.velocity, phase=start.phase)
-    return held.replace(initial_state=free)
+    none = np.array(np.nan)
+    return held.replace(initial_state=replace(start, striker_position=none, contact_time=none))
 
 
-def _require_common_period(system: System) -> None:
-    """Refuse a base or an axial load that does not repeat with the cycle that is asked about."""
-    if len(system.moving) == 0:
-        return
-    (section, first), *others = system.moving
-    for name, drive in system.moving if system.has_environment else ():
-        if not drive.harmonic:
-            raise InputError(f"{name}: is not a sine; the dynamics tools need a periodic excitation")
-    for name, drive in others:
-        times = float(drive.frequency_ratio) / float(first.frequency_ratio)  # type: ignore[attr-defined]
-        if round(times) < 1 or abs(times - round(times)) > 1e-12 * times:
+def require_map(system: System) -> None:
+    """Refuse a system whose state is not that of the beam alone.
+
+    Raises
+    ------
+    InputError
+    """
+    if system.harvester is not None:
+        raise InputError(
+            "harvester: has a state of its own, which the dynamics tools do not include; integrate such a system by "
+            "sb.advance(system, save_every_period=True), which returns the state after each cycle"
+        )
+    if system.striker is not None and system.striker.mass is not None:
+        raise InputError(
+            f"striker.mass = {system.striker.mass:g}: a striker with a mass has a state of its own, which the dynamics "
+            "tools do not include; integrate such a system by sb.advance(system, save_every_period=True)"
+        )
+
+
+_MOST_CYCLES = 100
+"""Cycles of the primary excitation in a common period, at most."""
+_SAME_RATIO = 1e-12
+"""Relative difference of a ratio of frequencies from a fraction that rounding can make."""
+
+
+def common_cycles(system: System, columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.int64]:
+    """Cycles of the primary excitation after which every motion repeats, for each run, shape (runs,).
+
+    Raises
+    ------
+    InputError
+        If a motion does not repeat, or the frequencies have no common period of at most 100 cycles.
+    """
+    cycle = cycles_of(system, columns)
+    found = np.ones(cycle.size, dtype=np.int64)
+    for section, drive in system.moving:
+        own = {
+            name.partition(".")[2]: values
+            for name, values in columns.items()
+            if name.startswith(f"{section}.")
+        }
+        rates = drive.frequencies(own or {"": np.zeros(cycle.size)}, system.scale)
+        if rates is None:
             raise InputError(
-                f"{name}.frequency_ratio = {drive.frequency_ratio:g}: must be a whole multiple of that of {section}, "  # type: ignore[attr-defined]
-                f"{first.frequency_ratio:g}, after whose period the system is seen"  # type: ignore[attr-defined]
+                f"{section}: a motion of type {drive.name!r} does not repeat; the dynamics tools need a common period of "
+                "all motions; use sb.advance or simulate"
             )
+        for rate in rates:
+            turns = rate * cycle / (2.0 * math.pi)
+            for ratio in np.unique(turns):
+                which, fraction = turns == ratio, Fraction(float(ratio)).limit_denominator(_MOST_CYCLES)
+                found[which] = np.lcm(found[which], fraction.denominator)
+                apart = abs(float(fraction) - ratio) > _SAME_RATIO * ratio
+                if apart or found[which].max() > _MOST_CYCLES:
+                    leads = system.moving[0][0]
+                    raise InputError(
+                        f"{section}: no common period with {leads}; the ratio of its frequency to that of {leads} is "
+                        f"{ratio:.12g} and must make all motions repeat within {_MOST_CYCLES} cycles of {leads}; choose "
+                        "frequencies in ratios of small whole numbers, or use sb.advance or simulate"
+                    )
+    return found
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -293,7 +318,7 @@ class Flow(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Stroboscope:
-    """The map of a system over a period of its drive, the tip's mid-position fixed in space.
+    """The map of a system over the common period of its motions, the tips' mid-positions fixed in space.
 
     A state is amplitude over that of the well for each buckling mode, then velocity over the same times omega_1: the
     coordinates ``amplitude[i]`` and ``velocity[i]``.
@@ -303,7 +328,7 @@ class Stroboscope:
     system : System
     integration : Integration, optional
     phase : float, optional
-        Phase of the striker's drive at which the map takes states, rad.  By default each motion has the phase at
+        Phase of the primary excitation at which the map takes states, rad.  By default each motion has the phase at
         which a run of the system begins.
     """
 
@@ -320,10 +345,8 @@ class Stroboscope:
             raise InputError(
                 f"tolerance = {self.integration.tolerance:g}: is for one run; give steps, or accuracy = 'reference'"
             )
-        if self.phase is not None and self.system.has_environment:
-            raise InputError(
-                f"phase = {self.phase:g}: a base or an axial load is at its own phase when a period begins; give none"
-            )
+        require_map(self.system)
+        self.cycles_per_period  # noqa: B018  refuses motions without a common period
         object.__setattr__(self, "system", held_in_space(self.system))
 
     @property
@@ -337,15 +360,29 @@ class Stroboscope:
         return 2 * self.modes
 
     @cached_property
+    def cycles_per_period(self) -> int:
+        """Cycles of the primary excitation in the common period of all motions."""
+        return int(common_cycles(self.system, run_columns(self.system, {}))[0])
+
+    @cached_property
     def period(self) -> float:
-        """Of the drive, s."""
-        return cycle_of(self.system)
+        """Common period of all motions, s."""
+        return self.cycles_per_period * cycle_of(self.system)
+
+    @property
+    def _turns(self) -> int:
+        """Cycles of the primary excitation in one turn of the phase of a state."""
+        leads = self.system.primary_excitation
+        return 1 if leads is None or (leads[1].is_periodic and len(self.system.moving) < 2) else HORIZON
 
     @property
     def smooth(self) -> bool:
-        """Whether the law of contact has a force without a jump."""
+        """Whether tangents exist: every contact law has a force without a jump that depends on the penetration only."""
         contact = self.system.contact
-        return contact is None or self.system.striker is None or contact.properties.smooth
+        if contact is None or self.system.striker is None:
+            return True
+        laws = [contact, *(each.contact for each in self.system.further_contacts)]
+        return all(law.properties.smooth and law.properties.tangent for law in laws)
 
     @property
     def refined(self) -> Stroboscope:
@@ -383,24 +420,31 @@ class Stroboscope:
     def given_phase(self) -> float:
         """The ``phase`` of a state that begins a period, rad; NaN: every motion begins at its own phase."""
         if self.phase is not None:
-            return self.phase
+            if self._turns == 1:
+                return self.phase
+            return (self.phase - self._own_phase) % (2.0 * math.pi) / self._turns
         return math.nan if self.system.initial_state is None else float(self.system.initial_state.phase)
 
     @property
     def striker_phase(self) -> float:
-        """Phase at the beginning of a period, rad, of the motion whose cycle is the period; 0 if nothing moves."""
-        if self.system.primary_excitation is None:
-            return 0.0
-        own, given = float(getattr(self.system.primary_excitation[1], "phase", 0.0)), self.given_phase
-        if math.isnan(given):
+        """Phase of the primary excitation at the beginning of a period, rad; 0 if nothing moves."""
+        own, given = self._own_phase, self.given_phase
+        if self.system.primary_excitation is None or math.isnan(given):
             return own
         # several motions share one clock, which counts from the time at which all have their own phases
-        return given if len(self.system.moving) == 1 else own + HORIZON * given
+        return given if self._turns == 1 else own + self._turns * given
+
+    @property
+    def _own_phase(self) -> float:
+        """Phase of the primary excitation at the start of a run, rad."""
+        leads = self.system.primary_excitation
+        return 0.0 if leads is None else float(getattr(leads[1], "phase", 0.0))
 
     def starting(self, state: State) -> System:
         """The system with *state* as its start, at the phase at which the map takes states."""
         changes: dict[str, Any] = {"initial_state": state}
-        if self.phase is not None and self.system.striker is not None:
+        section, drive = self.system.primary_excitation or ("", None)
+        if self.phase is not None and self._turns == 1 and section == "drive" and hasattr(drive, "phase"):
             changes["drive.phase"] = self.phase
         return self.system.replace(**changes)
 
@@ -412,8 +456,10 @@ class Stroboscope:
     def _require_free(self, name: str) -> None:
         """Refuse to change a phase that another value would override."""
         section, _, field = lookup(name).name.partition(".")
-        alone = len(self.system.moving) == 1 and section == self.system.moving[0][0]
-        if field == "phase" and alone and not math.isnan(self.given_phase):
+        leads = self.system.moving[:1]
+        if field != "phase" or not leads or section != leads[0][0]:
+            return
+        if self.phase is not None or (len(self.system.moving) == 1 and not math.isnan(self.given_phase)):
             source = "phase" if self.phase is not None else "initial_state.phase"
             raise InputError(
                 f"{source} = {self.given_phase:g}: must not be given if {section}.phase changes; leave {source} out"
@@ -436,8 +482,7 @@ class Stroboscope:
 
     def _require_phase(self, state: State) -> None:
         """Refuse a state at another phase of the motions than the one at which the map takes states."""
-        turns = 1 if len(self.system.moving) < 2 else HORIZON
-        apart = (state.phase - self._clock_phase) * turns
+        apart = (state.phase - self._clock_phase) * self._turns
         apart = np.abs(apart - 2.0 * math.pi * np.rint(apart / (2.0 * math.pi)))
         if self.system.primary_excitation is not None and (apart > _SAME_PHASE).any():
             raise InputError(
@@ -482,7 +527,7 @@ class Stroboscope:
         """As :meth:`Flow.march`; what a run gives does not depend on what it is marched with."""
         begun = states.hidden if isinstance(states, Marched) else self._begun(states)
         count, size = begun.batch[0], 2 * 8 * (self.modes + 16)
-        share = max(1, _BYTES // (size * periods))
+        share = max(1, _BYTES // (size * periods * self.cycles_per_period))
         parts = [slice(at, min(at + share, count)) for at in range(0, count, share)]
         found = [
             self._march_part(
@@ -525,12 +570,14 @@ class Stroboscope:
         own = {lookup(name).name: np.asarray(values) for name, values in (points or {}).items()}
         for name in own:
             self._require_free(name)
+        if own:
+            self._require_period(own)
         ensemble = make_ensemble(
             self.system,
             self.integration.replace(early_termination=False),
             own,
             start=begun.flat(),
-            periods=periods,
+            periods=periods * self.cycles_per_period,
         )
         _, engine = resolve("cpu")
         model = self.system.model
@@ -546,11 +593,16 @@ class Stroboscope:
         if lost is not None:
             failed |= lost
         last = self._rows(ensemble, landings.q[:, -1:], landings.p[:, -1:], landings.well_sign[:, -1:])[:, 0]
-        whole = self._rows(ensemble, landings.q, landings.p, landings.well_sign) if every else None
+        each = slice(self.cycles_per_period - 1, None, self.cycles_per_period)
+        whole = None
+        if every:
+            whole = self._rows(
+                ensemble, landings.q[:, each], landings.p[:, each], landings.well_sign[:, each]
+            )
         for array in (last, whole, moved):
             if array is not None:
                 array[failed] = np.nan
-        q, p = (np.where(failed[:, None], 0.0, each[:, -1]) for each in (landings.q, landings.p))
+        q, p = (np.where(failed[:, None], 0.0, values[:, -1]) for values in (landings.q, landings.p))
         ticks = ensemble.runs["end"]
         hidden = states_of(ensemble, q, p, landings.well_sign[:, -1], landings.contact_ticks[:, -1], ticks)
         status = np.where(
@@ -563,6 +615,16 @@ class Stroboscope:
         # after a period every motion is where it began
         hidden = replace(hidden, phase=ensemble.runs["phase"].copy(), statistics={"status": status})
         return Marched(last, whole, moved, statistics_of(ensemble, landings.accumulators_of_runs), hidden)
+
+    def _require_period(self, own: Mapping[str, _Array]) -> None:
+        """Refuse parameters of runs with which the motions have a common period of another number of cycles."""
+        found = common_cycles(self.system, run_columns(self.system, own))
+        if (found != self.cycles_per_period).any():
+            raise InputError(
+                f"{', '.join(own)}: the common period of all motions must have the same number of cycles in every run; it "
+                f"has {self.cycles_per_period} cycles in the system and {int(found[found != self.cycles_per_period][0])} "
+                "in one of the runs; change all frequencies together, or ask for each value by itself"
+            )
 
     def _rows(self, ensemble: Any, q: _Array, p: _Array, well_sign: NDArray[np.int64]) -> _Array:
         """States in coordinates, one by one, so that none depends on the others; shape (runs, periods, d)."""

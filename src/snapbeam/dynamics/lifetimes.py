@@ -37,6 +37,7 @@ __all__ = [
     "lifetime_map",
     "proportion",
     "refit",
+    "require_excitation",
 ]
 
 
@@ -410,13 +411,7 @@ def lifetime_map(
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
-    if system.striker is None or system.has_environment:
-        raise InputError(
-            "base_excitation, axial_load, harvester: initial conditions differ by the phase of a striker, and what else moves has a phase to it; "
-            "integrate a batch of states by sb.advance(system, save_every_period=True) and count"
-            if system.has_environment
-            else "striker = None: a beam that nothing strikes does not go on snapping"
-        )
+    require_excitation(system)
     integration = Integration() if integration is None else integration
     if not isinstance(integration, Integration):
         raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
@@ -434,6 +429,20 @@ def lifetime_map(
     return _single(setup, refit(dataset, settings, cycles_after))
 
 
+def require_excitation(system: System) -> None:
+    """Refuse a system that nothing drives.
+
+    Raises
+    ------
+    InputError
+    """
+    if not system.moving:
+        raise InputError(
+            "striker = None: a beam that nothing strikes or shakes does not go on snapping; give a striker, a "
+            "base_excitation or an axial_load"
+        )
+
+
 def _after(after: ArrayLike | None, cycles: int, settings: LifetimeSettings) -> NDArray[np.int64]:
     observed = cycles - settings.settling_cycles
     if observed <= 0.0:
@@ -449,13 +458,22 @@ def _after(after: ArrayLike | None, cycles: int, settings: LifetimeSettings) -> 
 
 def _setup(system: System, axes: Any, integration: Integration) -> SweepSetup:
     if axes is None:
-        assert system.striker is not None
-        axes = PointList({"striker.location": np.array([system.striker.location])})
+        axes = PointList(_own_point(system))
     return sweep_setup(system, axes, integration)
 
 
+def _own_point(system: System) -> dict[str, NDArray[np.float64]]:
+    """One parameter of the system with its own value: a sweep of one point."""
+    if system.striker is not None:
+        return {"striker.location": np.array([system.striker.location])}
+    section, drive = system.moving[0]
+    name, value = next(iter(drive.values().items()))
+    return {f"{section}.{name}": np.array([value])}
+
+
 def _single(setup: SweepSetup, dataset: xr.Dataset) -> xr.Dataset:
-    one = isinstance(setup.points, PointList) and tuple(setup.points.columns) == ("striker.location",)
+    own = tuple(_own_point(setup.system))
+    one = isinstance(setup.points, PointList) and tuple(setup.points.columns) == own
     return dataset.isel(point=0) if one and setup.points.size == 1 else dataset
 
 

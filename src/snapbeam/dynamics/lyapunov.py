@@ -14,6 +14,7 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State
 from snapbeam.model.system import System
+from snapbeam.simulation.request import cycle_of
 from snapbeam.sweeps.points import Points, points_of
 from snapbeam.util.diagnostics import Diagnostic, tell, to_json
 from snapbeam.util.validation import (
@@ -87,7 +88,7 @@ def lyapunov_spectrum(
     Raises
     ------
     InputError
-        For bad input, and for a law of contact whose force jumps: see :func:`largest_lyapunov`.
+        For bad input, and for a contact law whose force jumps or depends on the velocity: see :func:`largest_lyapunov`.
     """
     flow = flow_of(system, integration)
     count = integer("k", k, 1, flow.dimension)
@@ -95,7 +96,8 @@ def lyapunov_spectrum(
     before, rule = _transient(flow, transient, 0)
     if not flow.smooth:
         raise InputError(
-            "contact: its force jumps, so that the tangent flow does; use largest_lyapunov for the largest one"
+            "contact: has no tangent flow, since its force jumps or depends on the velocity; use largest_lyapunov for "
+            "the largest exponent"
         )
     begun, points, columns = _runs(flow, states, axes)
     marched = flow.march(begun, before, points=columns) if before else flow.march(begun, 1, points=columns)
@@ -218,12 +220,17 @@ def _error(means: _Array) -> _Array:
 
 
 def _periods(flow: Flow, points: Points) -> _Array:
-    """Seconds of a period of the drive at each point."""
-    name = "drive.frequency_ratio"
-    if not isinstance(flow, Stroboscope) or name not in points.names:
+    """Seconds of a period at each point; it follows from the parameters of the primary excitation."""
+    if not isinstance(flow, Stroboscope) or flow.system.primary_excitation is None:
         return np.full(points.size, flow.period)
-    ratios, which = np.unique(points.take(np.arange(points.size))[name], return_inverse=True)
-    return np.array([flow.neighbour(name, float(ratio)).period for ratio in ratios])[which]
+    leads = flow.system.primary_excitation[0]
+    names = [name for name in points.names if name.startswith(f"{leads}.") and not name.endswith(".phase")]
+    if not names:
+        return np.full(points.size, flow.period)
+    columns = points.take(np.arange(points.size))
+    rows, which = np.unique(np.stack([columns[name] for name in names], axis=1), axis=0, return_inverse=True)
+    systems = [flow.system.replace(**dict(zip(names, map(float, row), strict=True))) for row in rows]
+    return flow.cycles_per_period * np.array([cycle_of(system) for system in systems])[which.ravel()]
 
 
 @checked

@@ -294,7 +294,7 @@ class Passage(NamedTuple):
 
     impacts: int
     clearance: float
-    """Least gap, over the length scale b, at which the beam turns back from the tip without touching; NaN: never."""
+    """Least gap, over the length scale b, at which the beam turns back from a tip without touching; NaN: never."""
     min_penetration: float
     """Greatest penetration of the lightest impact, over b; NaN: none."""
     min_impulse: float
@@ -307,27 +307,31 @@ class Passage(NamedTuple):
 def passage_of(flow: Stroboscope, coordinates: _Array, periods: int) -> Passage:
     """Follow one state for some periods and look at every approach."""
     system = flow.starting(flow.state(coordinates))
-    integration = flow.integration.replace(cycles=periods, early_termination=False)
+    cycles = periods * flow.cycles_per_period
+    integration = flow.integration.replace(cycles=cycles, early_termination=False)
     run = simulate(
         system, integration, sample_times=np.linspace(0.0, periods * flow.period, _SAMPLES * periods + 1)
     )
     data = run.dataset
     time = data["time"].values
-    depth = data["penetration_normalised"].values
-    held, spacing = np.zeros(time.size, dtype=bool), 1.000001 * (time[1] - time[0])
+    depths = data["penetration_normalised"].values[:, None]
     onset, duration = run.impacts["onset"].values, run.impacts["duration"].values
-    for begun, lasted in zip(onset, duration, strict=True):
-        held |= (time >= begun - spacing) & (time <= begun + lasted + spacing)
+    striker = np.zeros(onset.size, dtype=np.int64)
+    if system.further_contacts:
+        depths, striker = data["striker_penetrations"].values, run.impacts["striker"].values.astype(int) - 1
+    held, spacing = np.zeros(depths.shape, dtype=bool), 1.000001 * (time[1] - time[0])
     lightest = least = np.nan
     deepest = []
-    for begun, lasted in zip(onset, duration, strict=True):
-        inside = depth[(time >= begun) & (time <= begun + lasted)]
+    for begun, lasted, at in zip(onset, duration, striker, strict=True):
+        held[:, at] |= (time >= begun - spacing) & (time <= begun + lasted + spacing)
+        inside = depths[(time >= begun) & (time <= begun + lasted), at]
         deepest.append(float(inside.max(initial=0.0)))
     if onset.size:
         lightest = min(deepest)
         least = float(run.impacts["impulse"].values.min())
+    clearance = [_turn_back(time, depth, touched) for depth, touched in zip(depths.T, held.T, strict=True)]
     return Passage(
-        int(onset.size), _turn_back(time, depth, held), lightest, least,
+        int(onset.size), float(np.fmin.reduce(clearance)), lightest, least,
         float(np.abs(data["displacement_at_striker"].values).max()),
         int(run.summary.zero_crossings),
     )  # fmt: skip

@@ -64,7 +64,7 @@ def poincare_section(
     transient : int, optional
         Periods before them; by default 16 time constants of the slowest mode, at least 200 and at most 20,000.
     phase : float, optional
-        Of the drive, rad, for the stroboscopic section; that at the start by default.
+        Of the primary excitation, rad, for the stroboscopic section; that at the start by default.
     integration : Integration, optional
 
     Returns
@@ -99,7 +99,7 @@ def poincare_section(
     if not np.isfinite(begun).all():
         raise InputError("transient: the run failed before the section; use a smaller step")
     held = flow.starting(flow.state(begun[0]))
-    how = flow.integration.replace(cycles=total, early_termination=False)
+    how = flow.integration.replace(cycles=total * flow.cycles_per_period, early_termination=False)
     end = total * flow.period
     reason, off = f"{total} periods after a transient of {before} periods ({rule})", None
     if section == "stroboscopic":
@@ -181,7 +181,8 @@ def _dataset(system: System, how: Integration, times: _Array, flow: Stroboscope,
     kept = data[["displacement_at_striker", "velocity_at_striker", "midspan_displacement", "midspan_velocity", "modal_amplitude",
                  "modal_velocity"]]  # fmt: skip
     kept = kept.rename(time="point").reset_coords(drop=True)
-    phase = (flow.striker_phase + 2.0 * np.pi * times / flow.period) % (2.0 * np.pi)
+    cycle = flow.period / flow.cycles_per_period
+    phase = (flow.striker_phase + 2.0 * np.pi * times / cycle) % (2.0 * np.pi)
     result = xr.Dataset(
         {name: (kept[name].dims, kept[name].values, kept[name].attrs) for name in kept.data_vars},
         {"time": ("point", times, {"units": "s", "long_name": "time since the transient"})},

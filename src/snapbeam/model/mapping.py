@@ -111,6 +111,8 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
         sections["harvester"] = {"type": system.harvester.name} | _fields(system.harvester)
     if start is not None:
         values = {name: getattr(start, name) for name in _START}
+        if start.contact_time.size == 1:
+            values["contact_time"] = start.contact_time[..., 0]
         sections["initial_state"] = {
             name: value if np.ndim(value) else float(value)
             for name, value in values.items()

@@ -50,9 +50,9 @@ class State:
         Phase of the drive, rad; NaN, or nothing given: the one that the drive has at the start.
     striker_position : array_like of shape (...), optional
         Where the mid-position of the tip is in space, m; NaN, or nothing given: the tip touches the beam.
-    contact_time : array_like of shape (...)
-        Seconds since the present contact began; negative where tip and beam are apart, NaN where the
-        penetration decides.
+    contact_time : array_like of shape (..., strikers), optional
+        Seconds since the present contact of each striker began, in the order of the strikers; negative where tip and
+        beam are apart.  NaN, or nothing given: the penetration decides.
     striker_shift, striker_rate : array_like of shape (...)
         Of a striker that is a body: displacement (m) and velocity (m/s) of its tip beyond the motion of its
         drive, positive towards the upper well; NaN where there is none.
@@ -103,7 +103,7 @@ class State:
         found["phase"] = _maybe("state phase", self.phase, batch)
         position = np.nan if self.striker_position is None else self.striker_position
         found["striker_position"] = _maybe("state striker_position", position, batch)
-        found["contact_time"] = _maybe("state contact_time", self.contact_time, batch)
+        found["contact_time"] = _contact_times(self.contact_time, batch)
         for name in ("striker_shift", "striker_rate", "circuit"):
             found[name] = _maybe(f"state {name}", getattr(self, name), batch)
         for name, array in found.items():
@@ -123,6 +123,22 @@ class State:
     def modes(self) -> int:
         """Number of modes N."""
         return self.amplitude.shape[-1]
+
+    def contact_times(self, strikers: int) -> _Array:
+        """The contact time of each of so many strikers, shape (..., strikers).
+
+        Raises
+        ------
+        InputError
+            If the state contains the contact times of another number of strikers.
+        """
+        count = self.contact_time.shape[-1]
+        if count != strikers and not np.isnan(self.contact_time).all():
+            raise InputError(
+                f"state contact_time of {count} strikers: must have one number for each of the {strikers} strikers of "
+                "the system; give one for each, or leave contact_time out"
+            )
+        return self.contact_time if count == strikers else np.full((*self.batch, strikers), np.nan)
 
     def __getitem__(self, index: Any) -> State:
         """States of a batch, with what is known of each of them and not of their way as a whole."""
@@ -166,7 +182,7 @@ class State:
             velocity=self.velocity.reshape(count, self.modes),
             phase=self.phase.ravel(),
             striker_position=self.striker_position.ravel(),
-            contact_time=self.contact_time.ravel(),
+            contact_time=self.contact_time.reshape(count, -1),
             striker_shift=self.striker_shift.ravel(),
             striker_rate=self.striker_rate.ravel(),
             circuit=self.circuit.ravel(),
@@ -215,15 +231,35 @@ def _spread(name: str, array: _Array, batch: tuple[int, ...]) -> _Array:
         raise InputError(f"{name} of shape {array.shape}: must have the shape {batch} of the batch") from None
 
 
+def _contact_times(value: ArrayLike, batch: tuple[int, ...]) -> _Array:
+    """Contact times of every striker; a single number is that of one striker."""
+    given = np.asarray(_numbers("state contact_time", value))
+    if given.ndim == 0:
+        given = given[None]
+    if given.shape[-1] == 0:
+        raise InputError(f"state contact_time = {shown(value)}: must have one number for each striker")
+    known = ~np.isnan(given)
+    if (known.any(axis=-1) & ~known.all(axis=-1)).any():
+        raise InputError(
+            f"state contact_time = {shown(value)}: must be given for every striker, or be NaN for all of them"
+        )
+    return _spread("state contact_time", given, (*batch, given.shape[-1]))
+
+
 def _maybe(name: str, value: ArrayLike, batch: tuple[int, ...]) -> _Array:
     """Numbers of which NaN means that none is given."""
+    return _spread(name, _numbers(name, value), batch)
+
+
+def _numbers(name: str, value: ArrayLike) -> _Array:
+    """Finite numbers, or NaN."""
     try:
         array = np.asarray(value)
     except Exception:
         raise InputError(f"{name} = {shown(value)}: must be an array of numbers") from None
     if array.dtype.kind not in "iuf" or np.isinf(array).any():
         raise InputError(f"{name} = {shown(value)}: must be finite numbers, or NaN for none")
-    return _spread(name, array.astype(np.float64), batch)
+    return array.astype(np.float64)
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -231,7 +231,8 @@ def check_others(system: Any) -> None:
         raise InputError(f"striker: {len(others) + 1} strikers; must be at most {MOST_STRIKERS}")
     if system.contact is not None and system.contact.impulsive:
         raise InputError(
-            f"contact = {system.contact!r} with several strikers: Newton's law allows one striker; use a HertzContact, or "
+            f"contact = {system.contact!r} with several strikers: Newton's law allows one striker, since a jump of the "
+            "velocity cannot act against another contact that is closed; use a HertzContact, or "
             "a HuntCrossley of the same restitution for the first striker"
         )
     if isinstance(system.striker.drive, RecordedMotion):
@@ -257,8 +258,8 @@ def _check_one(number: int, another: ContactPair) -> None:
         )
     if striker.mass is not None:
         raise InputError(
-            f"striker_{number}.mass = {striker.mass:g}: of several strikers the first alone may be a body; leave the "
-            "mass out, or make this one the first"
+            f"striker_{number}.mass = {striker.mass:g}: of several strikers the first alone may be a body, since the "
+            "reduced structure contains one body; leave the mass out, or make this one the first"
         )
     if isinstance(striker.drive, RecordedMotion):
         raise InputError(

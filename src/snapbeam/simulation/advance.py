@@ -22,7 +22,7 @@ from snapbeam.util.diagnostics import counting
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, finite_array, flag, instance, positive, shown
 
-__all__ = ["advance"]
+__all__ = ["advance", "require_tangent"]
 
 
 _Array = NDArray[np.float64]
@@ -48,8 +48,8 @@ def advance(
     """Advance a state, or a batch of states, by periods of the excitation.
 
     A step ends at every whole period, and the further motion depends only on the state there.  Two calls of one period
-    are therefore bitwise identical with one call of two periods (under a recorded motion, equal to rounding).
-    :func:`~snapbeam.simulate` has no such steps and agrees to the error of its accuracy level.
+    are therefore bitwise identical with one call of two periods.  They are equal to rounding under motions that do not
+    repeat, and if several parts move: then the phase of a state counts the periods.  :func:`~snapbeam.simulate` has no such steps and agrees to the error of its accuracy level.
 
     Parameters
     ----------
@@ -57,7 +57,8 @@ def advance(
     state : State, optional
         One state, or a batch, which all cores integrate in parallel; by default the initial state of the system.
     periods : float
-        Periods of the excitation, greater than 0; without an excitation, periods of the first mode.
+        Periods of the excitation, greater than 0: of the first striker that moves, or else of the base or the axial load;
+        without an excitation, periods of the first mode.
     tangent : array_like of shape (..., k, 2, N), optional
         Small changes of amplitudes (m^0.5) and velocities (m^0.5/s), which the tangent flow of the same steps
         advances: k of them for each state, or the same k for all.
@@ -85,10 +86,6 @@ def advance(
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if state is not None and not isinstance(state, State):
         raise InputTypeError(f"state = {shown(state)}: must be a State")
-    if system.further_contacts:
-        raise InputError(
-            "striker: a state contains the position of one striker only; for several strikers use simulate or a sweep"
-        )
     integration = instance(
         "integration", Integration() if integration is None else integration, Integration, "an Integration"
     )
@@ -131,7 +128,13 @@ def advance(
     )
 
 
-def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
+def require_tangent(system: System) -> None:
+    """Refuse a system whose tangent flow is not that of the beam alone.
+
+    Raises
+    ------
+    InputError
+    """
     if system.contact is not None and not system.contact.properties.smooth:
         raise InputError(
             f"tangent with contact = {shown(system.contact)}: its force jumps, and so does the tangent flow; give no tangent"
@@ -150,6 +153,10 @@ def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
             f"tangent with contact = {system.contact!r}: the tangent flow exists for laws whose force depends on the "
             "penetration only, such as HertzContact(stiffness); give no tangent"
         )
+
+
+def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
+    require_tangent(system)
     given = finite_array("tangent", tangent)
     shape = (2, flat.modes)
     if given.ndim < 3 or given.shape[-2:] != shape:

@@ -30,7 +30,9 @@ __all__ = ["compressed", "description", "load", "save_run", "summary_dataset"]
 
 _FORMAT = "snapbeam run 3"
 _GROUPS = ("impacts", "summary")
-_END = ("amplitude", "velocity", "phase", "striker_position", "contact_time", "striker_shift", "striker_rate")
+_END = (
+    "amplitude", "velocity", "phase", "striker_position", "contact_time", "striker_shift", "striker_rate", "circuit"
+)  # fmt: skip
 _COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 
 
@@ -152,7 +154,5 @@ def _arrays(sections: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
 
 
 def _state(values: dict[str, Any]) -> State:
-    given: dict[str, Any] = {
-        name: np.nan if value is None else np.array(value) for name, value in values.items()
-    }
-    return State(**given)
+    given = {name: np.array(value, dtype=np.float64) for name, value in values.items()}
+    return State(**given)  # type: ignore[arg-type]

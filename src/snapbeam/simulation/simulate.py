@@ -332,7 +332,7 @@ def end_state(ensemble: Ensemble, recorded: Recorded, summary: RunSummary) -> St
         last.q[None],
         last.p[None],
         np.array([last.well_sign]),
-        np.array([last.contact_ticks]),
+        last.contact_ticks[None],
         np.array([time]),
     )
     return states[0]

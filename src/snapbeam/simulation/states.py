@@ -30,8 +30,8 @@ def states_of(
 ) -> State:
     """Return the states of the runs of an ensemble, a batch of shape (runs,).
 
-    *q* and *p*, of shape (runs, N), are coordinates of the linear modes about the well *well_sign*; *ticks* is the
-    time in ticks.
+    *q* and *p*, of shape (runs, N), are coordinates of the linear modes about the well *well_sign*; *contact_ticks*, of
+    shape (runs, strikers), is the time since each contact began, and *ticks* the time, in ticks.
     """
     structure, runs = ensemble.structure, ensemble.runs
     far = (well_sign < 0)[:, None]
@@ -47,7 +47,7 @@ def states_of(
         striker_position=np.where(
             runs["offset"] > FAR_AWAY, structure.sign * (runs["rest_contact"] + runs["offset"]), np.nan
         ),
-        contact_time=np.where(contact_ticks >= 0, contact_ticks * tick, -1.0),
+        contact_time=np.where(contact_ticks >= 0, contact_ticks * tick[:, None], -1.0),
         striker_shift=structure.body_of(q),
         striker_rate=structure.body_of(p),
         circuit=structure.circuit_of(p) * circuit_unit(ensemble),

@@ -25,7 +25,7 @@ from snapbeam.model.striker import numbered
 from snapbeam.model.system import System
 from snapbeam.solver.ensemble import FAR_AWAY, RUN, CircuitCoupling, Ensemble, FurtherContactTable
 from snapbeam.solver.excitation import tip_motion
-from snapbeam.solver.further_contacts import LAW, NUMBERS, OFFSET, REST, SIGN, SPEED
+from snapbeam.solver.further_contacts import LAW, NUMBERS, OFFSET, REST, SIGN, SINCE, SPEED
 from snapbeam.solver.step_size import Clocked, Plan, choose_base_step, clocked, most_steps
 from snapbeam.solver.structure import Structure, structure_of
 from snapbeam.util.validation import InputError, shown
@@ -51,11 +51,12 @@ __all__ = [
 
 
 def others_of(
-    system: System, structure: Structure, columns: Mapping[str, _Array], runs: int
+    system: System, structure: Structure, columns: Mapping[str, _Array], runs: int, since: _Array
 ) -> FurtherContactTable | None:
     """Where they are and what they touch by; their motions are in the ensemble's drive.
 
-    A striker stands where its tip touches the beam at rest in the first well, or its gap away from that.
+    A striker stands where its tip touches the beam at rest in the first well, or its gap away from that.  *since* holds
+    the contact time of every striker, shape (runs or 1, strikers).
     """
     if not system.further_contacts:
         return None
@@ -77,6 +78,7 @@ def others_of(
         numbers[:, j, OFFSET] = np.where(np.isnan(gap), -begun, -gap)
         numbers[:, j, SIGN] = sign
         numbers[:, j, SPEED] = _speed(striker.drive, columns, f"drive_{number}", system, runs)
+        numbers[:, j, SINCE] = since[:, number - 1]
         names = type(each.contact).numbers_type()._fields
         for k, name in enumerate(names):
             numbers[:, j, LAW + k] = columns[f"contact_{number}.{name}"]
@@ -230,17 +232,10 @@ def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, t
     *ensemble* is that of the one run, which may begin in the middle of its drives.
     """
     found = {}
-    begun, alone = float(ensemble.runs["phase"][0]), getattr(ensemble.drive, "alone", True)
-    if not alone:
-        times = times + begun / float(ensemble.drive_numbers[0, ensemble.drive.number_names.index("omega")])
     for section, drive in system.moving:
         if section not in ("base_excitation", "axial_load"):
             continue
-        own = {name: np.array([value]) for name, value in drive.values().items()}
-        numbers, kind = drive.numbers(own, system.scale), drive.integrated_as or type(drive)
-        table = kind.numbers_type()(*(float(numbers[name][0]) for name in kind.number_names))
-        arguments = numbers["omega"][0] * times + (begun if alone else float(getattr(drive, "phase", 0.0)))
-        pairs = np.array([tip_motion(table, np.empty(0), at) for at in arguments.tolist()]).reshape(-1, 2)
+        pairs = _motion_at(ensemble, system, drive, times)
         sign = (
             -1.0
             if section == "base_excitation"
@@ -260,15 +255,20 @@ def tip_of(ensemble: Ensemble, system: System, number: int, times: _Array) -> tu
     """
     striker = system.further_contacts[number - 2].striker if number > 1 else system.striker
     assert striker is not None
-    drive = striker.drive
+    pairs = _motion_at(ensemble, system, striker.drive, times)
+    return pairs[:, 0], pairs[:, 1]
+
+
+def _motion_at(ensemble: Ensemble, system: System, drive: Drive, times: _Array) -> _Array:
+    """Displacement and velocity of one motion of the one run of an ensemble, shape (times, 2)."""
+    begun, alone = float(ensemble.runs["phase"][0]), getattr(ensemble.drive, "alone", True)
+    if not alone:
+        times = times + begun / float(ensemble.drive_numbers[0, ensemble.drive.number_names.index("omega")])
     own = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
     numbers, kind = drive.numbers(own, system.scale), drive.integrated_as or type(drive)
     table = kind.numbers_type()(*(float(numbers[name][0]) for name in kind.number_names))
-    clock = float(ensemble.drive_numbers[0, ensemble.drive.number_names.index("omega")])
-    times = times + float(ensemble.runs["phase"][0]) / clock
-    arguments = numbers["omega"][0] * times + float(getattr(drive, "phase", 0.0))
-    pairs = np.array([tip_motion(table, np.empty(0), at) for at in arguments.tolist()]).reshape(-1, 2)
-    return pairs[:, 0], pairs[:, 1]
+    arguments = numbers["omega"][0] * times + (begun if alone else float(getattr(drive, "phase", 0.0)))
+    return np.array([tip_motion(table, np.empty(0), at) for at in arguments.tolist()]).reshape(-1, 2)
 
 
 def begun_at(driven: Driven, phase: _Array) -> _Array:
@@ -346,7 +346,9 @@ def make_ensemble(
     driven = driven_of(system, columns, runs)
     table = np.zeros(runs, dtype=RUN)
     places = _places(structure, table, columns.get("striker.location", np.full(runs, 0.5)))
-    starts = _starts(structure, table, state, 1.0 if system.harvester is None else system.harvester.unit)
+    since = state.flat().contact_times(1 + len(system.further_contacts))
+    unit = 1.0 if system.harvester is None else system.harvester.unit
+    starts = _starts(structure, table, state, since, unit)
     table["phase"] = np.where(np.isnan(state.phase), phases_of(system, columns, runs), state.phase)
     table["offset"] = _offsets(system, structure, state, columns, table, places.rows, starts, driven)
     table["tip_speed"] = driven.speed
@@ -379,7 +381,7 @@ def make_ensemble(
         cycles=time.cycles,
         tapped=tapped,
         harvester=system.harvester,
-        others=others_of(system, structure, columns, runs),
+        others=others_of(system, structure, columns, runs, since),
     )
 
 
@@ -552,12 +554,12 @@ def _places(structure: Structure, table: NDArray[Any], location: _Array) -> _Pla
     return _Places(location, np.array([structure.row(shape) for shape in shapes]))
 
 
-def _starts(structure: Structure, table: NDArray[Any], state: State, unit: float) -> _Array:
-    """q and p of every start; which start and home each run has is entered in the table."""
+def _starts(structure: Structure, table: NDArray[Any], state: State, since: _Array, unit: float) -> _Array:
+    """q and p of every start; which start, well and contact time *since* each run has is entered in the table."""
     flat, modal = state.flat(), state.flat().modal
     count = flat.batch[0]
     table["start_row"] = np.arange(table.size) if count > 1 else 0
-    table["well_sign"], table["contact_time"] = 1.0, flat.contact_time
+    table["well_sign"], table["contact_time"] = 1.0, since[:, 0]
     if modal is not None and modal.structure == structure.hash:
         table["well_sign"] = modal.well_sign
         return np.stack((modal.q, modal.p), axis=1)

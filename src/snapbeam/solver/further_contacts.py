@@ -13,10 +13,10 @@ from snapbeam.model.contact.base import LAWS, ContactLaw
 from snapbeam.model.drive.combined import MOST_STRIKERS
 from snapbeam.model.quantity import numbers_type
 from snapbeam.solver.compilation import INLINE_HERE, inlined
-from snapbeam.solver.contact_force import contact_energy, contact_force
+from snapbeam.solver.contact_force import contact_energy, contact_force, contact_slope
 from snapbeam.solver.excitation import part_motion
 
-__all__ = ["Several", "count_of", "energy_of", "force_of", "motion_of", "several"]
+__all__ = ["Several", "count_of", "energy_of", "force_of", "motion_of", "several", "slope_of"]
 
 
 _SEPARATOR = "__"
@@ -28,6 +28,10 @@ OFFSET, REST, SIGN, SPEED = 0, 1, 2, 3
 HERE, TOUCHING, ONSET, SAFE, DEPTH, RATE, DEEPEST, PUSHED = 4, 5, 6, 7, 8, 9, 10, 11
 # of the step at hand
 DEPTH1, RATE1, CUT, FORCE, IMPULSE, WORK, GROSS, KEPT, WORKED = 12, 13, 14, 15, 16, 17, 18, 19, 20
+# of the state that a run begins in: s since the contact began; negative: apart; NaN: the penetration decides
+SINCE = 21
+# of the step that tangents go through again: whether the striker touched in it, and the slope of its force
+TOUCHED, SLOPE = 22, 23
 LAW = 24
 """The law's numbers follow from there on."""
 
@@ -112,6 +116,17 @@ def force_of(kinds: Any, memory: Any, at: int, j: int, penetration: float) -> fl
 @overload(force_of, jit_options=INLINE_HERE)
 def _force_of(kinds, memory, at, j, penetration):
     chosen = _by_law(kinds.instance_class.owner.laws, contact_force)
+    return lambda kinds, memory, at, j, penetration: chosen(memory, at, j, penetration)
+
+
+def slope_of(kinds: Any, memory: Any, at: int, j: int, penetration: float) -> float:
+    """Derivative of its force by the penetration, N/m."""
+    raise TypeError("slope_of runs in compiled code only")
+
+
+@overload(slope_of, jit_options=INLINE_HERE)
+def _slope_of(kinds, memory, at, j, penetration):
+    chosen = _by_law(kinds.instance_class.owner.laws, contact_slope)
     return lambda kinds, memory, at, j, penetration: chosen(memory, at, j, penetration)
 
 

@@ -632,7 +632,7 @@ class Landings(NamedTuple):
     well_sign: NDArray[np.int64]
     """That well: +1 the first, -1 the other, shape (runs, landings)."""
     contact_ticks: NDArray[np.int64]
-    """Ticks since the present contact began, -1 where tip and beam are apart."""
+    """Ticks since the present contact of each striker began, -1: apart, shape (runs, landings, strikers)."""
 
 
 class Last(NamedTuple):
@@ -642,7 +642,8 @@ class Last(NamedTuple):
     """Linear modes about the well at hand, shape (N,)."""
     p: _Array
     well_sign: int
-    contact_ticks: int
+    contact_ticks: NDArray[np.int64]
+    """Of each striker, shape (strikers,)."""
 
 
 class Recorded(NamedTuple):

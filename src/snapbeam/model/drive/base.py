@@ -100,6 +100,10 @@ class Drive:
         """Seconds of one cycle of excitation, shape (runs,)."""
         raise NotImplementedError
 
+    def frequencies(self, columns: Mapping[str, _Array], scale: Scale) -> list[_Array] | None:
+        """Angular frequencies (rad/s) that the motion consists of, arrays of shape (runs,); None: it does not repeat."""
+        return [2.0 * math.pi / self.cycle(columns, scale)] if self.is_periodic else None
+
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
         """Highest displacement (m) from the mid-position and greatest speed (m/s) ever, shape (runs,)."""
         raise NotImplementedError

@@ -38,6 +38,10 @@ class FixedStop(Drive):
         """A period of the first mode."""
         return np.full(next(iter(columns.values())).size, 2.0 * math.pi / scale.omega)
 
+    def frequencies(self, columns: Mapping[str, _Array], scale: Scale) -> list[_Array]:
+        """None: it repeats after any time."""
+        return []
+
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
         """It stays where it is."""
         nothing = np.zeros(next(iter(columns.values())).size)

@@ -126,6 +126,10 @@ class RecordedMotion(Drive):
         """One nominal period."""
         return np.full(next(iter(columns.values())).size, 1.0 / self.frequency)
 
+    def frequencies(self, columns: Mapping[str, _Array], scale: Scale) -> None:
+        """None: a record ends."""
+        return
+
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
         """What was recorded, with a margin for what lies between the samples."""
         runs = next(iter(columns.values())).size

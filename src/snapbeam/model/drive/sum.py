@@ -110,6 +110,16 @@ class SumDrive(Timed):
             fastest = np.maximum(fastest, numbers["fastest" if "fastest" in numbers else "omega"])
         return found | {"fastest": fastest}
 
+    def frequencies(self, columns: Mapping[str, _Array], scale: Scale) -> list[_Array] | None:
+        """Those of every term; None if one of them does not repeat."""
+        found: list[_Array] = []
+        for _, drive, own in self._each(columns):
+            of_term = drive.frequencies(own, scale)
+            if of_term is None:
+                return None
+            found += of_term
+        return found
+
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
         """All terms at their heights at once."""
         pairs = [

@@ -88,6 +88,10 @@ class TwoTone(Timed):
             "second_phase": columns["second_phase"],
         }
 
+    def frequencies(self, columns: Mapping[str, _Array], scale: Scale) -> list[_Array]:
+        """Those of the two sines."""
+        return [columns["frequency_ratio"] * scale.omega, columns["second_ratio"] * scale.omega]
+
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
         """Both at their heights at once."""
         found = self.shape_numbers(columns, scale)

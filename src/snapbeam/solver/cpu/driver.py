@@ -22,7 +22,7 @@ from snapbeam.solver.cpu.run_lanes.memory import lay_out_few, suits
 from snapbeam.solver.cpu.state import KernelInput, Scratch
 from snapbeam.solver.cpu.tangent import TANGENT_ROWS, integrate_tangent
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.further_contacts import several
+from snapbeam.solver.further_contacts import NUMBERS, ONSET, TOUCHING, count_of, several
 from snapbeam.solver.registered_statistics import extras_of_table
 from snapbeam.solver.simd import WIDTH
 from snapbeam.solver.statistics import Landings, Last, Recorded, empty_accumulators
@@ -257,7 +257,7 @@ def _spread_over(
     kernel_output = KernelOutput(
         empty_accumulators(ensemble.size, _beside(ensemble)),
         np.empty((ensemble.size, landings, 2 * size)),
-        np.empty((ensemble.size, landings, 2), dtype=np.int64),
+        np.empty((ensemble.size, landings, 2 + _beside(ensemble)), dtype=np.int64),
         np.zeros(1, dtype=np.int64),
     )
     threads = threads or usable_cores()
@@ -285,9 +285,8 @@ def _spread_over(
             pool.shutdown(wait=True, cancel_futures=True)
             raise
     q, p = kernel_output.states[..., packed.rows], kernel_output.states[..., size + packed.rows]
-    return Landings(
-        kernel_output.accumulators_of_runs, q, p, kernel_output.wells[..., 0], kernel_output.wells[..., 1]
-    )
+    contacts = kernel_output.contacts
+    return Landings(kernel_output.accumulators_of_runs, q, p, contacts[..., 0], contacts[..., 1:])
 
 
 def _last(
@@ -296,8 +295,12 @@ def _last(
     """Where a run that was laid aside stands."""
     marks, reals = aside
     q, p = memory[marks[4] : marks[4] + packed.layout.size], memory[marks[5] : marks[5] + packed.layout.size]
-    since = int(marks[0] - accumulators_of_runs["onset"][0]) if marks[10] else -1
-    return Last(q[packed.rows], p[packed.rows], int(reals[0]), since)
+    since = [int(marks[0] - accumulators_of_runs["onset"][0]) if marks[10] else -1]
+    others = packed.layout.others
+    for j in range(0 if others is None else count_of(others.kinds)):
+        at = others.numbers + j * NUMBERS
+        since.append(int(marks[0] - memory[at + ONSET]) if memory[at + TOUCHING] else -1)
+    return Last(q[packed.rows], p[packed.rows], int(reals[0]), np.array(since))
 
 
 class _Buffers(NamedTuple):

@@ -40,6 +40,7 @@ from snapbeam.solver.cpu.terms.discontinuities import up_to_discontinuity
 from snapbeam.solver.cpu.terms.further_contact_events import (
     close_further_contacts,
     further_contacts_step_level,
+    store_contact_states,
 )
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, mirror_further_contacts
 from snapbeam.solver.cpu.terms.second_well import has_crossed_to_other_well
@@ -64,8 +65,8 @@ class KernelOutput(NamedTuple):
     """A record a run."""
     states: Any
     """States at landings, q and p about the well at hand, shape (runs, landings, 2 rows); none if of length 0."""
-    wells: Any
-    """That well, and the ticks since the present contact began (-1: apart), shape (runs, landings, 2)."""
+    contacts: Any
+    """That well, and for each striker the ticks since its contact began (-1: apart), shape (runs, landings, 1 + strikers)."""
     stop_flag: Any
     """Not 0: stop."""
 
@@ -143,8 +144,9 @@ def store_state(memory, blocks, layout, run, now, accumulators, i, kernel_output
     for row in range(size):
         kernel_output.states[i, landed, row] = memory[rows.q + row]
         kernel_output.states[i, landed, size + row] = memory[rows.p + row]
-    kernel_output.wells[i, landed, 0] = int(now.well_sign)
-    kernel_output.wells[i, landed, 1] = now.t - accumulators.onset if now.control.touching else -1
+    kernel_output.contacts[i, landed, 0] = int(now.well_sign)
+    kernel_output.contacts[i, landed, 1] = now.t - accumulators.onset if now.control.touching else -1
+    store_contact_states(memory, layout.others, now.t, kernel_output.contacts[i, landed])
     if now.status != _RUNNING:
         return now
     if run.high:

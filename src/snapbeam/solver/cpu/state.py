@@ -20,7 +20,11 @@ from snapbeam.solver.cpu.mode_lanes import (
 from snapbeam.solver.cpu.step import observe, prepare
 from snapbeam.solver.cpu.terms.base_and_load import changed_load, enter_forces
 from snapbeam.solver.cpu.terms.circuit import disable_long_steps, put_rate
-from snapbeam.solver.cpu.terms.further_contact_events import begin_further_contacts
+from snapbeam.solver.cpu.terms.further_contact_events import (
+    accumulate_open_further_contacts,
+    begin_further_contacts,
+    restart_further_contacts,
+)
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, with_further_contact_energy
 from snapbeam.solver.cpu.terms.second_well import (
     about_level,
@@ -289,6 +293,7 @@ def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching
     q, p, k, r = rows.q, rows.p, rows.k, layout.work + 9 * layout.size
     enter_forces(layout.forced, memory, run.struck.drive, phase_at(run, t))
     evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, phase_at(run, t), q, 0.0, False)
+    restart_further_contacts(memory, layout.size, layout.others, run.struck.drive, phase_at(run, t), t, q)
     gq, qr = tension_rows(memory, blocks, layout, q, r)
     along_g, along_r = tension_factors(layout.gamma, gq, qr)
     along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
@@ -332,6 +337,7 @@ def begin(memory, blocks, workspace, kernel_input, i, accumulators):
         run.struck.drive,
         kernel_input,
         i,
+        run.clock.tick,
         phase_at(run, 0),
         record.well_sign,
         work,
@@ -390,6 +396,8 @@ def finish(memory, blocks, layout, run, now, accumulators, impacts, before, goes
             accumulate_open_contact(accumulators, run.struck.law, now.t, tick)
         else:
             close_impact(accumulators, impacts, before, run.struck.law, now.t, tick)
+    if goes_on:
+        accumulate_open_further_contacts(memory, layout.others, accumulators, now.t, tick)
     if now.status == _EARLY_STOP:
         accumulators.early_stop_time = now.t * tick
     if run.high:

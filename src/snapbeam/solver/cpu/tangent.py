@@ -4,7 +4,7 @@ A step is a composition of kicks and exact linear flows; its derivative, at the 
 composition of theirs.  A kick by the tension's acceleration k(q) and the contact's force f(d) changes by
 
     delta k = -2 gamma (r.dq) g - 2 gamma (g.dq + r.dq) r - gamma (2 g.q + q.r) G dq,    r = G q,
-    delta f = -f'(d) c.dq,
+    delta f = -f'(d) c.dq   of every striker that touches,
 
 so each kick is a shear and each flow contracts by what damping takes: the sum of all exponents is exact.  The laws of
 contact that are let in here have a force without a jump, so that nothing else happens where contact begins and ends.
@@ -21,6 +21,11 @@ from snapbeam.solver.cpu.mode_lanes import acceleration_rows, flow_rows, kick_ro
 from snapbeam.solver.cpu.state import Workspace, begin, cut_slot, finish
 from snapbeam.solver.cpu.step import prepare, take_step
 from snapbeam.solver.cpu.terms.base_and_load import changed_load, enter_forces
+from snapbeam.solver.cpu.terms.further_contacts import (
+    kick_tangent_by_further_contacts,
+    linearise_further_contacts,
+    note_touching,
+)
 from snapbeam.solver.excitation import seen_from, tip_motion
 from snapbeam.solver.physics import tension_factors
 from snapbeam.solver.simd import WIDTH, fma, load, store
@@ -39,6 +44,7 @@ def _kick_tangent(memory, layout, weight, along_r, slope, r, dq, dp, dr, gdq, rd
     """Change a tangent's velocity by a kick."""
     gamma, size = layout.gamma, layout.size
     push = -slope * dot(memory, size, layout.contact, dq)
+    kick_tangent_by_further_contacts(memory, size, layout.others, weight, dq, dp)
     of_g, of_r = -2.0 * gamma * rdq, -2.0 * gamma * (gdq + rdq)
     for row in range(0, size, WIDTH):
         change = fma(of_g, load(memory, layout.g + row), of_r * load(memory, r + row))
@@ -70,6 +76,7 @@ def carry_tangents(memory, blocks, workspace, run, tip, step, first, count):
             motion, _ = tip_motion(tip.drive, memory, now)
             penetration = tip.offset + motion - dot(memory, size, layout.contact, q)
             force, slope = contact_force(tip.law, penetration), contact_slope(tip.law, penetration)
+        linearise_further_contacts(memory, size, layout.others, tip.drive, at, q)
         for i in range(count):
             dq, dp = first + 2 * i * size, first + (2 * i + 1) * size
             gdq, _ = tension_rows(memory, blocks, layout, dq, dr)
@@ -107,6 +114,7 @@ def integrate_tangent(
                 return
             before = now.t
             now, step = propose_step(memory, blocks, workspace, run, now, accumulators)
+            note_touching(memory, layout.others)
             well_sign = now.well_sign
             tip = seen_from(run.struck, well_sign, run.rest_contact)
             done = take_step(memory, blocks, layout, stages, tip, step, None)

@@ -31,6 +31,7 @@ from snapbeam.solver.further_contacts import (
     RATE1,
     SAFE,
     SIGN,
+    SINCE,
     SPEED,
     TOUCHING,
     WORK,
@@ -46,6 +47,7 @@ from snapbeam.solver.step_control import TRUST, ContactKinematics, contact_level
 
 __all__ = [
     "accumulate_further_contacts",
+    "accumulate_open_further_contacts",
     "add_stored_contacts",
     "any_touches",
     "begin_further_contacts",
@@ -54,6 +56,8 @@ __all__ = [
     "further_contacts_step_level",
     "observe_further_contacts",
     "refine_further_onsets",
+    "restart_further_contacts",
+    "store_contact_states",
     "store_further_contacts",
     "trusted",
     "update_further_contacts",
@@ -61,20 +65,45 @@ __all__ = [
 
 
 @called
-def _begin(memory, size, others, drive, kernel_input, i, argument, well_sign, q):
-    mirror_further_contacts(memory, others, well_sign)
+def _observe(memory, size, others, drive, argument, t, q):
     for j in range(count_of(others.kinds)):
         at = block(others, j)
         depth, velocity = penetration_of(memory, size, others, drive, argument, j, q)
-        rate = velocity - dot(memory, size, others.rows + j * size, q + size)
-        memory[at + DEPTH], memory[at + RATE] = depth, rate
-        if depth > 0.0 or (depth == 0.0 and rate > 0.0):
-            memory[at + TOUCHING], memory[at + DEEPEST] = 1.0, max(depth, 0.0)
+        memory[at + DEPTH] = depth
+        memory[at + RATE] = velocity - dot(memory, size, others.rows + j * size, q + size)
+        memory[at + SAFE] = t
 
 
 @inlined
-def begin_further_contacts(memory, size, others, drive, kernel_input, i, argument, well_sign, q):
-    """Put the strikers of run *i* in memory; one that presses at the start touches from then on; p follows *q*."""
+def restart_further_contacts(memory, size, others, drive, argument, t, q):
+    """Where they are at tick *t*, from the state alone; p follows *q*."""
+    if others is None:
+        return
+    _observe(memory, size, others, drive, argument, t, q)
+
+
+@called
+def _begin(memory, size, others, drive, tick, argument, well_sign, q):
+    mirror_further_contacts(memory, others, well_sign)
+    _observe(memory, size, others, drive, argument, 0, q)
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        depth, since = memory[at + DEPTH], memory[at + SINCE]
+        touching = depth > 0.0 or (depth == 0.0 and memory[at + RATE] > 0.0)
+        if math.isfinite(since):
+            touching = since >= 0.0
+        if touching:
+            memory[at + TOUCHING], memory[at + DEEPEST] = 1.0, max(depth, 0.0)
+            if since > 0.0:
+                memory[at + ONSET] = -math.floor(since / tick + 0.5)
+
+
+@inlined
+def begin_further_contacts(memory, size, others, drive, kernel_input, i, tick, argument, well_sign, q):
+    """Put the strikers of run *i* in memory; one that presses at the start touches from then on; p follows *q*.
+
+    If the state contains the time since a contact began, or that there is none, it decides instead.
+    """
     if others is None:
         return
     for j in range(count_of(others.kinds)):
@@ -84,7 +113,7 @@ def begin_further_contacts(memory, size, others, drive, kernel_input, i, argumen
         place = kernel_input.other_places[i, j]
         for row in range(size):
             memory[others.rows + j * size + row] = kernel_input.other_rows[place, row]
-    _begin(memory, size, others, drive, kernel_input, i, argument, well_sign, q)
+    _begin(memory, size, others, drive, tick, argument, well_sign, q)
 
 
 @inlined
@@ -301,7 +330,8 @@ def _leave(memory, others, j, accumulators, outputs, t, tick):
         duration, force = (t - onset) * tick, force_of(others.kinds, memory, at + LAW, j, deepest)
         _write_impact(outputs, accumulators, onset * tick, duration, force, add_static_load, j)
         accumulators.impacts += 1
-        accumulators.contact_time += duration
+        # of a contact that began before the run, what falls into it
+        accumulators.contact_time += duration if onset >= 0.0 else t * tick
         accumulators.others[j, OTHER_IMPACTS] += 1.0
         accumulators.others[j, OTHER_PEAK] = max(accumulators.others[j, OTHER_PEAK], force)
     accumulators.total_impulse += memory[at + PUSHED]
@@ -358,9 +388,41 @@ def update_further_contacts(memory, others, edge, t, length, tick, accumulators,
 
 @inlined
 def close_further_contacts(memory, others, accumulators, outputs, t, tick):
-    """Enter the contacts that go on at the end of a run."""
+    """Enter the contacts that go on at the end of a run; they stay closed in its final state."""
     if others is None:
         return
     for j in range(count_of(others.kinds)):
-        if memory[block(others, j) + TOUCHING] != 0.0:
+        at = block(others, j)
+        if memory[at + TOUCHING] != 0.0:
             _leave(memory, others, j, accumulators, outputs, t, tick)
+            memory[at + TOUCHING] = 1.0
+
+
+@called
+def _accumulate_open(memory, others, accumulators, t, tick):
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        if memory[at + TOUCHING] != 0.0:
+            force = force_of(others.kinds, memory, at + LAW, j, memory[at + DEEPEST])
+            accumulators.contact_time += (t - max(memory[at + ONSET], 0.0)) * tick
+            accumulators.total_impulse += memory[at + PUSHED]
+            accumulators.others[j, OTHER_IMPULSE] += memory[at + PUSHED]
+            accumulators.others[j, OTHER_PEAK] = max(accumulators.others[j, OTHER_PEAK], force)
+
+
+@inlined
+def accumulate_open_further_contacts(memory, others, accumulators, t, tick):
+    """Enter what their contacts gave so far, of a run that is to go on from tick *t*."""
+    if others is None:
+        return
+    _accumulate_open(memory, others, accumulators, t, tick)
+
+
+@inlined
+def store_contact_states(memory, others, t, found):
+    """Write for each of them the ticks since its contact began, -1: apart, behind the well and the first striker."""
+    if others is None:
+        return
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        found[2 + j] = t - int(memory[at + ONSET]) if memory[at + TOUCHING] != 0.0 else -1

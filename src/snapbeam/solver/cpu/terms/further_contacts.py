@@ -27,20 +27,26 @@ from snapbeam.solver.further_contacts import (
     OFFSET,
     REST,
     SIGN,
+    SLOPE,
+    TOUCHED,
     TOUCHING,
     WORK,
     count_of,
     energy_of,
     force_of,
     motion_of,
+    slope_of,
 )
-from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat
+from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat, store
 
 __all__ = [
     "FurtherContacts",
     "block",
     "evaluate_contacts",
+    "kick_tangent_by_further_contacts",
+    "linearise_further_contacts",
     "mirror_further_contacts",
+    "note_touching",
     "penetration_of",
     "struck",
     "struck_along",
@@ -164,3 +170,48 @@ def with_further_contact_energy(memory, others, energy):
         at = block(others, j)
         energy += energy_of(others.kinds, memory, at + LAW, j, memory[at + DEPTH])
     return energy
+
+
+# ----------------------------------------------------------------------------------------------------
+# The tangent flow: a kick by f_j(d_j) along c_j changes by -f_j'(d_j) (c_j . dq) along c_j.
+
+
+@inlined
+def note_touching(memory, others):
+    """Keep which strikers touch in the step that is about to be taken; its end may be an onset or a release."""
+    if others is None:
+        return
+    for j in range(count_of(others.kinds)):
+        memory[block(others, j) + TOUCHED] = memory[block(others, j) + TOUCHING]
+
+
+@called
+def _linearise(memory, size, others, drive, argument, q):
+    for j in range(count_of(others.kinds)):
+        at, force, slope = block(others, j), 0.0, 0.0
+        if memory[at + TOUCHED] != 0.0:
+            depth, _ = penetration_of(memory, size, others, drive, argument, j, q)
+            force = force_of(others.kinds, memory, at + LAW, j, depth)
+            slope = slope_of(others.kinds, memory, at + LAW, j, depth)
+        memory[at + FORCE], memory[at + SLOPE] = force, slope
+
+
+@inlined
+def linearise_further_contacts(memory, size, others, drive, argument, q):
+    """Enter forces and slopes at a kick of the step that is gone through again."""
+    if others is None:
+        return
+    _linearise(memory, size, others, drive, argument, q)
+
+
+@inlined
+def kick_tangent_by_further_contacts(memory, size, others, weight, dq, dp):
+    """Change a tangent's velocity by a kick of the other strikers."""
+    if others is None:
+        return
+    for j in range(count_of(others.kinds)):
+        slope, contact = memory[block(others, j) + SLOPE], others.rows + j * size
+        if slope != 0.0:
+            push = -weight * slope * dot(memory, size, contact, dq)
+            for row in range(0, size, WIDTH):
+                store(memory, dp + row, fma(push, load(memory, contact + row), load(memory, dp + row)))
