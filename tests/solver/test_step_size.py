@@ -9,7 +9,8 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.model import default_values
-from snapbeam.solver.step_size import choose_base_step
+from snapbeam.solver import step_size
+from snapbeam.solver.step_size import choose_base_step, flight_step
 
 
 @pytest.mark.parametrize("modes", [1, 2, 5, 16, 32, 48, 64, 128])
@@ -43,3 +44,16 @@ def test_many_modes_are_as_good_as_few(modes: int) -> None:
     )
     error = np.abs(coarse - fine).max()
     assert float(error) < 1e-3
+
+
+def test_a_step_does_not_depend_on_what_was_chosen_before(monkeypatch) -> None:
+    """A reference frequency that is given, as the paper's, moves the step; the matrices are equal with and without it."""
+    monkeypatch.setattr(step_size, "_CHOSEN", type(step_size._CHOSEN)())
+    own = sb.ReducedModel.from_beam(default_values.BEAM, modes=4, damping_ratio=0.005)
+    given = sb.ReducedModel.from_beam(
+        default_values.BEAM, modes=4, damping_ratio=0.005, reference_frequency=81.85
+    )
+    alone = flight_step(own, 4, 2.5e-7)
+    step_size._CHOSEN.clear()
+    assert flight_step(given, 4, 2.5e-7) != alone
+    assert flight_step(own, 4, 2.5e-7) == alone

@@ -67,8 +67,9 @@ _NEIGHBOUR = 1e-9
 _PLACES = (0.1, 0.2, 0.3, 0.4, 0.5)
 _MOST_MODES = 48
 """Lowest modes that take part: the tension hardly couples the others, and the step found is the same."""
-_KEPT: OrderedDict[tuple[str, int, float], float] = OrderedDict()
-_MOST_KEPT = 4096
+_CHOSEN: OrderedDict[tuple[object, ...], float] = OrderedDict()
+"""Steps that were chosen, by all that the choice depends on."""
+_MOST_CHOSEN = 4096
 
 
 def flight_step(model: ReducedModel, order: int, limit: float) -> float:
@@ -87,14 +88,16 @@ def flight_step(model: ReducedModel, order: int, limit: float) -> float:
     if model.nonlinear_stiffness == 0.0 or not model.tension_matrix.any():
         return period / _FEWEST  # nothing but linear modes, whose flow is exact
     structure = structure_of(model, "below")
-    key = (structure.hash, order, limit)
-    if key not in _KEPT:
-        _KEPT[key] = period / _Bench(structure, order).fewest(limit)
+    places = model.beam if model.contact_shape is None else model.contact_shape.tobytes()
+    key = (structure.hash, order, limit, period, model.length_scale, places)
+    if key not in _CHOSEN:
+        chosen = period / _Bench(structure, order).fewest(limit)
         if structure.unequal_wells is not None:
-            _KEPT[key] = min(_KEPT[key], period / _Bench(structure, order, far=True).fewest(limit))
-        while len(_KEPT) > _MOST_KEPT:
-            _KEPT.popitem(last=False)
-    return _KEPT[key]
+            chosen = min(chosen, period / _Bench(structure, order, far=True).fewest(limit))
+        _CHOSEN[key] = chosen
+        while len(_CHOSEN) > _MOST_CHOSEN:
+            _CHOSEN.popitem(last=False)
+    return _CHOSEN[key]
 
 
 class _Bench:
