@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from snapbeam.plot.style import house_style, new_figure, save_figure
+from snapbeam.plot.style import figure_style, new_figure, save_figure
 
 __all__ = ["layouts_chart", "requests_chart", "scaling_chart", "work_precision_chart"]
 
@@ -41,7 +41,7 @@ _FLOOR = 1e-13
 def work_precision_chart(data: dict[str, Any], path: Path) -> None:
     """Time of a run against its error, a panel per point."""
     points = list(data["points"])
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 92.0)
         axes = figure.subplots(1, len(points), sharex=True, sharey=True)
         for ax, point in zip(axes, points, strict=True):
@@ -74,7 +74,7 @@ def work_precision_chart(data: dict[str, Any], path: Path) -> None:
 def requests_chart(data: dict[str, Any], path: Path) -> None:
     """Measured error against the tolerance asked for."""
     marks = {1: ("o", "#16245E"), 8: ("^", "#3D9BE0"), 32: ("s", "#B03A27")}
-    with house_style():
+    with figure_style():
         figure = new_figure("single", 80.0)
         ax = figure.subplots()
         for shift, (modes, (marker, color)) in enumerate(marks.items()):
@@ -108,7 +108,7 @@ def requests_chart(data: dict[str, Any], path: Path) -> None:
 
 def scaling_chart(data: dict[str, Any], path: Path) -> None:
     """Time per run against the number of runs; time against the number of modes."""
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 70.0)
         left, middle, right = figure.subplots(1, 3)
         runs, modes = data["runs"], data["modes"]
@@ -138,7 +138,7 @@ def scaling_chart(data: dict[str, Any], path: Path) -> None:
 def layouts_chart(path: Path, records: list[dict[str, Any]]) -> None:
     """Time of a step of one run against the number of modes, in both layouts of the CPU engine."""
     modes = [record["modes"] for record in records]
-    with house_style():
+    with figure_style():
         figure = new_figure("single", 62.0)
         ax = figure.subplots()
         for name, words, marker, color in (

@@ -127,9 +127,9 @@ def ways(orbits: int, periods: int, by_scipy: int) -> list[Way]:
     flow = flow_of(float(ratios[0]))
     # the drive's speed in a file is that of the tip, so that a ratio changes both
     points = {"drive.frequency_ratio": ratios, "drive.velocity_amplitude": ratios}
-    flow.march(states[:2], 1, points={name: values[:2] for name, values in points.items()})
+    flow.advance(states[:2], 1, points={name: values[:2] for name, values in points.items()})
     begun = time.process_time()
-    ends = flow.march(states, periods, points=points).states
+    ends = flow.advance(states, periods, points=points).states
     here = time.process_time() - begun
     in_closed_form(1.7, *states[0], 1, RESTITUTION)
     begun = time.process_time()

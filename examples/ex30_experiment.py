@@ -22,7 +22,7 @@ from snapbeam.lab.plot.comparison import plot_map_comparison, plot_waveform_comp
 from snapbeam.lab.plot.fit_decay import plot_decay
 from snapbeam.lab.plot.tracking import plot_frame, plot_tracking_quality
 from snapbeam.lab.plot.vibrometer import plot_drive
-from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, figure_style, new_figure
 from snapbeam.sweeps.measured_points import MeasuredPoints
 
 folder = tempfile.TemporaryDirectory()
@@ -189,7 +189,7 @@ figure = plot_tracking_quality(tracked)
 # Against the truth, which is the mean over each exposure:
 
 pixel = 1e3 * camera.pixel_size
-with house_style():
+with figure_style():
     figure = new_figure("double", 70.0)
     axes = figure.subplots(2, 1, sharex=True, sharey=True)
     for ax, name, color, word in (

@@ -1,4 +1,4 @@
-"""Ensembles marched by the CUDA engine in Numba's simulator, in a process of its own.
+"""Ensembles integrated by the CUDA engine in Numba's simulator, in a process of its own.
 
 The simulator is chosen when Numba is first imported, so it needs another process; there every thread of a
 block is a Python thread, and a step takes a tenth of a second: a few modes, a few dozen steps.
@@ -23,7 +23,7 @@ __all__ = ["Job", "march_in_simulator"]
 
 
 class Job(NamedTuple):
-    """An ensemble, how the engine is to march it, and the steps of every slice (None: one slice)."""
+    """An ensemble, how the engine is to integrate it, and the steps of every slice (None: one slice)."""
 
     ensemble: Ensemble
     options: Options = Options(most_blocks=1, fewest_threads=1)

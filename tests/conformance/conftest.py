@@ -23,7 +23,7 @@ from snapbeam.util.validation import InputError
 
 
 @dataclass(frozen=True)
-class Marched:
+class EnsembleResult:
     """What an engine answered."""
 
     ensemble: Ensemble
@@ -33,7 +33,7 @@ class Marched:
     def statistics(self) -> dict[str, NDArray[Any]]:
         return statistics_of(self.ensemble, self.accumulators_of_runs)
 
-    def assert_is(self, other: Marched, which: Any = slice(None)) -> None:
+    def assert_is(self, other: EnsembleResult, which: Any = slice(None)) -> None:
         """Every column is that of the runs *which* of another ensemble, to the last bit."""
         for name in self.accumulators_of_runs.dtype.names:
             np.testing.assert_array_equal(
@@ -41,7 +41,7 @@ class Marched:
             )
 
 
-class March:
+class EnsembleIntegrator:
     """An engine by name, called with the parameters of its runs, which broadcast.
 
     Without a law of contact nothing strikes, and there is one run.
@@ -64,13 +64,13 @@ class March:
         start: sb.State | None = None,
         threads: int | None = None,
         **integration: Any,
-    ) -> Marched:
-        # a limit that a march meets on its way; one that it cannot but meet is refused before
+    ) -> EnsembleResult:
+        # a limit that is reached during the integration; one that is always reached is refused before
         limit = integration.pop("max_steps", None)
         how = sb.Integration(**({"cycles": 1} | integration))
         if contact is None:
             ensemble = make_ensemble(sb.System(model, initial_state=start), how)
-            return Marched(ensemble, self.engine.run_ensemble(ensemble, threads, None))
+            return EnsembleResult(ensemble, self.engine.run_ensemble(ensemble, threads, None))
         own = {"drive.frequency_ratio": frequency_ratio, "drive.velocity_amplitude": velocity_amplitude}
         striker = sb.Striker(
             drive=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.0) if drive is None else drive, side=side
@@ -85,14 +85,14 @@ class March:
         ensemble = make_ensemble(sb.System(model, contact, striker, start), how, points)
         if limit is not None:
             ensemble = dataclasses.replace(ensemble, max_steps=limit)
-        return Marched(ensemble, self.engine.run_ensemble(ensemble, threads, None))
+        return EnsembleResult(ensemble, self.engine.run_ensemble(ensemble, threads, None))
 
 
 @pytest.fixture(scope="session", params=[name for name in ENGINES if name != "auto"])
-def march(request: pytest.FixtureRequest) -> March:
+def integrate_ensemble(request: pytest.FixtureRequest) -> EnsembleIntegrator:
     """The engine under test; skipped where the machine lacks what it needs."""
     try:
-        return March(request.param)
+        return EnsembleIntegrator(request.param)
     except InputError as refusal:
         pytest.skip(str(refusal))
 
@@ -116,7 +116,7 @@ class Kind:
     recorded: bool = False
 
     def given(self, model: sb.ReducedModel, columns: dict[str, Any], cycles: int) -> dict[str, Any]:
-        """Arguments of a march: random runs, of a record those of its location."""
+        """Arguments of an ensemble: random runs, of a record those of its location."""
         if not self.recorded:
             return {"contact": self.contact, "cycles": cycles} | columns
         own = {"contact": self.contact, "cycles": cycles, "drive": start_up(model, cycles=cycles)}

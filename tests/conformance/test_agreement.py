@@ -91,10 +91,10 @@ def test_reference_accuracy(modes, pair, cycles, measured) -> None:
 
 
 @pytest.mark.parametrize(("modes", "pair", "cycles", "measured"), [*CASES[::2], DEAR[0]])
-def test_statistics(march, model_of, modes, pair, cycles, measured) -> None:
+def test_statistics(integrate_ensemble, model_of, modes, pair, cycles, measured) -> None:
     """What an engine says of the same runs."""
     truth = solved(modes, *pair, cycles)
-    found = march(
+    found = integrate_ensemble(
         model_of(modes), frequency_ratio=pair[0], velocity_amplitude=pair[1], cycles=cycles
     ).statistics
     # of b: what a cubic through the flight steps may miss, and what may lie between two samples

@@ -8,10 +8,10 @@ import pytest
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 
 
-def compare(march, model, given, cycles: int) -> tuple[int, set[int]]:
+def compare(integrate_ensemble, model, given, cycles: int) -> tuple[int, set[int]]:
     """Check runs with and without early decisions; returns how many were decided, and the classes."""
-    full = march(model, **given, cycles=cycles).statistics
-    early = march(model, **given, cycles=cycles, early_termination=True).statistics
+    full = integrate_ensemble(model, **given, cycles=cycles).statistics
+    early = integrate_ensemble(model, **given, cycles=cycles, early_termination=True).statistics
     assert (full["status"] == RunStatus.OK).all()
     np.testing.assert_array_equal(early["response_class"], full["response_class"])
 
@@ -39,24 +39,24 @@ def compare(march, model, given, cycles: int) -> tuple[int, set[int]]:
 @pytest.mark.parametrize(
     ("modes", "runs", "cycles"), [(1, 1500, 20), (2, 300, 20), (8, 120, 16), (32, 40, 12)]
 )
-def test_early_terminations(march, model_of, draw, modes, runs, cycles) -> None:
-    decided, classes = compare(march, model_of(modes), draw(runs, 100 + modes), cycles)
+def test_early_terminations(integrate_ensemble, model_of, draw, modes, runs, cycles) -> None:
+    decided, classes = compare(integrate_ensemble, model_of(modes), draw(runs, 100 + modes), cycles)
     assert decided > runs // 20
     if runs > 100:
         assert classes == {0, 1, 2, 3}
 
 
-def test_early_termination_of_every_law_and_drive(march, model_of, draw, kind) -> None:
+def test_early_termination_of_every_law_and_drive(integrate_ensemble, model_of, draw, kind) -> None:
     """Newton's impacts decide early too; what a run decides never changes its class."""
     model, cycles = model_of(kind.modes), 16
     given = kind.given(model, draw(60, 300), cycles)
     given.pop("cycles")
-    compare(march, model, given, cycles)
+    compare(integrate_ensemble, model, given, cycles)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("modes", "runs", "cycles"), [(1, 5000, 100), (8, 800, 60), (32, 300, 60)])
-def test_many_early_terminations(march, model_of, draw, modes, runs, cycles) -> None:
-    decided, classes = compare(march, model_of(modes), draw(runs, 200 + modes), cycles)
+def test_many_early_terminations(integrate_ensemble, model_of, draw, modes, runs, cycles) -> None:
+    decided, classes = compare(integrate_ensemble, model_of(modes), draw(runs, 200 + modes), cycles)
     assert decided > runs // 10
     assert classes == {0, 1, 2, 3}

@@ -21,9 +21,9 @@ def thrown(stiffness: float = 0.0) -> ReducedModel:
 
 
 @pytest.mark.parametrize("speed", [0.005, 0.05, 0.5])
-def test_free_mass(march, speed) -> None:
+def test_free_mass(integrate_ensemble, speed) -> None:
     """Duration 2.94328 d_max/v, peak force kc d_max^1.5, unit restitution, no work by a shaker at rest."""
-    end = march(thrown(), start=State(amplitude=np.zeros(1), velocity=np.array([-speed])))
+    end = integrate_ensemble(thrown(), start=State(amplitude=np.zeros(1), velocity=np.array([-speed])))
     depth = default_values.CONTACT.max_penetration(MASS, speed)
     assert end.accumulators_of_runs["impacts"][0] == 1
     assert end.accumulators_of_runs["contact_time"][0] == pytest.approx(2.94328 * depth / speed, rel=2e-4)
@@ -35,8 +35,8 @@ def test_free_mass(march, speed) -> None:
     assert end.accumulators_of_runs["gross_work"][0] == 0.0
 
 
-def test_reference_accuracy(march) -> None:
-    end = march(
+def test_reference_accuracy(integrate_ensemble) -> None:
+    end = integrate_ensemble(
         thrown(), start=State(amplitude=np.zeros(1), velocity=np.array([-SPEED])), accuracy="reference"
     )
     duration = default_values.CONTACT.impact_duration(MASS, SPEED)
@@ -44,24 +44,24 @@ def test_reference_accuracy(march) -> None:
     assert end.accumulators_of_runs["energy"][0] == pytest.approx(0.5 * MASS * SPEED**2, rel=1e-6)
 
 
-def test_order_in_contact(march) -> None:
+def test_order_in_contact(integrate_ensemble) -> None:
     """The d^1.5 edge holds any fixed order to about 2.5; here the mean over five halvings."""
     duration = default_values.CONTACT.impact_duration(MASS, SPEED)
     steps = duration * 2.0 ** np.arange(3, -3, -1)
     errors = []
     for step in steps:
-        end = march(
+        end = integrate_ensemble(
             thrown(), start=State(amplitude=np.zeros(1), velocity=np.array([-SPEED])), step=float(step)
         )
         errors.append(abs(end.accumulators_of_runs["energy"][0] / (0.5 * MASS * SPEED**2) - 1.0))
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] >= 2.5, errors
 
 
-def test_onset_is_located(march) -> None:
+def test_onset_is_located(integrate_ensemble) -> None:
     """A mass on a spring leaves the shaker and is back after half a period, as fast as it left."""
     omega = 2.0 * math.pi * 80.0
     start = State(amplitude=np.zeros(1), velocity=np.array([SPEED]))
-    end = march(thrown(MASS * omega**2), start=start, frequency_ratio=1.0, cycles=1)
+    end = integrate_ensemble(thrown(MASS * omega**2), start=start, frequency_ratio=1.0, cycles=1)
     # half a period of flight, the impact, and of the second flight what is left of the cycle
     half = math.pi / omega
     duration = default_values.CONTACT.impact_duration(MASS, SPEED)

@@ -1,4 +1,4 @@
-"""What a run gives does not depend on what it is marched with."""
+"""What a run gives does not depend on the runs that are integrated with it."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ def part_of(given: dict, which: np.ndarray) -> dict:
     return {name: value[which] if isinstance(value, np.ndarray) else value for name, value in given.items()}
 
 
-def check_any_order_batch_and_threads(march, model, given: dict, runs: int) -> None:
-    whole = march(model, **given, threads=2)
+def check_any_order_batch_and_threads(integrate_ensemble, model, given: dict, runs: int) -> None:
+    whole = integrate_ensemble(model, **given, threads=2)
     for which, threads in (
         (np.arange(runs), 1),
         (np.arange(runs)[::-1], 3),
@@ -27,30 +27,30 @@ def check_any_order_batch_and_threads(march, model, given: dict, runs: int) -> N
         (np.array([runs // 2]), None),
         (np.array([runs - 1]), None),
     ):
-        march(model, **part_of(given, which), threads=threads).assert_is(whole, which)
+        integrate_ensemble(model, **part_of(given, which), threads=threads).assert_is(whole, which)
 
 
 @pytest.mark.parametrize(("modes", "runs", "cycles"), [(1, 60, 12), (8, 16, 5), (32, 10, 3), (40, 6, 1)])
-def test_order_batch_and_threads(march, model_of, draw, modes, runs, cycles) -> None:
+def test_order_batch_and_threads(integrate_ensemble, model_of, draw, modes, runs, cycles) -> None:
     given = draw(runs, 11) | {"cycles": cycles}
-    check_any_order_batch_and_threads(march, model_of(modes), given, runs)
+    check_any_order_batch_and_threads(integrate_ensemble, model_of(modes), given, runs)
 
 
-def test_order_batch_and_threads_of_every_law_and_drive(march, model_of, draw, kind) -> None:
+def test_order_batch_and_threads_of_every_law_and_drive(integrate_ensemble, model_of, draw, kind) -> None:
     model = model_of(kind.modes)
-    check_any_order_batch_and_threads(march, model, kind.given(model, draw(12, 12), 5), 12)
+    check_any_order_batch_and_threads(integrate_ensemble, model, kind.given(model, draw(12, 12), 5), 12)
 
 
 @pytest.mark.parametrize(("modes", "runs"), [(1, 5), (12, 4), (32, 3)])
-def test_runs_that_end_at_the_same_step(march, model_of, modes, runs) -> None:
-    """Equal runs are equal, and none is left out where those marched side by side end together."""
+def test_runs_that_end_at_the_same_step(integrate_ensemble, model_of, modes, runs) -> None:
+    """Equal runs are equal, and none is left out where those integrated side by side end together."""
     given = {"frequency_ratio": np.full(runs, 1.3), "velocity_amplitude": np.full(runs, 0.25)}
-    many = march(model_of(modes), **given, cycles=3, threads=1)
+    many = integrate_ensemble(model_of(modes), **given, cycles=3, threads=1)
     assert (many.statistics["status"] == RunStatus.OK).all()
     many.assert_is(many, np.zeros(runs, dtype=int))
 
 
-def test_runs_of_different_contact_are_what_they_are_alone(march, model_of) -> None:
+def test_runs_of_different_contact_are_what_they_are_alone(integrate_ensemble, model_of) -> None:
     """A stiffness that differs between the runs of one ensemble: the steps suit each run's own."""
     from snapbeam.solver.assemble import make_ensemble
 
@@ -60,33 +60,35 @@ def test_runs_of_different_contact_are_what_they_are_alone(march, model_of) -> N
     whole = make_ensemble(
         sb.System(model_of(2), default_values.CONTACT, shaker), integration, {"contact.stiffness": stiffness}
     )
-    accumulators_of_runs = march.engine.run_ensemble(whole, None, None)
+    accumulators_of_runs = integrate_ensemble.engine.run_ensemble(whole, None, None)
     assert len(set(accumulators_of_runs["steps"].tolist())) == 3
     for i, value in enumerate(stiffness):
         alone = make_ensemble(sb.System(model_of(2), sb.HertzContact(float(value)), shaker), integration)
         assert alone.runs["tick"][0] == whole.runs["tick"][i]
         assert alone.runs["finest"][0] == whole.runs["finest"][i]
-        found = march.engine.run_ensemble(alone, None, None)
+        found = integrate_ensemble.engine.run_ensemble(alone, None, None)
         for name in accumulators_of_runs.dtype.names:
             np.testing.assert_array_equal(found[name][0], accumulators_of_runs[name][i], err_msg=name)
 
 
-def test_cycles_beyond_the_last_do_not_change_the_first(march, model_of) -> None:
+def test_cycles_beyond_the_last_do_not_change_the_first(integrate_ensemble, model_of) -> None:
     """Statistics that only accumulate are those of the longer run's beginning: time comes from ticks."""
     model = model_of(2)
-    short, long = (march(model, frequency_ratio=1.4, velocity_amplitude=0.02, cycles=c) for c in (5, 10))
+    short, long = (
+        integrate_ensemble(model, frequency_ratio=1.4, velocity_amplitude=0.02, cycles=c) for c in (5, 10)
+    )
     for name in ("time", "zero_crossings", "impacts", "steps", "contact_time", "total_impulse", "gross_work"):
         assert (long.accumulators_of_runs[name] >= short.accumulators_of_runs[name]).all(), name
     assert long.statistics["peak_force"] >= short.statistics["peak_force"]
     assert long.statistics["min_displacement"] <= short.statistics["min_displacement"]
 
 
-def test_time_does_not_drift(march) -> None:
+def test_time_does_not_drift(integrate_ensemble) -> None:
     """Time comes from integers: after 10^5 cycles of a linear oscillator the run ends where it should."""
     oscillator = ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], reference_frequency=1.0)
     cycles = 100_000
     start = State(amplitude=np.zeros(1), velocity=np.ones(1))
-    end = march(oscillator, None, cycles=cycles, start=start, step=0.25)
+    end = integrate_ensemble(oscillator, None, cycles=cycles, start=start, step=0.25)
     seconds = end.accumulators_of_runs["time"][0] * end.ensemble.runs["tick"][0]
     assert seconds == pytest.approx(cycles, rel=1e-15)
     assert end.accumulators_of_runs["energy"][0] == pytest.approx(0.5, rel=1e-9)

@@ -59,11 +59,11 @@ def test_the_map_is_advance(names) -> None:
     flow = Stroboscope(system)
     wanted = advanced(system, flow)
     np.testing.assert_allclose(
-        flow.march(flow.coordinates(), PERIODS, every=True).every[0], wanted, atol=1e-12
+        flow.advance(flow.coordinates(), PERIODS, every=True).every[0], wanted, atol=1e-12
     )
     here = flow.coordinates()
     for period in range(PERIODS):
-        here = flow.march(here, 1)
+        here = flow.advance(here, 1)
         np.testing.assert_allclose(here.states[0], wanted[period], atol=1e-9)
     again = sb.advance(system, flow.state(flow.coordinates()), periods=PERIODS)
     # rounding of the striker's position decides whether a contact at the very start lasts a step longer
@@ -71,7 +71,7 @@ def test_the_map_is_advance(names) -> None:
     np.testing.assert_allclose(flow.coordinates(again)[0], wanted[-1], atol=near)
     for name in names:
         other = Stroboscope(system_of(names, **{name: 0.0}))
-        assert np.abs(other.march(other.coordinates(), PERIODS).states[0] - wanted[-1]).max() > 1e-3
+        assert np.abs(other.advance(other.coordinates(), PERIODS).states[0] - wanted[-1]).max() > 1e-3
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def test_against_an_independent_solution(names) -> None:
     else:
         own = {name: motion for name, motion in (("base", base), ("load", load)) if name in names}
         truth = live(PaperBeam(2), Surroundings(**own), times).midspan_displacement
-    every = flow.march(flow.coordinates(), PERIODS, every=True).every[0] * flow.scales
+    every = flow.advance(flow.coordinates(), PERIODS, every=True).every[0] * flow.scales
     found = every[:, :2] @ MODEL.midspan_shape / MODEL.length_scale
     np.testing.assert_allclose(found, truth[40::40], rtol=0.0, atol=2e-6)
 
@@ -126,10 +126,10 @@ def test_sections_orbits_and_diagrams_begin_at_the_phase() -> None:
 
     phases = np.array([0.0, 0.7, 0.5 * math.pi])
     rows = np.repeat(flow.coordinates(), 3, axis=0)
-    found = flow.march(rows, PERIODS, points={"base_excitation.phase": phases}).states
+    found = flow.advance(rows, PERIODS, points={"base_excitation.phase": phases}).states
     for phase, row in zip(phases, found, strict=True):
         one = flow.neighbour("base_excitation.phase", float(phase))
-        np.testing.assert_allclose(one.march(one.coordinates(), PERIODS).states[0], row, atol=1e-12)
+        np.testing.assert_allclose(one.advance(one.coordinates(), PERIODS).states[0], row, atol=1e-12)
     assert np.abs(np.diff(found, axis=0)).max(axis=1).min() > 1e-3
 
 
@@ -137,7 +137,7 @@ def test_the_phase_of_a_start_counts() -> None:
     start = sb.State(amplitude=0.9 * MODEL.mirrored.well_amplitude, phase=0.4)
     system = system_of(("base",)).replace(initial_state=start)
     flow = Stroboscope(system)
-    found = flow.march(flow.coordinates(), PERIODS, every=True).every[0]
+    found = flow.advance(flow.coordinates(), PERIODS, every=True).every[0]
     np.testing.assert_allclose(found, advanced(system, flow), atol=1e-12)
 
 

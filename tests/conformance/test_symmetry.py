@@ -27,14 +27,17 @@ def assert_mirrored(below, above) -> None:
 
 
 @pytest.mark.parametrize(("modes", "runs", "cycles"), [(1, 40, 20), (2, 20, 10), (8, 12, 6), (32, 8, 5)])
-def test_shaker_from_the_other_side(march, model_of, draw, modes, runs, cycles) -> None:
+def test_shaker_from_the_other_side(integrate_ensemble, model_of, draw, modes, runs, cycles) -> None:
     given = draw(runs, modes)
     assert_mirrored(
-        *(march(model_of(modes), **given, side=side, cycles=cycles) for side in ("below", "above"))
+        *(
+            integrate_ensemble(model_of(modes), **given, side=side, cycles=cycles)
+            for side in ("below", "above")
+        )
     )
 
 
-def test_every_law_and_drive_from_the_other_side(march, model_of, draw, kind) -> None:
+def test_every_law_and_drive_from_the_other_side(integrate_ensemble, model_of, draw, kind) -> None:
     """A record is given in the coordinates of space: its mirror image is the negated one."""
     model = model_of(kind.modes)
     below = kind.given(model, draw(12, kind.modes), 8)
@@ -44,17 +47,19 @@ def test_every_law_and_drive_from_the_other_side(march, model_of, draw, kind) ->
         above["drive"] = dataclasses.replace(
             drive, displacement=-drive.displacement, velocity=-drive.velocity
         )
-    assert_mirrored(march(model, **below), march(model, **above))
+    assert_mirrored(integrate_ensemble(model, **below), integrate_ensemble(model, **above))
 
 
 @pytest.mark.parametrize("modes", [2, 32])
-def test_negated_start(march, model_of, draw, modes) -> None:
+def test_negated_start(integrate_ensemble, model_of, draw, modes) -> None:
     model, given = model_of(modes), draw(6, 7)
     rng = np.random.default_rng(modes)
     alpha = model.well_amplitude + 0.02 * np.abs(model.well_amplitude[0]) * rng.standard_normal(
         modes
     ) / np.arange(1, modes + 1)
     velocity = model.linear_modes[:, 0] * np.sqrt(1.5 * (model.saddle_energy - model.well_energy))
-    below = march(model, **given, cycles=4, start=State(amplitude=alpha, velocity=velocity))
-    above = march(model, **given, cycles=4, start=State(amplitude=-alpha, velocity=-velocity), side="above")
+    below = integrate_ensemble(model, **given, cycles=4, start=State(amplitude=alpha, velocity=velocity))
+    above = integrate_ensemble(
+        model, **given, cycles=4, start=State(amplitude=-alpha, velocity=-velocity), side="above"
+    )
     assert_mirrored(below, above)

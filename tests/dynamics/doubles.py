@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from snapbeam.dynamics.flow import Marched
+from snapbeam.dynamics.flow import AdvancedStates
 
 Map = Callable[[np.ndarray, dict], np.ndarray]
 
@@ -22,8 +22,8 @@ class KnownMap:
         self.dimension, self.period, self.values = dimension, period, values
         self.names = tuple(f"x[{i + 1}]" for i in range(dimension))
 
-    def march(self, states, periods=1, *, tangents=None, every=False, points=None):
-        x = np.array(states.hidden if isinstance(states, Marched) else states, dtype=float)
+    def advance(self, states, periods=1, *, tangents=None, every=False, points=None):
+        x = np.array(states.hidden if isinstance(states, AdvancedStates) else states, dtype=float)
         of = self.values | dict(points or {})
         moved, seen = tangents, []
         for _ in range(periods):
@@ -31,7 +31,7 @@ class KnownMap:
                 moved = np.einsum("nij,nkj->nki", self._slope(x, of), moved)
             x = self._step(x, of)
             seen.append(x)
-        return Marched(x, np.stack(seen, axis=1) if every else None, moved, {}, x)
+        return AdvancedStates(x, np.stack(seen, axis=1) if every else None, moved, {}, x)
 
     def neighbour(self, name, value):
         return KnownMap(self._step, self._slope, self.dimension, self.period, **(self.values | {name: value}))

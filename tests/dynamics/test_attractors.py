@@ -92,7 +92,7 @@ def test_a_beam_between_two_wells() -> None:
     flow = found.flow
     for at in ((3, 4), (12, 10), (20, 15)):
         row = np.array([[plane["amplitude[1]"][at[0]], plane["velocity[1]"][at[1]]]])
-        end, label = flow.march(row, 2000).states[0], int(ds["basin"][at])
+        end, label = flow.advance(row, 2000).states[0], int(ds["basin"][at])
         assert label == -1 or np.abs(found.attractors[label].points - end).max(axis=1).min() < 1e-3
     alone = sb.dynamics.find_attractors(system, 40, transient=300, integration=sb.Integration(threads=1))
     np.testing.assert_array_equal(alone.labels, found.labels)
@@ -112,7 +112,7 @@ def test_the_edge_of_a_map_is_its_saddle() -> None:
     )
 
     def right(flow, states, horizon):
-        return flow.march(states, horizon).states[:, 0] > 0.0
+        return flow.advance(states, horizon).states[:, 0] > 0.0
 
     edge = sb.dynamics.edge_tracking(cubic, [-0.8, 0.6], [0.9, 0.6], outcome=right, horizon=80)
     np.testing.assert_allclose(edge.states[-1], [0.0, 0.0], atol=1e-4)

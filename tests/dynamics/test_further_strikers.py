@@ -244,11 +244,11 @@ def test_exponents_and_the_map(ratio: float, cycles: int) -> None:
     assert float(found.exponent.sum()) == pytest.approx(expected, rel=1e-8)
     every = sb.advance(flow.system, periods=4 * cycles, save_every_period=True)
     wanted = np.concatenate([every.amplitude, every.velocity], axis=1)[cycles - 1 :: cycles] / flow.scales
-    once = flow.march(flow.coordinates(), 4, every=True).every[0]
+    once = flow.advance(flow.coordinates(), 4, every=True).every[0]
     np.testing.assert_array_equal(once, wanted)
     here = flow.coordinates()
     for _ in range(4):
-        here = flow.march(here, 1)
+        here = flow.advance(here, 1)
     np.testing.assert_allclose(here.states[0], wanted[-1], atol=1e-9)
 
 
@@ -297,7 +297,7 @@ def test_phases_of_each_striker_count(shift: float) -> None:
         )
     flow, other = Stroboscope(system, EXACT, phase=at[0] + shift), Stroboscope(shifted, EXACT)
     x = other.coordinates()
-    np.testing.assert_allclose(flow.march(x, 1).states, other.march(x, 1).states, atol=1e-9)
+    np.testing.assert_allclose(flow.advance(x, 1).states, other.advance(x, 1).states, atol=1e-9)
     assert flow.striker_phase == pytest.approx(other.striker_phase)
     section = sb.dynamics.poincare_section(
         system, periods=3, transient=2, phase=at[0] + shift, integration=EXACT

@@ -85,7 +85,9 @@ def test_a_map_of_exponents_is_that_of_its_points() -> None:
     one = sb.dynamics.lyapunov_spectrum(system_of(1, 1.5, 0.3), 1, 30, transient=20)
     assert ds["exponent"].dims == ("frequency_ratio", "velocity_amplitude", "exponent_number")
     chosen = ds["exponent"].sel(frequency_ratio=1.5, velocity_amplitude=0.3)
-    assert float(chosen[0]) == float(one["exponent"][0, 0]), "to the last bit, whatever it is marched with"
+    assert float(chosen[0]) == float(one["exponent"][0, 0]), (
+        "to the last bit, whatever other runs are integrated with it"
+    )
     for name in ("exponent_error", "exponent_snapping", "exponent_settled"):
         np.testing.assert_array_equal(ds[name].sel(frequency_ratio=1.5, velocity_amplitude=0.3), one[name][0])
     alone = sb.dynamics.lyapunov_spectrum(

@@ -61,7 +61,7 @@ def test_orbits_with_one_impact_in_n_periods(ratio: float, restitution: float, p
     ("modes", "ratio", "velocity", "periods"), [(1, 1.6, 0.03, 1), (8, 1.4, 0.03, 2), (32, 3.5, 0.06, 2)]
 )
 def test_products_of_multipliers(modes: int, ratio: float, velocity: float, periods: int) -> None:
-    """exp(-2 T sum zeta omega), impacts or none; the orbit closes by the plain march too."""
+    """exp(-2 T sum zeta omega), impacts or none; the orbit closes by the plain integration too."""
     system = system_of(modes, ratio, velocity)
     orbit = sb.dynamics.periodic_orbit(system, period=periods, transient=2000)
     model = system.model

@@ -63,10 +63,10 @@ def test_periods_one_by_one_are_periods_at_once():
     """Each begins at the phases of base and load."""
     flow = Stroboscope(SHAKEN["both"])
     begun = flow.coordinates()
-    once = flow.march(begun, 6).states
+    once = flow.advance(begun, 6).states
     here = begun
     for _ in range(6):
-        here = flow.march(here, 1).states
+        here = flow.advance(here, 1).states
     np.testing.assert_allclose(here, once, atol=1e-9)
 
 
@@ -92,7 +92,7 @@ def test_a_map_at_a_phase_of_the_base():
     flow = Stroboscope(SHAKEN["base"], phase=1.0)
     shifted = Stroboscope(SHAKEN["base"].replace(**{"base_excitation.phase": 1.0}))
     x = shifted.coordinates()
-    np.testing.assert_allclose(flow.march(x, 3).states, shifted.march(x, 3).states, atol=1e-12)
+    np.testing.assert_allclose(flow.advance(x, 3).states, shifted.advance(x, 3).states, atol=1e-12)
     stop = sb.Striker(drive=sb.FixedStop(), gap=5e-5)
     beside = Stroboscope(sb.System(MODEL, default_values.CONTACT, stop, base_excitation=BASE), phase=1.0)
     assert float(beside.starting(beside.state(x[0])).initial_state.phase) == 1.0

@@ -23,7 +23,7 @@ def cubic() -> KnownMap:
 
 
 def right(flow, states, horizon):
-    return flow.march(states, horizon).states[:, 0] > 0.0
+    return flow.advance(states, horizon).states[:, 0] > 0.0
 
 
 def tracked(**options) -> sb.dynamics.EdgeState:

@@ -39,9 +39,9 @@ def test_a_wait_is_told_every_second_until_it_ends(heard):
     waiting = Waiting(heard, clock.later)
     waiting.begin(0, lambda seconds, words: told.append((seconds, words)))
     clock.tick()
-    logging.getLogger("snapbeam").info("compiling march, once on this machine")
+    logging.getLogger("snapbeam").info("compiling integrate, once on this machine")
     clock.tick()
-    assert [words for _, words in told] == ["", "compiling march, once on this machine"]
+    assert [words for _, words in told] == ["", "compiling integrate, once on this machine"]
     assert told[1][0] >= told[0][0] >= 0.0
     waiting.end(0)
     assert heard.words == "", "what was computed is compiled"

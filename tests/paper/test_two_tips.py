@@ -1,4 +1,4 @@
-"""Slow pushers with one tip or two: what is published, mirror images, a creeping beam, and the march itself."""
+"""Slow pushers with one tip or two: what is published, mirror images, a creeping beam, and the integration itself."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_a_creeping_beam() -> None:
 
 @pytest.mark.slow
 def test_two_strikers_that_move_slowly() -> None:
-    """The march, two tips at constant speed: forces and the height at which the beam leaves the one by the centre.
+    """The integrate_ensemble, two tips at constant speed: forces and the height at which the beam leaves the one by the centre.
 
     With the paper's damping the beam then goes over at once; one that creeps comes to rest on the other tip.
     """

@@ -1,4 +1,4 @@
-"""Runs that take long: marched once, heard when interrupted, and saying how far they are."""
+"""Runs that take long: integrated once, heard when interrupted, and saying how far they are."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SYSTEM = sb.System(
 
 
 def test_one_integration_a_run(monkeypatch) -> None:
-    """Samples, impacts and statistics come from the same march."""
+    """Samples, impacts and statistics come from the same integrate_ensemble."""
     steps = []
     record = driver.record
 
@@ -32,7 +32,7 @@ def test_one_integration_a_run(monkeypatch) -> None:
             yield piece
 
     def never(*_, **__):
-        raise AssertionError("a run is recorded, not marched beside it")
+        raise AssertionError("a run is recorded, not integrated beside it")
 
     monkeypatch.setattr(driver, "record", counted)
     monkeypatch.setattr(driver, "run_ensemble", never)

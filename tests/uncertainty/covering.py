@@ -215,7 +215,7 @@ def text() -> str:
 if __name__ == "__main__":
     for name in sys.argv[1:] or list(KINDS):
         counted = KINDS[name][1]()
-        # only the waveforms march a beam; the others are numbers alone
+        # only the waveforms integrate a beam; the others are numbers alone
         engine = solver_fingerprint() if name == "waveforms" else ""
         kept = stored() | {name: counted._asdict() | {"engine": engine}}
         kept = {key: kept[key] for key in KINDS if key in kept}

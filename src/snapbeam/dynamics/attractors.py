@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from scipy.stats import beta
 
 from snapbeam.dynamics.bifurcation import minimal_period
-from snapbeam.dynamics.flow import Flow, Marched, Stroboscope, flow_of, settling_periods
+from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, flow_of, settling_periods
 from snapbeam.dynamics.lyapunov import lyapunov_spectrum
 from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, orbit_tolerance, shoot
 from snapbeam.model.integration import Integration
@@ -106,7 +106,7 @@ def _ball(orbit: PeriodicOrbit, point: _Array, slope: _Array, directions: _Array
     radius = 0.0
     for level in range(_SHELLS, -1, -1):
         size = _LARGEST / longest * 0.5**level
-        came = orbit.flow.march(point + size * shell, orbit.period).states
+        came = orbit.flow.advance(point + size * shell, orbit.period).states
         away = (came - point) @ factor
         if not (np.sqrt((away**2).sum(axis=1)) < size).all():
             break
@@ -346,8 +346,8 @@ def find_attractors(
             progress(done, 4)
 
     report(0)
-    there = flow.march(rows, leave)
-    seen = flow.march(there, 2 * most, every=True)
+    there = flow.advance(rows, leave)
+    seen = flow.advance(there, 2 * most, every=True)
     report(1)
     assert seen.every is not None
     known = np.asarray(np.isfinite(seen.states).all(axis=1))
@@ -408,7 +408,7 @@ def _states_of(flow: Flow, states: ArrayLike | int, seed: int) -> _Array:
 
 
 def _orbits(
-    flow: Flow, seen: Marched, repeats: NDArray[np.int64], tolerance: float
+    flow: Flow, seen: AdvancedStates, repeats: NDArray[np.int64], tolerance: float
 ) -> tuple[list[tuple[PeriodicOrbit, PeriodicOrbit]], list[str]]:
     """The stable orbits that states which repeat are on, each once and with its verification; why others are none."""
     found: list[PeriodicOrbit] = []
@@ -473,7 +473,7 @@ def _periodic(orbit: PeriodicOrbit, verification: PeriodicOrbit) -> Attractor:
 def _chaotic(
     flow: Flow,
     rows: _Array,
-    seen: Marched,
+    seen: AdvancedStates,
     which: NDArray[np.int64],
     most: int,
     lasts: int,
@@ -482,7 +482,7 @@ def _chaotic(
     """Groups of runs that never repeat, those of them that last and diverge."""
     if not which.size or not flow.smooth:
         return [], []
-    later = flow.march(flow.march(seen.states[which], lasts), 2 * most + 62, every=True)
+    later = flow.advance(flow.advance(seen.states[which], lasts), 2 * most + 62, every=True)
     assert later.every is not None
     rest = minimal_period(np.nan_to_num(later.every[:, : 2 * most], nan=0.0), _REPEATS)
     left = (rest > 0) | ~np.isfinite(later.states).all(axis=1)

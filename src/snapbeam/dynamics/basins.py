@@ -155,7 +155,7 @@ def _labelled(
     open_, x, done = np.arange(len(rows)), rows, 0
     while done < total and open_.size:
         ahead = min(step, total - done)
-        x = flow.march(x, ahead).states
+        x = flow.advance(x, ahead).states
         done += ahead
         taken = np.zeros(open_.size, dtype=bool)
         for number, each in enumerate(found.attractors):

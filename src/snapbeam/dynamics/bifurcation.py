@@ -151,16 +151,16 @@ class _Diagram:
         """The states that are kept of some runs, shape (runs, keep, d), and impacts and crossings a period."""
         values, periods = self.values[at], self.leave + self.keep
         if lookup(self.name).is_run:
-            marched = [self.flow.march(x, periods, every=True, points={self.name: values})]
+            advanced = [self.flow.advance(x, periods, every=True, points={self.name: values})]
         else:
-            marched = [
-                self.flow.neighbour(self.name, float(value)).march(each[None], periods, every=True)
+            advanced = [
+                self.flow.neighbour(self.name, float(value)).advance(each[None], periods, every=True)
                 for each, value in zip(x, values, strict=True)
             ]
-        every = np.concatenate([each.every[:, self.leave :] for each in marched if each.every is not None])
+        every = np.concatenate([each.every[:, self.leave :] for each in advanced if each.every is not None])
         counts = np.array(
             [
-                np.concatenate([each.statistics[name] for each in marched])
+                np.concatenate([each.statistics[name] for each in advanced])
                 for name in ("impacts", "zero_crossings")
             ]
         )

@@ -201,7 +201,7 @@ def _centers(orbit: PeriodicOrbit) -> NDArray[np.float64]:
     assert isinstance(flow, Stroboscope)
     states = orbit.coordinates[np.newaxis]
     if orbit.period > 1:
-        later = flow.march(states, orbit.period - 1, every=True).every
+        later = flow.advance(states, orbit.period - 1, every=True).every
         assert later is not None
         states = np.concatenate([states, later[0]])
     amplitudes = states[:, : flow.modes] * flow.scales[: flow.modes]

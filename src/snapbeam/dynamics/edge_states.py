@@ -168,7 +168,7 @@ def edge_tracking(
                 break
             low, high = bracket
             closest = max(closest, float(np.abs(high - low).max()))
-        both = flow.march(np.stack([low, high]), 1).states
+        both = flow.advance(np.stack([low, high]), 1).states
         low, high = both[0], both[1]
         size = float(np.abs(high - low).max())
         if not np.isfinite(size):
@@ -223,12 +223,12 @@ def _row(flow: Flow, state: State | ArrayLike, name: str) -> _Array:
 
 
 def _snaps(flow: Flow, states: _Array, horizon: int) -> NDArray[np.bool_]:
-    marched = flow.march(states, horizon)
-    if "zero_crossings" not in marched.statistics:
+    advanced = flow.advance(states, horizon)
+    if "zero_crossings" not in advanced.statistics:
         raise InputError("outcome: is needed for a flow that is not a System")
-    if not np.isfinite(marched.states).all():
+    if not np.isfinite(advanced.states).all():
         raise InputError("a run failed, so its outcome is unknown; look at its status with sb.advance")
-    crossed = np.asarray(marched.statistics["zero_crossings"] > 0)
+    crossed = np.asarray(advanced.statistics["zero_crossings"] > 0)
     if isinstance(flow, Stroboscope):
         # on the border's way some have crossed before they are looked at again
         shape, first = flow.system.model.midspan_shape, flow.coordinates()[0]

@@ -33,9 +33,9 @@ from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, flag, integer, nonnegative, shown
 
 __all__ = [
+    "AdvancedStates",
     "Flow",
     "InitialConditions",
-    "Marched",
     "Stroboscope",
     "common_cycles",
     "flow_of",
@@ -258,7 +258,7 @@ _BYTES = 2**27
 
 
 @dataclass(frozen=True, eq=False)
-class Marched:
+class AdvancedStates:
     """Where states came to."""
 
     states: _Array
@@ -292,15 +292,15 @@ class Flow(Protocol):
         """Whether tangents can be carried along."""
         ...
 
-    def march(
+    def advance(
         self,
-        states: ArrayLike | Marched,
+        states: ArrayLike | AdvancedStates,
         periods: int = 1,
         *,
         tangents: _Array | None = None,
         every: bool = False,
         points: Mapping[str, _Array] | None = None,
-    ) -> Marched:
+    ) -> AdvancedStates:
         """Take states of shape (runs, d), or where they came to, some periods on.
 
         *tangents* has the shape (runs, k, d); *points* are parameters that differ between the runs.
@@ -515,22 +515,22 @@ class Stroboscope:
         run, sign = ensemble.runs[0], ensemble.structure.sign
         return float(sign * (run["rest_contact"] + run["offset"]))
 
-    def march(
+    def advance(
         self,
-        states: ArrayLike | Marched,
+        states: ArrayLike | AdvancedStates,
         periods: int = 1,
         *,
         tangents: _Array | None = None,
         every: bool = False,
         points: Mapping[str, _Array] | None = None,
-    ) -> Marched:
-        """As :meth:`Flow.march`; what a run gives does not depend on what it is marched with."""
-        begun = states.hidden if isinstance(states, Marched) else self._begun(states)
+    ) -> AdvancedStates:
+        """As :meth:`Flow.advance`; a run does not depend on the runs that are integrated with it."""
+        begun = states.hidden if isinstance(states, AdvancedStates) else self._begun(states)
         count, size = begun.batch[0], 2 * 8 * (self.modes + 16)
         share = max(1, _BYTES // (size * periods * self.cycles_per_period))
         parts = [slice(at, min(at + share, count)) for at in range(0, count, share)]
         found = [
-            self._march_part(
+            self._advance_part(
                 begun[part] if len(parts) > 1 else begun,
                 periods,
                 None if tangents is None else tangents[part],
@@ -558,14 +558,14 @@ class Stroboscope:
             statistics=passed,
         )
 
-    def _march_part(
+    def _advance_part(
         self,
         begun: State,
         periods: int,
         tangents: _Array | None,
         every: bool,
         points: Mapping[str, _Array] | None,
-    ) -> Marched:
+    ) -> AdvancedStates:
         lost = None if begun.statistics is None else ~np.isin(begun.statistics["status"], _REACHED)
         own = {lookup(name).name: np.asarray(values) for name, values in (points or {}).items()}
         for name in own:
@@ -614,7 +614,9 @@ class Stroboscope:
         )
         # after a period every motion is where it began
         hidden = replace(hidden, phase=ensemble.runs["phase"].copy(), statistics={"status": status})
-        return Marched(last, whole, moved, statistics_of(ensemble, landings.accumulators_of_runs), hidden)
+        return AdvancedStates(
+            last, whole, moved, statistics_of(ensemble, landings.accumulators_of_runs), hidden
+        )
 
     def _require_period(self, own: Mapping[str, _Array]) -> None:
         """Refuse parameters of runs with which the motions have a common period of another number of cycles."""
@@ -637,14 +639,14 @@ class Stroboscope:
         return rows
 
 
-def _joined(parts: list[Marched]) -> Marched:
-    """Runs that were marched one part after the other."""
+def _joined(parts: list[AdvancedStates]) -> AdvancedStates:
+    """Parts of an ensemble that were integrated one after the other."""
 
     def stacked(arrays: list[Any]) -> Any:
         return None if arrays[0] is None else np.concatenate(arrays)
 
     statistics = {name: stacked([part.statistics[name] for part in parts]) for name in parts[0].statistics}
-    return Marched(
+    return AdvancedStates(
         stacked([part.states for part in parts]),
         stacked([part.every for part in parts]),
         stacked([part.tangents for part in parts]),

@@ -280,7 +280,7 @@ class LifetimeWork(PointWork):
                 if progress is not None:
                     progress((s * size + done) // count, size)
 
-            found = self._march(points, s, threads, report)
+            found = self._integrate(points, s, threads, report)
             integers[0, s], integers[1, s] = found["status"], found["zero_crossings"]
             integers[2, s] = found["zero_crossings_last_quarter"]
             integers[3, s] = np.where(found["final_well"] == side, -1, 1)
@@ -288,7 +288,7 @@ class LifetimeWork(PointWork):
             numbers[s] = found["last_zero_crossing"] / cycle
         return ResultTable(integers.reshape(-1, size).T.copy(), numbers.T.copy())
 
-    def _march(
+    def _integrate(
         self, points: Columns, number: int, threads: int | None, report: Callable[[int], object]
     ) -> dict[str, NDArray[Any]]:
         """Every point from one start.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.dynamics.flow import Flow, Marched, Stroboscope, flow_of, settling_periods
+from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, flow_of, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State
@@ -100,15 +100,17 @@ def lyapunov_spectrum(
             "the largest exponent"
         )
     begun, points, columns = _runs(flow, states, axes)
-    marched = flow.march(begun, before, points=columns) if before else flow.march(begun, 1, points=columns)
-    runs = marched.states.shape[0]
+    advanced = (
+        flow.advance(begun, before, points=columns) if before else flow.advance(begun, 1, points=columns)
+    )
+    runs = advanced.states.shape[0]
     frame = np.tile(np.eye(flow.dimension)[:count], (runs, 1, 1))
     growth, crossed = np.empty((total, runs, count)), np.zeros((total, runs), dtype=bool)
     for period in range(total):
-        marched = flow.march(marched, 1, tangents=frame, points=columns)
-        frame, growth[period] = _orthogonal(marched)
-        if "zero_crossings" in marched.statistics:
-            crossed[period] = marched.statistics["zero_crossings"] > 0
+        advanced = flow.advance(advanced, 1, tangents=frame, points=columns)
+        frame, growth[period] = _orthogonal(advanced)
+        if "zero_crossings" in advanced.statistics:
+            crossed[period] = advanced.statistics["zero_crossings"] > 0
         if progress is not None:
             progress(period + 1, total)
     dataset = _dataset(flow, growth, crossed, points, before)
@@ -148,11 +150,11 @@ def _runs(
     return np.repeat(begun[:1], points.size, axis=0), points, columns
 
 
-def _orthogonal(marched: Marched) -> tuple[_Array, _Array]:
+def _orthogonal(advanced: AdvancedStates) -> tuple[_Array, _Array]:
     """An orthonormal frame, and the logarithm of what each of its directions grew by."""
-    assert marched.tangents is not None
-    lost = ~np.asarray(np.isfinite(marched.tangents).all(axis=(1, 2)))
-    vectors = np.where(lost[:, None, None], 1.0, marched.tangents).transpose(0, 2, 1)
+    assert advanced.tangents is not None
+    lost = ~np.asarray(np.isfinite(advanced.tangents).all(axis=(1, 2)))
+    vectors = np.where(lost[:, None, None], 1.0, advanced.tangents).transpose(0, 2, 1)
     q, r = np.linalg.qr(vectors)
     grown = np.abs(np.diagonal(r, axis1=1, axis2=2))
     with np.errstate(divide="ignore"):
@@ -267,12 +269,12 @@ def largest_lyapunov(
     before, rule = _transient(flow, transient, 1)
     size = within("distance", distance, *_DISTANCES, closed="both")
     begun, _, _ = _runs(flow, states, None)
-    here = flow.march(begun, before).states
+    here = flow.advance(begun, before).states
     runs = here.shape[0]
     along = np.tile(np.ones(flow.dimension) / np.sqrt(flow.dimension), (runs, 1))
     growth = np.empty((total, runs))
     for period in range(total):
-        both = flow.march(np.concatenate([here, here + size * along]), 1).states
+        both = flow.advance(np.concatenate([here, here + size * along]), 1).states
         here, apart = both[:runs], both[runs:] - both[:runs]
         away = np.sqrt((apart * apart).sum(axis=1))
         with np.errstate(divide="ignore", invalid="ignore"):

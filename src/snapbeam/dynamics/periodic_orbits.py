@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.dynamics.flow import Flow, Marched, Stroboscope, flow_of
+from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, flow_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State
@@ -102,16 +102,16 @@ class Family:
         self.name = name
         self._beside = name is not None and (not isinstance(flow, Stroboscope) or lookup(name).is_run)
 
-    def march(
+    def advance(
         self, x: _Array, periods: int, value: float | None = None, tangents: _Array | None = None
-    ) -> Marched:
+    ) -> AdvancedStates:
         """Take states of shape (runs, d) some periods on, at one value of the parameter."""
         if value is None or self.name is None:
-            return self.flow.march(x, periods, tangents=tangents)
+            return self.flow.advance(x, periods, tangents=tangents)
         if self._beside:
             points = {self.name: np.full(len(x), value)}
-            return self.flow.march(x, periods, tangents=tangents, points=points)
-        return self.at(value).march(x, periods, tangents=tangents)
+            return self.flow.advance(x, periods, tangents=tangents, points=points)
+        return self.at(value).advance(x, periods, tangents=tangents)
 
     def at(self, value: float) -> Flow:
         """The flow at a value of the parameter."""
@@ -122,11 +122,11 @@ class Family:
         """Derivative by the parameter of where the flow brings one state, shape (d,)."""
         if not self._beside or self.name is None:
             above, below = (
-                self.march(x[None], periods, value + sign * step).states[0] for sign in (1.0, -1.0)
+                self.advance(x[None], periods, value + sign * step).states[0] for sign in (1.0, -1.0)
             )
         else:
             points = {self.name: np.array([value + step, value - step])}
-            above, below = self.flow.march(np.repeat(x[None], 2, axis=0), periods, points=points).states
+            above, below = self.flow.advance(np.repeat(x[None], 2, axis=0), periods, points=points).states
         change: _Array = (above - below) / (2.0 * step)
         return change
 
@@ -149,9 +149,9 @@ def jacobian(family: Family, x: _Array, periods: int, value: float | None = None
     shares = min(usable_cores(), max(1, size // _SPLIT))
     shares = next(count for count in range(shares, 0, -1) if size % count == 0)
     tangents = np.eye(size).reshape(shares, size // shares, size)
-    marched = family.march(np.repeat(x[None], shares, axis=0), periods, value, tangents)
-    assert marched.tangents is not None
-    return Return(marched.states[0], marched.tangents.reshape(size, size).T, _impacts(marched))
+    advanced = family.advance(np.repeat(x[None], shares, axis=0), periods, value, tangents)
+    assert advanced.tangents is not None
+    return Return(advanced.states[0], advanced.tangents.reshape(size, size).T, _impacts(advanced))
 
 
 def _by_differences(family: Family, x: _Array, periods: int, value: float | None) -> Return:
@@ -160,18 +160,18 @@ def _by_differences(family: Family, x: _Array, periods: int, value: float | None
     weights = np.array([weight for _, weight in _STENCIL])
     for _ in range(_SHRINKINGS):
         moves = np.concatenate([sign * k * step * np.eye(size) for k, _ in _STENCIL for sign in (1.0, -1.0)])
-        marched = family.march(np.concatenate([x[None], x + moves]), periods, value)
-        impacts = marched.statistics.get("impacts")
+        advanced = family.advance(np.concatenate([x[None], x + moves]), periods, value)
+        impacts = advanced.statistics.get("impacts")
         if impacts is None or (impacts == impacts[0]).all():
             break
         step *= 0.25
-    table = marched.states[1:].reshape(len(_STENCIL), 2, size, size)
+    table = advanced.states[1:].reshape(len(_STENCIL), 2, size, size)
     slopes = np.einsum("k,kij->ij", weights, table[:, 0] - table[:, 1]) / step
-    return Return(marched.states[0], slopes.T, _impacts(marched))
+    return Return(advanced.states[0], slopes.T, _impacts(advanced))
 
 
-def _impacts(marched: Marched) -> int:
-    return int(marched.statistics["impacts"][0]) if "impacts" in marched.statistics else -1
+def _impacts(advanced: AdvancedStates) -> int:
+    return int(advanced.statistics["impacts"][0]) if "impacts" in advanced.statistics else -1
 
 
 def newton(
@@ -400,9 +400,9 @@ class PeriodicOrbit:
     @cached_property
     def points(self) -> _Array:
         """The orbit once a period of the drive, shape (m, d)."""
-        marched = self.flow.march(self.coordinates[None], self.period, every=True)
-        assert marched.every is not None
-        return np.concatenate([self.coordinates[None], marched.every[0, :-1]])
+        advanced = self.flow.advance(self.coordinates[None], self.period, every=True)
+        assert advanced.every is not None
+        return np.concatenate([self.coordinates[None], advanced.every[0, :-1]])
 
     @cached_property
     def minimal_period(self) -> int:
@@ -510,7 +510,7 @@ def periodic_orbit(
     phase : float, optional
         Of the drive at which the orbit is seen, rad; where no contact begins, ends or lasts no time.
     transient : int
-        Periods to march from the guess first, which brings it to what attracts it.
+        Periods to advance from the guess first, which brings it to what attracts it.
     tolerance : float
         Greatest coordinate that may remain, in units of the well's amplitude and of omega_1 times it; at most 1e-3.
     iterations : int
@@ -542,7 +542,7 @@ def periodic_orbit(
     x = _guess_of(flow, guess)
     before = integer("transient", transient, 0, 10**7)
     if before:
-        x = flow.march(x[None], before).states[0]
+        x = flow.advance(x[None], before).states[0]
         if not np.isfinite(x).all():
             raise OrbitNotFoundError("the run from the guess failed; see its status with sb.advance")
     tell(getattr(flow, "diagnostics", ()))
@@ -585,7 +585,7 @@ def shoot(
     one, family = np.eye(x.size), Family(flow)
 
     def residual(at: _Array) -> _Array:
-        return family.march(at[None], period).states[0] - at
+        return family.advance(at[None], period).states[0] - at
 
     def derivative(at: _Array) -> tuple[_Array, _Array]:
         came = jacobian(family, at, period)
@@ -658,7 +658,7 @@ class Corrector:
 
         def residual(y: _Array) -> _Array:
             value = float(y[-1]) * self.span
-            there = self.family.march(y[None, :-1], self.period, value).states[0]
+            there = self.family.advance(y[None, :-1], self.period, value).states[0]
             return np.append(there - y[:-1], row @ (y - guess))
 
         def derivative(y: _Array) -> tuple[_Array, _Array]:

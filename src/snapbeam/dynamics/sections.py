@@ -95,7 +95,7 @@ def poincare_section(
     )
     begun = flow.coordinates()
     if before:
-        begun = flow.march(begun, before).states
+        begun = flow.advance(begun, before).states
     if not np.isfinite(begun).all():
         raise InputError("transient: the run failed before the section; use a smaller step")
     held = flow.starting(flow.state(begun[0]))

@@ -79,8 +79,6 @@ POINT = "point"
 _ENTRIES = 12
 """Entries of one more dimension that are shown one by one: outcomes, wells, classes, numbers of cycles."""
 _HIDDEN = ("status",)
-_OF_0_1 = ("frequency_ratio", "velocity_amplitude", "location")
-"""Axes of maps of version 0.1, which do not say what parameter they are."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,7 @@ def parameter_name(skeleton: xr.Dataset, name: str) -> str | None:
     """The dotted name of what a coordinate is of; None if it is no parameter."""
     if name not in skeleton.coords:
         return None
-    said = skeleton[name].attrs.get("parameter", name if name in _OF_0_1 else "")
+    said = skeleton[name].attrs.get("parameter", "")
     try:
         return lookup(str(said)).name
     except InputError:

@@ -17,7 +17,7 @@ from .run import plot_run as plot_run
 from .run import plot_spectrum as plot_spectrum
 from .schematic import plot_system as plot_system
 from .style import CLASS_COLORS as CLASS_COLORS
-from .style import house_style as house_style
+from .style import figure_style as figure_style
 from .style import new_figure as new_figure
 from .style import save_figure as save_figure
 from .threshold import plot_threshold as plot_threshold

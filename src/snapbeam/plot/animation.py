@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from snapbeam.model.boundary_conditions import BoundaryConditions, modes_between
 from snapbeam.model.parameters import lookup
 from snapbeam.model.reduced_model import displacement_along
-from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, caption, fix_ticks, house_style, new_figure
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, caption, figure_style, fix_ticks, new_figure
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.util.files import MADE_BY, atomic_path, check_writable
 from snapbeam.util.packages import needs
@@ -129,7 +129,7 @@ def write_frames(
     """Write figures of one size, one after the other, as the frames of an MP4 (H.264) or a GIF."""
     target = check_writable(path, "animate", ANIMATION_SUFFIXES)
     rate = positive("fps", fps, "Hz")
-    with house_style(), atomic_path(target) as temporary:
+    with figure_style(), atomic_path(target) as temporary:
         pictures = _pictures(frames, dots_per_inch)
         if target.suffix.lower() == ".gif":
             _write_gif(pictures, temporary, rate)
@@ -253,7 +253,7 @@ class _Scene:
         self.location = float(dataset.attrs.get("location", 0.5))
         self.rate = np.median(np.diff(times))
         self.times = times
-        with house_style():
+        with figure_style():
             self.figure = new_figure("single", _HEIGHT)
             self.figure.set_size_inches(_WIDTH / 25.4, _HEIGHT / 25.4)
             self.figure.suptitle(caption(dataset, 2), x=0.02, ha="left", fontsize=8)

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from snapbeam.plot.axes import dress, edges_of, positions
-from snapbeam.plot.style import axes_or_new, fix_ticks, house_style
+from snapbeam.plot.style import axes_or_new, figure_style, fix_ticks
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, checked
 
@@ -68,7 +68,7 @@ def plot_diagram(
         )
     first = dataset if dataset is not None else branches[0]
     along = str(first.attrs.get("parameter", ""))
-    with house_style():
+    with figure_style():
         ax = axes_or_new(ax, "double", 84.0)
         handles: list[Line2D] = []
         if dataset is not None:
@@ -181,7 +181,7 @@ def plot_lifetimes(
     dims = [str(name) for name in dataset["lifetime"].dims]
     if not 1 <= len(dims) <= 2 or "point" in dims:
         raise InputError(f"lifetime over {dims}: is drawn over one or two parameters")
-    with house_style():
+    with figure_style():
         ax = axes_or_new(ax)
         if len(dims) == 1:
             x, _ = positions(dataset, dims[0])
@@ -243,7 +243,7 @@ def plot_survival(
     if len(rows) > 5:
         raise InputError(f"dataset: has {len(rows)} points; choose at most 5 of them")
     tau, delay = (np.atleast_1d(runs[name].values).ravel() for name in ("lifetime", "delay"))
-    with house_style():
+    with figure_style():
         ax = axes_or_new(ax)
         seen = float(dataset.attrs["cycles"]) - float(dataset.attrs["settling_cycles"])
         settled = runs["final_well_proven"].values.astype(bool) | (
@@ -307,7 +307,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     if "exponent" not in dataset:
         raise InputError(f"no exponents among {list(map(str, dataset.variables))}")
     dims = [str(name) for name in dataset["exponent"].dims if name != "exponent_number"]
-    with house_style():
+    with figure_style():
         ax = axes_or_new(ax)
         if "running" in dataset:
             period = np.arange(1, dataset.sizes["period"] + 1)
@@ -352,7 +352,7 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
     y = x.replace("displacement", "velocity")
     if x not in dataset or y not in dataset:
         raise InputError(f"no {x} and {y} among {list(map(str, dataset.variables))}")
-    with house_style():
+    with figure_style():
         ax = axes_or_new(ax)
         ax.plot(
             dataset[x].values,
@@ -379,7 +379,7 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     count = int(dataset["basin"].attrs["flag_values"].max()) + 1
     colors = [_UNDECIDED, *(cm.batlow(0.08 + 0.84 * i / max(count - 1, 1)) for i in range(count))]
     meanings = str(dataset["basin"].attrs["flag_meanings"]).split()
-    with house_style():
+    with figure_style():
         ax = axes_or_new(ax, height=84.0)
         edges = [edges_of(dataset, name) for name in names]
         norm = BoundaryNorm(np.arange(-1.5, count), count + 1)
@@ -417,7 +417,7 @@ def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         raise InputError(f"no edge state among {list(map(str, dataset.variables))}")
     name = str(dataset["coordinate"].values[0])
     values = dataset["state"].values[:, 0]
-    with house_style():
+    with figure_style():
         ax = axes_or_new(ax)
         for at, words in ((-1.0, "well"), (0.0, "straight")):
             if name == "amplitude[1]" and values.min() - 0.3 < at < values.max() + 0.3:

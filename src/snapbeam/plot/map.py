@@ -22,8 +22,8 @@ from snapbeam.plot.style import (
     CLASS_COLORS,
     beam_text,
     class_cells,
+    figure_style,
     fix_ticks,
-    house_style,
     new_figure,
 )
 from snapbeam.solver.statistics import STATISTICS
@@ -119,7 +119,7 @@ def plot_response_map(
         for name in ("frequency_ratio", "location", "velocity_amplitude")
         if name not in (across, upward)
     }
-    with house_style():
+    with figure_style():
         own = new_figure("single", 92.0 if legend else 70.0) if ax is None else None
         if own is not None:
             ax = own.add_subplot()
@@ -154,7 +154,7 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
     if overlaid:
         raise InputError("measurements, quasi_static_line: are drawn over two axes; this map has one")
     name = str(dataset["response_class"].squeeze().dims[0])
-    with house_style():
+    with figure_style():
         own = new_figure("single", 84.0 if legend else 62.0) if ax is None else None
         ax = own.add_subplot() if own is not None else ax
         assert ax is not None
@@ -375,7 +375,7 @@ def plot_statistic(
     data = values.copy(data=scaled.reshape(values.shape))
     if log is None:
         log = wants_powers(scaled)
-    with house_style():
+    with figure_style():
         if ax is None:
             ax = new_figure("single", 74.0).add_subplot()
         fix_ticks(ax)
@@ -494,7 +494,7 @@ def plot_points(
         raise InputError(f"variable = {shown(name)}: the points have {', '.join(named) or 'no variables'}")
     along = _along(dataset, across, upward)
     of_class = name == "response_class"
-    with house_style():
+    with figure_style():
         own = new_figure("single", 92.0 if of_class and legend else 74.0) if ax is None else None
         if own is not None:
             ax = own.add_subplot()

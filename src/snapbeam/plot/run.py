@@ -15,8 +15,8 @@ from snapbeam.plot.style import (
     CENTER_COLOR,
     SHAKER_COLOR,
     caption,
+    figure_style,
     fix_ticks,
-    house_style,
     new_figure,
 )
 from snapbeam.simulation.dataset import check_trajectory
@@ -90,7 +90,7 @@ def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, mode
     name, label = across(dataset)
     alpha = dataset["modal_amplitude"].values
     well = _well_amplitude(dataset)
-    with house_style():
+    with figure_style():
         ax = _axes(ax, dataset)
         for i in range(count):
             color = crameri.batlow(0.85 * i / max(count - 1, 1))
@@ -141,7 +141,7 @@ def plot_energies(run: Run | xr.Dataset, ax: Axes | None = None) -> Axes:
     name, label = across(dataset)
     found = [(key, words, color) for key, words, color in _ENERGIES if key in dataset]
     factor, unit = scale_of(np.concatenate([dataset[key].values for key, _, _ in found]), "J")
-    with house_style():
+    with figure_style():
         ax = _axes(ax, dataset)
         for key, words, color in found:
             ax.plot(dataset[name], dataset[key] / factor, color=color, label=words)
@@ -194,7 +194,7 @@ def plot_spectrum(
     spectrum = 2.0 * np.abs(np.fft.rfft((y - y.mean()) * weight)) / weight.sum()
     frequency = np.fft.rfftfreq(even.size, float(even[1] - even[0]))
     unit = dataset[variable].attrs.get("units", "1")
-    with house_style():
+    with figure_style():
         ax = _axes(ax, dataset)
         ax.plot(frequency[1:], spectrum[1:], color=BEAM_COLOR, linewidth=0.6)
         top = 12.0 if name == "cycle" else float(frequency[-1])
@@ -230,7 +230,7 @@ def plot_phase_portrait(
     names = names if at_midspan else ("displacement_at_striker", "velocity_at_striker")
     dataset = dataset_of(run, *names)
     w, v = (dataset[name].values for name in names)
-    with house_style():
+    with figure_style():
         ax = _axes(ax, dataset)
         ax.plot(w, v, color="0.6", linewidth=0.4, rasterized=w.size > 20_000)
         if strobe and "cycle" in dataset.variables:
@@ -292,7 +292,7 @@ def plot_run(
     rows = 1 + ("penetration_normalised" in part) + ("contact_force" in part)
     if ax is not None:
         return _alone(ax, part, part[axis_name].values, label)
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 35.0 + 28.0 * rows)
         grid = figure.add_gridspec(
             rows, 2 if has_force else 1, width_ratios=(2.2, 1.0) if has_force else None,
@@ -324,7 +324,7 @@ def plot_run(
 
 def _alone(ax: Axes, part: xr.Dataset, x: np.ndarray, label: str) -> Axes:
     """Draw the displacements on the given axes."""
-    with house_style():
+    with figure_style():
         for name, words, color in _CURVES:
             if name in part:
                 ax.plot(x, part[name].values, color=color, label=words, rasterized=x.size > _MANY)

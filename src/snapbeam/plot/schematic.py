@@ -17,7 +17,7 @@ from snapbeam.model.harvester import ElectromagneticHarvester, PiezoelectricHarv
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
-from snapbeam.plot.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, house_style, new_figure
+from snapbeam.plot.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, figure_style, new_figure
 from snapbeam.util.validation import InputError, checked, instance
 
 __all__ = ["FRAME", "draw_surroundings", "draw_tips", "motion_of", "plot_system"]
@@ -200,7 +200,7 @@ def plot_system(system: System, title: str = "") -> Figure:
     if system.model.beam is None:
         raise InputError("system: a structure given by matrices has no shape; give a model made from a beam")
     figure = new_figure("double", 52.0)
-    with house_style():
+    with figure_style():
         striker = system.striker
         widths = [2.4, 1.0] if striker is not None or system.primary_excitation is not None else [1.0]
         axes = figure.subplots(1, len(widths), squeeze=False, width_ratios=widths)[0]

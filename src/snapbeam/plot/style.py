@@ -41,8 +41,8 @@ __all__ = [
     "diagnostics_height",
     "draw_diagnostics",
     "figure_legend",
+    "figure_style",
     "fix_ticks",
-    "house_style",
     "new_figure",
     "panel_letters",
     "save_figure",
@@ -98,8 +98,8 @@ _RC: Any = {
 }
 
 
-def house_style() -> AbstractContextManager[None]:
-    """Return a context in which Matplotlib draws in the house style.
+def figure_style() -> AbstractContextManager[None]:
+    """Return a context in which Matplotlib draws in the style of this package.
 
     Matplotlib loads its backend first.  In a notebook the backend switches ``rcParams["interactive"]`` on, and the end
     of the context would switch it off again if the backend were loaded inside.
@@ -112,13 +112,13 @@ def house_style() -> AbstractContextManager[None]:
 
 
 def fix_ticks(*axes: Axes) -> None:
-    """Give the ticks of *axes* the house style for good; Matplotlib makes them only when it draws."""
+    """Give the ticks of *axes* the style of this package; Matplotlib makes them only when it draws."""
     for ax in axes:
         ax.tick_params(labelsize=_RC["xtick.labelsize"], width=_RC["xtick.major.width"])
 
 
 def new_figure(width: str = "single", height: float = 75.0) -> Figure:
-    """Return an empty figure in the house style, known to pyplot so that notebooks show it.
+    """Return an empty figure in the style of this package, known to pyplot so that notebooks show it.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def new_figure(width: str = "single", height: float = 75.0) -> Figure:
     import matplotlib.pyplot as plt
 
     millimetres = COLUMN_WIDTHS[choice("width", width, tuple(COLUMN_WIDTHS))]
-    with house_style():
+    with figure_style():
         return plt.figure(figsize=(millimetres / 25.4, positive("height", height, "mm") / 25.4))
 
 
@@ -159,7 +159,7 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
         "pdf": {"Creator": MADE_BY, "CreationDate": None},
         "svg": {"Creator": MADE_BY, "Date": None},
     }.get(kind, {"Description": MADE_BY})
-    with house_style(), atomic_path(target) as temporary:
+    with figure_style(), atomic_path(target) as temporary:
         figure.savefig(temporary, format=kind, metadata=stamp)
     return target
 

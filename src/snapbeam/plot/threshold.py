@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.quasi_static import quasi_static_threshold
 from snapbeam.plot.axes import dress, edges_of, positions, symbol_of
-from snapbeam.plot.style import fix_ticks, house_style, new_figure
+from snapbeam.plot.style import figure_style, fix_ticks, new_figure
 from snapbeam.util.validation import InputError, checked, instance
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def plot_threshold(
     curves = [curve.squeeze() for curve in curves]
     if len(curves) > len(_STYLES):
         raise InputError(f"dataset: has {len(curves)} curves; at most {len(_STYLES)} can be told apart")
-    with house_style():
+    with figure_style():
         if ax is None:
             ax = new_figure("single", 70.0).add_subplot()
         for curve, (color, dashes) in zip(curves, _STYLES, strict=False):

@@ -16,7 +16,7 @@ from matplotlib.ticker import EngFormatter
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quasi_static import quasi_static_threshold
 from snapbeam.plot.axes import dress, edges_of, is_geometric, positions, symbol_of
-from snapbeam.plot.style import CLASS_COLORS, fix_ticks, house_style, new_figure
+from snapbeam.plot.style import CLASS_COLORS, figure_style, fix_ticks, new_figure
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, instance, shown
 
@@ -68,7 +68,7 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     else:
         raise InputError(f"over = {shown(over)}: must be one of {', '.join(variables)}")
     up = f"objective_{objectives[0]}"
-    with house_style():
+    with figure_style():
         if ax is None:
             ax = new_figure("single", 74.0).add_subplot()
         x, y = dataset[f"tried_{across}"].values, dataset[f"tried_{up}"].values
@@ -169,7 +169,7 @@ def plot_probability(
     data = data.squeeze()
     if not 1 <= len(dims) <= 2 or "point" in dims:
         raise InputError(f"probability over {dims}: is drawn over one or two parameters")
-    with house_style():
+    with figure_style():
         if ax is None:
             ax = new_figure("single", 72.0).add_subplot()
         if len(dims) == 1:
@@ -295,7 +295,7 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
     along, raised = dims[0], str(data.attrs["parameter"])
     bottom, top = (float(each) for each in data.attrs["bounds"])
     x, _ = positions(data, along)
-    with house_style():
+    with figure_style():
         if ax is None:
             ax = new_figure("single", 70.0).add_subplot()
         for level, (color, dashes) in zip(data["quantile"].values, _STYLES, strict=False):
@@ -364,7 +364,7 @@ def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     weight = np.abs(dataset["effect" if local else "first_order"].values)
     data = dataset.isel(parameter=np.argsort(weight, kind="stable"))
     place = np.arange(data.sizes["parameter"])
-    with house_style():
+    with figure_style():
         if ax is None:
             ax = new_figure("single", 28.0 + 10.0 * place.size).add_subplot()
         if local:

@@ -130,7 +130,7 @@ def _epsilon(binned: NDArray[np.int64], y: _Array, count: int) -> float:
 
 
 # ----------------------------------------------------------------------------------------------------
-# Sobol's indices of independent inputs, with intervals from sequences scrambled anew.
+# Sobol's indices of independent inputs, with intervals from sequences scrambled independently.
 
 
 class Sobol(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from snapbeam.plot.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
+from snapbeam.plot.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, figure_style, fix_ticks, new_figure
 
 if TYPE_CHECKING:
     from snapbeam.lab.calibration import Calibration
@@ -33,7 +33,7 @@ def plot_calibration(result: Calibration) -> Figure:
     """
     named = [name for name in result.values if name in result.standard_errors][:2]
     rows = max(len(result.residuals), 1)
-    with house_style():
+    with figure_style():
         figure = new_figure("double" if len(named) == 2 else "single", 50.0 + 6.0 * rows)
         axes = figure.subplots(1, 2 if len(named) == 2 else 1, squeeze=False)[0]
         _deviations(axes[0], result)

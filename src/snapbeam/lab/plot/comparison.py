@@ -17,8 +17,8 @@ from snapbeam.plot.style import (
     SHAKER_COLOR,
     diagnostics_height,
     draw_diagnostics,
+    figure_style,
     fix_ticks,
-    house_style,
     new_figure,
 )
 from snapbeam.sweeps.measured_points import MeasuredPoints
@@ -42,7 +42,7 @@ def plot_map_comparison(dataset: xr.Dataset, points: MeasuredPoints, result: Map
     Points whose class differs from the class of the map are crossed out.  In the table what agrees is grey, on the diagonal,
     and what does not is red and bold, each the darker the greater its share of the measured class is.
     """
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 92.0)
         grid = figure.add_gridspec(1, 2, width_ratios=(1.15, 1.0))
         left = plot_response_map(dataset, figure.add_subplot(grid[0]), measurements=points)
@@ -125,7 +125,7 @@ def plot_waveform_comparison(
         ("measured", "measured_displacement", "measured_shaker", result.measured_impacts),
         ("simulated", "simulated_displacement", "simulated_shaker", result.simulated_impacts),
     )
-    with house_style():
+    with figure_style():
         told = result.diagnostics
         figure = new_figure("double", 100.0 + diagnostics_height(told, COLUMN_WIDTHS["double"], 3))
         draw_diagnostics(figure, told, 3)
@@ -171,7 +171,7 @@ def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float
         raise InputError(f"window = {window}: holds none of the compared cycles")
     cycle = waveforms["cycle"].values
     told = result.diagnostics
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 105.0 + diagnostics_height(told, COLUMN_WIDTHS["double"], 3))
         draw_diagnostics(figure, told, 3)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0))

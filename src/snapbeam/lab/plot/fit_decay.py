@@ -18,8 +18,8 @@ from snapbeam.plot.style import (
     SHAKER_COLOR,
     diagnostics_height,
     draw_diagnostics,
+    figure_style,
     fix_ticks,
-    house_style,
     new_figure,
 )
 
@@ -53,7 +53,7 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
     envelope = mode.amplitude * law_envelope(mode.law, time - fit.start, rate, mode.law_strength)
     middle = float(values.mean())
     told = fit.diagnostics
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 105.0 + diagnostics_height(told, COLUMN_WIDTHS["double"]))
         draw_diagnostics(figure, told)
         grid = figure.add_gridspec(2, 2, height_ratios=(1.0, 1.1))
@@ -114,7 +114,7 @@ def plot_stabilisation(signal: xr.DataArray, fit: DecayFit) -> Figure:
     window = np.cos(0.5 * np.pi * np.arange(n) / n) ** 2
     level = np.abs(np.fft.rfft((cut.values - cut.values.mean()) * window))
     freq = np.fft.rfftfreq(n, 1.0 / cut.sampling_frequency)
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 80.0)
         ax = figure.subplots()
         back = ax.twinx()

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from snapbeam.plot.style import BEAM_COLOR, CLASS_COLORS, SHAKER_COLOR, fix_ticks, house_style, new_figure
+from snapbeam.plot.style import BEAM_COLOR, CLASS_COLORS, SHAKER_COLOR, figure_style, fix_ticks, new_figure
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError
 
@@ -38,7 +38,7 @@ def plot_test_series(results: list[TestResult], folder: Path) -> Figure:
     if not results:
         raise InputError("results: must hold at least one test")
     rows = -(-len(results) // _ACROSS)
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 34.0 * rows + 8.0)
         axes = figure.subplots(rows, _ACROSS, squeeze=False).ravel()
         for ax, result in zip(axes, results, strict=False):

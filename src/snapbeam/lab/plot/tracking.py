@@ -20,7 +20,7 @@ from snapbeam.plot.style import (
     SHAKER_COLOR,
     diagnostics_height,
     draw_diagnostics,
-    house_style,
+    figure_style,
     new_figure,
 )
 from snapbeam.util.diagnostics import diagnostics_of, doubtful
@@ -106,7 +106,7 @@ def plot_frame(recording: Recording, dataset: xr.Dataset, frame: int = 0) -> Fig
         + 26.0
         + diagnostics_height(told, COLUMN_WIDTHS["single"], 3)
     )
-    with house_style():
+    with figure_style():
         figure = new_figure("single", size)
         draw_diagnostics(figure, told, 3)
         axes = figure.subplots()
@@ -147,7 +147,7 @@ def plot_tracking_quality(dataset: xr.Dataset) -> Figure:
     pixel = dataset.attrs["pixel_size"] * 1e3
     shaker = "shaker_displacement_mm" in dataset
     told = diagnostics_of(dataset)
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 120.0 + diagnostics_height(told, COLUMN_WIDTHS["double"]))
         draw_diagnostics(figure, told)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.6, 1.8))

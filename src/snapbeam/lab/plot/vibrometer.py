@@ -15,8 +15,8 @@ from snapbeam.plot.style import (
     SHAKER_COLOR,
     diagnostics_height,
     draw_diagnostics,
+    figure_style,
     fix_ticks,
-    house_style,
     new_figure,
 )
 
@@ -48,7 +48,7 @@ def plot_drive(signal: xr.DataArray, drive: DriveMeasurement, cycles: float = 12
     fit = drive.steady
     begin = fit.start if drive.startup is None else drive.startup.onset
     told = drive.diagnostics
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 105.0 + diagnostics_height(told, COLUMN_WIDTHS["double"]))
         draw_diagnostics(figure, told)
         grid = figure.add_gridspec(2, 2, height_ratios=(1.1, 1.0))

@@ -9,7 +9,7 @@ from matplotlib.patches import FancyArrowPatch, Polygon, Rectangle
 
 from snapbeam.model.default_values import BEAM, LOCATION
 from snapbeam.paper.system import paper_model, shapes_along
-from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, figure_style, new_figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,7 +44,7 @@ def draw(results: Results) -> Figure:
     x, (lower, upper) = wells.position.values, wells.displacement.values
     location = float(wells.attrs["location"])
     touch = float(np.interp(location, x, lower))
-    with house_style():
+    with figure_style():
         figure = new_figure("single", 58.0)
         ax = figure.add_subplot()
         ax.set(xlim=(-0.22, 1.22), ylim=(-2.45, 1.75))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from snapbeam.paper.system import TOLERANCE, paper_run
-from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, figure_style, fix_ticks, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,7 +48,7 @@ def draw(results: Results) -> Figure:
     onset, duration = float(hit.onset[0]), float(hit.duration[0])
     near = (time >= onset - 0.4 * duration) & (time <= onset + 1.4 * duration)
     micro = 1e6 * (time - onset)
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 68.0)
         grid = figure.add_gridspec(2, 2, width_ratios=(1.7, 1.0))
         wave = figure.add_subplot(grid[:, 0])

@@ -21,7 +21,7 @@ import snapbeam as sb
 from snapbeam.model.default_values import BEAM, CYCLES, LOCATION
 from snapbeam.paper.system import TOLERANCE, class_map, paper_model, paper_run
 from snapbeam.parts import installed_parts
-from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, figure_style, fix_ticks, new_figure, panel_letters
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.util.netcdf import read_netcdf
 from snapbeam.util.validation import InputError
@@ -183,7 +183,7 @@ def draw(results: Results, measured: Sequence[str | os.PathLike[str]] | None = N
         raise InputError(f"measured: must be three files, one a kind of waveform, not {len(measured)}")
     left = [data[f"{kind}_recorded"] if measured is None else read_measured(measured[i])
             for i, kind in enumerate(KINDS)]  # fmt: skip
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 132.0)
         axes = figure.subplots(3, 2, sharey=True, sharex=measured is None)
         for row, ((first, second), recorded, (kind, words)) in enumerate(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.default_values import MODES
 from snapbeam.paper.system import TOLERANCE, paper_model, paper_run, shapes_along
-from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, figure_style, fix_ticks, new_figure, panel_letters
 from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def draw(results: Results) -> Figure:
     inside = snaps[snaps < snaps[0] + 0.5 * period] / period
     marks = _instants(cycle, run.midspan_displacement.values.astype(float), inside)
     rest = abs(float(along.attrs["rest_amplitude"]))
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 125.0)
         rows = figure.add_gridspec(2, 1, height_ratios=(1.15, 1.0))
         upper = rows[0].subgridspec(1, 2, width_ratios=(1.4, 1.0))

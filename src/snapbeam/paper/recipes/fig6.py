@@ -9,7 +9,7 @@ import numpy as np
 from snapbeam.model.default_values import BEAM, CYCLES
 from snapbeam.paper.system import class_map, legend_handles, paper_model
 from snapbeam.plot.map import plot_response_map
-from snapbeam.plot.style import figure_legend, house_style, new_figure, panel_letters
+from snapbeam.plot.style import figure_legend, figure_style, new_figure, panel_letters
 from snapbeam.sweeps.measured_points import MeasuredPoints
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def read_measurements(measurements: str | os.PathLike[str] | None, ds: xr.Datase
 def draw(results: Results, measurements: str | os.PathLike[str] | None = None) -> Figure:
     """A panel a model, measured responses laid over both if a table of them is given."""
     data = results["fig6"]
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 84.0)
         axes = figure.subplots(1, 2, sharey=True)
         for ax, ds in zip(axes, data.values(), strict=True):

@@ -10,7 +10,7 @@ from snapbeam.model.default_values import LONG_CYCLES
 from snapbeam.paper.recipes.fig6 import frequency_maps, read_measurements
 from snapbeam.paper.system import legend_handles
 from snapbeam.plot.map import plot_response_map
-from snapbeam.plot.style import figure_legend, house_style, new_figure, panel_letters
+from snapbeam.plot.style import figure_legend, figure_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import os
@@ -34,7 +34,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 def draw(results: Results, measurements: str | os.PathLike[str] | None = None) -> Figure:
     """Above, the maps with the quasi-static threshold; below, the new class of the points that changed."""
     long, short = results["fig7"], results["fig6"]
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 150.0)
         axes = figure.subplots(2, 2, sharex=True, sharey=True)
         for (above, below), name in zip(axes.T, long, strict=True):

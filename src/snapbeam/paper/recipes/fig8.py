@@ -17,8 +17,8 @@ from snapbeam.plot.style import (
     cell_edges,
     class_cells,
     figure_legend,
+    figure_style,
     fix_ticks,
-    house_style,
     new_figure,
     panel_letters,
 )
@@ -97,7 +97,7 @@ def draw_relative_map(ax: Axes, ds: xr.Dataset) -> list[Artist]:
 def draw(results: Results, measurements: str | os.PathLike[str] | None = None) -> Figure:
     """The start positions, and a row of maps a frequency."""
     data = results["fig8"]
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 205.0)
         grid = figure.add_gridspec(4, 2, height_ratios=(0.62, 1.0, 1.0, 1.0))
         top = figure.add_subplot(grid[0, :])

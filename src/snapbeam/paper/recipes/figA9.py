@@ -9,7 +9,7 @@ import numpy as np
 import snapbeam as sb
 from snapbeam.model.default_values import BEAM, MODES
 from snapbeam.paper.system import paper_model
-from snapbeam.plot.style import fix_ticks, house_style, new_figure
+from snapbeam.plot.style import figure_style, fix_ticks, new_figure
 from snapbeam.util.provenance import made_by
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def draw(results: Results) -> Figure:
 
     error = results["figA9"]["error"]
     modes = error.modes.values
-    with house_style():
+    with figure_style():
         figure = new_figure("single", 74.0)
         ax = figure.add_subplot()
         colors = cm.batlow(np.linspace(0.0, 0.92, _COUNT))

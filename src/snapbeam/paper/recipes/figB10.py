@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.default_values import LONG_CYCLES
 from snapbeam.paper.system import paper_map, paper_model
-from snapbeam.plot.style import fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.plot.style import figure_style, fix_ticks, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,7 +58,7 @@ def maxima(ds: xr.Dataset, level: int, prominence: float = 0.1) -> list[tuple[fl
 def draw(results: Results) -> Figure:
     """One panel a model, with the greatest two maxima of each drive marked."""
     data = results["figB10"]
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 62.0)
         axes = figure.subplots(1, 2, sharey=True)
         for ax, ds in zip(axes, data.values(), strict=True):

@@ -10,7 +10,7 @@ import numpy as np
 from snapbeam.model.default_values import CYCLES
 from snapbeam.paper.recipes.fig8 import draw_relative_map, relative_amplitudes
 from snapbeam.paper.system import legend_handles, relative_map
-from snapbeam.plot.style import figure_legend, house_style, new_figure, panel_letters
+from snapbeam.plot.style import figure_legend, figure_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,7 +48,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 def draw(results: Results) -> Figure:
     """Six frames of the animation, or as many as there are."""
     data = {name: ds for name, ds in results["si5"].items() if int(ds.attrs["modes"]) in _SHOWN}
-    with house_style():
+    with figure_style():
         rows = (len(data) + 2) // 3
         figure = new_figure("double", 22.0 + 54.0 * rows)
         axes = figure.subplots(rows, 3, sharex=True, sharey=True, squeeze=False)
@@ -71,7 +71,7 @@ def write_video(results: Results, folder: Path) -> list[Path]:
 
     def frames() -> Any:
         for ds in results["si5"].values():
-            with house_style():
+            with figure_style():
                 figure = new_figure("single", 84.0)
                 ax = figure.add_subplot()
                 handles = draw_relative_map(ax, ds)

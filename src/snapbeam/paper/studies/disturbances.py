@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import snapbeam as sb
 from snapbeam.model.default_values import CONTACT, CYCLES, LOCATION
 from snapbeam.paper.system import paper_map, paper_model
-from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, figure_style, fix_ticks, new_figure, panel_letters
 from snapbeam.util.provenance import made_by
 
 if TYPE_CHECKING:
@@ -211,7 +211,7 @@ def _impact_table(rows: _Array, attrs: dict[str, Any]) -> xr.Dataset:
 def draw(results: Results) -> Figure:
     """Left: share of the points that change class in each variant; right: the repeated impacts."""
     data = results["disturbances"]
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 72.0)
         axes = figure.subplots(1, 2)
         _changes(axes[0], data["classes"])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam.model.default_values import BEAM, CONTACT
-from snapbeam.plot.style import fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.plot.style import figure_style, fix_ticks, new_figure, panel_letters
 from snapbeam.util.status_codes import ResponseClass
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def draw(results: Results) -> Figure:
 
     ds = results["harvesting"]["power"]
     power, share = 1e6 * ds.power.values, 100.0 * ds.share_above.values
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 68.0)
         axes = figure.subplots(1, 3)
         norm = LogNorm(max(float(power.max()) * 1e-4, 1e-12), float(power.max()))

@@ -15,7 +15,7 @@ import snapbeam as sb
 from snapbeam.model.default_values import CONTACT, LONG_CYCLES
 from snapbeam.paper.system import paper_model
 from snapbeam.plot.dynamics import plot_lifetimes, plot_survival
-from snapbeam.plot.style import house_style, new_figure, panel_letters
+from snapbeam.plot.style import figure_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -126,7 +126,7 @@ def draw(results: Results) -> Figure:
     """A panel a number of modes, and the survival at four points."""
     data = results["lifetimes"]
     maps = {name: ds for name, ds in data.items() if name.startswith("modes_")}
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 118.0)
         axes = figure.subplots(2, 3).ravel()
         for ax, (name, ds) in zip(axes, maps.items(), strict=False):

@@ -9,7 +9,7 @@ import numpy as np
 import snapbeam as sb
 from snapbeam.model.default_values import CYCLES, LOCATION
 from snapbeam.paper.system import class_map, paper_model
-from snapbeam.plot.style import fix_ticks, house_style, new_figure
+from snapbeam.plot.style import figure_style, fix_ticks, new_figure
 from snapbeam.sweeps.threshold import interwell_threshold
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 
 def draw(results: Results) -> Figure:
     """The ratio of the two thresholds over frequency."""
-    with house_style():
+    with figure_style():
         figure = new_figure("single", 62.0)
         ax = figure.add_subplot()
         for ds, color, marker in zip(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import snapbeam as sb
 from snapbeam.model.default_values import BEAM, CONTACT, LOCATION
 from snapbeam.paper.studies.sensitivity import tip_contact
-from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, figure_style, fix_ticks, new_figure, panel_letters
 from snapbeam.sweeps.threshold import Notch
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ def draw(results: Results) -> Figure:
     where = {name: moved(ds, name) for name in names}
     base = where[BASE][0]
     ranked = sorted(names[1:], key=lambda name: -abs(np.nan_to_num(where[name][0] - base)))
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 125.0)
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 0.85))
         shown = [(BASE, BEAM_COLOR, "-")]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.paper.system import paper_map, paper_model
-from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, figure_style, fix_ticks, new_figure, panel_letters
 from snapbeam.sweeps.threshold import interwell_threshold, is_interwell
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def draw(results: Results) -> Figure:
     from cmcrameri import cm
 
     data, maps = results["resonance"], results["fig6"]
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 78.0)
         axes = figure.subplots(1, 2)
         for ax, ds, whole in zip(axes, data.values(), maps.values(), strict=True):

@@ -17,7 +17,7 @@ import snapbeam as sb
 from snapbeam.model.default_values import CYCLES, DAMPING_RATIO, LONG_CYCLES
 from snapbeam.paper.system import class_map, legend_handles, paper_model
 from snapbeam.plot.map import plot_response_map
-from snapbeam.plot.style import figure_legend, house_style, new_figure, panel_letters
+from snapbeam.plot.style import figure_legend, figure_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -107,7 +107,7 @@ def draw(results: Results) -> Figure:
     shown = [(name, "base", words) for name, words in VARIANTS.items()]
     shown.append(("one_mode_reference", "one_mode", r"$N$ = 1, $\omega_1$ of the full model"))
     shown.append(("one_mode_perturbed", "one_mode", "$N$ = 1, $V$ changed by $10^{-9}$"))
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 235.0)
         axes = figure.subplots(4, 2, sharex=True, sharey=True)
         plot_response_map(base, axes[0, 0], legend=False)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam.model.default_values import BEAM, CONTACT, LOCATION
-from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, figure_style, fix_ticks, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,7 +119,7 @@ def draw(results: Results) -> Figure:
 
     ds = results["switch"]["bursts"]
     repeats, count = int(ds.attrs["repeats"]), ds.sizes["bias"]
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 58.0)
         axes = figure.subplots(1, count + 1, width_ratios=[1.0] * count + [1.25])
         rows = np.arange(ds.sizes["length"])

@@ -9,7 +9,7 @@ import numpy as np
 from snapbeam.model.default_values import LONG_CYCLES
 from snapbeam.paper.system import class_map, legend_handles, paper_model
 from snapbeam.plot.map import plot_response_map
-from snapbeam.plot.style import figure_legend, house_style, new_figure, panel_letters
+from snapbeam.plot.style import figure_legend, figure_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,7 +40,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 def draw(results: Results) -> Figure:
     """A panel a model: the class after the longer time of the points that changed."""
     maps = list(results["transients"].values())
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 84.0)
         axes = figure.subplots(1, 2, sharey=True)
         for ax, before, after in zip(axes, maps[::2], maps[1::2], strict=True):

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 import snapbeam as sb
 from snapbeam.model.default_values import BEAM
 from snapbeam.paper.system import shapes_along
-from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, figure_style, fix_ticks, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -265,7 +265,7 @@ def draw(results: Results) -> Figure:
     ds = results["two_tips"]["snaps"]
     model = beam_of(float(ds.attrs["buckling_level"]), int(ds.attrs["modes"]))
     x, shapes = shapes_along(model)
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 60.0)
         axes = figure.subplots(1, 3)
         rest = shapes @ model.well_amplitude / _size(model)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam.paper.system import paper_model, paper_run
-from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, figure_style, fix_ticks, new_figure, panel_letters
 from snapbeam.util.provenance import made_by
 
 if TYPE_CHECKING:
@@ -190,7 +190,7 @@ def _strobed(results: Results, modes: int, points: _Array, attrs: dict[str, Any]
 def draw(results: Results) -> Figure:
     """Four panels: which modes dominate, how antisymmetric a passage is, how long impacts last, every mode's peak."""
     data = results["waveforms"]
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 118.0)
         axes = figure.subplots(2, 2)
         _dominance(axes[0, 0], data["runs"])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import snapbeam as sb
 from snapbeam.model.default_values import CYCLES
 from snapbeam.paper.system import KEPT, legend_handles, paper_map, paper_model
-from snapbeam.plot.style import class_cells, figure_legend, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.plot.style import class_cells, figure_legend, figure_style, fix_ticks, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,7 +74,7 @@ def longest_window(ds: xr.Dataset) -> tuple[_Array, _Array]:
 def draw(results: Results) -> Figure:
     """A panel a frequency; the longest window of each location in black."""
     data = results["windows"]
-    with house_style():
+    with figure_style():
         figure = new_figure("double", 92.0)
         axes = figure.subplots(1, 2)
         for ax, ds in zip(axes, data.values(), strict=True):
