@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import re
 import sys
 from importlib import import_module, invalidate_caches
 from pathlib import Path
@@ -22,52 +23,9 @@ from snapbeam.model.parameters import lookup, parameters
 from snapbeam.solver.statistics import STATISTICS, unregister
 from snapbeam.util.validation import InputError
 
-FUNCTION = '''"""The deepest that the tip ever is, at the end of a step, m."""
-
-
-def deepest(held, step):
-    return max(held, step.penetration[1])
-'''
-ROW = '''"""One row of the table of outcomes."""
-
-from own_function import deepest
-from snapbeam.solver.statistics import Statistic, register
-
-ROW = Statistic(
-    "max_penetration", "float64", "m", "greatest penetration at the end of a step",
-    lambda reading, held: held, update=deepest,
-)
-register(ROW)
-'''
-LAW = '''"""A spring between tip and beam: a linear force, nothing lost."""
-
-from dataclasses import dataclass
-
-from snapbeam.model.contact.base import ContactLaw
-from snapbeam.model.quantity import RUN, quantity
-
-
-@dataclass(frozen=True)
-class LinearContact(ContactLaw):
-    linear_stiffness: float = quantity("N/m", "stiffness of the contact", low=0.0, scope=RUN, symbol="k")
-
-    name = "linear"
-
-    @staticmethod
-    def force(law, penetration):
-        return law.linear_stiffness * penetration
-
-    @staticmethod
-    def energy(law, penetration):
-        return 0.5 * law.linear_stiffness * penetration * penetration
-
-    @staticmethod
-    def slope(law, penetration):
-        return law.linear_stiffness
-
-    def impact_duration(self, mass, velocity):
-        return 3.141592653589793 * (mass / self.linear_stiffness) ** 0.5
-'''
+PAGE = Path(__file__).parents[2] / "CONTRIBUTING.md"
+BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+"""The code of the page: a contact law, the function of a statistic, the row of the statistic."""
 MASS, SPEED = 2e-3, 0.05
 
 
@@ -83,13 +41,14 @@ def own(tmp_path_factory):
     """The three files, imported; taken back again afterwards."""
     before = package_hash()
     statistic, law = tmp_path_factory.mktemp("statistic"), tmp_path_factory.mktemp("law")
-    (statistic / "own_function.py").write_text(FUNCTION, encoding="utf-8")
-    (statistic / "own_row.py").write_text(ROW, encoding="utf-8")
-    (law / "own_law.py").write_text(LAW, encoding="utf-8")
+    for path, text in zip(
+        (law / "own_law.py", statistic / "deepest.py", statistic / "my_statistics.py"), BLOCKS, strict=True
+    ):
+        path.write_text(text, encoding="utf-8")
     sys.path[:0] = [str(statistic), str(law)]
     invalidate_caches()
     try:
-        import_module("own_row")
+        import_module("my_statistics")
         yield import_module("own_law").LinearContact, statistic, law
     finally:
         sys.path[:] = [path for path in sys.path if path not in (str(statistic), str(law))]
@@ -120,6 +79,17 @@ def test_files_touched(own) -> None:
     assert "linear" in parameters()["contact.linear_stiffness"].kinds
 
 
+def test_contact_steps_follow_from_the_energy_of_a_law(own) -> None:
+    """pi sqrt(m/k) of a spring; Hertz's closed form, (4/5) B(2/5, 1/2) d_max/v; 0 if nothing stops the mass."""
+    law, *_ = own
+    assert law(1e6).impact_duration(MASS, SPEED) == pytest.approx(math.pi * math.sqrt(MASS / 1e6), rel=1e-9)
+    assert law(1e6).time_scale(MASS, SPEED) == pytest.approx(math.pi * math.sqrt(MASS / 1e6), rel=1e-9)
+    hertz = default_values.CONTACT
+    general = sb.ContactLaw.impact_duration(hertz, MASS, SPEED)
+    assert general == pytest.approx(hertz.impact_duration(MASS, SPEED), rel=1e-6)
+    assert law(1e-9).impact_duration(MASS, SPEED) == 0.0
+
+
 @pytest.mark.slow
 def test_impact_of_a_free_mass_on_a_spring(own) -> None:
     """Half a period: duration pi sqrt(m/k), greatest force v sqrt(k m), depth v sqrt(m/k), and nothing lost."""
@@ -140,7 +110,7 @@ def test_impact_of_a_free_mass_on_a_spring(own) -> None:
 
 @pytest.mark.slow
 def test_a_beam_struck_by_a_spring(own, tmp_path) -> None:
-    """The ledger closes, classes are decided early, and a system with the law is saved and read back."""
+    """The energy balance closes, runs end early with the same class, and a system with the law is saved and read back."""
     law, *_ = own
     system = sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=4, damping_ratio=0.0), law(2e6),

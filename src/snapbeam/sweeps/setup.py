@@ -28,7 +28,7 @@ from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, shown
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 __all__ = [
     "Progress",
@@ -359,15 +359,6 @@ class SweepSetup:
             for (name, (unit, words)), values in zip(labels.items(), table, strict=True)
             if name not in dims and name not in self.points.coordinates()
         }
-
-    def dataset(self, statistics: dict[str, NDArray[Any]]) -> xr.Dataset:
-        """Return the statistics of all points as a dataset."""
-        import xarray as xr
-
-        dataset = xr.Dataset(coords=self.coordinates(), attrs=self.attributes())
-        for name, values in statistics.items():
-            dataset[name] = (self.points.dims, self.points.arranged(values), variable_attributes(name))
-        return dataset
 
 
 def sweep_setup(system: System, axes: Any, integration: Integration | None = None) -> SweepSetup:

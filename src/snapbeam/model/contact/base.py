@@ -7,6 +7,9 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+from scipy.optimize import brentq
+
 from snapbeam.model.quantity import check_fields, numbers_type
 
 __all__ = ["LAWS", "ContactLaw", "LawProperties", "hertzian_time"]
@@ -33,7 +36,7 @@ class LawProperties:
     mirror: bool = True
     """The mirror image of a run is a run."""
     energy_bound: bool = True
-    """Untouched, the beam's energy only falls: what early decision rests on."""
+    """Untouched, the beam's energy only falls: which early termination needs."""
     smooth: bool = True
     """The force is continuous where contact begins and ends, so that the tangent flow is plain."""
     tangent: bool = True
@@ -48,7 +51,7 @@ class ContactLaw:
 
     - ``force(law, penetration)``: force on both, N, for a penetration > 0 (m);
     - ``energy(law, penetration)``: energy stored in the contact, J, whose derivative is the force;
-    - ``slope(law, penetration)``: derivative of the force, N/m, for the tangent flow.
+    - ``slope(law, penetration)``: derivative of the force, N/m, for tangents and for the length of contact steps.
 
     A law that loses energy (``rate_dependent``) has ``damping(law, penetration)`` besides, N s/m: its force is
     max(0, force + damping times the rate of penetration).
@@ -93,9 +96,46 @@ class ContactLaw:
         return self.impulsive or self.rate_dependent
 
     def impact_duration(self, mass: float, velocity: float) -> float:
-        """Duration, s, of the impact of a free *mass* (kg) that arrives with *velocity* (m/s); 0 if none is known."""
-        return 0.0
+        """Duration, s, of the impact of a free *mass* (kg) that arrives with *velocity* (m/s); 0 if it is never stopped.
+
+        Of the force without what it loses: 2 times the integral of 1/sqrt(v^2 - 2 E/m) over the penetration, from 0 to
+        the greatest, where the energy E of the law is m v^2/2.
+        """
+        depth = self._greatest_penetration(mass, velocity)
+        if depth == 0.0:
+            return 0.0
+        law: Any = type(self)
+        numbers, energy = self._numbers(), law.energy
+        # penetration = depth sin(angle): the integrand is smooth at both ends
+        nodes, weights = np.polynomial.legendre.leggauss(64)
+        angle, total = 0.25 * math.pi * (nodes + 1.0), 0.0
+        for at, weight in zip(angle.tolist(), weights.tolist(), strict=True):
+            left = velocity**2 - 2.0 * energy(numbers, depth * math.sin(at)) / mass
+            total += weight * math.cos(at) / math.sqrt(left) if left > 0.0 else 0.0
+        return 0.5 * math.pi * depth * total
 
     def time_scale(self, mass: float, velocity: float) -> float:
-        """Time, s, that steps in contact are planned by: the duration, or less where the force acts in a part of it."""
-        return self.impact_duration(mass, velocity)
+        """Time, s, that the contact steps follow from: the duration, or less if the force acts in a part of it."""
+        depth = self._greatest_penetration(mass, velocity)
+        law: Any = type(self)
+        numbers = self._numbers()
+        steepest = (
+            max((law.slope(numbers, depth * i / 64.0) for i in range(1, 65)), default=0.0)
+            if depth > 0.0
+            else 0.0
+        )
+        return min(self.impact_duration(mass, velocity), hertzian_time(steepest, mass))
+
+    def _numbers(self) -> Any:
+        return self.numbers_type()(*(getattr(self, item.name) for item in dataclasses.fields(self)))  # type: ignore[arg-type]
+
+    def _greatest_penetration(self, mass: float, velocity: float) -> float:
+        """Penetration, m, at which a free mass stops; 0 if the force does not stop it within a metre."""
+        law: Any = type(self)
+        numbers, energy, arrives = self._numbers(), law.energy, 0.5 * mass * velocity**2
+        high = 1e-12
+        while energy(numbers, high) < arrives:
+            high *= 2.0
+            if high > 1.0:
+                return 0.0
+        return float(brentq(lambda depth: energy(numbers, depth) - arrives, 0.0, high, xtol=1e-15 * high))

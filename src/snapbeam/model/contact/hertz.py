@@ -107,6 +107,10 @@ class HertzContact(ContactLaw):
         velocity = positive("velocity", velocity, "m/s")
         return _DURATION * self.max_penetration(mass, velocity) / velocity
 
+    def time_scale(self, mass: float, velocity: float) -> float:
+        """Time, s, that the contact steps follow from: the duration."""
+        return self.impact_duration(mass, velocity)
+
 
 def _pair(name: str, value: tuple[float, float]) -> list[tuple[int, float]]:
     try:

@@ -97,3 +97,7 @@ class HuntCrossley(ContactLaw):
     def impact_duration(self, mass: float, velocity: float) -> float:
         """As of Hertz's law, s: a loss shortens the approach and lengthens the departure."""
         return HertzContact(self.stiffness).impact_duration(mass, velocity)
+
+    def time_scale(self, mass: float, velocity: float) -> float:
+        """Time, s, that the contact steps follow from: the duration."""
+        return self.impact_duration(mass, velocity)

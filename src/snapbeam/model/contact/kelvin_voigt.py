@@ -108,6 +108,10 @@ class KelvinVoigt(ContactLaw):
             return half
         return min(half, 4.0 * math.pi * mass / self.linear_damping)
 
+    def time_scale(self, mass: float, velocity: float) -> float:
+        """Time, s, that the contact steps follow from: the duration."""
+        return self.impact_duration(mass, velocity)
+
 
 def _restitution(zeta: float) -> float:
     """e of a damping ratio: exp(-2 zeta theta / sin theta) with cos theta = zeta."""
