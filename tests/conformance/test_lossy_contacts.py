@@ -166,7 +166,7 @@ def test_order_with_kicks_that_depend_on_velocity(composition, order) -> None:
 def test_refusals() -> None:
     law = sb.HuntCrossley(4e8, 1.0)
     with pytest.raises(
-        InputError, match="'hunt_crossley', which loses energy, is marched by the CPU engine alone"
+        InputError, match="'hunt_crossley', which loses energy, is integrated by the CPU engine alone"
     ):
         resolve("cuda", law=type(law))
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)

@@ -179,7 +179,7 @@ def test_early_termination_is_off_and_refusals() -> None:
         sb.Striker(drive=drive, suspension_stiffness=10.0)
     with pytest.raises(InputError, match="leave the mass out, or use a HertzContact"):
         sb.System(model, sb.Restitution(0.5), sb.Striker(drive=drive, mass=0.1))
-    with pytest.raises(InputError, match="a striker with a mass is marched by the CPU engine alone"):
+    with pytest.raises(InputError, match="a striker with a mass is integrated by the CPU engine alone"):
         resolve("cuda", body=True)
     system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, mass=0.1))
     with pytest.raises(InputError, match="give no tangent, or no mass"):

@@ -246,7 +246,7 @@ def test_refusals() -> None:
         model_of(3, rise=2e-4).require_bistable("a map")
     with pytest.raises(InputError, match=r"antisymmetric_amplitude = .*: needs a second mode"):
         model_of(1, skew=1e-5)
-    with pytest.raises(InputError, match="unequal wells is marched by the CPU engine alone"):
+    with pytest.raises(InputError, match="unequal wells is integrated by the CPU engine alone"):
         resolve("cuda", unequal_wells=True)
     with pytest.raises(InputError, match="must ascend from 0 to 1"):
         sb.Imperfection(profile=[[0.0, 0.2, 0.4, 0.9], [0.0, 1e-5, 1e-5, 0.0]])

@@ -1,4 +1,4 @@
-"""From a beam to numbers with names: mass, stiffness, wells, linear modes and damping; no time."""
+"""Galerkin reduction of a beam: mass, stiffness and tension matrices, wells, linear modes, damping."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Running statistics of a signal known by its values and slopes, shared by every engine.
+"""Cubic Hermite interpolation inside a step: roots, extremes and zero crossings of a signal.
 
 Between two instants a signal is taken as the cubic that matches both values and both slopes (Hermite);
 with s in [0, 1] and h the interval, u(s) = c0 + c1 s + c2 s^2 + c3 s^3.  Intervals are taken short enough that
@@ -23,14 +23,14 @@ __all__ = [
 ]
 
 
-_BULGE = 0.15
-"""Times h and the sum of both slopes: a Hermite cubic stays that close to its ends (4/27, rounded up)."""
+_OVERSHOOT = 0.15
+"""Overshoot of a Hermite cubic beyond its end values over h(|v0| + |v1|), at most: 4/27, rounded up."""
 
 
 @inlined
 def hermite_overshoot_bound(v0, v1, h):
     """How far the cubic can at most pass the greater and the lesser of its end values."""
-    return _BULGE * h * (abs(v0) + abs(v1))
+    return _OVERSHOOT * h * (abs(v0) + abs(v1))
 
 
 @inlined
@@ -162,9 +162,9 @@ def count_zero_crossings(side, u0, v0, u1, v1, h):
 
 @inlined
 def update_extrema(low, high, u0, v0, u1, v1, h):
-    """The range [low, high], widened to hold the cubic on [0, 1]."""
-    lesser, greater, swell = min(u0, u1), max(u0, u1), hermite_overshoot_bound(v0, v1, h)
-    if greater + swell > high or lesser - swell < low:
+    """The range [low, high], extended to contain the cubic on [0, 1]."""
+    lesser, greater, overshoot = min(u0, u1), max(u0, u1), hermite_overshoot_bound(v0, v1, h)
+    if greater + overshoot > high or lesser - overshoot < low:
         turn = turning_point(u0, v0, u1, v1, h)
         if turn > 0.0:
             c0, c1, c2, c3 = cubic(u0, v0, u1, v1, h)

@@ -7,7 +7,7 @@ from typing import Any
 
 from snapbeam.model.quantity import own_name
 from snapbeam.solver.compilation import inlined, overloaded
-from snapbeam.solver.statistics import Passed, Statistic, updated
+from snapbeam.solver.statistics import CompletedStep, Statistic, updated
 
 __all__ = ["Extras", "extras_of_table", "observe"]
 
@@ -50,7 +50,7 @@ def observe(
 
 @inlined
 def _passed(time, length, seen, seen1, touching):
-    return Passed(
+    return CompletedStep(
         time, length, (seen.w, seen1.w), (seen.wv, seen1.wv), (seen.c, seen1.c), (seen.cv, seen1.cv),
         (seen.d, seen1.d), touching,
     )  # fmt: skip

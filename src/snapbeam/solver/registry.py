@@ -96,10 +96,10 @@ def resolve(
         Of contact, and of the striker.
     body : bool
         Whether the striker is a body with a mass.
-    uneven : bool
+    unequal_wells : bool
         Whether the wells are unequal.
     around : bool
-        Whether a base moves, the axial load changes, or a harvester taps the beam.
+        Whether a base moves, the axial load changes, or a harvester is attached.
     several : bool
         Whether several strikers strike.
 
@@ -115,15 +115,15 @@ def resolve(
 
         reason = cuda.refusal(modes, law, drive)
         if body:
-            reason = "a striker with a mass is marched by the CPU engine alone"
+            reason = "a striker with a mass is integrated by the CPU engine alone"
         if unequal_wells:
-            reason = "a beam with unequal wells is marched by the CPU engine alone"
+            reason = "a beam with unequal wells is integrated by the CPU engine alone"
         if around:
             reason = (
-                "a moving base, a changing axial load and a harvester are marched by the CPU engine alone"
+                "a moving base, a changing axial load and a harvester are integrated by the CPU engine alone"
             )
         if several:
-            reason = "several strikers are marched by the CPU engine alone"
+            reason = "several strikers are integrated by the CPU engine alone"
         if reason is None and (name == "cuda" or not cuda.simulated()):
             return "cuda", cuda
         if name == "cuda":

@@ -29,9 +29,9 @@ __all__ = [
     "OTHER_PEAK",
     "OTHER_WORK",
     "STATISTICS",
+    "CompletedStep",
     "Landings",
     "Last",
-    "Passed",
     "Reading",
     "Recorded",
     "Statistic",
@@ -49,8 +49,8 @@ __all__ = [
 Values = NDArray[Any]
 
 
-class Passed(NamedTuple):
-    """A step that was taken, as statistics see it; SI units, seen from the striker's side."""
+class CompletedStep(NamedTuple):
+    """A step, as statistics see it; SI units, displacements positive away from the striker."""
 
     time: float
     """At its beginning, s."""
@@ -135,7 +135,7 @@ class Statistic:
         from the reading and the array of what *update* left.
     update : callable, optional
         ``update(held, step) -> held``, a scalar function of numbers that kernels compile; *step* is a
-        :class:`Passed`.
+        :class:`CompletedStep`.
     start : float
         What *update* begins with.
     comment : str
@@ -269,19 +269,19 @@ _ROWS = (
     ),
     Statistic("final_well_proven", "bool", "1", "whether the run provably ends in its last well", lambda r: r.final),
     Statistic(
-        "min_displacement", "float64", "1", "least beam displacement at the striker, over b",
+        "min_displacement", "float64", "1", "minimum beam displacement at the striker, over b",
         _low_high("min_displacement", "max_displacement", greatest=False),
     ),
     Statistic(
-        "max_displacement", "float64", "1", "greatest beam displacement at the striker, over b",
+        "max_displacement", "float64", "1", "maximum beam displacement at the striker, over b",
         _low_high("min_displacement", "max_displacement", greatest=True),
     ),
     Statistic(
-        "min_midspan_displacement", "float64", "1", "least centre displacement, over b",
+        "min_midspan_displacement", "float64", "1", "minimum mid-span displacement, over b",
         _low_high("min_center", "max_center", greatest=False),
     ),
     Statistic(
-        "max_midspan_displacement", "float64", "1", "greatest centre displacement, over b",
+        "max_midspan_displacement", "float64", "1", "maximum mid-span displacement, over b",
         _low_high("min_center", "max_center", greatest=True),
     ),
     Statistic("peak_force", "float64", "N", "peak contact force", lambda reading: reading.peak_force),
@@ -406,7 +406,7 @@ ACCUMULATORS = accumulators_dtype()
 
 
 def empty_accumulators(runs: int, others: int = 0) -> Any:
-    """Books of runs that have not begun, with *others* strikers beside the first."""
+    """Accumulators of runs that have not begun, with *others* strikers beside the first."""
     accumulators_of_runs = np.zeros(runs, dtype=accumulators_dtype(others))
     for name, _, start in _KEPT:
         accumulators_of_runs[name] = start
@@ -461,9 +461,9 @@ def _of_one(name: str, number: int) -> Statistic:
 
 
 _MADE = 0.01
-"""Of the gross work: energy out of nothing from which a run is not believed."""
+"""Tolerance of the energy balance over the gross work: a run that gains more energy is not accepted."""
 _ROUNDED = 1e-6
-"""Of the energies themselves, the same."""
+"""The same over the energies, for rounding."""
 
 
 @dataclass(frozen=True)
@@ -627,7 +627,7 @@ class Landings(NamedTuple):
 
     accumulators_of_runs: NDArray[Any]
     q: _Array
-    """Linear modes about the well at hand, shape (runs, landings, N)."""
+    """Linear modes about the current well, shape (runs, landings, N)."""
     p: _Array
     well_sign: NDArray[np.int64]
     """That well: +1 the first, -1 the other, shape (runs, landings)."""
@@ -639,7 +639,7 @@ class Last(NamedTuple):
     """Where a recorded run stands at its end."""
 
     q: _Array
-    """Linear modes about the well at hand, shape (N,)."""
+    """Linear modes about the current well, shape (N,)."""
     p: _Array
     well_sign: int
     contact_ticks: NDArray[np.int64]

@@ -51,7 +51,7 @@ class Clock(NamedTuple):
     period: int
     """Of the drive's argument."""
     landing: int
-    """From one state that is handed out to the next."""
+    """Between two output states."""
     end: int
     last_quarter: int
     coarsest: int
@@ -93,7 +93,7 @@ TRUST = 8
 STRETCHED = 4.0
 # Below this share of the energy of the barrier, free flight takes steps of twice the length: what the steps
 # must resolve is how far the tension swings, and that goes with the root of the energy.
-_QUIET = 0.2
+_LOW_ENERGY = 0.2
 # Pieces per period of the fastest mode when a step is looked into.
 PIECES = 5.0
 _THIRD, _SIXTH, TWELFTH = 1.0 / 3.0, 1.0 / 6.0, 1.0 / 12.0
@@ -133,7 +133,7 @@ def begin_statistics(accumulators, center, seen, law, energy):
 
 @compiled
 def close_impact(accumulators, impacts, before, law, end, tick):
-    """Enter the contact that ends at tick *end* in the statistics, unless nothing was pressed.
+    """Enter the contact that ends at tick *end* in the statistics, unless the penetration stayed at zero.
 
     *impacts* is a table that begins after *before* impacts, or None.
     """
@@ -197,8 +197,8 @@ def is_low_energy(energy, gamma, stretch_at_rest):
 
 @inlined
 def low_energy_limit(gamma, stretch_at_rest):
-    """The energy below which a beam is quiet."""
-    return _QUIET * 0.25 * gamma * stretch_at_rest * stretch_at_rest
+    """The energy below which a beam has low energy, and flight steps are longer."""
+    return _LOW_ENERGY * 0.25 * gamma * stretch_at_rest * stretch_at_rest
 
 
 @inlined
@@ -216,7 +216,7 @@ def ticks_of(clock, level):
 
 @compiled
 def flight_level(clock, low_energy, stretch, stretch_at_rest):
-    """Halvings of the flight step for a beam stretched far beyond its wells; -1 if it is quiet."""
+    """Halvings of the flight step for a beam stretched far beyond its wells; -1 if its energy is low."""
     if low_energy:
         return -1
     level = 0

@@ -48,7 +48,7 @@ _MOST_LOST = 12
 """Maximum number of lost workers, per present worker, while no task finishes."""
 _PATIENCE = 20.0
 """Seconds after which a missing local worker is replaced; the time doubles with each replacement."""
-_MOST_MENDED = 5
+_MOST_RESTARTS = 5
 
 
 class WorkerPool:
@@ -65,14 +65,14 @@ class WorkerPool:
         self._cluster = getattr(client, "cluster", None)
         self._known: set[str] | None = None
         self._lost: set[str] = set()
-        self._whole_at = time.monotonic()
-        self._mended = 0
+        self._complete_at = time.monotonic()
+        self._restarts = 0
 
     def finished(self) -> None:
         """Record that a task finished."""
         self.succeeded = True
         self._lost.clear()
-        self._mended = 0
+        self._restarts = 0
 
     def now(self, there: Mapping[str, int]) -> None:
         """Update the pool with the present workers.
@@ -101,18 +101,18 @@ class WorkerPool:
         assert self._known is not None
         now = time.monotonic()
         if len(self._known) >= len(cluster.worker_spec):
-            self._whole_at = now
-        elif now - self._whole_at > _PATIENCE * 2**self._mended:
-            if self._mended >= _MOST_MENDED and not self._known:
+            self._complete_at = now
+        elif now - self._complete_at > _PATIENCE * 2**self._restarts:
+            if self._restarts >= _MOST_RESTARTS and not self._known:
                 raise CheckpointError("the workers cannot compute this sweep: none of them can be started")
-            self._mended, self._whole_at = min(self._mended + 1, _MOST_MENDED), now
+            self._restarts, self._complete_at = min(self._restarts + 1, _MOST_RESTARTS), now
             self.note("starting workers again")
             cluster.sync(_replace, cluster, self._known)
             cluster.scale(len(cluster.worker_spec))
 
 
 async def _replace(cluster: Any, there: set[str]) -> None:
-    """Remove the nannies whose workers are missing."""
+    """Remove the supervisors (nannies, in Dask) whose workers are missing."""
     for name, nanny in list(cluster.workers.items()):
         if nanny.worker_address not in there:
             del cluster.workers[name]
@@ -208,15 +208,15 @@ class ClusterWorkers:
         """Compute the tasks on the present workers."""
         provenance = provenance_of(work.setup.system)
         queue = deque(tasks)
-        flying: dict[Future, tuple[int, str]] = {}
+        running: dict[Future, tuple[int, str]] = {}
         trouble: Counter[int] = Counter()
         pool = WorkerPool(self.client, self.note)
         try:
-            while queue or flying:
+            while queue or running:
                 there = self._workers()
                 with _answered():
                     pool.now(there)
-                idle = there.keys() - {address for _, address in flying.values()}
+                idle = there.keys() - {address for _, address in running.values()}
                 for address in sorted(idle)[: len(queue)]:
                     task = queue.popleft()
                     with _answered():
@@ -224,9 +224,9 @@ class ClusterWorkers:
                             compute_task, work, stage.columns(task), there[address], provenance.version, provenance.code,
                             workers=[address], allow_other_workers=False, pure=False, retries=0,
                         )  # fmt: skip
-                    flying[future] = task, address
-                for future, task, address in self._settled(flying, there):
-                    del flying[future]
+                    running[future] = task, address
+                for future, task, address in self._settled(running, there):
+                    del running[future]
                     with _answered():
                         outcome = self._outcome(future, address)
                     future.release()
@@ -244,9 +244,9 @@ class ClusterWorkers:
                         )
                     yield task, TaskError(f"{outcome.reason}, {ATTEMPTS} times")
         finally:
-            if flying:
+            if running:
                 with suppress(*_GONE):
-                    self.client.cancel(list(flying), force=True)
+                    self.client.cancel(list(running), force=True)
 
     def _workers(self) -> dict[str, int]:
         until = time.monotonic() + _RECONNECT
@@ -257,18 +257,18 @@ class ClusterWorkers:
         with _answered():
             return dict(self.client.nthreads())
 
-    def _settled(self, flying: dict[Future, tuple[int, str]], there: dict[str, int]) -> list[Any]:
+    def _settled(self, running: dict[Future, tuple[int, str]], there: dict[str, int]) -> list[Any]:
         """Return futures that ended or whose worker is gone, after a short wait."""
         from distributed import wait
 
-        if not flying:
+        if not running:
             time.sleep(_POLL)
             return []
         with self.client.as_current(), suppress(*_GONE):
-            wait(list(flying), timeout=_POLL, return_when="FIRST_COMPLETED")
+            wait(list(running), timeout=_POLL, return_when="FIRST_COMPLETED")
         if self.client.status != "running":
             return []
-        return [(f, task, at) for f, (task, at) in flying.items() if f.done() or at not in there]
+        return [(f, task, at) for f, (task, at) in running.items() if f.done() or at not in there]
 
     def _outcome(self, future: Future, address: str) -> TaskResult | TaskError:
         """Return the result of a task that ended; lost results count like a killed worker."""

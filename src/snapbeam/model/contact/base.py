@@ -17,8 +17,8 @@ __all__ = ["LAWS", "ContactLaw", "LawProperties", "hertzian_time"]
 
 LAWS: dict[str, type[ContactLaw]] = {}
 """Every law by the name it has in parameter files."""
-_HERTZ_TURN = 4.03026
-"""Of Hertz's contact, how far it turns in an impact at the rate of its greatest slope: (4/5) B(2/5, 1/2) sqrt(15/8)."""
+_HERTZ_PHASE = 4.03026
+"""Phase of the linear oscillator with the greatest slope of Hertz's contact during an impact: (4/5) B(2/5, 1/2) sqrt(15/8)."""
 
 
 def hertzian_time(slope: float, mass: float) -> float:
@@ -26,7 +26,7 @@ def hertzian_time(slope: float, mass: float) -> float:
 
     A force that begins softly and becomes steep is resolved by this, not by the longer time that it lasts.
     """
-    return _HERTZ_TURN * math.sqrt(mass / slope) if slope > 0.0 else math.inf
+    return _HERTZ_PHASE * math.sqrt(mass / slope) if slope > 0.0 else math.inf
 
 
 @dataclass(frozen=True)

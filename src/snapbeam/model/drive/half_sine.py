@@ -1,4 +1,4 @@
-"""One knock of the tip."""
+"""A half-sine pulse of the tip."""
 
 from __future__ import annotations
 

@@ -76,13 +76,11 @@ def simulated() -> bool:
 def refusal(modes: int, law: type[ContactLaw] | None = None, drive: type[Drive] = Sine) -> str | None:
     """Why such runs cannot be integrated on a device here, or None if they can."""
     if law is not None and law.impulsive:
-        return (
-            f"the law of contact {law.name!r}, whose impacts last no time, is marched by the CPU engine alone"
-        )
+        return f"the law of contact {law.name!r}, whose impacts last no time, is integrated by the CPU engine alone"
     if law is not None and law.rate_dependent:
-        return f"the law of contact {law.name!r}, which loses energy, is marched by the CPU engine alone"
+        return f"the law of contact {law.name!r}, which loses energy, is integrated by the CPU engine alone"
     if not drive.harmonic:
-        return f"the drive {drive.name!r} is marched by the CPU engine alone"
+        return f"the drive {drive.name!r} is integrated by the CPU engine alone"
     if modes > MOST_MODES:
         return f"a model of {modes} modes has more than its {MOST_MODES}"
     if updated():
