@@ -251,6 +251,7 @@ def test_refusals() -> None:
         two.replace(**{"striker_3.gap": 1e-5})
 
 
+@pytest.mark.slow
 def test_a_run_that_goes_on_shows_every_tip_where_it_is() -> None:
     """From a state within a cycle: displacements, forces and penetrations are those of one run."""
     second = sb.Striker(

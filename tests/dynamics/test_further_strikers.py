@@ -71,6 +71,7 @@ def pressed() -> tuple[sb.System, sb.State, sb.State]:
     return system, begun, sb.advance(system, begun, 4)
 
 
+@pytest.mark.slow
 def test_calls_compose_whatever_is_closed(pressed) -> None:
     """Six periods at once are four and two, and the statistics of both add up; from plain numbers to rounding."""
     system, begun, between = pressed

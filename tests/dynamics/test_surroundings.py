@@ -59,6 +59,7 @@ def test_an_orbit_is_one_of_the_run_itself(name):
     assert abs(seen[0]) > 0.5
 
 
+@pytest.mark.slow
 def test_periods_one_by_one_are_periods_at_once():
     """Each begins at the phases of base and load."""
     flow = Stroboscope(SHAKEN["both"])

@@ -54,6 +54,7 @@ def test_statistics_are_those_of_the_recorded_beam(name) -> None:
     assert_of_beam(run)
 
 
+@pytest.mark.slow
 def test_a_sphere_that_flies_away_leaves_no_trace_in_the_statistics() -> None:
     """Neither in the package's own statistics nor in a registered one nor in the share of energy of high modes."""
     own = Statistic(

@@ -136,6 +136,7 @@ def test_no_layout_of_records_begins_as_another_one_does() -> None:
             assert i == j or one[: len(other)] != other
 
 
+@pytest.mark.slow
 def test_the_layouts_of_the_processor_agree_on_integrated_statistics(monkeypatch) -> None:
     """Eight modes of a run in a register, or eight runs: the same bits."""
     from snapbeam.solver.assemble import make_ensemble

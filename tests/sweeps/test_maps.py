@@ -108,14 +108,16 @@ def test_mirror_image() -> None:
 
 
 def test_reference_frequency() -> None:
-    """Omega and V mean another frequency and velocity: half of omega_1, twice the ratios."""
+    """Omega and V mean another frequency and velocity: half of omega_1, twice the ratios; with equal steps."""
+    step = 5e-5
     freq = model_of(1).reference_frequency
     half = make(
         reference_frequency=0.5 * freq,
         frequency_ratio=2.0 * np.array(RATIO),
         velocity_amplitude=2.0 * np.array(VELOCITY),
+        step=step,
     )
-    whole = make()
+    whole = make(step=step)
     assert half.attrs["reference_frequency"] == 0.5 * freq
     np.testing.assert_array_equal(half.response_class, whole.response_class)
     np.testing.assert_allclose(half.peak_force, whole.peak_force, rtol=1e-6)
