@@ -24,16 +24,21 @@ kick i uses the displacement w_s of the striker at the time of that kick, after 
 A *stage* is a kick and the flow after it; the last stage has no flow.  Every stage
 
 1. forms the inner products c.q, g.q and q.Gq,
-2. computes from them the contact force f and the two coefficients of k, one of g and one of Gq,
-3. adds impulse and work of the contact, b_i h f and b_i h f w_s',
+2. computes the two coefficients of k, one of g and one of r = Gq,
+3. computes the contact force f, and adds impulse and work of the contact, b_i h f and b_i h f w_s',
 4. kicks p, and then lets q and p flow.
 
 The first kick needs no tension: k at the beginning of a step is k at the end of the last one, which every step keeps.
 
+A layout may have further forces.  Those that depend on position and time alone (unequal wells, further contacts, base
+acceleration) add to k, and a change of the axial load adds to both coefficients.  A contact force that depends on velocity
+changes during a kick; its mean follows from the exact solution of the kick along c.  A harvester circuit is coupled with p
+within the kick, also exactly.
+
 The step itself decides nothing.  Whether a contact is closed is fixed for a whole step.  The caller observes the beam at
 the end, and inside the step where needed.  If a contact began or ended there, the caller takes a shorter step from the same
 beginning.  Then it accepts the step: the end becomes the next beginning, and the increments enter the statistics
-(``cpu/events.py: accept_step``, ``cpu/run_lanes/control.py``, ``cuda/control.py``).
+(``cpu/events.py: accept_step``, ``cpu/run_lanes/control.py: accept``, ``cuda/control.py``).
 
 Layouts.  This file does not know where numbers are in memory.  A number is a float, or a register of eight runs; q, p and k
 are rows in memory, registers, or one number in each thread of a block.  A layout provides the operations of
@@ -97,6 +102,8 @@ class InnerProducts(NamedTuple):
     gq: Any
     """g.q and q.Gq. Not at the first kick of a step."""
     qr: Any
+    r: Any
+    """The row r = Gq, as the layout holds rows. Not at the first kick of a step."""
 
 
 class ContactIncrement(NamedTuple):
@@ -113,7 +120,7 @@ class ContactIncrement(NamedTuple):
 
 
 class Increment(NamedTuple):
-    """Changes over the stages so far of a step."""
+    """Changes over the stages of a step so far."""
 
     gq: Any
     """g.q and q.Gq at the last kick."""
@@ -142,14 +149,14 @@ class Primitives(NamedTuple):
     tip_motion: Callable[..., Any]
     """``tip_motion(data, stage)``: displacement w_s and velocity of the striker at a kick."""
     form_products: Callable[..., Any]
-    """``form_products(data, stage, state)``: the state with Gq, and :class:`InnerProducts`."""
+    """``form_products(data, stage, state)``: :class:`InnerProducts`."""
     where_closed: Callable[..., Any]
     """``where_closed(data, force)``: the force; 0 in those runs of a register that are not in contact."""
     kick_and_flow: Callable[..., Any]
-    """``kick_and_flow(data, stage, state, weight, along_g, along_r, force)``.
+    """``kick_and_flow(data, stage, state, weight, along_g, along_r, r, force)``.
 
     Returns the state after the kick and the flow of a stage, and the energy dissipated in the flow.  After the first stage
-    k is *along_g* g + *along_r* Gq, with the accelerations of further forces that the layout has.
+    k is *along_g* g + *along_r* r, with the accelerations of further forces that the layout has.
     """
     enter_forces: Callable[..., Any] | None = None
     """``enter_forces(data, stage, weight)``: compute further forces at a kick: further contacts, base, axial load.
@@ -195,11 +202,8 @@ def build_step(layout: Primitives, compiled_part: Callable[..., Any] = inlined) 
         Compiles a function into the kernel that calls it.
     """
     zero, begin, kick_weight, tip_motion = layout.zero, layout.begin, layout.kick_weight, layout.tip_motion
-    form_products, where_closed, kick_and_flow = (
-        layout.form_products,
-        layout.where_closed,
-        layout.kick_and_flow,
-    )
+    form_products, where_closed = layout.form_products, layout.where_closed
+    kick_and_flow = layout.kick_and_flow
     enter_forces, add_axial_load = layout.enter_forces, layout.add_axial_load
     rate_dependent_force, exchange_energy = layout.rate_dependent_force, layout.exchange_energy
 
@@ -224,11 +228,10 @@ def build_step(layout: Primitives, compiled_part: Callable[..., Any] = inlined) 
 
     @compiled_part
     def begin_step(data):
+        """The state before the first stage, and increments of 0."""
         state, surroundings = begin(data)
-        none = zero(data)
-        return state, Increment(
-            none, none, ContactIncrement(none, none, none, none, none), none, surroundings
-        )
+        nil = zero(data)
+        return state, Increment(nil, nil, ContactIncrement(nil, nil, nil, nil, nil), nil, surroundings)
 
     @compiled_part
     def take_stage(data, stage, state, products, before):
@@ -243,16 +246,19 @@ def build_step(layout: Primitives, compiled_part: Callable[..., Any] = inlined) 
         surroundings = before.surroundings
         if exchange_energy is not None:
             surroundings = exchange_energy(data, stage, weight, along_g, along_r, contact.force, surroundings)
-        state, dissipated = kick_and_flow(data, stage, state, weight, along_g, along_r, contact.force)
-        dissipated += before.dissipated
-        return state, Increment(products.gq, products.qr, contact, dissipated, surroundings)
+        state, dissipated = kick_and_flow(
+            data, stage, state, weight, along_g, along_r, products.r, contact.force
+        )
+        return state, Increment(
+            products.gq, products.qr, contact, before.dissipated + dissipated, surroundings
+        )
 
     @compiled_part
     def take_step(data):
         """All stages of a step."""
         state, increment = begin_step(data)
         for stage in range(data.flows + 1):
-            state, products = form_products(data, stage, state)
+            products = form_products(data, stage, state)
             state, increment = take_stage(data, stage, state, products, increment)
         return state, increment
 

@@ -1,6 +1,6 @@
 """The step in the mode-lane layout: the modes of a run eight at a time, their rows in memory.
 
-``solver/step.py`` explains the step; here are the operations that it is built from, and what a step is given and gives.
+``solver/step.py`` explains the step.  This file has the operations that it is built from, its input and its results.
 """
 
 from __future__ import annotations
@@ -223,7 +223,7 @@ def _form_products(data, stage, q):
     cq, gq, qr = _contact_product(data, q), 0.0, 0.0
     if stage > 0:
         gq, qr = tension_rows(data.memory, data.blocks, data.layout, q, data.step.r)
-    return q, InnerProducts(cq, gq, qr)
+    return InnerProducts(cq, gq, qr, data.step.r)
 
 
 @inlined
@@ -235,7 +235,7 @@ def _form_products_of_two(a, b, stage, q_a, q_b):
         gq_a, qr_a, gq_b, qr_b = tension_rows_twice(
             a.memory, a.blocks, a.layout, q_a, a.step.r, b.layout, q_b, b.step.r
         )
-    return InnerProducts(cq_a, gq_a, qr_a), InnerProducts(cq_b, gq_b, qr_b)
+    return InnerProducts(cq_a, gq_a, qr_a, a.step.r), InnerProducts(cq_b, gq_b, qr_b, b.step.r)
 
 
 @inlined
@@ -255,9 +255,9 @@ def _flow(memory, layout, flow, q, p, q1, p1, with_energy):
 
 
 @inlined
-def _later_kick(memory, layout, step, flow, last, weight, along_g, along_r, force, with_energy):
+def _later_kick(memory, layout, step, flow, last, weight, along_g, along_r, r, force, with_energy):
     """A kick after the first, and the flow after it unless it is the last."""
-    q1, p1, k1, r = step.q1, step.p1, step.k1, step.r
+    q1, p1, k1 = step.q1, step.p1, step.k1
     if with_energy is None:
         if not last:
             kick_and_flow_rows(memory, layout, flow, weight, along_g, along_r, r, force, q1, p1)
@@ -270,14 +270,14 @@ def _later_kick(memory, layout, step, flow, last, weight, along_g, along_r, forc
 
 
 @inlined
-def _kick_and_flow(data, stage, q, weight, along_g, along_r, force):
+def _kick_and_flow(data, stage, q, weight, along_g, along_r, r, force):
     memory, layout, step, energy = data.memory, data.layout, data.step, data.with_energy
     if stage == 0:
         kick_rows(memory, layout, weight, step.k, force, kick_source(layout.circuit, step), step.p1)
         return step.q1, _flow(memory, layout, step.at, step.q, step.p1, step.q1, step.p1, energy)
     flow = step.at + min(stage, data.flows - 1 - stage) * 4 * layout.size
     last = stage == data.flows
-    return step.q1, _later_kick(memory, layout, step, flow, last, weight, along_g, along_r, force, energy)
+    return step.q1, _later_kick(memory, layout, step, flow, last, weight, along_g, along_r, r, force, energy)
 
 
 @inlined
