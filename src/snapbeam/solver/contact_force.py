@@ -21,7 +21,6 @@ __all__ = [
     "contact_slope",
     "felt_force",
     "is_impulsive",
-    "is_rate_dependent",
     "jumps",
     "kick_force",
     "lossy_kick",
@@ -212,17 +211,6 @@ def is_impulsive(law: Any) -> bool:
 def _is_impulsive(law):
     impulsive = bool(law.instance_class.owner.impulsive)
     return lambda law: impulsive
-
-
-def is_rate_dependent(law: Any) -> bool:
-    """Whether the force under the law depends on the rate of penetration."""
-    return bool(type(law).owner.rate_dependent)
-
-
-@overloaded(is_rate_dependent)
-def _is_rate_dependent(law):
-    rate_dependent = bool(law.instance_class.owner.rate_dependent)
-    return lambda law: rate_dependent
 
 
 def jumps(law: Any) -> bool:

@@ -17,6 +17,7 @@ __all__ = [
     "Tip",
     "base_acceleration",
     "drive_rate",
+    "has_axial_load",
     "joined_motion",
     "kind_acceleration",
     "kind_motion",
@@ -228,6 +229,17 @@ def _load_change(drive, memory, argument):
         return lambda drive, memory, argument: 0.0
     own = _of_part(owner, "load", "motion")
     return lambda drive, memory, argument: own(drive, memory, argument)[0]
+
+
+def has_axial_load(drive: Any) -> bool:
+    """Whether the axial load changes."""
+    return any(part == "load" for part, _ in type(drive).owner.parts)
+
+
+@overload(has_axial_load, jit_options=INLINE)
+def _has_axial_load(drive):
+    found = any(part == "load" for part, _ in drive.instance_class.owner.parts)
+    return lambda drive: found
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -487,8 +487,8 @@ def accept_step(
         accumulators.gross_work += done.gross
         accumulators.lost += done.lost
     accumulate_further_contacts(memory, layout.others, touching, done, accumulators)
-    accumulate_environment_work(layout.forced, accumulators, done.given)
-    accumulate_circuit(memory, layout, layout.circuit, step.p1, accumulators, done.tap)
+    accumulate_environment_work(layout.forced, accumulators, done.external)
+    accumulate_circuit(memory, layout, layout.circuit, step.p1, accumulators, done.circuit)
     if outputs is not None:
         accumulators.dissipated += done.dissipated + done.lost
     accumulate_displacement(accumulators, seen, seen1, step.length)

@@ -33,7 +33,7 @@ from snapbeam.solver.cpu.state import (
     restart_from_state,
     run_of,
 )
-from snapbeam.solver.cpu.step import Step, StepIncrement, prepare, take_step, take_two
+from snapbeam.solver.cpu.step import Step, StepIncrement, prepare, take_step, take_two_steps
 from snapbeam.solver.cpu.terms.base_and_load import ExternalWork, enter_forces
 from snapbeam.solver.cpu.terms.circuit import CircuitIncrement
 from snapbeam.solver.cpu.terms.discontinuities import up_to_discontinuity
@@ -193,7 +193,7 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
         tip_a = seen_from(run_a.struck, now_a.well_sign, run_a.rest_contact)
         tip_b = seen_from(run_b.struck, now_b.well_sign, run_b.rest_contact)
         if live_a and live_b:
-            done_a, done_b = take_two(
+            done_a, done_b = take_two_steps(
                 memory, blocks, stages, layouts[0], tip_a, step_a, layouts[1], tip_b, step_b
             )
         elif live_a:

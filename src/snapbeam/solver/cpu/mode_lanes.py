@@ -27,6 +27,7 @@ from snapbeam.solver.physics import (
     turned,
 )
 from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat, store, vabs
+from snapbeam.solver.step import flow_mode, kick_mode
 
 __all__ = [
     "Layout",
@@ -37,7 +38,7 @@ __all__ = [
     "dot",
     "flow_coefficients",
     "flow_rows",
-    "kick_and_flow",
+    "kick_and_flow_rows",
     "kick_rows",
     "modal_energies",
     "modal_energy",
@@ -217,49 +218,53 @@ def tension_rows_twice(memory, blocks, layout_a, q_a, r_a, layout_b, q_b, r_b):
 
 
 @inlined
+def _acceleration_row(memory, layout, along_g, along_r, r, row):
+    k = tension_acceleration(along_g, along_r, load(memory, layout.g + row), load(memory, r + row))
+    k = add_static_load(memory, layout.unequal_wells, row, k)
+    k = struck(memory, layout.size, layout.others, row, k)
+    return add_base_acceleration(memory, layout.forced, row, k)
+
+
+@inlined
 def acceleration_rows(memory, layout, along_g, along_r, r, k):
-    """k = the modal acceleration by the change of tension, and by the side force where q has another origin."""
+    """k = the modal acceleration by the change of tension, and by the further forces at a kick."""
     for row in range(0, layout.size, WIDTH):
-        g_row = load(memory, layout.g + row)
-        tension = tension_acceleration(along_g, along_r, g_row, load(memory, r + row))
-        tension = add_static_load(memory, layout.unequal_wells, row, tension)
-        tension = struck(memory, layout.size, layout.others, row, tension)
-        store(memory, k + row, add_base_acceleration(memory, layout.forced, row, tension))
+        store(memory, k + row, _acceleration_row(memory, layout, along_g, along_r, r, row))
 
 
 @inlined
 def kick_rows(memory, layout, weight, k, force, p_from, p_to):
     """p_to = p_from + weight (k + c force), c the contact's row."""
     for row in range(0, layout.size, WIDTH):
-        total = fma(force, load(memory, layout.contact + row), load(memory, k + row))
-        store(memory, p_to + row, fma(weight, total, load(memory, p_from + row)))
+        k_row, c_row = load(memory, k + row), load(memory, layout.contact + row)
+        store(memory, p_to + row, kick_mode(weight, k_row, c_row, force, load(memory, p_from + row)))
 
 
 @inlined
-def kick_and_flow(memory, layout, flow, weight, along_g, along_r, r, force, q, p):
-    """In place: p += weight (tension + c force), then one flow of every linear mode."""
+def kick_and_flow_rows(memory, layout, flow, weight, along_g, along_r, r, force, q, p):
+    """In place: :func:`acceleration_rows`, :func:`kick_rows` and :func:`flow_rows` in one pass through memory."""
     size = layout.size
     for row in range(0, size, WIDTH):
-        k = tension_acceleration(along_g, along_r, load(memory, layout.g + row), load(memory, r + row))
-        k = add_static_load(memory, layout.unequal_wells, row, k)
-        k = struck(memory, size, layout.others, row, k)
-        k = add_base_acceleration(memory, layout.forced, row, k)
-        k = fma(force, load(memory, layout.contact + row), k)
-        kicked = fma(weight, k, load(memory, p + row))
-        q_row, at = load(memory, q + row), flow + row
-        store(memory, q + row, turned(q_row, load(memory, at), load(memory, at + size), kicked))
-        at += 2 * size
-        store(memory, p + row, turned(kicked, load(memory, at + size), load(memory, at), q_row))
+        k = _acceleration_row(memory, layout, along_g, along_r, r, row)
+        kicked = kick_mode(weight, k, load(memory, layout.contact + row), force, load(memory, p + row))
+        _flow_row(memory, size, flow, row, load(memory, q + row), kicked, q, p)
 
 
 @inlined
 def flow_rows(memory, size, flow, q_from, p_from, q_to, p_to):
     """One flow of every linear mode."""
     for row in range(0, size, WIDTH):
-        q_row, p_row, at = load(memory, q_from + row), load(memory, p_from + row), flow + row
-        store(memory, q_to + row, turned(q_row, load(memory, at), load(memory, at + size), p_row))
-        at += 2 * size
-        store(memory, p_to + row, turned(p_row, load(memory, at + size), load(memory, at), q_row))
+        _flow_row(memory, size, flow, row, load(memory, q_from + row), load(memory, p_from + row), q_to, p_to)
+
+
+@inlined
+def _flow_row(memory, size, flow, row, q_row, p_row, q_to, p_to):
+    at = flow + row
+    a11, a12 = load(memory, at), load(memory, at + size)
+    a21, a22 = load(memory, at + 2 * size), load(memory, at + 3 * size)
+    q_row, p_row = flow_mode(q_row, p_row, a11, a12, a21, a22)
+    store(memory, q_to + row, q_row)
+    store(memory, p_to + row, p_row)
 
 
 @inlined

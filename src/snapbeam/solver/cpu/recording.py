@@ -113,7 +113,7 @@ def _sums_with(accumulators, done):
     """The same with what a part of a step gave."""
     return _Sums(
         accumulators.work + done.work, accumulators.dissipated + done.dissipated + done.lost, accumulators.lost + done.lost,
-        accumulators.base_work + done.given.base, accumulators.load_work + done.given.load, accumulators.circuit_energy + done.tap.energy,
+        accumulators.base_work + done.external.base, accumulators.load_work + done.external.load, accumulators.circuit_energy + done.circuit.energy,
     )  # fmt: skip
 
 

@@ -1,4 +1,7 @@
-"""One step of one trajectory, or of two side by side: a composition of kicks and exact linear flows."""
+"""The step in the mode-lane layout: the modes of a run eight at a time, their rows in memory.
+
+``solver/step.py`` explains the step.  This file has the operations that it is built from, its input and its results.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +10,14 @@ from typing import Any, NamedTuple
 from numba.extending import overload
 
 from snapbeam.solver.compilation import INLINE_HERE, called, compiled, inlined
-from snapbeam.solver.contact_force import contact_force, is_rate_dependent, kick_force
+from snapbeam.solver.contact_force import contact_force, kick_force
 from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.mode_lanes import (
     acceleration_rows,
     beam_signals,
     flow_coefficients,
     flow_rows,
-    kick_and_flow,
+    kick_and_flow_rows,
     kick_rows,
     modal_energy,
     signals,
@@ -45,211 +48,23 @@ from snapbeam.solver.cpu.terms.further_contacts import (
     with_further_contact_work,
 )
 from snapbeam.solver.cpu.terms.second_well import pushed_along
-from snapbeam.solver.excitation import tip_motion, turned_motion
-from snapbeam.solver.physics import sincos, tension_factors
+from snapbeam.solver.excitation import has_axial_load, tip_motion, turned_motion
+from snapbeam.solver.physics import sincos
 from snapbeam.solver.simd import WIDTH, fma, load, store
 from snapbeam.solver.splitting import TURNS
+from snapbeam.solver.step import InnerProducts, Primitives, build_step, rotate_phase
 from snapbeam.solver.step_control import ContactKinematics
 
 __all__ = [
-    "ContactIncrement",
     "Step",
     "StepIncrement",
     "accumulate_environment_work",
-    "apply_contact_loss",
-    "around_kick",
-    "no_contact_increment",
     "observe",
     "prepare",
     "take_step",
-    "take_two",
+    "take_two_steps",
     "with_circuit_acceleration",
 ]
-
-
-# ----------------------------------------------------------------------------------------------------
-# The contact within a step: its force at a kick, and what it did so far.
-
-
-class ContactIncrement(NamedTuple):
-    """The contact within a step: the force at the present kick, and its quadratures so far."""
-
-    force: float
-    impulse: float
-    work: float
-    gross: float
-    lost: float
-    penetration: float
-    """At the present kick, and the tip's velocity there: of a law that loses energy."""
-    velocity: float
-
-
-@inlined
-def no_contact_increment():
-    """The contact of a step that has not begun."""
-    return ContactIncrement(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-def apply_contact_loss(
-    memory: Any,
-    layout: Any,
-    tip: Any,
-    step: Any,
-    stage: int,
-    weight: float,
-    along_g: float,
-    along_r: float,
-    push: Any,
-) -> Any:
-    """The contact of a law that loses energy, once the tension's acceleration is known; *push* of any other law.
-
-    Of the first kick that acceleration is the row that the last step left.
-    """
-    raise TypeError("apply_contact_loss runs in compiled code only")
-
-
-@inlined
-def _damped(memory, layout, tip, step, stage, weight, along_g, along_r, push):
-    if not step.touching:
-        return ContactIncrement(
-            0.0, push.impulse, push.work, push.gross, push.lost, push.penetration, push.velocity
-        )
-    size, contact = layout.size, layout.contact
-    if stage == 0:
-        rate, along = dot(memory, size, contact, step.p), dot(memory, size, contact, step.k)
-    else:
-        rate = dot(memory, size, contact, step.p1)
-        along = along_g * dot(memory, size, contact, layout.g) + along_r * dot(memory, size, contact, step.r)
-        along = pushed_along(memory, size, layout.unequal_wells, contact, along)
-        along = struck_along(memory, size, layout.others, contact, along)
-        along = shaken_along(memory, size, layout.forced, contact, along)
-    mobility = dot(memory, size, contact, contact)
-    given = kick_force(tip.law, push.penetration, push.velocity - rate, mobility, along, weight)
-    force, velocity = given.impulse, push.velocity
-    return ContactIncrement(
-        force,
-        push.impulse + weight * force,
-        push.work + weight * force * velocity,
-        push.gross + weight * abs(force * velocity),
-        push.lost + given.lost,
-        push.penetration,
-        push.velocity,
-    )
-
-
-@overload(apply_contact_loss, jit_options=INLINE_HERE)
-def _apply_contact_loss(memory, layout, tip, step, stage, weight, along_g, along_r, push):
-    law = tip.types[tip.fields.index("law")]
-    if not law.instance_class.owner.rate_dependent:
-        return lambda memory, layout, tip, step, stage, weight, along_g, along_r, push: push
-
-    def implementation(memory, layout, tip, step, stage, weight, along_g, along_r, push):
-        return _damped(memory, layout, tip, step, stage, weight, along_g, along_r, push)
-
-    return implementation
-
-
-# ----------------------------------------------------------------------------------------------------
-# What surrounds the beam, at a kick: the work that is given to it and the circuit that taps it.
-
-
-@inlined
-def _whole_kick(memory, layout, step, stage, along_g, along_r, force, kick):
-    """The acceleration of a kick, contact included, as a row; of the first kick of a step the one that was kept."""
-    if stage > 0:
-        acceleration_rows(memory, layout, along_g, along_r, step.r, kick)
-    for row in range(0, layout.size, WIDTH):
-        k = load(memory, kick + row) if stage > 0 else load(memory, step.k + row)
-        store(memory, kick + row, fma(force, load(memory, layout.contact + row), k))
-
-
-def around_kick(
-    memory: Any,
-    blocks: Any,
-    layout: Any,
-    tip: Any,
-    step: Any,
-    stage: int,
-    weight: float,
-    along: Any,
-    given: Any,
-) -> Any:
-    """Work given in the step with a kick that is about to be made, and what the circuit then has done.
-
-    *along* is what the tension pulls along g and r with, and the contact force; *given* is the work so far and the tap
-    so far.  The circuit's impulse is given to p here, the kick itself is left to the caller; of the first kick of a
-    step p1 then holds p with that impulse.
-    """
-    raise TypeError("around_kick runs in compiled code only")
-
-
-@overload(around_kick, jit_options=INLINE_HERE)
-def _around_kick(memory, blocks, layout, tip, step, stage, weight, along, given):
-    forced = hasattr(layout.types[layout.fields.index("forced")], "fields")
-    circuit = hasattr(layout.types[layout.fields.index("circuit")], "fields")
-    if not forced and not circuit:
-        return lambda memory, blocks, layout, tip, step, stage, weight, along, given: given
-    drive = tip.types[tip.fields.index("drive")]
-    with_load = any(part == "load" for part, _ in drive.instance_class.owner.parts)
-
-    if not circuit:
-
-        def work_alone(memory, blocks, layout, tip, step, stage, weight, along, given):
-            along_g, along_r, force = along
-            _whole_kick(memory, layout, step, stage, along_g, along_r, force, layout.forced.kick)
-            if with_load and stage == 0:
-                tension_rows(memory, blocks, layout, step.q, step.r)
-            p = step.p if stage == 0 else step.p1
-            work, tap = given
-            work = worked(
-                memory, layout.size, layout.forced, weight, layout.g, step.r, layout.forced.kick, p, work
-            )
-            return work, tap
-
-        return work_alone
-
-    if not forced:
-
-        def tap_alone(memory, blocks, layout, tip, step, stage, weight, along, given):
-            along_g, along_r, force = along
-            size, circuit = layout.size, layout.circuit
-            _whole_kick(memory, layout, step, stage, along_g, along_r, force, circuit.kick)
-            p = step.p if stage == 0 else step.p1
-            work, tap = given
-            tap = tap_of(memory, size, circuit, circuit.own, p, weight, tap)
-            apply_tap(memory, size, circuit, circuit.own, p, step.p1, tap)
-            return work, tap
-
-        return tap_alone
-
-    def both(memory, blocks, layout, tip, step, stage, weight, along, given):
-        along_g, along_r, force = along
-        size, circuit = layout.size, layout.circuit
-        _whole_kick(memory, layout, step, stage, along_g, along_r, force, circuit.kick)
-        p = step.p if stage == 0 else step.p1
-        work, tap = given
-        tap = tap_of(memory, size, circuit, circuit.own, p, weight, tap)
-        lean_kick(memory, size, circuit, weight, tap)
-        if with_load and stage == 0:
-            tension_rows(memory, blocks, layout, step.q, step.r)
-        work = worked(memory, size, layout.forced, weight, layout.g, step.r, circuit.kick, p, work)
-        apply_tap(memory, size, circuit, circuit.own, p, step.p1, tap)
-        return work, tap
-
-    return both
-
-
-@inlined
-def accumulate_environment_work(forced, accumulators, given):
-    """Enter the work given in a step in the statistics."""
-    if forced is None:
-        return
-    accumulators.base_work += given.base
-    accumulators.load_work += given.load
-    accumulators.gross_work += given.gross
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 class Step(NamedTuple):
@@ -276,7 +91,7 @@ class Step(NamedTuple):
 
 
 class StepIncrement(NamedTuple):
-    """What a step gave: g.q and q.Gq at its end, and quadratures of the order of the step."""
+    """Results of a step: g.q and q.Gq at its end, and changes over the step."""
 
     gq: float
     qr: float
@@ -287,10 +102,19 @@ class StepIncrement(NamedTuple):
     lost: float
     """In the contact."""
     dissipated: float
-    given: ExternalWork
-    """By a moving base and a changing axial load."""
-    tap: CircuitIncrement
-    """What a circuit did."""
+    external: ExternalWork
+    """Of a moving base and a changing axial load."""
+    circuit: CircuitIncrement
+
+
+@inlined
+def accumulate_environment_work(forced, accumulators, external):
+    """Enter the work of base and axial load in a step in the statistics."""
+    if forced is None:
+        return
+    accumulators.base_work += external.base
+    accumulators.load_work += external.load
+    accumulators.gross_work += external.gross
 
 
 @called
@@ -316,94 +140,6 @@ def observe(memory, layout, tip, phase, q, p):
 
 
 @inlined
-def _begin_push(step, stages, size):
-    """Sine and cosine of the drive at the beginning, and where its turns at the kicks stand."""
-    sine, cosine = 0.0, 1.0
-    if step.touching:
-        sine, cosine = sincos(step.phase)
-    return sine, cosine, step.at + ((stages.flows + 1) // 2) * 4 * size
-
-
-@inlined
-def _push(memory, layout, stages, tip, step, drive0, stage, weight, push):
-    """The contact at a stage of a step in contact; *push* as it was if the step is a free one.
-
-    Of a law that loses energy, what its force is to follow from, in :func:`~snapbeam.solver.cpu.step.apply_contact_loss`.
-    """
-    if not step.touching:
-        return push
-    here = step.q1 if stage > 0 else step.q
-    sine0, cosine0, turns = drive0
-    sine, cosine = memory[turns + stage], memory[turns + TURNS + stage]
-    sine, cosine = sine0 * cosine + cosine0 * sine, cosine0 * cosine - sine0 * sine
-    now = step.phase + memory[stages.elapsed + stage] * step.length * tip.drive.omega
-    motion, velocity = turned_motion(tip.drive, memory, now, sine, cosine)
-    penetration = tip.offset + motion - dot(memory, layout.size, layout.contact, here)
-    if is_rate_dependent(tip.law):
-        return ContactIncrement(0.0, push.impulse, push.work, push.gross, push.lost, penetration, velocity)
-    force = contact_force(tip.law, penetration)
-    return ContactIncrement(
-        force,
-        push.impulse + weight * force,
-        push.work + weight * force * velocity,
-        push.gross + weight * abs(force * velocity),
-        0.0,
-        0.0,
-        0.0,
-    )
-
-
-@inlined
-def _first(memory, layout, step, weight, force, with_energy):
-    """The kick that begins a step, with the acceleration known from the last one, and the flow after it."""
-    kick_rows(memory, layout, weight, step.k, force, kick_source(layout.circuit, step), step.p1)
-    if with_energy is None:
-        flow_rows(memory, layout.size, step.at, step.q, step.p1, step.q1, step.p1)
-        return 0.0
-    before = modal_energy(memory, layout, step.q, step.p1)
-    flow_rows(memory, layout.size, step.at, step.q, step.p1, step.q1, step.p1)
-    return before - modal_energy(memory, layout, step.q1, step.p1)
-
-
-@inlined
-def _kick(memory, layout, stages, step, stage, weight, along_g, along_r, force, with_energy):
-    """The kick of a stage after the first, and the flow after it unless it is the last."""
-    q1, p1, k1, r = step.q1, step.p1, step.k1, step.r
-    if stage == stages.flows:
-        # the acceleration is kept for the next step
-        acceleration_rows(memory, layout, along_g, along_r, r, k1)
-        kick_rows(memory, layout, weight, k1, force, p1, p1)
-        return 0.0
-    flow = step.at + min(stage, stages.flows - 1 - stage) * 4 * layout.size
-    if with_energy is None:
-        kick_and_flow(memory, layout, flow, weight, along_g, along_r, r, force, q1, p1)
-        return 0.0
-    acceleration_rows(memory, layout, along_g, along_r, r, k1)
-    kick_rows(memory, layout, weight, k1, force, p1, p1)
-    before = modal_energy(memory, layout, q1, p1)
-    flow_rows(memory, layout.size, flow, q1, p1, q1, p1)
-    return before - modal_energy(memory, layout, q1, p1)
-
-
-@inlined
-def _forces(memory, layout, stages, tip, step, stage):
-    """Put the forces that follow from time, and those of other strikers, at hand for a kick."""
-    now = step.phase + memory[stages.elapsed + stage] * step.length * tip.drive.omega
-    enter_forces(layout.forced, memory, tip.drive, now)
-    here = step.q1 if stage > 0 else step.q
-    weight = memory[stages.kick + stage] * step.length
-    evaluate_contacts(memory, layout.size, layout.others, tip.drive, now, here, weight, stage == 0)
-
-
-@inlined
-def _done(memory, layout, gq, qr, push, dissipated, given):
-    """What a step gave, other strikers included."""
-    work = with_further_contact_work(memory, layout.others, push.work)
-    gross = with_further_contact_gross_work(memory, layout.others, push.gross)
-    return StepIncrement(gq, qr, push.impulse, work, gross, push.lost, dissipated, given[0], given[1])
-
-
-@inlined
 def with_circuit_acceleration(memory, layout, spare, step):
     """A free step as it is looked into: with the circuit's part in the accelerations of its ends, if there is one."""
     k, k1 = circuit_acceleration_rows(memory, layout.size, layout.circuit, spare, step)
@@ -412,89 +148,299 @@ def with_circuit_acceleration(memory, layout, spare, step):
     )  # fmt: skip
 
 
+# ----------------------------------------------------------------------------------------------------
+# The operations that the step is built from.
+
+
+class StepData(NamedTuple):
+    """All numbers that a step reads; its state is the row of q."""
+
+    memory: Any
+    blocks: Any
+    layout: Any
+    stages: Any
+    tip: Any
+    step: Step
+    with_energy: Any
+    """None: energy dissipated in the modes is not computed."""
+    flows: int
+    gamma: float
+    in_contact: bool
+    sine: float
+    """Of the phase of the drive at the beginning, if in contact."""
+    cosine: float
+
+
+@inlined
+def _step_data(memory, blocks, layout, stages, tip, step, with_energy):
+    sine, cosine = 0.0, 1.0
+    if step.touching:
+        sine, cosine = sincos(step.phase)
+    return StepData(
+        memory, blocks, layout, stages, tip, step, with_energy, stages.flows, layout.gamma, step.touching, sine, cosine
+    )  # fmt: skip
+
+
+@inlined
+def _zero(data):
+    return 0.0
+
+
+@inlined
+def _begin(data):
+    return data.step.q, (no_external_work(), no_circuit_increment())
+
+
+@inlined
+def _kick_weight(data, stage):
+    return data.memory[data.stages.kick + stage] * data.step.length
+
+
+@inlined
+def _argument(data, stage):
+    """Argument of the drive at a kick."""
+    step = data.step
+    return step.phase + data.memory[data.stages.elapsed + stage] * step.length * data.tip.drive.omega
+
+
+@inlined
+def _tip_motion(data, stage):
+    memory, drive = data.memory, data.tip.drive
+    turns = data.step.at + ((data.flows + 1) // 2) * 4 * data.layout.size
+    sine, cosine = rotate_phase(data.sine, data.cosine, memory[turns + stage], memory[turns + TURNS + stage])
+    return turned_motion(drive, memory, _argument(data, stage), sine, cosine)
+
+
+@inlined
+def _contact_product(data, q):
+    if data.in_contact:
+        return dot(data.memory, data.layout.size, data.layout.contact, q)
+    return 0.0
+
+
+@inlined
+def _form_products(data, stage, q):
+    cq, gq, qr = _contact_product(data, q), 0.0, 0.0
+    if stage > 0:
+        gq, qr = tension_rows(data.memory, data.blocks, data.layout, q, data.step.r)
+    return InnerProducts(cq, gq, qr, data.step.r)
+
+
+@inlined
+def _form_products_of_two(a, b, stage, q_a, q_b):
+    """The same for two runs, with G read only once."""
+    cq_a, cq_b = _contact_product(a, q_a), _contact_product(b, q_b)
+    gq_a, qr_a, gq_b, qr_b = 0.0, 0.0, 0.0, 0.0
+    if stage > 0:
+        gq_a, qr_a, gq_b, qr_b = tension_rows_twice(
+            a.memory, a.blocks, a.layout, q_a, a.step.r, b.layout, q_b, b.step.r
+        )
+    return InnerProducts(cq_a, gq_a, qr_a, a.step.r), InnerProducts(cq_b, gq_b, qr_b, b.step.r)
+
+
+@inlined
+def _where_closed(data, force):
+    return force
+
+
+@inlined
+def _flow(memory, layout, flow, q, p, q1, p1, with_energy):
+    """Apply a flow; returns the energy that it dissipates."""
+    if with_energy is None:
+        flow_rows(memory, layout.size, flow, q, p, q1, p1)
+        return 0.0
+    before = modal_energy(memory, layout, q, p)
+    flow_rows(memory, layout.size, flow, q, p, q1, p1)
+    return before - modal_energy(memory, layout, q1, p1)
+
+
+@inlined
+def _later_kick(memory, layout, step, flow, last, weight, along_g, along_r, r, force, with_energy):
+    """A kick after the first, and the flow after it unless it is the last."""
+    q1, p1, k1 = step.q1, step.p1, step.k1
+    if with_energy is None:
+        if not last:
+            kick_and_flow_rows(memory, layout, flow, weight, along_g, along_r, r, force, q1, p1)
+            return 0.0
+    acceleration_rows(memory, layout, along_g, along_r, r, k1)
+    kick_rows(memory, layout, weight, k1, force, p1, p1)
+    if last:
+        return 0.0
+    return _flow(memory, layout, flow, q1, p1, q1, p1, with_energy)
+
+
+@inlined
+def _kick_and_flow(data, stage, q, weight, along_g, along_r, r, force):
+    memory, layout, step, energy = data.memory, data.layout, data.step, data.with_energy
+    if stage == 0:
+        kick_rows(memory, layout, weight, step.k, force, kick_source(layout.circuit, step), step.p1)
+        return step.q1, _flow(memory, layout, step.at, step.q, step.p1, step.q1, step.p1, energy)
+    flow = step.at + min(stage, data.flows - 1 - stage) * 4 * layout.size
+    last = stage == data.flows
+    return step.q1, _later_kick(memory, layout, step, flow, last, weight, along_g, along_r, r, force, energy)
+
+
+@inlined
+def _enter_forces(data, stage, weight):
+    memory, layout, drive, step = data.memory, data.layout, data.tip.drive, data.step
+    argument = _argument(data, stage)
+    enter_forces(layout.forced, memory, drive, argument)
+    q = step.q1 if stage > 0 else step.q
+    evaluate_contacts(memory, layout.size, layout.others, drive, argument, q, weight, stage == 0)
+
+
+@inlined
+def _add_axial_load(data, along_g, along_r):
+    return changed_load(data.memory, data.layout.forced, along_g, along_r)
+
+
+def _rate_dependent_force(
+    data: Any, stage: int, weight: float, along_g: float, along_r: float, penetration: float, velocity: float
+) -> Any:
+    """Mean contact force in a kick and the energy lost, for any contact law."""
+    raise TypeError("_rate_dependent_force runs in compiled code only")
+
+
+@inlined
+def _lossy_force(data, stage, weight, along_g, along_r, penetration, velocity):
+    memory, layout, step = data.memory, data.layout, data.step
+    size, contact = layout.size, layout.contact
+    if stage == 0:
+        rate, along = dot(memory, size, contact, step.p), dot(memory, size, contact, step.k)
+    else:
+        rate = dot(memory, size, contact, step.p1)
+        along = along_g * dot(memory, size, contact, layout.g) + along_r * dot(memory, size, contact, step.r)
+        along = pushed_along(memory, size, layout.unequal_wells, contact, along)
+        along = struck_along(memory, size, layout.others, contact, along)
+        along = shaken_along(memory, size, layout.forced, contact, along)
+    mobility = dot(memory, size, contact, contact)
+    loss = kick_force(data.tip.law, penetration, velocity - rate, mobility, along, weight)
+    return loss.impulse, loss.lost
+
+
+@overload(_rate_dependent_force, jit_options=INLINE_HERE)
+def _rate_dependent_force_by_law(data, stage, weight, along_g, along_r, penetration, velocity):
+    tip = data.types[data.fields.index("tip")]
+    law = tip.types[tip.fields.index("law")]
+    if law.instance_class.owner.rate_dependent:
+        return lambda data, stage, weight, along_g, along_r, penetration, velocity: _lossy_force(
+            data, stage, weight, along_g, along_r, penetration, velocity
+        )
+    return lambda data, stage, weight, along_g, along_r, penetration, velocity: (
+        contact_force(data.tip.law, penetration),
+        0.0,
+    )
+
+
+@inlined
+def _whole_acceleration(memory, layout, step, stage, along_g, along_r, force, kick):
+    """The acceleration of a kick, contact included, as the row *kick*; of the first kick that of the last step."""
+    if stage > 0:
+        acceleration_rows(memory, layout, along_g, along_r, step.r, kick)
+    for row in range(0, layout.size, WIDTH):
+        k = load(memory, kick + row) if stage > 0 else load(memory, step.k + row)
+        store(memory, kick + row, fma(force, load(memory, layout.contact + row), k))
+
+
+@inlined
+def _exchange(data, forced, circuit, stage, weight, along_g, along_r, force, surroundings):
+    """Work of base and load, and the impulse of the circuit, which p1 then includes."""
+    if forced is None:
+        if circuit is None:
+            return surroundings
+    memory, layout, step = data.memory, data.layout, data.step
+    size, p = layout.size, step.p if stage == 0 else step.p1
+    work, tap = surroundings
+    kick = _row_of_kick(forced, circuit)
+    _whole_acceleration(memory, layout, step, stage, along_g, along_r, force, kick)
+    if circuit is not None:
+        tap = tap_of(memory, size, circuit, circuit.own, p, weight, tap)
+        if forced is not None:
+            lean_kick(memory, size, circuit, weight, tap)
+    if forced is not None:
+        if stage == 0 and has_axial_load(data.tip.drive):
+            tension_rows(memory, data.blocks, layout, step.q, step.r)
+        work = worked(memory, size, forced, weight, layout.g, step.r, kick, p, work)
+    if circuit is not None:
+        apply_tap(memory, size, circuit, circuit.own, p, step.p1, tap)
+    return work, tap
+
+
+@inlined
+def _row_of_kick(forced, circuit):
+    if circuit is None:
+        return _row_of_forces(forced)
+    return circuit.kick
+
+
+@inlined
+def _row_of_forces(forced):
+    if forced is None:
+        return 0
+    return forced.kick
+
+
+@inlined
+def _exchange_energy(data, stage, weight, along_g, along_r, force, surroundings):
+    layout = data.layout
+    return _exchange(
+        data, layout.forced, layout.circuit, stage, weight, along_g, along_r, force, surroundings
+    )
+
+
+_STEP = build_step(
+    Primitives(
+        zero=_zero,
+        begin=_begin,
+        kick_weight=_kick_weight,
+        tip_motion=_tip_motion,
+        form_products=_form_products,
+        where_closed=_where_closed,
+        kick_and_flow=_kick_and_flow,
+        enter_forces=_enter_forces,
+        add_axial_load=_add_axial_load,
+        rate_dependent_force=_rate_dependent_force,
+        exchange_energy=_exchange_energy,
+    )
+)
+_take_step, _begin_step, _take_stage = _STEP.take_step, _STEP.begin_step, _STEP.take_stage
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+@inlined
+def _results(memory, layout, increment):
+    """The results of a step, with the work of further contacts."""
+    contact, (external, circuit) = increment.contact, increment.surroundings
+    work = with_further_contact_work(memory, layout.others, contact.work)
+    gross = with_further_contact_gross_work(memory, layout.others, contact.gross)
+    return StepIncrement(
+        increment.gq, increment.qr, contact.impulse, work, gross, contact.lost, increment.dissipated, external, circuit
+    )  # fmt: skip
+
+
 @called
 def take_step(memory, blocks, layout, stages, tip, step, with_energy):
-    """Advance (q, p) with tension acceleration k by a step into (q1, p1, k1).
+    """Advance (q, p) with acceleration k by a step into (q1, p1, k1).
 
-    Dissipation is added up unless *with_energy* is None; nothing else depends on it, to the last bit.
+    The dissipated energy is computed unless *with_energy* is None; nothing else depends on it, to the last bit.
     """
-    drive0 = _begin_push(step, stages, layout.size)
-    push, gq, qr, dissipated, given = (
-        no_contact_increment(),
-        0.0,
-        0.0,
-        0.0,
-        (no_external_work(), no_circuit_increment()),
-    )
-    for stage in range(stages.flows + 1):
-        weight = memory[stages.kick + stage] * step.length
-        push = _push(memory, layout, stages, tip, step, drive0, stage, weight, push)
-        _forces(memory, layout, stages, tip, step, stage)
-        if stage == 0:
-            push = apply_contact_loss(memory, layout, tip, step, stage, weight, 0.0, 0.0, push)
-            given = around_kick(
-                memory, blocks, layout, tip, step, stage, weight, (0.0, 0.0, push.force), given
-            )
-            dissipated += _first(memory, layout, step, weight, push.force, with_energy)
-            continue
-        gq, qr = tension_rows(memory, blocks, layout, step.q1, step.r)
-        along_g, along_r = tension_factors(layout.gamma, gq, qr)
-        along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
-        push = apply_contact_loss(memory, layout, tip, step, stage, weight, along_g, along_r, push)
-        given = around_kick(
-            memory, blocks, layout, tip, step, stage, weight, (along_g, along_r, push.force), given
-        )
-        dissipated += _kick(
-            memory, layout, stages, step, stage, weight, along_g, along_r, push.force, with_energy
-        )
-    return _done(memory, layout, gq, qr, push, dissipated, given)
+    _, increment = _take_step(_step_data(memory, blocks, layout, stages, tip, step, with_energy))
+    return _results(memory, layout, increment)
 
 
 @compiled
-def take_two(memory, blocks, stages, layout_a, tip_a, a, layout_b, tip_b, b):
-    """A step of each of two trajectories, stage by stage in turn: :func:`take_step` twice, bit for bit.
+def take_two_steps(memory, blocks, stages, layout_a, tip_a, step_a, layout_b, tip_b, step_b):
+    """A step of each of two runs, stage by stage in turn: :func:`take_step` twice, bit for bit.
 
-    A single trajectory leaves the processor waiting for sums most of the time; the other one uses that time.
+    A single run leaves the processor waiting for sums most of the time; the other one uses that time.
     """
-    drive_a, drive_b = _begin_push(a, stages, layout_a.size), _begin_push(b, stages, layout_b.size)
-    push_a, gq_a, qr_a = no_contact_increment(), 0.0, 0.0
-    push_b, gq_b, qr_b = push_a, 0.0, 0.0
-    given_a = (no_external_work(), no_circuit_increment())
-    given_b = given_a
+    a = _step_data(memory, blocks, layout_a, stages, tip_a, step_a, None)
+    b = _step_data(memory, blocks, layout_b, stages, tip_b, step_b, None)
+    (q_a, increment_a), (q_b, increment_b) = _begin_step(a), _begin_step(b)
     for stage in range(stages.flows + 1):
-        weight_a, weight_b = memory[stages.kick + stage] * a.length, memory[stages.kick + stage] * b.length
-        push_a = _push(memory, layout_a, stages, tip_a, a, drive_a, stage, weight_a, push_a)
-        push_b = _push(memory, layout_b, stages, tip_b, b, drive_b, stage, weight_b, push_b)
-        _forces(memory, layout_a, stages, tip_a, a, stage)
-        _forces(memory, layout_b, stages, tip_b, b, stage)
-        if stage == 0:
-            push_a = apply_contact_loss(memory, layout_a, tip_a, a, stage, weight_a, 0.0, 0.0, push_a)
-            push_b = apply_contact_loss(memory, layout_b, tip_b, b, stage, weight_b, 0.0, 0.0, push_b)
-            given_a = around_kick(
-                memory, blocks, layout_a, tip_a, a, stage, weight_a, (0.0, 0.0, push_a.force), given_a
-            )
-            given_b = around_kick(
-                memory, blocks, layout_b, tip_b, b, stage, weight_b, (0.0, 0.0, push_b.force), given_b
-            )
-            _first(memory, layout_a, a, weight_a, push_a.force, None)
-            _first(memory, layout_b, b, weight_b, push_b.force, None)
-            continue
-        gq_a, qr_a, gq_b, qr_b = tension_rows_twice(memory, blocks, layout_a, a.q1, a.r, layout_b, b.q1, b.r)
-        g_a, r_a = tension_factors(layout_a.gamma, gq_a, qr_a)
-        g_b, r_b = tension_factors(layout_b.gamma, gq_b, qr_b)
-        g_a, r_a = changed_load(memory, layout_a.forced, g_a, r_a)
-        g_b, r_b = changed_load(memory, layout_b.forced, g_b, r_b)
-        push_a = apply_contact_loss(memory, layout_a, tip_a, a, stage, weight_a, g_a, r_a, push_a)
-        push_b = apply_contact_loss(memory, layout_b, tip_b, b, stage, weight_b, g_b, r_b, push_b)
-        given_a = around_kick(
-            memory, blocks, layout_a, tip_a, a, stage, weight_a, (g_a, r_a, push_a.force), given_a
-        )
-        given_b = around_kick(
-            memory, blocks, layout_b, tip_b, b, stage, weight_b, (g_b, r_b, push_b.force), given_b
-        )
-        _kick(memory, layout_a, stages, a, stage, weight_a, g_a, r_a, push_a.force, None)
-        _kick(memory, layout_b, stages, b, stage, weight_b, g_b, r_b, push_b.force, None)
-    return (
-        _done(memory, layout_a, gq_a, qr_a, push_a, 0.0, given_a),
-        _done(memory, layout_b, gq_b, qr_b, push_b, 0.0, given_b),
-    )
+        products_a, products_b = _form_products_of_two(a, b, stage, q_a, q_b)
+        q_a, increment_a = _take_stage(a, stage, q_a, products_a, increment_a)
+        q_b, increment_b = _take_stage(b, stage, q_b, products_b, increment_b)
+    return _results(memory, layout_a, increment_a), _results(memory, layout_b, increment_b)

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 from numba import cuda
 
-from snapbeam.solver.contact_force import contact_force
 from snapbeam.solver.cuda.layout import device, sums, synchroniser
 from snapbeam.solver.physics import (
     decay_less_one,
@@ -23,11 +22,11 @@ from snapbeam.solver.physics import (
     sincos,
     sincos_cosm1,
     tension_acceleration,
-    tension_factors,
     turned,
 )
 from snapbeam.solver.simd import fma
 from snapbeam.solver.splitting import COMPOSITIONS
+from snapbeam.solver.step import InnerProducts, Primitives, build_step, flow_mode, kick_mode, rotate_phase
 from snapbeam.solver.step_control import ContactKinematics
 
 __all__ = ["Functions", "Mode", "functions"]
@@ -43,6 +42,36 @@ class Mode(NamedTuple):
     center: float
     contact: float
     high: float
+
+
+class State(NamedTuple):
+    """Displacement, velocity, and acceleration at the last kick of a thread's mode."""
+
+    q: float
+    p: float
+    k: float
+
+
+class StepData(NamedTuple):
+    """All numbers that a step reads."""
+
+    block: Any
+    flows: int
+    gamma: float
+    tip: Any
+    in_contact: bool
+    g: float
+    """Of this thread's mode, in the well at hand."""
+    contact: float
+    slot: int
+    """Which of the prepared lengths of step this one has."""
+    length: float
+    sine: float
+    """Of the phase of the drive at the beginning, if in contact."""
+    cosine: float
+    q: float
+    p: float
+    k: float
 
 
 class Functions(NamedTuple):
@@ -99,12 +128,98 @@ def _flows(order: int, threads: int, synchronise: Any) -> tuple[Any, Any]:
     return flow_into, prepare
 
 
+def _step(order: int, sum_one: Any, sum_two: Any, sum_three: Any, tension: Any) -> Any:
+    """The device function of a step, built from the operations of a thread of the block."""
+    composition = COMPOSITIONS[order]
+    flows, kick_weights, which_flow = composition.flow.size, composition.kick, composition.distinct
+    distinct = (flows + 1) // 2
+
+    @device
+    def zero(data):
+        return 0.0
+
+    @device
+    def begin(data):
+        return State(data.q, data.p, data.k), None
+
+    @device
+    def kick_weight(data, stage):
+        kick = cuda.const.array_like(kick_weights)
+        return kick[stage] * data.length
+
+    @device
+    def tip_motion(data, stage):
+        ahead, cosine_ahead = data.block.turns[data.slot, 0, stage], data.block.turns[data.slot, 1, stage]
+        sine, cosine = rotate_phase(data.sine, data.cosine, ahead, cosine_ahead)
+        return shaker_motion(data.tip.drive.amplitude, data.tip.drive.omega, sine, cosine)
+
+    @device
+    def form_products(data, stage, state):
+        q, cq, gq, qr, r = state.q, 0.0, 0.0, 0.0, 0.0
+        if stage == 0:
+            if data.in_contact:
+                cq = sum_one(data.block, data.contact * q)
+        else:
+            r = tension(data.block, q)
+            if data.in_contact:
+                gq, qr, cq = sum_three(data.block, data.g * q, r * q, data.contact * q)
+            else:
+                gq, qr = sum_two(data.block, data.g * q, r * q)
+        return InnerProducts(cq, gq, qr, r)
+
+    @device
+    def where_closed(data, force):
+        return force
+
+    @device
+    def kick_and_flow(data, stage, state, weight, along_g, along_r, r, force):
+        which = cuda.const.array_like(which_flow)
+        q, p, k = state.q, state.p, state.k
+        if stage > 0:
+            k = tension_acceleration(along_g, along_r, data.g, r)
+        p = kick_mode(weight, k, data.contact, force, p)
+        if stage < flows:
+            flow, lane = data.block.flows[data.slot * distinct + which[stage]], data.block.lane
+            q, p = flow_mode(q, p, flow[0, lane], flow[1, lane], flow[2, lane], flow[3, lane])
+        return State(q, p, k), 0.0
+
+    take = build_step(
+        Primitives(
+            zero=zero,
+            begin=begin,
+            kick_weight=kick_weight,
+            tip_motion=tip_motion,
+            form_products=form_products,
+            where_closed=where_closed,
+            kick_and_flow=kick_and_flow,
+        ),
+        device,
+    ).take_step
+
+    @device
+    def take_step(block, mode, g, gamma, tip, slot, length, phase, touching, q, p, k):
+        """A step of this thread's mode.
+
+        Returns q, p and k at the end, g.q and q.Gq there, and the step's impulse, work and gross work.
+        """
+        sine, cosine = 0.0, 1.0
+        if touching:
+            sine, cosine = sincos(phase)
+        state, increment = take(
+            StepData(block, flows, gamma, tip, touching, g, mode.contact, slot, length, sine, cosine, q, p, k)
+        )
+        contact = increment.contact
+        return (
+            state.q, state.p, state.k, increment.gq, increment.qr, contact.impulse, contact.work, contact.gross
+        )  # fmt: skip
+
+    return take_step
+
+
 @cache
 def functions(order: int, threads: int, columns: int) -> Functions:
     """The device functions for a composition, a number of threads and of coupled modes (at most)."""
-    composition = COMPOSITIONS[order]
-    stages, kick_weights, which_flow = composition.flow.size, composition.kick, composition.distinct
-    distinct = (stages + 1) // 2
+    distinct = (COMPOSITIONS[order].flow.size + 1) // 2
     synchronise = synchroniser(threads)
     sum_one, sum_two, sum_three, sum_four = sums(threads, synchronise)
     flow_into, prepare = _flows(order, threads, synchronise)
@@ -130,54 +245,6 @@ def functions(order: int, threads: int, columns: int) -> Functions:
             block, mode.contact * q, mode.contact * p, mode.center * q, mode.center * p
         )
         return ContactKinematics(w, rate, tip.offset + motion - w, velocity - rate, c, c_rate)
-
-    @device
-    def evaluate_contacts(block, tip, slot, stage, sine0, cosine0, cq):
-        """Contact force at a kick, and the velocity of the tip."""
-        sine, cosine = block.turns[slot, 0, stage], block.turns[slot, 1, stage]
-        sine, cosine = sine0 * cosine + cosine0 * sine, cosine0 * cosine - sine0 * sine
-        motion, velocity = shaker_motion(tip.drive.amplitude, tip.drive.omega, sine, cosine)
-        return contact_force(tip.law, tip.offset + motion - cq), velocity
-
-    @device
-    def take_step(block, mode, g, gamma, tip, slot, length, phase, touching, q, p, k):
-        """As :func:`snapbeam.solver.cpu.step.take_step`, of this thread's mode.
-
-        Returns q, p and k at the end, g.q and q.Gq there, and the step's impulse, work and gross work.
-        """
-        kick = cuda.const.array_like(kick_weights)
-        flow_of = cuda.const.array_like(which_flow)
-        sine0, cosine0 = 0.0, 1.0
-        impulse, work, gross, force = 0.0, 0.0, 0.0, 0.0
-        weight = kick[0] * length
-        if touching:
-            sine0, cosine0 = sincos(phase)
-            cq = sum_one(block, mode.contact * q)
-            force, velocity = evaluate_contacts(block, tip, slot, 0, sine0, cosine0, cq)
-            impulse = weight * force
-            work = weight * force * velocity
-            gross = weight * abs(force * velocity)
-        p = fma(weight, fma(force, mode.contact, k), p)
-        gq, qr = 0.0, 0.0
-        for stage in range(1, stages + 1):
-            flow = block.flows[slot * distinct + flow_of[stage - 1]]
-            moved = turned(q, flow[0, block.lane], flow[1, block.lane], p)
-            p = turned(p, flow[3, block.lane], flow[2, block.lane], q)
-            q = moved
-            r = tension(block, q)
-            weight = kick[stage] * length
-            if touching:
-                gq, qr, cq = sum_three(block, g * q, r * q, mode.contact * q)
-                force, velocity = evaluate_contacts(block, tip, slot, stage, sine0, cosine0, cq)
-                impulse += weight * force
-                work += weight * force * velocity
-                gross += weight * abs(force * velocity)
-            else:
-                gq, qr = sum_two(block, g * q, r * q)
-            along_g, along_r = tension_factors(gamma, gq, qr)
-            k = tension_acceleration(along_g, along_r, g, r)
-            p = fma(weight, fma(force, mode.contact, k), p)
-        return q, p, k, gq, qr, impulse, work, gross
 
     @device
     def sample_inside_step(block, mode, tip, at, pieces, piece, phase, q, p, k, k1):
@@ -208,6 +275,7 @@ def functions(order: int, threads: int, columns: int) -> Functions:
             sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine
         synchronise()
 
+    take_step = _step(order, sum_one, sum_two, sum_three, tension)
     return Functions(
         distinct,
         synchronise,

@@ -521,9 +521,9 @@ def _weigh(m, n, shape, lane_settings, kernel_input, law, seen1, released, event
 
 @inlined
 def accept(
-    m, n, shape, lane_settings, kernel_input, accumulators_of_runs, law, about, given, which, inner_samples
+    m, n, shape, lane_settings, kernel_input, accumulators_of_runs, law, about, contact, which, inner_samples
 ):
-    """Take the steps of the lanes *which*; returns those that are decided."""
+    """Accept the steps of the lanes *which*; returns those that are decided."""
     mask, length = mask_of(which), load(m, at.LENGTH)
     well_sign = load(m, at.HOME)
     seen1 = ContactKinematics(
@@ -532,13 +532,12 @@ def accept(
     )  # fmt: skip
     touching = which & n[at.TOUCHING]
     if touching:
-        impulse, work, gross = given
         pressed = mask_of(touching)
         deepest = load(m, at.DEEPEST)
         store(m, at.DEEPEST, pick(pressed, vmax(deepest, about.d), deepest))
-        _add(m, at.IMPULSE, pressed, impulse)
-        _add(m, at.WORK, pressed, work)
-        _add(m, at.GROSS, pressed, gross)
+        _add(m, at.IMPULSE, pressed, contact.impulse)
+        _add(m, at.WORK, pressed, contact.work)
+        _add(m, at.GROSS, pressed, contact.gross)
     _track(m, seen1, length, which)
     ticks, period = load(m, at.TICKS), load(m, at.PERIOD)
     after = load(m, at.T) + ticks

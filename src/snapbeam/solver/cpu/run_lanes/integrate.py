@@ -24,7 +24,7 @@ from snapbeam.solver.cpu.run_lanes.control import (
     propose_step,
 )
 from snapbeam.solver.cpu.run_lanes.state import close_energy, seat
-from snapbeam.solver.cpu.run_lanes.step import beam_signals, modal_energy, signals, take, tension
+from snapbeam.solver.cpu.run_lanes.step import beam_signals, modal_energy, signals, take_step, tension
 from snapbeam.solver.excitation import numbers_of
 from snapbeam.solver.physics import shaker_motion, sincos, tension_energy
 from snapbeam.solver.simd import (
@@ -126,7 +126,9 @@ def _pass(m, n, shape, lane_settings, kernel_input, accumulators_of_runs, inner_
     live = n[at.LIVE]
     touching = n[at.TOUCHING] & live
     law = lanes_tuple(kernel_input.law, m, at.LAW)
-    given = take(m, shape, lane_settings.stages, lane_settings.gamma, touching != 0, mask_of(touching), law)
+    contact = take_step(
+        m, shape, lane_settings.stages, lane_settings.gamma, touching != 0, mask_of(touching), law
+    )
     about = _observe(m, shape)
     going = live
     aside = n[at.ASIDE] & live
@@ -161,7 +163,7 @@ def _pass(m, n, shape, lane_settings, kernel_input, accumulators_of_runs, inner_
             accumulators_of_runs,
             law,
             about,
-            given,
+            contact,
             going,
             inner_samples,
         )

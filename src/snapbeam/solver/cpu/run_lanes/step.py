@@ -1,20 +1,21 @@
-"""The functions over modes, written out for a shape: one mode a variable, nothing in a loop.
+"""The run-lane layout's operations over modes, written out for a shape: one mode a variable, nothing in a loop.
 
-Sums over modes are taken in the very order in which the other layout takes them, eight modes to a register, so that
+``solver/step.py`` explains the step that is built from them.  Sums over modes are taken in the order in which the
+mode-lane layout takes them, eight modes to a register, so that
 both give the same bits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from numba.extending import overload
 
 from snapbeam.solver.compilation import INLINE_HERE, inlined
-from snapbeam.solver.contact_force import contact_force
 from snapbeam.solver.cpu.run_lanes import layout as at
+from snapbeam.solver.excitation import Tip
 from snapbeam.solver.interpolation import hermite_overshoot_bound
 from snapbeam.solver.physics import (
     mode_energy,
@@ -40,6 +41,7 @@ from snapbeam.solver.simd import (
     vmax,
 )
 from snapbeam.solver.splitting import TURNS
+from snapbeam.solver.step import InnerProducts, Primitives, build_step, flow_mode, kick_mode, rotate_phase
 
 __all__ = [
     "TEXTS",
@@ -55,17 +57,17 @@ __all__ = [
     "modes_of",
     "propagate_free",
     "signals",
-    "take",
+    "take_step",
     "tension",
 ]
 
 
-_KNOWN = {
-    "__name__": __name__, "both": both, "hermite_overshoot_bound": hermite_overshoot_bound, "contact_force": contact_force, "fma": fma, "less": less,
-    "load": load, "move": move, "mode_energy": mode_energy, "mode_power": mode_power, "pick": pick, "shaker_motion": shaker_motion,
-    "sincos": sincos, "splat": splat, "broadcast_load": broadcast_load, "store": store,
-    "tension_acceleration": tension_acceleration, "tension_factors": tension_factors, "turned": turned, "vabs": vabs,
-    "vmax": vmax,
+_KNOWN: dict[str, Any] = {
+    "__name__": __name__, "both": both, "hermite_overshoot_bound": hermite_overshoot_bound, "flow_mode": flow_mode, "fma": fma,
+    "InnerProducts": InnerProducts, "kick_mode": kick_mode, "less": less, "load": load, "move": move,
+    "mode_energy": mode_energy, "mode_power": mode_power, "pick": pick, "shaker_motion": shaker_motion, "sincos": sincos,
+    "splat": splat, "broadcast_load": broadcast_load, "store": store, "tension_acceleration": tension_acceleration,
+    "tension_factors": tension_factors, "turned": turned, "vabs": vabs, "vmax": vmax,
 }  # fmt: skip
 
 
@@ -167,45 +169,151 @@ def _tension(modes: Modes) -> list[str]:
     return lines
 
 
-def _take(modes: Modes) -> list[str]:
-    head = ["def take(m, shape, stages, gamma, any_touching, touching, law):"]
-    body = [f"length = load(m, {at.LENGTH})", "gq, qr = splat(0.0), splat(0.0)"]
-    body += ["impulse, work, gross, force = splat(0.0), splat(0.0), splat(0.0), splat(0.0)"]
-    body += [f"offset = load(m, {at.OFFSET}) + (1.0 - load(m, {at.HOME})) * load(m, {at.REST_CONTACT})"]
-    body += [f"amplitude, omega = load(m, {at.AMPLITUDE}), load(m, {at.OMEGA})"]
-    body += [f"sine0, cosine0 = load(m, {at.SINE}), load(m, {at.COSINE})"]
+# ----------------------------------------------------------------------------------------------------
+# The operations that the step is built from.  Rows are tuples of registers, one for each mode.
+
+
+class State(NamedTuple):
+    """Rows of a step: displacements, velocities, and accelerations at the last kick."""
+
+    q: Any
+    p: Any
+    k: Any
+
+
+class StepData(NamedTuple):
+    """All numbers that a step of eight runs reads."""
+
+    m: Any
+    stages: Any
+    flows: int
+    gamma: float
+    tip: Any
+    in_contact: bool
+    """Whether any of the runs is."""
+    closed: Any
+    """Mask of those that are."""
+    length: Any
+    sine: Any
+    """Of the phase of the drive at the beginning."""
+    cosine: Any
+
+
+class SineDrive(NamedTuple):
+    """The drives of eight runs."""
+
+    amplitude: Any
+    omega: Any
+
+
+_KNOWN["State"] = State
+
+
+@inlined
+def _zero(data):
+    return splat(0.0)
+
+
+@inlined
+def _kick_weight(data, stage):
+    return broadcast_load(data.m, data.stages.kick + stage) * data.length
+
+
+@inlined
+def _tip_motion(data, stage):
+    turn = at.TURN + WIDTH * stage
+    ahead, cosine_ahead = load(data.m, turn), load(data.m, turn + TURNS * WIDTH)
+    sine, cosine = rotate_phase(data.sine, data.cosine, ahead, cosine_ahead)
+    return shaker_motion(data.tip.drive.amplitude, data.tip.drive.omega, sine, cosine)
+
+
+@inlined
+def _where_closed(data, force):
+    return pick(data.closed, force, 0.0)
+
+
+def _row(terms: Iterable[str]) -> str:
+    return f"({', '.join(terms)},)"
+
+
+def _begin(modes: Modes) -> list[str]:
+    rows = [_row(modes.row(i, field) for i in modes.each()) for field in (at.Q, at.P, at.K)]
+    return ["def begin(data):", "    m = data.m", f"    return State({', '.join(rows)}), None"]
+
+
+def _form_products(modes: Modes) -> list[str]:
+    lines = ["def form_products(data, stage, state):", "    m, cq, r = data.m, splat(0.0), state.q"]
+    lines += ["    gq, qr = cq, cq"]
+    lines += [f"    q{i} = state.q[{i}]" for i in modes.each()]
+    lines += ["    if data.in_contact:"]
+    lines += [f"        cq = {modes.total(lambda i: (modes.row(i, at.CONTACT), f'q{i}'))}"]
+    lines += ["    if stage > 0:"]
+    lines += [f"        g{i} = {modes.row(i, at.SEEN_WELL)}" for i in modes.each()]
+    lines += [f"        {line}" for line in _tension(modes)]
+    lines += [f"        r = {_row(f'r{i}' for i in modes.each())}"]
+    return [*lines, "    return InnerProducts(cq, gq, qr, r)"]
+
+
+def _kick_and_flow(modes: Modes) -> list[str]:
+    each, last = modes.each(), modes.flows
+    k = (f"tension_acceleration(along_g, along_r, {modes.row(i, at.SEEN_WELL)}, r[{i}])" for i in each)
+    p = (f"kick_mode(weight, k[{i}], {modes.row(i, at.CONTACT)}, force, p[{i}])" for i in each)
+    lines = ["def kick_and_flow(data, stage, state, weight, along_g, along_r, r, force):"]
+    lines += ["    m, q, p, k = data.m, state.q, state.p, state.k"]
+    lines += ["    if stage > 0:", f"        k = {_row(k)}", f"    p = {_row(p)}"]
+    lines += [f"    if stage < {last}:", f"        flow = {4 * WIDTH} * min(stage, {last - 1} - stage)"]
+    for i in each:
+        a = (f"load(m, {modes.place(i, at.FLOW + c * WIDTH)} + flow)" for c in range(4))
+        lines += [f"        q{i}, p{i} = flow_mode(q[{i}], p[{i}], {', '.join(a)})"]
+    lines += [f"        q, p = {_row(f'q{i}' for i in each)}, {_row(f'p{i}' for i in each)}"]
+    return [*lines, "    return State(q, p, k), splat(0.0)"]
+
+
+def _store_end(modes: Modes) -> list[str]:
+    """The state at the end of a step, into Q1, P1 and K1."""
+    lines = ["def store_end(m, state):"]
     for i in modes.each():
-        body += [
-            f"q{i}, p{i}, g{i} = {modes.row(i, at.Q)}, {modes.row(i, at.P)}, {modes.row(i, at.SEEN_WELL)}"
-        ]
-        body += [f"k{i} = {modes.row(i, at.K)}"]
-    body += [f"for stage in range({modes.flows + 1}):"]
-    stage = ["weight = broadcast_load(m, stages.kick + stage) * length", "if any_touching:"]
-    stage += [f"    sine = load(m, {at.TURN} + {WIDTH} * stage)"]
-    stage += [f"    cosine = load(m, {at.TURN + TURNS * WIDTH} + {WIDTH} * stage)"]
-    stage += ["    sine, cosine = sine0 * cosine + cosine0 * sine, cosine0 * cosine - sine0 * sine"]
-    stage += ["    motion, velocity = shaker_motion(amplitude, omega, sine, cosine)"]
-    dot = modes.total(lambda i: (modes.row(i, at.CONTACT), f"q{i}"))
-    stage += [f"    force = pick(touching, contact_force(law, offset + motion - {dot}), 0.0)"]
-    stage += ["    impulse = impulse + weight * force"]
-    stage += ["    work = work + weight * force * velocity"]
-    stage += ["    gross = gross + weight * vabs(force * velocity)"]
-    stage += ["if stage > 0:"]
-    stage += [f"    {line}" for line in _tension(modes)]
-    stage += ["    along_g, along_r = tension_factors(gamma, gq, qr)"]
-    stage += [f"    k{i} = tension_acceleration(along_g, along_r, g{i}, r{i})" for i in modes.each()]
-    stage += [f"p{i} = fma(weight, fma(force, {modes.row(i, at.CONTACT)}, k{i}), p{i})" for i in modes.each()]
-    stage += [f"if stage < {modes.flows}:"]
-    stage += [f"    flow = {4 * WIDTH} * min(stage, {modes.flows - 1} - stage)"]
-    for i in modes.each():
-        a11, a12, a21, a22 = (f"load(m, {modes.place(i, at.FLOW + c * WIDTH)} + flow)" for c in range(4))
-        stage += [f"    q{i}, p{i} = turned(q{i}, {a11}, {a12}, p{i}), turned(p{i}, {a22}, {a21}, q{i})"]
-    body += [f"    {line}" for line in stage]
-    for i in modes.each():
-        for field, value in ((at.Q1, f"q{i}"), (at.P1, f"p{i}"), (at.K1, f"k{i}")):
-            body += [f"store(m, {modes.place(i, field)}, {value})"]
-    body += [f"store(m, {at.GQ}, gq)", f"store(m, {at.QR}, qr)", "return impulse, work, gross"]
-    return head + [f"    {line}" for line in body]
+        for name, field in (("q", at.Q1), ("p", at.P1), ("k", at.K1)):
+            lines += [f"    store(m, {modes.place(i, field)}, state.{name}[{i}])"]
+    return lines
+
+
+@cache
+def _step_of(shape: Any) -> Any:
+    """The step for a shape."""
+    begin, form_products, kick_and_flow, store_end = (
+        _function(name, shape) for name in ("begin", "form_products", "kick_and_flow", "store_end")
+    )
+    flows = shape.flows
+    take = build_step(
+        Primitives(
+            zero=_zero,
+            begin=begin,
+            kick_weight=_kick_weight,
+            tip_motion=_tip_motion,
+            form_products=form_products,
+            where_closed=_where_closed,
+            kick_and_flow=kick_and_flow,
+        )
+    ).take_step
+
+    @inlined
+    def take_step(m, stages, gamma, in_contact, closed, law):
+        offset = load(m, at.OFFSET) + (1.0 - load(m, at.HOME)) * load(m, at.REST_CONTACT)
+        tip = Tip(offset, law, SineDrive(load(m, at.AMPLITUDE), load(m, at.OMEGA)))
+        length, sine, cosine = load(m, at.LENGTH), load(m, at.SINE), load(m, at.COSINE)
+        state, increment = take(
+            StepData(m, stages, flows, gamma, tip, in_contact, closed, length, sine, cosine)
+        )
+        store_end(m, state)
+        store(m, at.GQ, increment.gq)
+        store(m, at.QR, increment.qr)
+        return increment.contact
+
+    return take_step
+
+
+# ----------------------------------------------------------------------------------------------------
 
 
 def _signals(modes: Modes) -> list[str]:
@@ -364,7 +472,8 @@ def _at_hand(modes: Modes) -> list[str]:
 
 
 TEXTS = {
-    "at_hand": _at_hand, "take": _take, "signals": _signals, "tension": _tension_at, "bounds": _bounds,
+    "at_hand": _at_hand, "begin": _begin, "form_products": _form_products, "kick_and_flow": _kick_and_flow,
+    "store_end": _store_end, "signals": _signals, "tension": _tension_at, "bounds": _bounds,
     "modal_energy": _energies, "modal_energies": _energies_and_powers, "glide": _glide,
 }  # fmt: skip
 
@@ -379,19 +488,19 @@ def _function(name: str, shape: Any) -> Any:
     return inlined(made(name, TEXTS[name](Modes(shape.blocks, shape.flows))))
 
 
-def take(m: Any, shape: Any, stages: Any, gamma: float, any_touching: bool, touching: Any, law: Any) -> Any:
-    """A step of every lane, from Q, P and K to Q1, P1 and K1; returns impulse, work and gross work of the contact.
+def take_step(m: Any, shape: Any, stages: Any, gamma: float, in_contact: bool, closed: Any, law: Any) -> Any:
+    """A step of every lane, from Q, P and K to Q1, P1 and K1; returns the increment of the contact.
 
-    *touching* is the mask of those in contact.
+    *closed* is the mask of the lanes in contact; *in_contact* is whether there is any.
     """
-    raise TypeError("take runs in compiled code only")
+    raise TypeError("take_step runs in compiled code only")
 
 
-@overload(take, jit_options=INLINE_HERE)
-def _take_of(m, shape, stages, gamma, any_touching, touching, law):
-    written = _function("take", shape.instance_class)
-    return lambda m, shape, stages, gamma, any_touching, touching, law: written(
-        m, shape, stages, gamma, any_touching, touching, law
+@overload(take_step, jit_options=INLINE_HERE)
+def _take_step_of(m, shape, stages, gamma, in_contact, closed, law):
+    written = _step_of(shape.instance_class)
+    return lambda m, shape, stages, gamma, in_contact, closed, law: written(
+        m, stages, gamma, in_contact, closed, law
     )
 
 

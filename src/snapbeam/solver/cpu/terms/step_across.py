@@ -53,9 +53,9 @@ def _in_two_parts(memory, blocks, layout, stages, run, tip, step, length, with_e
         two.gq, two.qr, one.impulse + two.impulse, one.work + two.work, one.gross + two.gross, one.lost + two.lost,
         one.dissipated + two.dissipated,
         ExternalWork(
-            one.given.base + two.given.base, one.given.load + two.given.load, one.given.gross + two.given.gross
+            one.external.base + two.external.base, one.external.load + two.external.load, one.external.gross + two.external.gross
         ),
-        CircuitIncrement(two.tap.impulse, two.tap.y, one.tap.energy + two.tap.energy, two.tap.twice),
+        CircuitIncrement(two.circuit.impulse, two.circuit.y, one.circuit.energy + two.circuit.energy, two.circuit.twice),
     )  # fmt: skip
 
 

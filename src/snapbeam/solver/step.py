@@ -1,0 +1,265 @@
+"""The time step of every layout: kicks by the nonlinear forces and exact flows of the linear modes.
+
+With the amplitudes ``alpha = alpha_eq + V q`` about a well and ``p = q'``, a structure obeys
+
+    q' = p,    p' = -omega^2 q - 2 zeta omega p + k(q) + c f(d),
+
+    k(q) = -gamma [(q.Gq) g + (2 g.q + q.Gq) Gq],    G = V^T V,    g = V^T alpha_eq,    c = V^T phi(x_s),
+
+where k is the acceleration by the change of midplane tension and f the contact force at the penetration
+``d = offset + w_s(t) - c.q``.  The right-hand side has two parts, each with an exact solution:
+
+* A **flow** A(t) solves the linear part.  Every mode is a damped oscillator of its own: (q, p) is multiplied by a matrix
+  of 2 x 2 numbers, which :func:`flow_mode` applies (``physics.py: rotation`` computes it, once for each length of step).
+* A **kick** B(t) solves the nonlinear part.  q does not change in it, and neither do k and f:
+  ``p <- p + t (k + c f)``, as in :func:`kick_mode`.
+
+A step of length h is the symmetric composition
+
+    A step =  B(b_0 h) A(a_0 h) B(b_1 h) A(a_1 h) ... A(a_{s-1} h) B(b_s h),    a_i = a_{s-1-i},    b_i = b_{s-i},
+
+from left to right in time.  ``splitting.py`` holds the weights of orders 4 and 6, and their source.  The contact force of
+kick i uses the displacement w_s of the striker at the time of that kick, after the fraction a_0 + ... + a_{i-1} of the step.
+
+A *stage* is a kick and the flow after it; the last stage has no flow.  Every stage
+
+1. forms the inner products c.q, g.q and q.Gq,
+2. computes the two coefficients of k, one of g and one of r = Gq,
+3. computes the contact force f, and adds impulse and work of the contact, b_i h f and b_i h f w_s',
+4. kicks p, and then lets q and p flow.
+
+The first kick needs no tension: k at the beginning of a step is k at the end of the last one, which every step keeps.
+
+A layout may have further forces.  Those that depend on position and time alone (unequal wells, further contacts, base
+acceleration) add to k, and a change of the axial load adds to both coefficients.  A contact force that depends on velocity
+changes during a kick; its mean follows from the exact solution of the kick along c.  A harvester circuit is coupled with p
+within the kick, also exactly.
+
+The step itself decides nothing.  Whether a contact is closed is fixed for a whole step.  The caller observes the beam at
+the end, and inside the step where needed.  If a contact began or ended there, the caller takes a shorter step from the same
+beginning.  Then it accepts the step: the end becomes the next beginning, and the increments enter the statistics
+(``cpu/events.py: accept_step``, ``cpu/run_lanes/control.py: accept``, ``cuda/control.py``).
+
+Layouts.  This file does not know where numbers are in memory.  A number is a float, or a register of eight runs; q, p and k
+are rows in memory, registers, or one number in each thread of a block.  A layout provides the operations of
+:class:`Primitives`; :func:`build_step` binds the step to them, and Numba compiles the result into the kernel of the layout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from snapbeam.solver.compilation import inlined
+from snapbeam.solver.contact_force import contact_force
+from snapbeam.solver.physics import tension_factors, turned
+from snapbeam.solver.simd import fma
+
+__all__ = [
+    "ContactIncrement",
+    "Increment",
+    "InnerProducts",
+    "Primitives",
+    "StepFunctions",
+    "build_step",
+    "flow_mode",
+    "kick_mode",
+    "rotate_phase",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# One mode: layouts call these in their loops over modes.
+
+
+@inlined
+def kick_mode(weight, k, c, force, p):
+    """p after a kick of *weight* seconds: p + weight (k + c f)."""
+    return fma(weight, fma(force, c, k), p)
+
+
+@inlined
+def flow_mode(q, p, a11, a12, a21, a22):
+    """q and p after a flow; the diagonal a11, a22 of its matrix is stored less one."""
+    return turned(q, a11, a12, p), turned(p, a22, a21, q)
+
+
+@inlined
+def rotate_phase(sine, cosine, sine_ahead, cosine_ahead):
+    """Sine and cosine of the sum of two angles: the phase of a drive at the beginning of a step and its advance since."""
+    return sine * cosine_ahead + cosine * sine_ahead, cosine * cosine_ahead - sine * sine_ahead
+
+
+# ----------------------------------------------------------------------------------------------------
+# The values that pass from stage to stage.
+
+
+class InnerProducts(NamedTuple):
+    """Inner products of the displacements at a kick; 0 where they are not needed."""
+
+    cq: Any
+    """c.q, m: displacement of the beam at the striker. Only of a step in contact."""
+    gq: Any
+    """g.q and q.Gq. Not at the first kick of a step."""
+    qr: Any
+    r: Any
+    """The row r = Gq, as the layout holds rows. Not at the first kick of a step."""
+
+
+class ContactIncrement(NamedTuple):
+    """Contact of the first striker within a step."""
+
+    force: Any
+    """Force at the present kick, N."""
+    impulse: Any
+    """Sums over the kicks so far: impulse, N s; work of the striker, J; the sum of its absolute values, J."""
+    work: Any
+    gross: Any
+    lost: Any
+    """Energy lost in the contact so far, J."""
+
+
+class Increment(NamedTuple):
+    """Changes over the stages of a step so far."""
+
+    gq: Any
+    """g.q and q.Gq at the last kick."""
+    qr: Any
+    contact: ContactIncrement
+    dissipated: Any
+    """Energy that the damping of the modes dissipated, J; 0 in a layout or a run that does not account for it."""
+    surroundings: Any
+    """Work of base and axial load, and the state of the circuit; None in a layout without them."""
+
+
+class Primitives(NamedTuple):
+    """Operations of a layout.
+
+    *data* is a named tuple of all numbers that a step reads.  Its fields ``flows`` (number s of flows), ``gamma``, ``tip``
+    (an :class:`~snapbeam.solver.excitation.Tip`) and ``in_contact`` are read here.  *state* is the layout's form of q, p
+    and k.
+    """
+
+    zero: Callable[..., Any]
+    """``zero(data)``: the number 0."""
+    begin: Callable[..., Any]
+    """``begin(data)``: the state at the beginning of the step, and the surroundings before it."""
+    kick_weight: Callable[..., Any]
+    """``kick_weight(data, stage)``: b_i h, s."""
+    tip_motion: Callable[..., Any]
+    """``tip_motion(data, stage)``: displacement w_s and velocity of the striker at a kick."""
+    form_products: Callable[..., Any]
+    """``form_products(data, stage, state)``: :class:`InnerProducts`."""
+    where_closed: Callable[..., Any]
+    """``where_closed(data, force)``: the force; 0 in those runs of a register that are not in contact."""
+    kick_and_flow: Callable[..., Any]
+    """``kick_and_flow(data, stage, state, weight, along_g, along_r, r, force)``.
+
+    Returns the state after the kick and the flow of a stage, and the energy dissipated in the flow.  After the first stage
+    k is *along_g* g + *along_r* r, with the accelerations of further forces that the layout has.
+    """
+    enter_forces: Callable[..., Any] | None = None
+    """``enter_forces(data, stage, weight)``: compute further forces at a kick: further contacts, base, axial load.
+
+    None in a layout without them, as are the following operations.
+    """
+    add_axial_load: Callable[..., Any] | None = None
+    """``add_axial_load(data, along_g, along_r)``: both coefficients of k with the change of the axial load."""
+    rate_dependent_force: Callable[..., Any] | None = None
+    """``rate_dependent_force(data, stage, weight, along_g, along_r, penetration, velocity)``.
+
+    Returns the mean force in a kick and the energy lost, of any contact law; *velocity* is that of the striker.
+    """
+    exchange_energy: Callable[..., Any] | None = None
+    """``exchange_energy(data, stage, weight, along_g, along_r, force, surroundings)``.
+
+    Adds the work of base and axial load in a kick, and couples the circuit with p.
+    """
+
+
+class StepFunctions(NamedTuple):
+    """The step of a layout."""
+
+    begin_step: Any
+    """``begin_step(data)``: state and :class:`Increment` before the first stage."""
+    take_stage: Any
+    """``take_stage(data, stage, state, products, increment)``: both after a stage."""
+    take_step: Any
+    """``take_step(data)``: both at the end of the step."""
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+def build_step(layout: Primitives, compiled_part: Callable[..., Any] = inlined) -> StepFunctions:
+    """Build the time step of a layout.
+
+    Parameters
+    ----------
+    layout : Primitives
+        A primitive that is None leaves no code.
+    compiled_part : callable
+        Compiles a function into the kernel that calls it.
+    """
+    zero, begin, kick_weight, tip_motion = layout.zero, layout.begin, layout.kick_weight, layout.tip_motion
+    form_products, where_closed = layout.form_products, layout.where_closed
+    kick_and_flow = layout.kick_and_flow
+    enter_forces, add_axial_load = layout.enter_forces, layout.add_axial_load
+    rate_dependent_force, exchange_energy = layout.rate_dependent_force, layout.exchange_energy
+
+    @compiled_part
+    def evaluate_contact(data, stage, weight, along_g, along_r, cq, before):
+        """The contact at a kick of *weight* seconds."""
+        if not data.in_contact:
+            return before
+        displacement, velocity = tip_motion(data, stage)
+        penetration = data.tip.offset + displacement - cq
+        if rate_dependent_force is None:
+            force, lost = where_closed(data, contact_force(data.tip.law, penetration)), zero(data)
+        else:
+            force, lost = rate_dependent_force(data, stage, weight, along_g, along_r, penetration, velocity)
+        return ContactIncrement(
+            force,
+            before.impulse + weight * force,
+            before.work + weight * force * velocity,
+            before.gross + weight * abs(force * velocity),
+            before.lost + lost,
+        )
+
+    @compiled_part
+    def begin_step(data):
+        """The state before the first stage, and increments of 0."""
+        state, surroundings = begin(data)
+        nil = zero(data)
+        return state, Increment(nil, nil, ContactIncrement(nil, nil, nil, nil, nil), nil, surroundings)
+
+    @compiled_part
+    def take_stage(data, stage, state, products, before):
+        """A kick and the flow after it."""
+        weight = kick_weight(data, stage)
+        along_g, along_r = tension_factors(data.gamma, products.gq, products.qr)
+        if enter_forces is not None:
+            enter_forces(data, stage, weight)
+        if add_axial_load is not None:
+            along_g, along_r = add_axial_load(data, along_g, along_r)
+        contact = evaluate_contact(data, stage, weight, along_g, along_r, products.cq, before.contact)
+        surroundings = before.surroundings
+        if exchange_energy is not None:
+            surroundings = exchange_energy(data, stage, weight, along_g, along_r, contact.force, surroundings)
+        state, dissipated = kick_and_flow(
+            data, stage, state, weight, along_g, along_r, products.r, contact.force
+        )
+        return state, Increment(
+            products.gq, products.qr, contact, before.dissipated + dissipated, surroundings
+        )
+
+    @compiled_part
+    def take_step(data):
+        """All stages of a step."""
+        state, increment = begin_step(data)
+        for stage in range(data.flows + 1):
+            products = form_products(data, stage, state)
+            state, increment = take_stage(data, stage, state, products, increment)
+        return state, increment
+
+    return StepFunctions(begin_step, take_stage, take_step)
