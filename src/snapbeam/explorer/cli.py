@@ -34,13 +34,11 @@ def explore(
     address: Annotated[str, typer.Option(help="Address to serve on.")] = "127.0.0.1",
     allow_remote: Annotated[
         bool,
-        typer.Option(
-            "--allow-remote", help="Allow an address that others can reach; a token is needed then."
-        ),
+        typer.Option("--allow-remote", help="Allow an address that others can reach."),
     ] = False,
     token: Annotated[
         str | None,
-        typer.Option(help="Token that pages must bring; made up, with --allow-remote, if not given."),
+        typer.Option(help="Token in the address of the page; a random one by default."),
     ] = None,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
