@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from snapbeam.cli.console import cli_command, out, write_json_now
+from snapbeam.cli.console import INTERRUPTED, cli_command, out, write_json_now
 
 __all__ = ["explore"]
 
@@ -79,3 +79,4 @@ def explore(
         )  # fmt: skip
     except KeyboardInterrupt:
         out().print("stopped")
+        raise typer.Exit(INTERRUPTED) from None
