@@ -367,11 +367,15 @@ def main(calls: int, seed: int, report: Path, seconds: float = math.inf) -> None
     report = report.absolute()
     start = time.monotonic()
     made, wrong = fuzz_calls(calls, seed, seconds=seconds)
-    seen = {"calls": made, "kinds": len(wrong), "wrong": sum(map(len, wrong.values()))}
-    lines = [json.dumps(seen | {"seconds": round(time.monotonic() - start)})]
-    for name, examples in sorted(wrong.items(), key=lambda item: -len(item[1])):
-        lines.append(f"{len(examples):5d}  {name}\n       {examples[0][:200]}")
-    report.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    found = {
+        "calls": made,
+        "seconds": round(time.monotonic() - start),
+        "wrong": {
+            name: {"times": len(examples), "example": examples[0]}
+            for name, examples in sorted(wrong.items(), key=lambda item: -len(item[1]))
+        },
+    }
+    report.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
