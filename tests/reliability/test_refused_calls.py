@@ -13,7 +13,7 @@ from snapbeam.simulation.run import Run
 from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.util.validation import InputError
 
-pytest.importorskip("cv2", reason="the part lab needs its extra")
+pytest.importorskip("snapbeam.lab", reason="the part lab is not installed", exc_type=ImportError)
 
 LONG = range(10**12)
 SHORT = sb.Integration(cycles=2)
