@@ -21,7 +21,7 @@ WORKERS ?= 2
 # Where the benchmarks write; the docs show what is in docs/images
 BENCH ?= out/bench
 
-.PHONY: help map explorer-deps test test-slow test-oldest lint docs bench dist clean
+.PHONY: help map explorer-deps test test-slow test-oldest lint docs bench audit dist clean
 
 help:
 	@echo "make map        compute the response map ($(MAP), $(PLOT)); variables: MODES CYCLES FREQUENCY_RATIO"
@@ -32,6 +32,7 @@ help:
 	@echo "make test-oldest  the tests with the oldest packages that are allowed, on Python 3.11"
 	@echo "make docs       the documentation, in docs/_build/html"
 	@echo "make bench      the benchmarks, in out/bench; variable: BENCH"
+	@echo "make audit      known vulnerabilities of the pinned packages"
 	@echo "make dist       wheel and source archive, each installed alone and run"
 	@echo "make clean      remove what was built (not the environment, not results)"
 
@@ -98,6 +99,10 @@ docs: $(VENV)/.installed-docs
 
 bench: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks -o $(BENCH)
+
+audit: $(VENV)/.installed-test
+	$(PIP) install --constraint constraints.txt pip-audit
+	$(BIN)/python -m pip_audit --requirement constraints.txt --no-deps --disable-pip
 
 dist: $(VENV)/.installed-test
 	$(PIP) install --constraint constraints.txt build

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-import sys
+from snapbeam.util import interrupts
 
 __all__ = ["main"]
 
 
 def main() -> None:
-    """Run the program; an interrupt while it is still being loaded ends it as one later does."""
+    """Run the program."""
+    interrupts.install()  # before the imports of the program, which take seconds
+    from snapbeam.cli.app import main as run
+
     try:
-        from snapbeam.cli.app import main as run
-    except KeyboardInterrupt:
-        sys.exit(130)
-    run()
+        run()
+    except SystemExit as ended:
+        interrupts.end(ended.code)
+        raise
 
 
 if __name__ == "__main__":

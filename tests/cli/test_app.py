@@ -183,7 +183,7 @@ def test_frequencies(cli):
 @pytest.mark.skipif(sys.platform == "win32", reason="interrupts are POSIX signals here")
 def test_interrupt_leaves_nothing_behind(tmp_path):
     """Ctrl-C while a long map is computed: status 130, no traceback, no file."""
-    command = [sys.executable, "-c", "from snapbeam.cli import main; main()", "map", "--modes", "1"]
+    command = [sys.executable, "-m", "snapbeam", "map", "--modes", "1"]
     command += ["--cycles", "30000", "--frequency-ratio", "0.5:4:20", "--velocity-amplitude", "0.01:0.65:20"]
     process = subprocess.Popen(
         command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -194,7 +194,7 @@ def test_interrupt_leaves_nothing_behind(tmp_path):
         first = process.stderr.readline()
     assert re.match(r"\d+ of 400 points, [\d.]+ points/s, .* left", first), first + process.stderr.read()
     process.send_signal(signal.SIGINT)
-    output, messages = process.communicate(timeout=60)
+    output, messages = process.communicate(timeout=600)
     assert process.returncode == 130
     assert messages.splitlines()[-1] == "interrupted; no file was left half written"
     assert output == "" and "Traceback" not in messages

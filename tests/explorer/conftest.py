@@ -20,6 +20,8 @@ from snapbeam.model.parameter_file import Config
 pytest.importorskip("panel", reason="the explorer's extra is not installed: make explorer-deps")
 
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
+TOKENS: dict[str, str] = {}
+"""Token of each server by its address; a page opened without a token gets it here."""
 PATIENCE = 180_000
 """Milliseconds that a page may take on a busy machine; a test of what a page does is no test of how fast."""
 
@@ -76,6 +78,8 @@ class Served:
         while not self.url and self.process.poll() is None and time.monotonic() < limit:
             time.sleep(0.05)
         assert self.url, self.text
+        self.url, _, self.token = self.url.partition("?token=")
+        TOKENS[self.url] = self.token
 
     def _listen(self) -> None:
         with self.process.stdout as lines:
@@ -159,7 +163,11 @@ class Tab:
 
     def open(self, url: str) -> None:
         """Load a page and wait until its map stands."""
-        self.page.goto(url)
+        base, _, search = url.partition("?")
+        if base in TOKENS:
+            search = f"token={TOKENS[base]}" + (f"&{search}" if search else "")
+        self.page.goto(f"{base}?{search}")
+        assert "token" not in self.page.url
         self.page.wait_for_function(
             """() => { const d = window.Bokeh && Bokeh.documents[0]; const m = d && d.get_model_by_name('map');
                        return m && Bokeh.index.find_one(m) && Bokeh.index.find_one(m).frame.bbox.width > 10; }"""

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import http.client
 import os
-import re
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
-from urllib.parse import quote, urlparse
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -323,74 +320,3 @@ def test_a_hostile_address_counts_for_nothing_and_is_told(tab, served, state):
     assert page.page.locator("script:has-text('alert(1)')").count() == 0
     page.click(1.2, 0.3)
     page.wait(lambda: "bit for bit" in page.notes(), "a run none the less")
-
-
-def _status(url, host=None, path="/"):
-    where = urlparse(url)
-    connection = http.client.HTTPConnection(where.hostname, where.port, timeout=60)
-    connection.request("GET", path, headers={"Host": host} if host else {})
-    response = connection.getresponse()
-    body = response.read().decode(errors="replace")
-    connection.close()
-    return response.status, body, dict(response.getheaders())
-
-
-def test_pages_of_other_names_and_origins_are_refused(served):
-    assert _status(served.url)[0] == 200
-    assert _status(served.url, host="evil.example")[0] in (302, 403)
-    import asyncio
-
-    from tornado.httpclient import HTTPClientError, HTTPRequest
-    from tornado.websocket import websocket_connect
-
-    body = _status(served.url)[1]
-    token = re.search(r'"token":"([^"]+)"', body)[1]
-
-    async def knock(origin):
-        request = HTTPRequest(
-            served.url.replace("http", "ws") + "ws",
-            headers={"Origin": origin, "Sec-WebSocket-Protocol": f"bokeh, {token}"},
-        )
-        try:
-            connection = await websocket_connect(request, subprotocols=["bokeh", token])
-        except HTTPClientError as error:
-            return error.code
-        connection.close()
-        return 101
-
-    with ThreadPoolExecutor(1) as other:  # this thread has the browser's own loop
-        assert other.submit(asyncio.run, knock("http://evil.example")).result() == 403
-        assert other.submit(asyncio.run, knock(served.url.rstrip("/"))).result() == 101
-
-
-def test_a_token_is_asked_for(serve):
-    server = serve("map.nc", "--token", "a-token-of-many-letters")
-    assert server.url.endswith("?token=a-token-of-many-letters")
-    assert _status(server.url)[0] in (302, 403)
-    assert _status(server.url, path="/?token=wrong")[0] in (302, 403)
-    status, _, headers = _status(server.url, path="/?token=a-token-of-many-letters")
-    assert status == 200
-    assert "HttpOnly" in headers["Set-Cookie"] and "SameSite=Strict" in headers["Set-Cookie"]
-
-
-@pytest.mark.slow
-def test_other_addresses_need_a_flag(folder):
-    code = "from snapbeam.cli import main; main()"
-    found = subprocess.run(
-        [sys.executable, "-c", code, "explore", "map.nc", "--no-browser", "--address", "0.0.0.0"],
-        cwd=folder, capture_output=True, text=True, env=dict(os.environ), check=False,
-    )  # fmt: skip
-    assert found.returncode == 2
-    assert "--allow-remote" in found.stderr
-
-
-@pytest.mark.slow
-def test_the_same_in_a_notebook(tab, small_map):
-    shown = sb.explorer.explore(small_map)
-    try:
-        assert shown.url in shown._repr_html_()
-        page = tab(shown.url)
-        page.click(float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][4]))
-        page.wait(lambda: "bit for bit" in page.notes(), "the run")
-    finally:
-        shown.stop()

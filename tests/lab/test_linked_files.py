@@ -46,7 +46,7 @@ def test_recordings_in_other_files_are_refused(tmp_path):
 
 def test_long_headers_are_no_trap():
     """The patterns that take a header apart need a time that goes with the square of its length."""
-    start = time.perf_counter()
+    start = time.process_time()
     assert split_unit("[" * 60_000) == ("[" * 60_000, None)
     assert header_values(["a" * 60_000 + ":", " " * 60_000, "rate: 5"]) == {"rate": "5"}
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start < 1.0

@@ -11,6 +11,7 @@ import collections
 import datetime
 import enum
 import fractions
+import functools
 import importlib
 import inspect
 import json
@@ -41,7 +42,7 @@ from snapbeam.util.validation import InputError
 LONGEST = 10.0
 """Seconds that a call may take."""
 PACKAGE = str(Path(sb.__file__).parent)
-_NOT_WALKED = ("cli", "explorer", "__main__", "paper")
+_NOT_WALKED = ("cli", "explorer", "__main__", "paper", "parts")
 """Commands are taken from the program itself; a server and the making of the paper take as long as they should."""
 _LONG_COMMANDS = ("reproduce", "explore")
 
@@ -75,9 +76,11 @@ HOSTILE: list[Any] = [
     np.array([True, False]), np.ma.array([0.1, 0.2], mask=[True, False]), np.ma.masked,
     np.array([10**400], dtype=object),
     xr.DataArray([1.0, 2.0]), DATASET, MODEL, SYSTEM, SHAKER, default_values.BEAM, default_values.CONTACT, SHORT, lambda *a: None,
-    enum.Enum("E", "A").A, range(3), iter([1]), Path("nowhere/x.nc"), "x.nc", "x.toml", Ellipsis, int, np,
+    enum.Enum("E", "A").A, range(3), range(10**12), "a\udcff.nc", Path("a\udcff.toml"), [1, 2], DATASET.to_dataframe(),
+    (0.5, 0.1), (0, 10**9), {"a": 1}, iter([1]), Path("nowhere/x.nc"), "x.nc", "x.toml", Ellipsis, int, np,
 ]  # fmt: skip
 WORDS = [
+    "a\udcff.toml",
     "", "-1", "0", "1", "2", "0.3", "1e400", "nan", "inf", "1e-300", "abc", "0.1:2:3", "0.1:2:1000000000", "2:1:3",
     "1/0", "1/2.1", "9" * 5000, "x.nc", "x.toml", "x.csv", "x.png", ".", "/", "nowhere/x.nc", "\u00b5m", "a,b", "1,2",
     "--", "-", "true", "below", "drive.frequency_ratio=0.1:2:3", "striker.location=nan", "beam.length", "[]", "{}",
@@ -96,7 +99,26 @@ def _valid(name: str, draw: random.Random) -> Any:
         "values": [0.1, 0.3, 0.5], "coefficient": 0.5, "amplitude": [0.1], "velocity": [0.0],
         "drive": sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.3),
     }  # fmt: skip
+    if name in _OF_RESULTS:
+        return draw.choice(_results())
     return pool[name] if name in pool else draw.choice(HOSTILE)
+
+
+_OF_RESULTS = ("run", "dataset", "data", "result", "measured", "simulated", "signal", "lower", "upper")
+
+
+@functools.cache
+def _results() -> list[Any]:
+    """A run, its dataset, a map, a threshold and a measured signal."""
+    run = sb.simulate(SYSTEM, SHORT)
+    field = sb.sweep(
+        SYSTEM, {"drive.frequency_ratio": [0.9, 1.0], "drive.velocity_amplitude": [0.1, 0.2]}, SHORT
+    )
+    limit = sb.threshold(
+        SYSTEM, "drive.velocity_amplitude", [0.1, 0.2], {"drive.frequency_ratio": [0.9, 1.0]}, SHORT
+    )
+    signal = sb.lab.make_signal(np.sin(np.arange(500.0)), sampling_frequency=1e3, units="m/s")
+    return [run, run, run.dataset, field, limit, signal]
 
 
 _KEPT_OFF = {"cluster": [None, "", "abc", "local:x", 3, "x.toml"], "threads": [1, None, 0, "a", -1, 1.5]}
@@ -329,16 +351,31 @@ def _short(given: Any) -> str:
         return "?"
 
 
+def _limit_memory(gibibytes: float = 12.0) -> None:
+    """Let a large request fail at once; without limits of memory (Windows) it is made as it is."""
+    try:
+        import resource
+    except ImportError:
+        return
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    resource.setrlimit(resource.RLIMIT_AS, (int(gibibytes * 2**30), hard))
+
+
 def main(calls: int, seed: int, report: Path, seconds: float = math.inf) -> None:
     """Fuzzed calls whose result is written to a file: what is tried may close any stream."""
+    _limit_memory()
     report = report.absolute()
     start = time.monotonic()
     made, wrong = fuzz_calls(calls, seed, seconds=seconds)
-    seen = {"calls": made, "kinds": len(wrong), "wrong": sum(map(len, wrong.values()))}
-    lines = [json.dumps(seen | {"seconds": round(time.monotonic() - start)})]
-    for name, examples in sorted(wrong.items(), key=lambda item: -len(item[1])):
-        lines.append(f"{len(examples):5d}  {name}\n       {examples[0][:200]}")
-    report.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    found = {
+        "calls": made,
+        "seconds": round(time.monotonic() - start),
+        "wrong": {
+            name: {"times": len(examples), "example": examples[0]}
+            for name, examples in sorted(wrong.items(), key=lambda item: -len(item[1]))
+        },
+    }
+    report.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -106,6 +106,17 @@ def test_a_run_that_cannot_be_saved_is_not_lost(mounted, tmp_path, monkeypatch, 
     xr.testing.assert_identical(sb.load(kept).impacts, run.impacts)
 
 
+@pytest.mark.parametrize("kind", ["pdf", "png", "svg"])
+@pytest.mark.parametrize("size", ["4k", "12k", "20k"])
+def test_a_figure_that_does_not_fit(mounted, synthetic_run, tried, size, kind):
+    """Matplotlib's writer of PDF files raises errors of other kinds when the disk is full."""
+    disk = mounted("disk", f"size={size}")
+    with pytest.raises(NoRoomError, match="No space left"):
+        sb.plot.save_figure(sb.plot.plot_run(synthetic_run), disk / f"x.{kind}")
+    assert os.listdir(disk) == []
+    tried("figures written to a disk that is too small")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("place", ["output", "store", "plot", "save"])
 def test_commands_on_a_full_disk(mounted, tmp_path, tried, place):

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -44,8 +47,6 @@ def test_a_finished_store_is_the_map_that_was_returned(whole):
 
 
 def test_what_is_not_done_is_unknown_and_says_so(whole, tmp_path):
-    import shutil
-
     path, dataset = whole
     half = tmp_path / "half.store"
     shutil.copytree(path, half)
@@ -107,3 +108,33 @@ def test_the_order_of_the_axes_is_kept_before_anything_is_computed(system, tmp_p
         read = sb.read_checkpoint(path)
         assert read["response_class"].dims == tuple(lookup(each).short for each in order)
         assert read.attrs["points_done"] == 0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of memory are POSIX limits here")
+@pytest.mark.parametrize("where", ["map.json", "zarr.json"])
+def test_a_foreign_task_size_takes_no_memory(whole, tmp_path, where):
+    """The task size is outside the hash of the parameters, and Zarr allocates whole chunks: 1e9 points are 26 GiB."""
+    path = tmp_path / "foreign.store"
+    shutil.copytree(whole[0], path)
+    for file in path.rglob(where):
+        text = file.read_text(encoding="utf-8").replace(
+            '"points_per_task": 16', '"points_per_task": 1000000000'
+        )
+        file.write_text(
+            text.replace('"points_per_task":16', '"points_per_task":1000000000'), encoding="utf-8"
+        )
+        if where == "zarr.json" and (found := json.loads(text)).get("node_type") == "array":
+            found["chunk_grid"]["configuration"]["chunk_shape"][0] = 10**9
+            file.write_text(json.dumps(found), encoding="utf-8")
+    code = f"""
+import resource
+import snapbeam as sb
+resource.setrlimit(resource.RLIMIT_AS, (12 * 2**30, 12 * 2**30))
+try:
+    print(int(sb.read_checkpoint({str(path)!r}).attrs["points_done"]))
+except sb.InputError:
+    print(0)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) in (0, 120)

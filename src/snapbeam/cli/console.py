@@ -27,6 +27,7 @@ from rich.text import Text
 
 from snapbeam._version import __version__
 from snapbeam.util.files import VERSION, foreign_files_kept
+from snapbeam.util.interrupts import WORDS, during_command
 from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
@@ -189,7 +190,7 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
         asked = _OutputOptions(quiet, path if isinstance(path, Path) else None)
         token = _OUTPUT_OPTIONS.set(asked)
         try:
-            with warnings.catch_warnings(), kept:
+            with during_command(), warnings.catch_warnings(), kept:
                 warnings.showwarning = _show_warning  # type: ignore[assignment]
                 if asked.json is not None and asked.json != Path("-"):
                     from snapbeam.util.files import check_writable
@@ -209,7 +210,7 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
             errors().print(f"[bold red]error:[/] {escape(str(error))}")
             raise typer.Exit(FAILED) from None
         except KeyboardInterrupt:
-            errors().print("interrupted; no file was left half written")
+            errors().print(WORDS)
             raise typer.Exit(INTERRUPTED) from None
         finally:
             _OUTPUT_OPTIONS.reset(token)

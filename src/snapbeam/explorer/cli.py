@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from snapbeam.cli.console import cli_command, out, write_json_now
+from snapbeam.cli.console import INTERRUPTED, cli_command, out, write_json_now
 
 __all__ = ["explore"]
 
@@ -34,13 +34,11 @@ def explore(
     address: Annotated[str, typer.Option(help="Address to serve on.")] = "127.0.0.1",
     allow_remote: Annotated[
         bool,
-        typer.Option(
-            "--allow-remote", help="Allow an address that others can reach; a token is needed then."
-        ),
+        typer.Option("--allow-remote", help="Allow an address that others can reach."),
     ] = False,
     token: Annotated[
         str | None,
-        typer.Option(help="Token that pages must bring; made up, with --allow-remote, if not given."),
+        typer.Option(help="Token in the address of the page; a random one by default."),
     ] = None,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
@@ -81,3 +79,4 @@ def explore(
         )  # fmt: skip
     except KeyboardInterrupt:
         out().print("stopped")
+        raise typer.Exit(INTERRUPTED) from None

@@ -1,4 +1,4 @@
-"""The server of the page: on the loopback address, to pages of its own origin, or elsewhere to who has the token."""
+"""The server of the page: it answers its own pages, and whoever has the token."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ import logging
 import secrets
 import threading
 from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlparse
+from urllib.parse import parse_qsl, quote, urlencode
 
 import panel as pn
-from bokeh.server.auth_provider import AuthProvider
-from tornado.web import RequestHandler
+from tornado.httputil import HTTPServerRequest
+from tornado.routing import Router
+from tornado.web import OutputTransform, RequestHandler
 
 from snapbeam import InputError, InputTypeError, Integration, System
 from snapbeam.explorer.jobs import BODY, SESSIONS
@@ -24,6 +26,7 @@ __all__ = ["Explorer", "Gate", "explore", "is_loopback", "make_server", "serve"]
 
 
 _LOG = logging.getLogger("snapbeam.explorer")
+_ICON = "/favicon.ico"
 _COOKIE = "snapbeam_token"
 _OWN = "static/extensions/panel/"
 """Where the server keeps what pages are made of; what Panel is not told it fetches from elsewhere."""
@@ -40,73 +43,130 @@ def is_loopback(address: str) -> bool:
 
 
 class _Refused(RequestHandler):
-    """Says that there is no entrance."""
+    """Answers a request that the gate refuses."""
+
+    def initialize(self, status: int, words: str) -> None:
+        self._refusal = status, words
+
+    def prepare(self) -> None:
+        status, words = self._refusal
+        self.set_status(status)
+        self.set_header("Content-Type", "text/plain; charset=utf-8")
+        self.finish(words)
+
+
+class _Entered(RequestHandler):
+    """Moves the token from the address into a cookie."""
+
+    def initialize(self, key: str) -> None:
+        self._key = key
 
     def get(self) -> None:
-        """Refuse."""
-        self.set_status(403)
-        self.finish("This page needs its token: open the address that snapbeam explore printed.")
+        rest = [(name, value) for name, value in parse_qsl(self.request.query) if name != "token"]
+        path = self.request.path
+        self.set_cookie(_COOKIE, self._key, path=path, httponly=True, samesite="Strict")
+        self.redirect(path + (f"?{urlencode(rest, safe=',:')}" if rest else ""))
 
 
-class Gate(AuthProvider):
-    """Who may see the page and speak to it: by the name it is called by, and by the token, if there is one.
+class Gate(Router):
+    """Every request to the server passes here: pages, scripts, sockets, and addresses that do not exist.
 
-    The name is looked at because any page on the Internet may have a name of its own lead to the loopback address.
+    A request must call the server by one of its names, because any page on the Internet may direct a name of its own
+    to the loopback address.  It must come from a page of this server or from the address bar.  A page and its socket
+    need the token: in a cookie or, in the frame of a notebook, which has no cookies, in the address.
+
+    Parameters
+    ----------
+    application : tornado.web.Application
+        Answers the requests that pass.
+    shared : Shared
+        Counts the open pages.
+    hosts : tuple of str
+        Names and ports of the server.
+    prefix : str
+        Path of the page, to which the cookie is limited.
+    token : str
     """
 
-    def __init__(self, hosts: tuple[str, ...], token: str | None) -> None:
-        self._hosts, self._token = hosts, token
-        super().__init__()
+    def __init__(
+        self, application: Any, shared: Shared, hosts: tuple[str, ...], prefix: str, token: str
+    ) -> None:
+        self._application, self._shared, self._hosts = application, shared, hosts
+        self._prefix, self._token = prefix, token
+        self._key = sha256(b"cookie " + token.encode()).hexdigest()
+        self._pages = {f"{prefix}/", f"{prefix}/ws"}
 
-    @property
-    def get_user(self) -> Any:
-        """Decide about a request."""
+    def find_handler(self, request: HTTPServerRequest, **_: Any) -> Any:
+        """Choose what answers a request."""
+        refusal = self._refusal(request)
+        if refusal is not None:
+            _LOG.info("refused %r: %s", request.path[:80], refusal[1])
+            return self._answer(request, _Refused, status=refusal[0], words=refusal[1])
+        is_frame = request.headers.get("Sec-Fetch-Dest", "document") != "document"
+        if request.path == f"{self._prefix}/" and self._in_address(request) and not is_frame:
+            return self._answer(request, _Entered, key=self._key)
+        return self._application.find_handler(request)
 
-        def decide(request: Any) -> str | None:
-            host = urlparse(f"//{request.request.host}").hostname or ""
-            if host not in self._hosts:
-                _LOG.warning("refused a request to the name %r", host[:80])
-                return None
-            if self._token is None:
-                return "reader"
-            given = request.get_argument("token", "") or request.get_cookie(_COOKIE, "")
-            if not hmac.compare_digest(given.encode(), self._token.encode()):
-                return None
-            if not request.get_cookie(_COOKIE):
-                request.set_cookie(_COOKIE, self._token, httponly=True, samesite="Strict")
-            return "reader"
+    def _answer(self, request: HTTPServerRequest, handler: type[RequestHandler], **arguments: Any) -> Any:
+        return self._application.get_handler_delegate(request, handler, arguments)
 
-        return decide
-
-    @property
-    def get_user_async(self) -> None:
-        """Not used."""
+    def _refusal(self, request: HTTPServerRequest) -> tuple[int, str] | None:
+        host, origin = request.host.lower(), request.headers.get("Origin")
+        if host not in self._hosts:
+            return 403, f"the server is not called {host[:80]!r}"
+        if origin is not None and origin != f"http://{host}":
+            return 403, f"pages of {origin[:80]!r} may not ask this server"
+        entering = request.headers.get("Sec-Fetch-Mode") == "navigate" and self._in_address(request)
+        if request.headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin") and not entering:
+            return 403, "other pages may not ask this server; type the address"
+        if request.path.startswith(f"{self._prefix}/static/") or request.path == _ICON:
+            return None
+        if request.path not in self._pages:
+            return 404, "there is no such page; open the address that snapbeam explore printed"
+        if not (self._in_address(request) or self._in_cookie(request)):
+            return 403, "this page needs its token; open the address that snapbeam explore printed"
+        if request.path != f"{self._prefix}/ws" and self._shared.pages >= SESSIONS:
+            return 503, f"{SESSIONS} pages are open, which is the limit; close one of them, and wait 20 s"
         return None
 
-    @property
-    def login_url(self) -> str:
-        """Where the refused are led."""
-        return "/refused"
+    def _in_address(self, request: HTTPServerRequest) -> bool:
+        given = request.query_arguments.get("token", [b""])[0]
+        return hmac.compare_digest(given, self._token.encode())
 
-    @property
-    def get_login_url(self) -> None:
-        """Not used."""
-        return None
+    def _in_cookie(self, request: HTTPServerRequest) -> bool:
+        held = request.cookies.get(_COOKIE)
+        return held is not None and hmac.compare_digest(held.value.encode(), self._key.encode())
 
-    @property
-    def login_handler(self) -> type[RequestHandler]:
-        """What tells the refused."""
-        return _Refused
 
-    @property
-    def logout_url(self) -> None:
-        """There is none."""
-        return None
+class _Headers(OutputTransform):
+    """The headers of every response, which tell the browser what a page may do.
 
-    @property
-    def logout_handler(self) -> None:
-        """There is none."""
-        return None
+    Only the server's files and the scripts of the page as it was sent may run: text that becomes markup later cannot
+    run a script.  Bokeh needs ``unsafe-eval`` for its callbacks, inline style sheets, and scripts that it composes (``blob:``).
+    """
+
+    def __init__(self, request: HTTPServerRequest) -> None:
+        self._host = request.headers.get("Host", "")
+        self._framed = request.headers.get("Sec-Fetch-Dest") == "iframe"
+
+    def transform_first_chunk(
+        self, status_code: int, headers: Any, chunk: bytes, finishing: bool
+    ) -> tuple[int, Any, bytes]:
+        """Add the headers."""
+        nonce = secrets.token_urlsafe(16)
+        if headers.get("Content-Type", "").startswith("text/html") and finishing:
+            chunk = chunk.replace(b"<script", f'<script nonce="{nonce}"'.encode())
+            headers["Content-Length"] = str(len(chunk))
+        headers["Content-Security-Policy"] = (
+            f"default-src 'none'; script-src 'self' blob: 'unsafe-eval' 'nonce-{nonce}'; style-src 'self' 'unsafe-inline'; "
+            f"img-src 'self' data: blob:; media-src data: blob:; font-src 'self' data:; "
+            f"connect-src 'self' ws://{self._host}; base-uri 'none'; form-action 'none'"
+            + ("" if self._framed else "; frame-ancestors 'none'")
+        )
+        headers["Referrer-Policy"] = "no-referrer"
+        headers["X-Content-Type-Options"] = "nosniff"
+        headers["Cross-Origin-Resource-Policy"] = "same-origin"
+        return status_code, headers, chunk
 
 
 def make_server(
@@ -116,8 +176,10 @@ def make_server(
     *,
     allow_remote: bool = False,
     token: str | None = None,
-) -> tuple[Any, str, str | None]:
-    """A server that is not started, its port and its address for a browser.
+) -> tuple[Any, str]:
+    """A server that is not started, and its address for a browser.
+
+    The address contains the token, a random one unless given.
 
     Raises
     ------
@@ -130,37 +192,40 @@ def make_server(
         )
     if ":" in address:
         raise InputError(f"address = {address!r}: must be a name or an address of four numbers")
-    if not is_loopback(address) and token is None:
-        token = secrets.token_urlsafe(24)
-    hosts: tuple[str, ...] = ("127.0.0.1", "localhost") if is_loopback(address) else (address,)
+    token = token or secrets.token_urlsafe(24)
+    names: tuple[str, ...] = ("127.0.0.1", "localhost") if is_loopback(address) else (address,)
     if address == "0.0.0.0":
         import socket
 
-        hosts = ("127.0.0.1", "localhost", socket.gethostname(), socket.getfqdn(), *_own_addresses())
+        names = ("127.0.0.1", "localhost", socket.gethostname(), socket.getfqdn(), *_own_addresses())
     taken = port or _free_port(address)
-    origins = [f"{host}:{taken}" for host in hosts if ":" not in host]
+    names = tuple(name.lower() for name in names if ":" not in name)
+    hosts = names if taken == 80 else tuple(f"{name}:{taken}" for name in names)
+    prefix = (
+        f"/{sha256(token.encode()).hexdigest()[:16]}"  # other servers of this machine never get its cookie
+    )
     try:
         server = pn.io.server.get_server(
-            {"/": _factory(shared)}, port=taken, address=address, websocket_origin=origins, show=False, start=False,
-            title="snapbeam explorer", auth_provider=Gate(hosts, token), websocket_max_message_size=BODY,
+            {"/": _factory(shared)}, port=taken, address=address, websocket_origin=list(hosts), show=False,
+            start=False, title="snapbeam explorer", prefix=prefix, websocket_max_message_size=BODY,
             http_server_kwargs={"max_body_size": BODY}, check_unused_sessions_milliseconds=5000,
             unused_session_lifetime_milliseconds=15000,
         )  # fmt: skip
     except OSError as error:
         raise InputError(f"port = {port}: cannot be used, {error.strerror or error}") from None
+    application = server._tornado
+    application.transforms.append(_Headers)
+    server._http.request_callback = Gate(application, shared, hosts, prefix, token)
     shown = "127.0.0.1" if address == "0.0.0.0" else address
-    return server, f"http://{shown}:{taken}/" + (f"?token={token}" if token else ""), token
+    return server, f"http://{shown}:{taken}{prefix}/?token={quote(token)}"
 
 
 def _factory(shared: Shared) -> Callable[[], Any]:
     def page() -> Any:
         from snapbeam.explorer.page import Page
-        from snapbeam.explorer.style import Html
 
-        if shared.pages >= SESSIONS:
-            return Html(f"{SESSIONS} pages are open, the most that there may be: close one of them.")
         shared.pages += 1
-        pn.state.curdoc.template_variables.setdefault("dist_url", _OWN)
+        pn.state.curdoc.template_variables.update(dist_url=_OWN, app_favicon=_ICON)
         try:
             made = Page(shared, dict(pn.state.session_args))
         except BaseException:
@@ -275,7 +340,7 @@ def explore(what: Any = None, *, integration: Integration | None = None, height:
 
         asyncio.set_event_loop(asyncio.new_event_loop())
         try:
-            server, held["url"], _ = make_server(shared)
+            server, held["url"] = make_server(shared)
             held["server"] = server
             server.start()
         except BaseException as error:
@@ -323,7 +388,7 @@ def serve(
     matplotlib.use("Agg")  # pictures are drawn beside the page, for files alone
     shared = _shared(what, system, integration)
 
-    server, url, _ = make_server(shared, address, port, allow_remote=allow_remote, token=token)
+    server, url = make_server(shared, address, port, allow_remote=allow_remote, token=token)
     server.start()
     server.io_loop.add_callback(ready, url)
     try:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.util.status_codes import ResponseClass
-from snapbeam.util.validation import InputError
+from snapbeam.util.validation import InputError, axis, finite, instance
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -112,10 +112,13 @@ def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -
 
     if not isinstance(dataset, xr.Dataset) or "response_class" not in dataset:
         raise InputError("dataset: must be a map with the variable response_class")
+    instance("measurements", measurements, MeasuredPoints, "MeasuredPoints")
     response = dataset["response_class"]
     dims = [str(name) for name in response.dims]
     if not dims or any(name not in _AXES for name in dims):
         raise InputError(f"response_class with dimensions {dims}: must be among {', '.join(_AXES)}")
+    if not np.isin(response.values, [int(kind) for kind in ResponseClass]).all():
+        raise InputError("response_class: must contain the numbers of response classes only")
     where = {name: np.asarray(getattr(measurements, name), dtype=np.float64) for name in _AXES}
     measured = np.asarray(measurements.response_class, dtype=np.int8)
     count = measured.size
@@ -124,13 +127,14 @@ def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -
     for name in _AXES:
         value = where[name]
         if name in dims:
-            axis = np.asarray(dataset[name].values, dtype=np.float64)
-            place[name] = _steps(axis, value)
-            inside &= (place[name] >= -0.5) & (place[name] <= axis.size - 0.5)
+            points = axis(name, dataset[name].values, -math.inf, math.inf)
+            place[name] = _steps(points, value)
+            inside &= (place[name] >= -0.5) & (place[name] <= points.size - 0.5)
             continue
         fixed = dataset.coords[name].item() if name in dataset.coords else dataset.attrs.get(name)
         if fixed is not None:
-            belongs &= np.isnan(value) | (np.abs(value - float(fixed)) <= _NEAR * abs(float(fixed)))
+            fixed = finite(name, fixed)
+            belongs &= np.isnan(value) | (np.abs(value - fixed) <= _NEAR * abs(fixed))
     index = {
         name: np.clip(np.nan_to_num(np.round(p)), 0, dataset.sizes[name] - 1) for name, p in place.items()
     }

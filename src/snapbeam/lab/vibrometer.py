@@ -686,7 +686,7 @@ def measure_drive(
             f"signal: no oscillation, it is {samples.values[0]:g} everywhere: nothing was recorded; look at the cable, "
             "or choose another channel (--channel)"
         )
-    guess = spectral_peak(samples) if frequency is None else frequency
+    guess = spectral_peak(samples) if frequency is None else positive("frequency", frequency, "Hz")
     first, last = moving_part(samples, guess)
     moving = _slice(samples, first, last)
     outside = moves_outside(samples, guess, first, last)

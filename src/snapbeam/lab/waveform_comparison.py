@@ -16,7 +16,7 @@ from snapbeam.lab.vibrometer import measure_drive
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.status_codes import ResponseClass, classify
-from snapbeam.util.validation import InputError, choice, integer, nonnegative, positive
+from snapbeam.util.validation import InputError, choice, finite, integer, nonnegative, positive
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -392,7 +392,7 @@ def measure_response(
     if "valid" in run:
         good &= run["valid"].values.astype(bool)
     if start is not None:
-        good &= time >= start
+        good &= time >= finite("start", start)
     if good.sum() < 16:
         raise InputError(f"run: {int(good.sum())} valid sample(s) of {at}: must be at least 16")
     if "cycle" in run.coords:

@@ -213,7 +213,7 @@ def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
 def _chosen(values: Mapping[str, Any], section: str, key: str, known: Mapping[str, Any]) -> Any:
     own = dict(values)
     name = own.pop(key, None)
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         raise InputError(f"[{section}] {key} = {shown(name)}: must be one of {', '.join(map(repr, known))}")
     kind = known[name]
     _only(own, section, [item.name for item in dataclasses.fields(kind)])

@@ -257,8 +257,8 @@ def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
     """What is in no row: the law, the drive's kind, materials, and physical units."""
     if name == "type":
         known = LAWS if numbered(section)[0] == "contact" else _KINDS[numbered(section)[0]]
-        if value not in known and not _is_sum(section, value):
-            return f"{name} = {value!r}: must be one of {', '.join(map(repr, known))}", None
+        if not isinstance(value, str) or (value not in known and not _is_sum(section, value)):
+            return f"{name} = {shown(value)}: must be one of {', '.join(map(repr, known))}", None
         return "", value
     full = f"{section}.{name}"
     if full in PHYSICAL or name == "radius" or name in WANTED:

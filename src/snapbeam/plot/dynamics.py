@@ -60,6 +60,7 @@ def plot_diagram(
     InputError
         If there is nothing to draw, or branches are asked for beside another variable.
     """
+    branches = list(branches)
     if dataset is None and not branches:
         raise InputError("dataset: give a diagram or at least one branch")
     if branches and variable != "midspan_displacement":
@@ -67,7 +68,11 @@ def plot_diagram(
             f"variable = {variable!r}: branches have midspan_displacement alone; draw one or the other"
         )
     first = dataset if dataset is not None else branches[0]
-    along = str(first.attrs.get("parameter", ""))
+    along = str(getattr(first, "attrs", {}).get("parameter", ""))
+    for name, each in [("dataset", dataset), *(("branches", branch) for branch in branches)]:
+        needed = {"sweep", "period"} if name == "dataset" else {"orbit"}
+        if each is not None and not needed <= set(getattr(each, "dims", ())):
+            raise InputError(f"{name}: must have the dimensions {', '.join(sorted(needed))}")
     with figure_style():
         ax = axes_or_new(ax, "double", 84.0)
         handles: list[Line2D] = []

@@ -239,7 +239,7 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     if kinds is not None:
         try:
             shown_kinds = np.asarray(kinds, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
+        except (TypeError, ValueError, OverflowError, MemoryError):
             raise InputTypeError("kinds: must be an array of class codes") from None
         # points that a picture leaves out are NaN in it
         kinds = finite_array("kinds", shown_kinds[shown_kinds == shown_kinds]).astype(np.int8)

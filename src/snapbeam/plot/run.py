@@ -22,7 +22,7 @@ from snapbeam.plot.style import (
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.simulation.run import Run
 from snapbeam.util.si_prefixes import scale_of
-from snapbeam.util.validation import InputError, checked, choice, finite, integer
+from snapbeam.util.validation import InputError, checked, choice, integer, interval
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -184,7 +184,8 @@ def plot_spectrum(
     name, _ = across(dataset)
     x, y = dataset[name].values, dataset[variable].values
     if window is not None:
-        inside = (x >= window[0]) & (x <= window[1])
+        first, last = interval("window", window)
+        inside = (x >= first) & (x <= last)
         x, y = x[inside], y[inside]
     if x.size < 16:
         raise InputError(f"window = {window}: must hold at least 16 samples")
@@ -345,7 +346,7 @@ def _from(first: float, last: float) -> float:
 def _cut(dataset: xr.Dataset, across: str, window: tuple[float, float] | None) -> xr.Dataset:
     if window is None:
         return dataset
-    first, last = (finite(f"window[{at}]", value) for at, value in enumerate(window))
+    first, last = interval("window", window)
     inside = (dataset[across].values >= first) & (dataset[across].values <= last)
     if inside.sum() < 2:
         end = float(dataset[across][-1])

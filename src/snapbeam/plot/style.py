@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -159,8 +160,11 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
         "pdf": {"Creator": MADE_BY, "CreationDate": None},
         "svg": {"Creator": MADE_BY, "Date": None},
     }.get(kind, {"Description": MADE_BY})
-    with figure_style(), atomic_path(target) as temporary:
-        figure.savefig(temporary, format=kind, metadata=stamp)
+    whole_file = io.BytesIO()  # Matplotlib's PDF writer fails in other ways when the disk is full
+    with figure_style():
+        figure.savefig(whole_file, format=kind, metadata=stamp)
+    with atomic_path(target) as temporary:
+        temporary.write_bytes(whole_file.getvalue())
     return target
 
 

@@ -76,7 +76,9 @@ def simulate_to_file(
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
-    integration = instance("integration", integration or Integration(), Integration, "an Integration")
+    integration = instance(
+        "integration", Integration() if integration is None else integration, Integration, "an Integration"
+    )
     target, report = check_writable(path, "path", (".nc",)), sharing(progress, "run")
     run = prepared(system, integration, sample_times)
     _, engine = resolve("cpu")

@@ -65,7 +65,7 @@ class RunSummary(Mapping[str, Any]):
         index = integer(
             "index", index, 0, max(0, min((np.size(each) for each in statistics.values()), default=1) - 1)
         )
-        return cls({name: array[index] for name, array in statistics.items()})
+        return cls({name: np.atleast_1d(array)[index] for name, array in statistics.items()})
 
     def __getattr__(self, name: str) -> Any:
         values = self.__dict__.get("_values", {})

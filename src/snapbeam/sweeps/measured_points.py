@@ -6,14 +6,14 @@ import csv
 import math
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.util.input_files import input_text
 from snapbeam.util.status_codes import ResponseClass
-from snapbeam.util.validation import InputError, file_path, positive
+from snapbeam.util.validation import InputError, InputTypeError, file_path, positive
 
 __all__ = ["MeasuredPoints", "read_measured_points"]
 
@@ -51,6 +51,15 @@ class MeasuredPoints:
     velocity_amplitude: _Array
     location: _Array
     response_class: NDArray[np.int8]
+
+    def __post_init__(self) -> None:
+        columns = [np.asarray(getattr(self, item.name)) for item in fields(self)]
+        if len({each.shape for each in columns}) > 1 or columns[0].ndim != 1:
+            raise InputError("MeasuredPoints: must be one-dimensional arrays of the same length")
+        if any(each.dtype.kind not in "iuf" for each in columns):
+            raise InputTypeError("MeasuredPoints: must be arrays of numbers")
+        if not np.isin(columns[-1], [int(kind) for kind in ResponseClass]).all():
+            raise InputError("response_class: must contain the numbers of response classes only")
 
     def __len__(self) -> int:
         return len(self.response_class)

@@ -203,7 +203,7 @@ def _axis(row: Parameter, name: str, values: Any) -> NDArray[Any]:
         if len(set(words)) < len(words):
             raise InputError(f"{name} = {words}: must differ from each other")
         return np.array(words)
-    if not isinstance(values, (list, tuple)) and np.ndim(values) == 0:
+    if not isinstance(values, (list, tuple, range)) and np.ndim(values) == 0:
         raise InputError(f"{name} = {shown(values)}: must be an array; put a single value into the system")
     closed = item.closed if item.kind is float else "both"
     array = axis(name, values, item.low, item.high, closed=closed)

@@ -108,7 +108,7 @@ def threshold(
         )
     if not isinstance(axes, Mapping) or not axes:
         raise InputError(f"axes = {shown(axes)}: must map at least one parameter to an array of values")
-    if np.size(values) < 2:
+    if (len(values) if isinstance(values, range) else np.size(values)) < 2:
         raise InputError(f"{parameter}: must be an array of at least two values to choose from")
     asked = Integration() if integration is None else integration
     if not isinstance(asked, Integration):

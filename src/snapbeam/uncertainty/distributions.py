@@ -286,6 +286,8 @@ class ParameterUncertainty:
         InputError
             If the data leave a fitted parameter undetermined.
         """
+        if not hasattr(calibration, "undetermined"):
+            raise InputTypeError(f"calibration = {shown(calibration)}: must be a Calibration")
         if calibration.undetermined:
             raise InputError(
                 f"calibration: {', '.join(calibration.undetermined)} not determined by the data, so its uncertainty is unknown; leave it out of the fit"

@@ -161,7 +161,7 @@ def _numbers(name: str, values: Any) -> tuple[float, ...]:
         raise InputTypeError(f"{name} = {shown(values)}: must be a list of numbers")
     try:
         given = tuple(values)
-    except TypeError:
+    except (TypeError, MemoryError):
         raise InputTypeError(f"{name} = {shown(values)}: must be a list of numbers") from None
     return tuple(positive(f"{name}[{i}]", value) for i, value in enumerate(given))
 

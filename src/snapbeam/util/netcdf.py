@@ -85,11 +85,14 @@ def write_netcdf(
     groups = {None: data} if isinstance(data, xr.Dataset) else mapping("data", data)
     for name, dataset in groups.items():
         instance(f"data[{name!r}]", dataset, xr.Dataset, "an xarray.Dataset")
+    settings = mapping("encoding", {} if encoding is None else encoding)
     with netcdf_file(target) as file:
         for name, dataset in groups.items():
             group = None if name is None else file.create_group(name)
             store = H5NetCDFStore(file if group is None else group)
-            dataset.dump_to_store(store, encoding=dict((encoding or {}).get(name, {})))
+            dataset.dump_to_store(
+                store, encoding=dict(mapping(f"encoding[{name!r}]", settings.get(name, {})))
+            )
 
 
 @contextmanager

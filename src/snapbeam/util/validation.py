@@ -37,6 +37,7 @@ __all__ = [
     "flag",
     "instance",
     "integer",
+    "interval",
     "mapping",
     "nonnegative",
     "parsed_json",
@@ -56,6 +57,7 @@ class InputTypeError(InputError, TypeError):
 
 _LONGEST = 300
 _LONGEST_PATH = 4000
+_MOST_NUMBERS = 1e8
 _NO_NUMBERS = (bool, np.bool_, np.timedelta64)
 """Kinds that count as numbers in Python or NumPy and are none here."""
 
@@ -83,6 +85,12 @@ def _require_plain(name: str, value: Any) -> None:
         hasattr(value, attribute) for attribute in ("units", "unit", "dimensionality")
     ):
         raise InputTypeError(f"{name} = {shown(value)}: must be plain numbers, without a unit of their own")
+
+
+def _require_room(name: str, value: Any) -> None:
+    """Refuse a range whose numbers would fill the memory."""
+    if isinstance(value, range) and (value.stop - value.start) // value.step > _MOST_NUMBERS:
+        raise InputError(f"{name} = {shown(value)}: must have at most {_MOST_NUMBERS:g} numbers")
 
 
 def _number(name: str, value: Any, allowed: str) -> float:
@@ -184,6 +192,7 @@ def choice(name: str, value: Any, allowed: tuple[str, ...]) -> str:
 def finite_array(name: str, value: Any, ndim: int | None = None) -> NDArray[np.float64]:
     """Return *value* as a float64 array; refuse text, NaN, infinity and a wrong number of dimensions."""
     _require_plain(name, value)
+    _require_room(name, value)
     try:
         raw = np.asarray(value)
     except ValueError:
@@ -218,6 +227,14 @@ def axis(name: str, value: Any, low: float, high: float, *, closed: str = "neith
             f"{name}[{at}] = {array[at]:g}, {name}[{at + 1}] = {array[at + 1]:g}: must be strictly increasing"
         )
     return array
+
+
+def interval(name: str, value: Any) -> tuple[float, float]:
+    """Return *value* as two finite numbers, of which the second is larger."""
+    limits = finite_array(name, value, 1)
+    if limits.size != 2 or not limits[0] < limits[1]:
+        raise InputError(f"{name} = {shown(value)}: must be two numbers, of which the second is larger")
+    return float(limits[0]), float(limits[1])
 
 
 def file_path(name: str, value: Any) -> Path:
@@ -429,7 +446,7 @@ class NamedTable(dict[str, Kind]):
         return found
 
     def __contains__(self, name: object) -> bool:
-        return super().__contains__(name) or (isinstance(name, str) and self._find(name) is not None)
+        return isinstance(name, str) and (super().__contains__(name) or self._find(name) is not None)
 
     def get(self, name: str, default: Any = None) -> Any:
         """As of any mapping."""

@@ -28,7 +28,7 @@ from snapbeam.lab.decay.window import find_centres, noise_fall, prepared, undone
 from snapbeam.lab.diagnostics import KINDS_DECAY
 from snapbeam.lab.signals import SignalSamples, check_signal
 from snapbeam.lab.sine_fit import white_variance
-from snapbeam.util.validation import InputError, choice, integer, positive
+from snapbeam.util.validation import InputError, choice, finite_array, integer, positive
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -101,7 +101,10 @@ def identify_decay(
     asked = (
         None
         if frequencies is None
-        else [positive(f"frequencies[{i}]", float(f), "Hz") for i, f in enumerate(np.atleast_1d(frequencies))]
+        else [
+            positive(f"frequencies[{i}]", f, "Hz")
+            for i, f in enumerate(np.atleast_1d(finite_array("frequencies", frequencies)).tolist())
+        ]
     )
     samples = check_signal(signal)
     if exponential_window is not None:

@@ -12,7 +12,7 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.solver.statistics import rows_for
 from snapbeam.sweeps.checkpoint.records import Record, TaskLog
-from snapbeam.sweeps.checkpoint.store import BASE, layers_of, read_description
+from snapbeam.sweeps.checkpoint.store import BASE, is_table, layers_of, read_description
 from snapbeam.sweeps.export import to_dataset
 from snapbeam.sweeps.points import Grid
 from snapbeam.sweeps.replicates import Replicates
@@ -130,6 +130,11 @@ def _rows(folder: Path, work: PointWork, stage: Stage, done: dict[int, Record]) 
             zarr.open_array(folder / "runs.zarr", path=f"{stage.name}/{name}", mode="r") for name in _TABLES
         ]
     except (OSError, ValueError, KeyError):  # another process is creating the arrays
+        return found, points
+    if not all(
+        is_table(array, stage, len(names))
+        for array, names in zip(arrays, (work.integers, work.numbers), strict=True)
+    ):
         return found, points
     for task, record in done.items():
         if not 0 <= task < stage.tasks:

@@ -68,6 +68,7 @@ __all__ = [
     "checkpoint_folder",
     "grown",
     "is_growth",
+    "is_table",
     "layers_of",
     "open_tables",
     "read_description",
@@ -721,6 +722,16 @@ def _tables(work: PointWork) -> dict[str, tuple[str, tuple[str, ...]]]:
     return {"integers": ("int32", work.integers), "numbers": ("float64", work.numbers)}
 
 
+def _chunks(stage: Stage, columns: int) -> tuple[int, int]:
+    """Return the shape of a chunk: one task.  The number in map.json may be any, and Zarr allocates whole chunks."""
+    return max(min(stage.chunk, stage.size), 1), columns
+
+
+def is_table(array: Any, stage: Stage, columns: int) -> bool:
+    """Whether a stored array has the shape and the chunks that the stage determines."""
+    return bool(array.shape == (stage.size, columns) and array.chunks == _chunks(stage, columns))
+
+
 def _create(store: Any, stage: Stage, work: PointWork) -> None:
     import zarr
     from zarr.codecs import Crc32cCodec, ZstdCodec
@@ -732,7 +743,7 @@ def _create(store: Any, stage: Stage, work: PointWork) -> None:
             store,
             name=f"{stage.name}/{name}",
             shape=(stage.size, len(columns)),
-            chunks=(stage.chunk, len(columns)),
+            chunks=_chunks(stage, len(columns)),
             dtype=kind,
             compressors=[ZstdCodec(level=1), Crc32cCodec()],
             fill_value=0,

@@ -1,0 +1,93 @@
+"""Ctrl-C and termination of the program while it starts, compiles and computes: a sentence and the status of the signal."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="interrupts are POSIX signals here")
+
+SENTENCE = "interrupted; no file was left half written"
+BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+AT_IMPORT = """
+import os, signal, sys
+from snapbeam.__main__ import main
+
+class Interrupter:
+    def find_spec(self, name, path=None, target=None):
+        if name == {name!r}:
+            os.kill(os.getpid(), {number})
+
+sys.meta_path.insert(0, Interrupter())
+sys.argv = ["snapbeam", "map", "--modes", "1", "--cycles", "2", "-o", "map.nc"]
+main()
+"""
+
+
+@BOTH
+@pytest.mark.parametrize("name", ["typer", "snapbeam.cli.map", "numpy", "numba", "xarray"])
+def test_while_modules_are_imported(tmp_path, number, name):
+    code = AT_IMPORT.format(name=name, number=int(number))
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 128 + number, done.stderr
+    assert done.stderr.splitlines()[-1] == SENTENCE
+    assert "Traceback" not in done.stderr
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+def test_while_a_kernel_is_compiled(tmp_path, number):
+    """The main thread is in the compiler for seconds; the program does not wait for it."""
+    command = ["map", "--modes", "3", "--cycles", "2", "-o", "map.nc"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "snapbeam", *command], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
+        env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+    )  # fmt: skip
+    line = process.stderr.readline()
+    while line and not line.startswith("compiling"):
+        line = process.stderr.readline()
+    assert line
+    process.send_signal(number)
+    _, messages = process.communicate(timeout=600)
+    assert process.returncode == 128 + number
+    assert messages.splitlines()[-1] == SENTENCE and "Traceback" not in messages
+    assert " of " not in messages  # no point was computed
+    assert not (tmp_path / "map.nc").exists()
+
+
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
+def test_while_points_are_computed(tmp_path, number):
+    command = ["map", "--modes", "1", "--cycles", "30000", "--frequency-ratio", "0.5:4:20"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "snapbeam", *command], cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    )
+    while " of " not in process.stderr.readline():
+        assert process.poll() is None
+    process.send_signal(number)
+    _, messages = process.communicate(timeout=600)
+    assert process.returncode == 128 + number
+    assert messages.splitlines()[-1] == SENTENCE and "Traceback" not in messages
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_background_job_ignores_what_its_shell_says(tmp_path):
+    """A shell starts background jobs with SIGINT ignored; the program leaves it so."""
+    code = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n" + AT_IMPORT.format(
+        name="typer", number=int(signal.SIGINT)
+    ).replace('"map", "--modes", "1", "--cycles", "2", "-o", "map.nc"', '"frequencies"')
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_library_leaves_the_signals_alone():
+    code = "import signal, snapbeam as sb; sb.simulate; print(signal.getsignal(signal.SIGTERM) is signal.SIG_DFL)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "True\n"
