@@ -292,7 +292,7 @@ def _spread_over(
 def _last(
     memory: _Array, packed: Packed, aside: tuple[_Integers, _Array], accumulators_of_runs: NDArray[Any]
 ) -> Last:
-    """Where a run that was laid aside stands."""
+    """Final state of a run that was saved."""
     marks, reals = aside
     q, p = memory[marks[4] : marks[4] + packed.layout.size], memory[marks[5] : marks[5] + packed.layout.size]
     since = [int(marks[0] - accumulators_of_runs["onset"][0]) if marks[10] else -1]

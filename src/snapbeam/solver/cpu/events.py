@@ -38,10 +38,10 @@ from snapbeam.solver.cpu.terms.circuit import (
 from snapbeam.solver.cpu.terms.further_contact_events import (
     accumulate_further_contacts,
     first_further_event,
+    limit_safe_interval,
     observe_further_contacts,
     refine_further_onsets,
     store_further_contacts,
-    trusted,
     update_further_contacts,
 )
 from snapbeam.solver.cpu.terms.second_well import (
@@ -80,11 +80,11 @@ __all__ = ["accept_step", "locate_peak_force", "sample_inside_step"]
 
 
 # ----------------------------------------------------------------------------------------------------
-# The hardest moment of a contact: the deepest, or that of the maximum force where the rate counts too.
+# Instant of the greatest penetration of a contact, or of the greatest force if it depends on the rate too.
 
 
 _PARTS = 24
-"""Of a step, at whose ends the force is looked at."""
+"""Equal parts of a step, at whose ends the force is evaluated."""
 
 
 def locate_peak_force(
@@ -219,11 +219,11 @@ def sample_inside_step(memory, layout, tip, flow, pieces, piece, step, with_cent
     turn_sine, turn_cosine = sincos(drive.omega * piece)
     sine, cosine = sincos(step.phase)
     w, rate, c, c_rate = signals(memory, layout, q, p)
-    # kicks stand on the borders of the pieces, half a kick at the first; seen rates are half a kick ahead
+    # kicks act at the ends of the pieces, half a kick at the first; the rates there lack the remaining half
     for i in range(pieces + 1):
-        done, owed = i / pieces, 0.5 * piece
+        done, remaining = i / pieces, 0.5 * piece
         if i == 0:
-            owed = 0.0
+            remaining = 0.0
         else:
             at = 4 * WIDTH * (i - 1)
             w, rate = lanes_sum(load(parts, at)), lanes_sum(load(parts, at + WIDTH))
@@ -232,9 +232,9 @@ def sample_inside_step(memory, layout, tip, flow, pieces, piece, step, with_cent
         argument = step.phase + i * piece * drive.omega
         motion, velocity = turned_motion(drive, memory, argument, sine, cosine)
         inner_samples[i, 0] = tip.offset + motion - w
-        inner_samples[i, 1] = velocity - rate - owed * ((1.0 - done) * contact0 + done * contact1)
+        inner_samples[i, 1] = velocity - rate - remaining * ((1.0 - done) * contact0 + done * contact1)
         inner_samples[i, 2] = c
-        inner_samples[i, 3] = c_rate + owed * ((1.0 - done) * center0 + done * center1)
+        inner_samples[i, 3] = c_rate + remaining * ((1.0 - done) * center0 + done * center1)
         sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine
 
 
@@ -248,7 +248,7 @@ _DIVERGED, _STEP_LIMIT = int(RunStatus.DIVERGED), int(RunStatus.STEP_LIMIT)
 
 
 class ContactEvent(NamedTuple):
-    """What a step met: whether it enters or leaves the contact, where it is cut, and how it was looked into."""
+    """Whether contact begins or ends in a step, where the step is cut, and how its inside was sampled."""
 
     event: bool
     cut: int
@@ -307,8 +307,8 @@ def detect_contact_event(memory, layout, run, now, tip, step, seen1, scratch):
         safe_center = now.t + int(
             safe_interval(abs(at_center(layout.unequal_wells, seen.c)), bound, 0.0, push, known) / tick
         )
-    safe_gap = trusted(memory, layout.others, now.t, safe_gap)
-    safe_center = trusted(memory, layout.others, now.t, safe_center)
+    safe_gap = limit_safe_interval(memory, layout.others, now.t, safe_gap)
+    safe_center = limit_safe_interval(memory, layout.others, now.t, safe_center)
     if after > min(safe_gap, safe_center):
         look, pieces = look_slot(run), run.step_pieces
         if step.ticks == 2 * clock.step:
@@ -450,7 +450,7 @@ def accept_step(
             t, now.well_sign, now.stretch, now.rows, seen, control, now.sample, now.landed, status
         ), step
     whole, cut = step.ticks, contact_event.cut
-    looks = 0 if touching or not contact_event.event else _LOCATIONS if jumps(tip.law) else 1
+    corrections = 0 if touching or not contact_event.event else _LOCATIONS if jumps(tip.law) else 1
     due = edge < whole and not contact_event.event
     while cut != step.ticks:
         step = cut_step(step, run, cut, cut * tick)
@@ -461,8 +461,8 @@ def accept_step(
         about = observe(memory, layout, tip, there, step.q1, step.p1)
         observe_further_contacts(memory, layout.size, layout.others, tip.drive, there, step.q1, step.p1)
         least = (clock.step >> clock.finest) * tick
-        if looks > 0:
-            looks -= 1
+        if corrections > 0:
+            corrections -= 1
             cut = refine_onset(clock, cut, whole, about, 0.5 * tick if jumps(tip.law) else least)
         cut = refine_further_onsets(memory, layout.others, clock, contact_event.cut, cut, whole, least, due)
         due = False

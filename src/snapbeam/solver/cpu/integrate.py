@@ -1,14 +1,15 @@
 """Integration on the CPU: two runs at a time, each with steps that follow from its own contacts.
 
 In free flight a trajectory takes steps of a fixed length, or of twice that while its energy is low, as many as
-a bound on the speed of the gap says are safe; near the tip it looks inside each step with a resolution finer
-than the fastest mode, and a step that would enter the contact is cut where it does.  In contact, steps grow
+a bound on the speed of the gap says are safe; near the tip the motion
+is sampled inside each step with a resolution finer than the fastest mode, and a step in which a contact begins is
+shortened to end at the onset.  In contact, steps grow
 from the onset and shrink towards the release, which is located too, so that the edges of the force fall
 between steps.  Time is an integer number of ticks; the argument of the drive comes from that integer alone.
 
-A kick waits for the sums of the one before, so that one trajectory alone leaves a core waiting.  Two are
-integrated side by side, a step of each at a time; when one ends, the next run takes its place.  They share nothing
-but the structure: results do not depend on batch, order or threads.
+Each kick depends on the sums of the kick before it, so a single trajectory leaves the processor idle for most of the
+time.  Two trajectories are therefore integrated together, a step of each at a time; when one ends, the next run takes
+its place.  They share nothing but the structure: results do not depend on batch, order or threads.
 """
 
 from __future__ import annotations
@@ -168,9 +169,9 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
     live_a, live_b, following = True, False, 1
     i_a = which[0]
     i_b = i_a
-    book_a = accumulators_of_runs[i_a]
-    book_b = book_a
-    run_a, now_a = begin(memory, blocks, place_a, kernel_input, i_a, book_a)
+    accumulators_a = accumulators_of_runs[i_a]
+    accumulators_b = accumulators_a
+    run_a, now_a = begin(memory, blocks, place_a, kernel_input, i_a, accumulators_a)
     run_b, now_b = run_a, now_a
     step_a, step_b, done_a, done_b = _NO_STEP, _NO_STEP, _NOTHING_DONE, _NOTHING_DONE
     while live_a or live_b or following < which.size:
@@ -178,18 +179,18 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
             break
         if not live_a and following < which.size:
             i_a = which[following]
-            book_a = accumulators_of_runs[i_a]
-            run_a, now_a = begin(memory, blocks, place_a, kernel_input, i_a, book_a)
+            accumulators_a = accumulators_of_runs[i_a]
+            run_a, now_a = begin(memory, blocks, place_a, kernel_input, i_a, accumulators_a)
             live_a, following = True, following + 1
         if not live_b and following < which.size:
             i_b = which[following]
-            book_b = accumulators_of_runs[i_b]
-            run_b, now_b = begin(memory, blocks, place_b, kernel_input, i_b, book_b)
+            accumulators_b = accumulators_of_runs[i_b]
+            run_b, now_b = begin(memory, blocks, place_b, kernel_input, i_b, accumulators_b)
             live_b, following = True, following + 1
         if live_a:
-            now_a, step_a = propose_step(memory, blocks, place_a, run_a, now_a, book_a)
+            now_a, step_a = propose_step(memory, blocks, place_a, run_a, now_a, accumulators_a)
         if live_b:
-            now_b, step_b = propose_step(memory, blocks, place_b, run_b, now_b, book_b)
+            now_b, step_b = propose_step(memory, blocks, place_b, run_b, now_b, accumulators_b)
         tip_a = seen_from(run_a.struck, now_a.well_sign, run_a.rest_contact)
         tip_b = seen_from(run_b.struck, now_b.well_sign, run_b.rest_contact)
         if live_a and live_b:
@@ -202,28 +203,52 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
             done_b = take_step(memory, blocks, layouts[1], stages, tip_b, step_b, None)
         if live_a:
             now_a, _ = accept_step_by_law(
-                memory, blocks, place_a, run_a, now_a, step_a, done_a, scratch, book_a, kernel_input, None
+                memory,
+                blocks,
+                place_a,
+                run_a,
+                now_a,
+                step_a,
+                done_a,
+                scratch,
+                accumulators_a,
+                kernel_input,
+                None,
             )
-            now_a = store_state(memory, blocks, layouts[0], run_a, now_a, book_a, i_a, kernel_output)
+            now_a = store_state(memory, blocks, layouts[0], run_a, now_a, accumulators_a, i_a, kernel_output)
             if now_a.status != _RUNNING:
                 if not goes_on:
-                    close_further_contacts(memory, layouts[0].others, book_a, None, now_a.t, run_a.clock.tick)
-                finish(memory, blocks, layouts[0], run_a, now_a, book_a, None, 0, goes_on)
+                    close_further_contacts(
+                        memory, layouts[0].others, accumulators_a, None, now_a.t, run_a.clock.tick
+                    )
+                finish(memory, blocks, layouts[0], run_a, now_a, accumulators_a, None, 0, goes_on)
                 live_a = False
         if live_b:
             now_b, _ = accept_step_by_law(
-                memory, blocks, place_b, run_b, now_b, step_b, done_b, scratch, book_b, kernel_input, None
+                memory,
+                blocks,
+                place_b,
+                run_b,
+                now_b,
+                step_b,
+                done_b,
+                scratch,
+                accumulators_b,
+                kernel_input,
+                None,
             )
-            now_b = store_state(memory, blocks, layouts[1], run_b, now_b, book_b, i_b, kernel_output)
+            now_b = store_state(memory, blocks, layouts[1], run_b, now_b, accumulators_b, i_b, kernel_output)
             if now_b.status != _RUNNING:
                 if not goes_on:
-                    close_further_contacts(memory, layouts[1].others, book_b, None, now_b.t, run_b.clock.tick)
-                finish(memory, blocks, layouts[1], run_b, now_b, book_b, None, 0, goes_on)
+                    close_further_contacts(
+                        memory, layouts[1].others, accumulators_b, None, now_b.t, run_b.clock.tick
+                    )
+                finish(memory, blocks, layouts[1], run_b, now_b, accumulators_b, None, 0, goes_on)
                 live_b = False
     if live_a:
-        book_a.time, book_a.status = now_a.t, _RUNNING
+        accumulators_a.time, accumulators_a.status = now_a.t, _RUNNING
     if live_b:
-        book_b.time, book_b.status = now_b.t, _RUNNING
+        accumulators_b.time, accumulators_b.status = now_b.t, _RUNNING
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -236,7 +261,7 @@ def integrate_recorded(
 ):
     """Integrate the first run until it ends, *outputs* are full or *budget* steps are taken.
 
-    *aside* is a pair of arrays in which the run is laid aside; the first integer there, if negative, says that
+    *aside* is a pair of arrays in which the run is saved; the first integer there, if negative, says that
     it has not begun.
     """
     workspace, (marks, reals) = Workspace(layout, stages), aside

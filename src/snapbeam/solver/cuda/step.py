@@ -261,12 +261,12 @@ def functions(order: int, threads: int, columns: int) -> Functions:
             )
             done = i / pieces
             if block.lane == 0:
-                owed = half if i > 0 else 0.0
+                remaining = half if i > 0 else 0.0
                 motion, velocity = shaker_motion(tip.drive.amplitude, tip.drive.omega, sine, cosine)
                 block.seen[i, 0] = tip.offset + motion - w
-                block.seen[i, 1] = velocity - rate - owed * ((1.0 - done) * contact0 + done * contact1)
+                block.seen[i, 1] = velocity - rate - remaining * ((1.0 - done) * contact0 + done * contact1)
                 block.seen[i, 2] = c
-                block.seen[i, 3] = c_rate + owed * ((1.0 - done) * center0 + done * center1)
+                block.seen[i, 3] = c_rate + remaining * ((1.0 - done) * center0 + done * center1)
             kick = piece if i > 0 else half
             p = fma(kick * (1.0 - done), k, fma(kick * done, k1, p))
             moved = turned(q, flow[0, block.lane], flow[1, block.lane], p)

@@ -54,12 +54,12 @@ __all__ = [
     "close_further_contacts",
     "first_further_event",
     "further_contacts_step_level",
+    "limit_safe_interval",
     "observe_further_contacts",
     "refine_further_onsets",
     "restart_further_contacts",
     "store_contact_states",
     "store_further_contacts",
-    "trusted",
     "update_further_contacts",
 ]
 
@@ -127,8 +127,8 @@ def any_touches(memory, others, touching):
 
 
 @inlined
-def trusted(memory, others, t, until):
-    """Until when a bound holds that knows free flight alone: not beyond tick *t* while another striker touches."""
+def limit_safe_interval(memory, others, t, until):
+    """Tick until which free flight is known to last; *t* while another striker touches the beam."""
     if others is None:
         return until
     return t if any_touches(memory, others, False) else until
