@@ -19,21 +19,16 @@ from snapbeam.model.parameter_file import SECTIONS, load_config
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md")])
 CODE = [
-    "systems.md",
-    "sweeps.md",
-    "states.md",
+    "README.md",
+    "accuracy_and_speed.md",
     "extended_models.md",
-    *(
-        pytest.param(name, marks=pytest.mark.slow)
-        for name in (
-            "README.md",
-            "getting-started.md",
-            "design.md",
-            "dynamics.md",
-            "long_maps.md",
-            "accuracy_and_speed.md",
-        )
-    ),
+    "getting-started.md",
+    "long_maps.md",
+    "states.md",
+    "sweeps.md",
+    "systems.md",
+    pytest.param("design.md", marks=pytest.mark.slow),
+    pytest.param("dynamics.md", marks=pytest.mark.slow),
 ]
 """Pages whose Python blocks run in order in one namespace; those that take more than a few seconds are slow."""
 NEEDS_FILES = ('open_dataset("map.nc")', 'open_recording("test.cihx"')
