@@ -53,6 +53,16 @@ def is_measured(row, truth):
     assert (row["diagnostics"], row["comment"]) == ("", "")
 
 
+@pytest.mark.parametrize("name", ["tests.png", "measurements.png"])
+def test_a_foreign_figure_is_kept_and_nothing_is_measured(tmp_path, name):
+    output = tmp_path / "test_series"
+    output.mkdir()
+    (output / name).write_text("not a figure of snapbeam")
+    done = command(tmp_path, *OPTIONS)
+    assert done.exit_code == 2 and name in done.output
+    assert [path.name for path in output.iterdir()] == [name]
+
+
 def test_a_good_test_and_a_spoiled_one(tmp_path):
     folder = tmp_path / "tests"
     folder.mkdir()

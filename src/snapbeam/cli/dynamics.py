@@ -66,7 +66,7 @@ _AXES = ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location"
 _OWN = "Analysis"
 _FEW = 4000
 """Maximum size of a variable in the JSON output."""
-_SETTLING = "16 time constants of the slowest mode"
+_SETTLING = "16 time constants of the slowest mode, at least 200 and at most 20,000"
 Output = Annotated[
     Path,
     typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE"),
@@ -236,7 +236,9 @@ def lyapunov_spectrum(
     plot: opt.Plot = None,
     threads: opt.Threads = None,
 ) -> None:
-    """Compute Lyapunov exponents by the tangent flow, or a map of the largest exponent.
+    """Compute Lyapunov exponents (1/s) by the tangent flow, or a map of the largest exponent.
+
+    For the exponents of a transient set --transient 0.
 
     Example: snapbeam dynamics lyapunov-spectrum --modes 8 --frequency-ratio 1.4 --velocity-amplitude 0.01 --k 4
     """
@@ -356,7 +358,9 @@ def basins(
     periods: Annotated[
         int | None,
         opt.count_option(
-            "Periods after which a state counts as undecided (16 time constants of the slowest decay).", _OWN
+            "Periods after which a state counts as undecided (16 time constants of the slowest decay, at least 200 "
+            "and at most 20,000).",
+            _OWN,
         ),
     ] = None,
     states: Annotated[
@@ -367,6 +371,9 @@ def basins(
     threads: opt.Threads = None,
 ) -> None:
     """Find and verify attractors; compute their basins over the first modal amplitude and its velocity.
+
+    The search draws amplitude[1] from -1.4 to 1.4 and velocity[1] from -0.6 to 0.6, and discards 16 time constants, at
+    least 1000 periods; its bound for attractors that were not found applies to that region, not to the plane.
 
     Example: snapbeam dynamics basins --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --plot basins.png
     """

@@ -261,9 +261,11 @@ class Attractors:
 
 
 def spread_states(flow: Stroboscope, count: int, seed: int = 0) -> _Array:
-    """States about both wells and between: the first mode anywhere, the others as far as their equal energy allows.
+    """Random states about both wells and between.
 
-    State s comes from Philox with the key (seed, s) alone.
+    ``amplitude[1]`` is uniform in [-1.4, 1.4] and ``velocity[1]`` in [-0.6, 0.6]; a random vibration of each linear mode
+    is added, of at most 0.2 omega_1/omega_j in amplitude and 0.2 in velocity.  State s comes from Philox with the key
+    (seed, s) alone.
     """
     model = flow.system.model
     rest = flow.coordinates(None)[0] * 0.0
@@ -297,16 +299,21 @@ def find_attractors(
 ) -> Attractors:
     """Find the attractors that many states lead to, and verify each; other states are undecided.
 
-    A periodic attractor is verified when shooting converges from where a state came to and every multiplier is inside
-    the unit circle, at accuracy level "reference" too.  A chaotic one, when its largest exponent is above 0 by three
-    standard errors and none of its states left it in *check_periods* more periods: slow transients are so told from
-    attractors as far as that time goes.
+    A periodic attractor is verified if shooting converges from the last state of a run and every multiplier is inside
+    the unit circle, at accuracy level "reference" too.  A chaotic attractor is verified if its largest exponent exceeds
+    0 by three standard errors and none of its states leaves it in *check_periods* more periods.  Under a contact law
+    that loses energy no tangent flow exists: chaotic attractors are not verified and their states stay undecided.
+
+    If *states* is a number, the sampled region is the following, in the dimensionless coordinates of the flow:
+    ``amplitude[1]`` is uniform in [-1.4, 1.4] and ``velocity[1]`` in [-0.6, 0.6]; to this a random vibration of each
+    linear mode j is added, of at most 0.2 omega_1/omega_j in amplitude and 0.2 in velocity.  ``unseen_share`` is a
+    bound for this region.  Give states of your own to sample another one, such as the plane of a basin plot.
 
     Parameters
     ----------
     system : System, or a Flow
     states : array_like of shape (states, d), or int
-        Where to begin, or how many states to spread over both wells.
+        Initial states, or their number in the region above.
     transient : int, optional
         Periods to leave out; by default 16 time constants of the slowest mode, at least 1000 and at most
         20,000 periods.
@@ -315,7 +322,7 @@ def find_attractors(
     check_periods : int
         Periods over which a chaotic attractor must not end.
     seed : int
-        Of states that are spread.
+        Seed of the initial states.
     tolerance : float
         Of the orbits, as in :func:`periodic_orbit`.
     integration : Integration, optional

@@ -54,18 +54,18 @@ def lyapunov_spectrum(
 ) -> xr.Dataset:
     """The largest Lyapunov exponents, by the tangent flow with a QR factorisation at every whole period.
 
-    k small changes are carried along by the steps of the run itself and made orthogonal once a period (Benettin,
-    Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9); the logarithms of what each grew by, over the time, are
-    the exponents.  A run that snaps and then settles has two kinds: those of the transient, while it snaps, and those
-    of what it settles on.
+    The linearised time steps of the run advance k small changes, which are orthonormalised once a period (Benettin,
+    Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9).  The exponents are the logarithms of their growth, divided
+    by the time.  A run that snaps and then settles has two kinds: those of the transient, and those of the settled
+    motion.  Set ``transient=0`` to obtain both: the default transient is usually longer than the snap-through.
 
     Parameters
     ----------
     system : System, or a Flow
     k : int
-        Exponents, from the largest on, at most the dimension of the state.
+        Number of exponents, largest first; at most the dimension of the state.
     periods : int
-        Periods of the drive to go over.
+        Periods of the drive to average over.
     transient : int, optional
         Periods before them; by default 16 time constants of the slowest mode, at least 200 and at most 20,000.
     states : State or array_like of shape (runs, d), optional
@@ -81,9 +81,9 @@ def lyapunov_spectrum(
     -------
     xarray.Dataset
         ``exponent`` (1/s, over ``exponent_number`` and the axes or runs) with ``exponent_error``, one standard error
-        from the means of stretches; ``exponent_snapping`` and ``exponent_settled``, of the periods before and after the
-        last crossing, with ``periods_snapping``; and, without axes, ``running``, the estimate
-        after each period.
+        from the means of blocks; ``exponent_snapping`` and ``exponent_settled``, of the periods before and after the
+        last crossing (NaN if there are none), with ``periods_snapping``; and, without axes, ``running``, the estimate
+        after each period, and the attribute ``period`` (s): multiply by it for exponents per period.
 
     Raises
     ------
@@ -247,7 +247,7 @@ def largest_lyapunov(
 ) -> xr.Dataset:
     """The largest exponent from two trajectories, brought back to a small distance at every whole period.
 
-    An independent check of :func:`lyapunov_spectrum`, and the way under a law of contact whose force jumps.
+    An independent check of :func:`lyapunov_spectrum`, and the only estimate under a contact law that loses energy.
 
     Parameters
     ----------

@@ -62,8 +62,8 @@ class State:
     tangent : array_like of shape (..., k, 2, N), optional
         Small changes of amplitude and velocity that were carried along, k of them.
     statistics : mapping, optional
-        What happened on the way here: crossings, impacts, peak_force, ... by name.  A state that was not reached,
-        as its ``passed["status"]`` says, is NaN.
+        Statistics of the interval since the previous state: crossings, impacts, peak_force, ... by name.  If the
+        integration failed, ``statistics["status"]`` gives the reason and the state is NaN.
     modal : ModalState, optional
         The same in an engine's coordinates.
 

@@ -95,7 +95,7 @@ def process_tests(
     )  # fmt: skip
     target = folder / "test_series" if output is None else output
     console = out()
-    for name in ("tests.png", "map.png"):
+    for name in ("tests.png", "measurements.png"):
         if target.is_dir():
             check_writable(target / name)
     results = run_test_series(folder, wanted, target, table=table, strict=strict, progress=_tell)

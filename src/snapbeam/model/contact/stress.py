@@ -86,7 +86,7 @@ def hertz_stress(
     Parameters
     ----------
     force : float
-        F, N, such as ``run.outcome.peak_force``.
+        F, N, such as ``run.summary.peak_force``.
     stiffness : float
         k_c, N/m^1.5.
     radius : float
