@@ -14,9 +14,9 @@ where k is the acceleration by the change of midplane tension and f the contact 
 * A **kick** B(t) solves the nonlinear part.  q does not change in it, and neither do k and f:
   ``p <- p + t (k + c f)``, as in :func:`kick_mode`.
 
-A step of length h is the symmetric composition
+A step of length h is the symmetric composition of kicks and flows
 
-    A step =  B(b_0 h) A(a_0 h) B(b_1 h) A(a_1 h) ... A(a_{s-1} h) B(b_s h),    a_i = a_{s-1-i},    b_i = b_{s-i},
+    S(h) =  B(b_0 h) A(a_0 h) B(b_1 h) A(a_1 h) ... A(a_{s-1} h) B(b_s h),    a_i = a_{s-1-i},    b_i = b_{s-i},
 
 from left to right in time.  ``splitting.py`` holds the weights of orders 4 and 6, and their source.  The contact force of
 kick i uses the displacement w_s of the striker at the time of that kick, after the fraction a_0 + ... + a_{i-1} of the step.
