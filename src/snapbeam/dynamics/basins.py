@@ -46,12 +46,12 @@ def basins_of_attraction(
     every: int = 10,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.Dataset:
-    """Which attractor each state of a plane goes to.
+    """Compute the attractor that each state of a plane goes to.
 
     A state goes to a periodic attractor once it is in a ball about one of its points in which the flow contracts (see
-    :class:`~snapbeam.dynamics.attractors.Ball`), and to a chaotic one if it lies among its points at eight looks in a row
-    and at the end.  One that does neither within *periods* is undecided, -1.  The tip's mid-position is fixed in space.
-    If more than 5 % of the states are undecided, a warning says so.
+    :class:`~snapbeam.dynamics.attractors.Ball`).  It goes to a chaotic attractor if it is among its points at eight
+    consecutive checks and at the end.  All other states are undecided after *periods*, -1.  The tip's mid-position is
+    fixed in space.  If more than 5 % of the states are undecided, a warning is given.
 
     Parameters
     ----------
@@ -60,13 +60,13 @@ def basins_of_attraction(
     grid : mapping of str to array_like
         Two coordinates with their values, such as ``{"amplitude[1]": ..., "velocity[1]": ...}``, strictly increasing.
     fixed_coordinates : State or array_like of shape (d,), optional
-        The other coordinates; a beam at rest in the well that a run starts in by default.
+        The other coordinates; by default those of a beam at rest in the well in which a run starts.
     periods : int, optional
-        Of the drive, at most.  By default 16 time constants of the slowest decay, at least 200 and at most 20,000
+        Maximum number of periods of the drive.  By default 16 time constants of the slowest decay, at least 200 and at most 20,000
         periods; the decay is that of the slowest mode, min(zeta_j omega_j), or of a perturbation of one of the
         periodic attractors, if that is slower.
     every : int
-        Periods between two looks.
+        Periods between two checks.
     progress : callable, optional
         Called as ``progress(done, total)`` with periods.
 
@@ -481,8 +481,8 @@ def dynamical_integrity(
 ) -> Integrity:
     """Global and local integrity measure and integrity factor of one basin in a window.
 
-    As of Soliman and Thompson (J. Sound Vib. 135 (1989) 453) and Rega and Lenci (Nonlinear Anal. 63 (2005) 902).  The
-    rim of the window counts as a border: what lies beyond is not known.  Undecided points count as outside the basin.
+    The definitions are those of Soliman and Thompson (J. Sound Vib. 135 (1989) 453) and Rega and Lenci (Nonlinear Anal.
+    63 (2005) 902).  The rim of the window counts as a border.  Undecided points count as outside the basin.
 
     Parameters
     ----------

@@ -53,21 +53,23 @@ __all__ = [
 
 @dataclass(frozen=True, kw_only=True)
 class InitialConditions:
-    """Starts that differ a little, or in the phase of the drive; number s is the same whatever it is run with.
+    """Random initial conditions near the start of the system, or with another phase of the drive.
+
+    Initial condition s follows from the seed and s only.
 
     Parameters
     ----------
     count : int
-        Starts, at least 1.
+        Number of initial conditions, at least 1.
     displacement : float
-        Root mean square of the change of the centre, m: every linear mode rings with equal mean energy.  0 for none;
-        by default the error of reading a position to a pixel of the paper's camera.  A start that would press the beam
-        into the tip begins on the other side of its rest: the overlap would hold energy that nothing put there.
+        Root mean square of the mid-span displacement, m: every linear mode vibrates with equal mean energy.  0 for none;
+        by default the error of reading a position to a pixel of the paper's camera.  An initial condition that would
+        press the beam into the tip is mirrored about the beam at rest, because the overlap would add contact energy.
     phase : bool
-        Whether the drive begins at any phase of the half of its cycle in which the tip is drawn back, so that none
-        presses a beam at rest.  For a single striker with a sinusoidal motion.
+        Whether to sample the phase of the drive in the half of its cycle in which the tip moves away, so that it does
+        not press the beam at rest.  For a single striker with a sinusoidal motion.
     seed : int
-        Chooses them: start s comes from Philox with the key (seed, s).
+        Seed of the initial conditions: number s comes from Philox with the key (seed, s).
     """
 
     count: int = 32

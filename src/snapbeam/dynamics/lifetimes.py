@@ -59,17 +59,16 @@ _FEWEST, _TRIALS = 8, 40
 
 @dataclass(frozen=True, kw_only=True)
 class LifetimeSettings:
-    """How lifetimes are read from runs.
+    """Settings of the estimate of lifetimes.
 
     Parameters
     ----------
     delay : float, optional
-        Cycles t0 from which on ends are counted; by default the first end from which on the exponential is not
-        refused at 1 %, at most half of them left out.  That end says when ends begin and is none of those that say
-        how often they are.
+        Delay t0, cycles: earlier ends are not counted.  By default the first end after which a test does not reject the
+        exponential at 1 %; at most half of the ends are left out.  That end itself is not counted.
     settling_cycles : float
-        Cycles without a crossing after which snapping is taken to have ended, greater than 0.  A run that crossed
-        within the last of them is still snapping: its lifetime is only known to be longer.
+        Cycles without a zero crossing after which snap-through counts as ended, greater than 0.  A run with a crossing
+        in its last *settling_cycles* cycles is censored: its lifetime is known only to be longer.
     confidence : float
         Of the intervals, in (0, 1).
     """
@@ -365,12 +364,11 @@ def lifetime_map(
     cluster: str | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.Dataset:
-    """How long snapping lasts and how likely each end is, over any parameters.
+    """Compute the lifetime of snap-through and the probability of each final well, over any parameters.
 
-    A class after n cycles is one sample of what may be a chaotic transient.  Here every point is run from many
-    starts, with the tip's mid-position fixed in space; a run snaps until its centre crosses zero for the last time,
-    and the share that still snaps, exp(-(t - delay)/lifetime), is fitted to the runs that ended and to those that
-    did not (:func:`~snapbeam.dynamics.lifetimes.fit_lifetime`).
+    Every point is run from many initial conditions, with the tip's mid-position fixed in space.  Snap-through lasts
+    until the last zero crossing of mid-span.  The fraction that still snaps, exp(-(t - delay)/lifetime), is fitted to
+    the runs that ended and to those that did not (:func:`~snapbeam.dynamics.lifetimes.fit_lifetime`).
 
     Parameters
     ----------
