@@ -180,6 +180,7 @@ def test_frequencies(cli):
     assert numbers[2][4] > 221.0
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="interrupts are POSIX signals here")
 def test_interrupt_leaves_nothing_behind(tmp_path):
     """Ctrl-C while a long map is computed: status 130, no traceback, no file."""

@@ -12,6 +12,7 @@ import pytest
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="interrupts are POSIX signals here")
 
 SENTENCE = "interrupted; no file was left half written"
+LATER = ("snapbeam.cli.map", "numpy", "xarray")
 BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 AT_IMPORT = """
 import os, signal, sys
@@ -29,7 +30,9 @@ main()
 
 
 @BOTH
-@pytest.mark.parametrize("name", ["typer", "snapbeam.cli.map", "numpy", "numba", "xarray"])
+@pytest.mark.parametrize(
+    "name", ["typer", *(pytest.param(name, marks=pytest.mark.slow) for name in LATER), "numba"]
+)
 def test_while_modules_are_imported(tmp_path, number, name):
     code = AT_IMPORT.format(name=name, number=int(number))
     done = subprocess.run(
@@ -61,6 +64,7 @@ def test_while_a_kernel_is_compiled(tmp_path, number):
     assert not (tmp_path / "map.nc").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
 def test_while_points_are_computed(tmp_path, number):
     command = ["map", "--modes", "1", "--cycles", "30000", "--frequency-ratio", "0.5:4:20"]

@@ -136,7 +136,15 @@ KINDS = {
 """Every law of contact and every drive there is: what is asked of one is asked of all."""
 
 
-SLOW = {"hunt-crossley", "recorded", "recorded restitution", "kelvin-voigt", "power"}
+SLOW = {
+    "restitution",
+    "plastic",
+    "hunt-crossley",
+    "recorded",
+    "recorded restitution",
+    "kelvin-voigt",
+    "power",
+}
 """Kernels of their own, half a minute to compile, for what the others test one by one."""
 
 

@@ -260,7 +260,7 @@ def advanced_rows(system: sb.System, order: str, periods: int, tangents: int = 0
     return rows
 
 
-QUICK = ("the paper's", "a body")
+QUICK = ("the paper's",)
 """Entries whose kernels other quick tests use too, in the order in which a second process begins to use them."""
 TANGENTS = (
     "the paper's", "power", "a gap", "recorded", "unequal wells", "a measured shape", "other ends", "a given load",

@@ -90,6 +90,7 @@ def killed(*names: str, only: str = "") -> None:
     assert seen["swept"] > 0
 
 
+@pytest.mark.slow
 def test_swept_killed_and_resumed() -> None:
     """A few parameters of the paper's system, of structures and of runs."""
     killed("the paper's", only="beam.thickness,model.modes,contact.stiffness,striker.side,integration.cycles")

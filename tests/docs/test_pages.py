@@ -21,13 +21,13 @@ PAGES = sorted([*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md")])
 CODE = [
     "README.md",
     "accuracy_and_speed.md",
-    "extended_models.md",
     "getting-started.md",
     "long_maps.md",
     "states.md",
     "sweeps.md",
     "systems.md",
     pytest.param("design.md", marks=pytest.mark.slow),
+    pytest.param("extended_models.md", marks=pytest.mark.slow),
     pytest.param("dynamics.md", marks=pytest.mark.slow),
 ]
 """Pages whose Python blocks run in order in one namespace; those that take more than a few seconds are slow."""

@@ -93,6 +93,7 @@ def test_location_maps_reach_twice_the_static_threshold(results):
     assert {float(ds.frequency_ratio) for ds in results["fig8"].values()} == set(fig8.FREQUENCY_RATIOS)
 
 
+@pytest.mark.slow
 @needs_lab
 def test_three_kinds_are_what_they_say(results):
     data = results["fig4"]

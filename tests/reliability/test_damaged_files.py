@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -66,22 +63,6 @@ def test_a_description_that_is_none(written, tmp_path, text):
     said = CliRunner().invoke(app, ["map", "--from", str(tmp_path / "m.nc")])
     assert said.exit_code == 2 and isinstance(said.exception, SystemExit)
     assert "its description is damaged" in " ".join(said.output.split())
-
-
-def test_an_interrupt_while_it_loads_is_no_traceback():
-    code = (
-        "import builtins, sys\n"
-        "from snapbeam.__main__ import main\n"
-        "real = builtins.__import__\n"
-        "def stop(name, *rest, **more):\n"
-        "    if name.startswith('snapbeam.cli'):\n"
-        "        raise KeyboardInterrupt\n"
-        "    return real(name, *rest, **more)\n"
-        "builtins.__import__ = stop\n"
-        "main()\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600)
-    assert done.returncode == 130 and "Traceback" not in done.stderr
 
 
 def test_no_such_file(tmp_path):

@@ -177,6 +177,7 @@ print(total(np.arange(4.0)), "loaded" if total.stats.cache_hits else "compiled")
 """A function that needs memory, for which Numba's runtime must stand before its kept code is loaded."""
 
 
+@pytest.mark.slow
 def test_code_that_needs_numbas_runtime_is_loaded_in_a_fresh_process(python, tmp_path):
     (tmp_path / "arrays.py").write_text(ARRAYS, encoding="utf-8")
     for how in ("compiled", "loaded"):

@@ -82,6 +82,7 @@ def between(monkeypatch, client, tried):
     return left
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_before_it_delivers(tmp_path, work, whole, client, between):
     between += [False, True, False, True]
     columns, report, _ = within(120, computed, tmp_path / "store", work, client)

@@ -72,7 +72,7 @@ def test_random_runs_with_contact(modes: int, accuracy: str) -> None:
             assert run.summary.high_frequency_energy_fraction == pytest.approx(wanted, rel=SHARE[accuracy])
 
 
-@pytest.mark.parametrize("accuracy", ["standard", "reference"])
+@pytest.mark.parametrize("accuracy", [pytest.param("standard", marks=pytest.mark.slow), "reference"])
 def test_unequal_wells(accuracy: str) -> None:
     model = sb.ReducedModel.from_beam(
         default_values.BEAM, modes=4, imperfection=sb.Imperfection(midspan_amplitude=2e-6)

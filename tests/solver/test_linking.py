@@ -6,6 +6,8 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 from snapbeam.model.contact.base import LAWS, ContactLaw
 from snapbeam.model.drive.base import DRIVES
 from snapbeam.solver.registered_statistics import extras_of_table
@@ -36,6 +38,7 @@ def told(*laws: str) -> dict[str, list[str]]:
     return json.loads(done.stdout.splitlines()[-1])
 
 
+@pytest.mark.slow
 def test_a_law_gives_what_it_gives_alone() -> None:
     """Each law in a process of its own, then together, their code loaded from disk."""
     alone = told("hertz") | told("plastic", "elastic")

@@ -110,6 +110,7 @@ def test_workers_that_are_killed_in_mid_task(tmp_path, small, whole, client):
     ]
 
 
+@pytest.mark.slow
 def test_a_poisonous_task_is_set_apart(tmp_path, small, whole, client):
     work, stage = trouble(small, tmp_path, always={2: "kill"}, once={5: "raise"})
     columns, report, said, made = computed(tmp_path / "store", work, stage, client)

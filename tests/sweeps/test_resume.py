@@ -55,6 +55,7 @@ def test_killed_at_two_hundred_random_instants(tmp_path):
     kill_loop(tmp_path, 200, 2)
 
 
+@pytest.mark.slow
 def test_killed_command_goes_on_from_its_store_alone(tmp_path, monkeypatch):
     """``snapbeam map --checkpoint DIR`` of a killed command: the rest is computed, the file is the same."""
     monkeypatch.chdir(tmp_path)
