@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
@@ -46,6 +47,14 @@ def pytest_collection_modifyitems(items):
         return next((k for k, part in enumerate(FIRST) if f"/tests/{part}" in path), len(FIRST))
 
     items.sort(key=place)
+
+
+@pytest.fixture(autouse=True)
+def close_figures():
+    """Close the figures of a test: Matplotlib warns of more than twenty open ones, in whatever test comes next."""
+    yield
+    if pyplot := sys.modules.get("matplotlib.pyplot"):
+        pyplot.close("all")
 
 
 @pytest.fixture
