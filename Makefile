@@ -21,7 +21,7 @@ WORKERS ?= 2
 # Where the benchmarks write; the docs show what is in docs/images
 BENCH ?= out/bench
 
-.PHONY: help map explorer-deps test test-slow test-oldest lint docs bench audit dist clean
+.PHONY: help map explorer-deps test quick-tests test-slow test-oldest lint docs bench audit dist clean
 
 help:
 	@echo "make map        compute the response map ($(MAP), $(PLOT)); variables: MODES CYCLES FREQUENCY_RATIO"
@@ -74,7 +74,11 @@ lint: $(VENV)/.installed-test
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-test: lint
+# The linters take one minute beside the tests.
+test:
+	$(MAKE) --no-print-directory --jobs 2 lint quick-tests
+
+quick-tests: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -m "not slow" --durations=15 -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 test-slow: $(VENV)/.installed-test

@@ -177,7 +177,7 @@ MEASURED = sb.Imperfection(
 
 SYSTEMS: dict[str, ExtendedSystem] = {
     "the paper's": ExtendedSystem(struck(sine()), SINE | PLACE, own_kernel=False),
-    "restitution": ExtendedSystem(struck(sine(), sb.Restitution(0.6)), SINE | PLACE, modes=1, own_kernel=False),
+    "restitution": ExtendedSystem(struck(sine(), sb.Restitution(0.6)), SINE | PLACE, modes=1),
     "power": ExtendedSystem(struck(sine(), sb.PowerLaw.from_stiffness(4e11, 2.0)), SINE | PLACE),
     "layer": ExtendedSystem(struck(sine(), sb.LayeredHertz(stiffness=4e8, layer_stiffness=1e10)), SINE | PLACE),
     "hunt_crossley": ExtendedSystem(

@@ -139,6 +139,7 @@ def test_heavy_body_is_the_shaker() -> None:
     assert errors[2] < 1e-7
 
 
+@pytest.mark.slow
 def test_going_on_and_mirror() -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
     body = {"mass": 0.01, "suspension_stiffness": 300.0, "suspension_damping": 0.4}

@@ -168,6 +168,7 @@ def test_a_statistic_of_somebody_is_never_kept() -> None:
         unregister("own")
 
 
+@pytest.mark.slow
 def test_a_law_typed_at_a_prompt_is_never_kept() -> None:
     """Its source cannot be read, so nothing tells two of them apart."""
     code = LAW.format(factor="1.0", more="") + (

@@ -72,7 +72,8 @@ def test_random_runs_with_contact(modes: int, accuracy: str) -> None:
             assert run.summary.high_frequency_energy_fraction == pytest.approx(wanted, rel=SHARE[accuracy])
 
 
-@pytest.mark.parametrize("accuracy", [pytest.param("standard", marks=pytest.mark.slow), "reference"])
+@pytest.mark.slow
+@pytest.mark.parametrize("accuracy", ["standard", "reference"])
 def test_unequal_wells(accuracy: str) -> None:
     model = sb.ReducedModel.from_beam(
         default_values.BEAM, modes=4, imperfection=sb.Imperfection(midspan_amplitude=2e-6)
@@ -91,6 +92,7 @@ def test_unequal_wells(accuracy: str) -> None:
     assert reached, "a run that passes from one well to the other"
 
 
+@pytest.mark.slow
 def test_a_statistic_that_is_registered_after_a_run_has_its_own_kernels() -> None:
     """No record is taken for one of another layout: Numba says nothing, and the results are the same."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
