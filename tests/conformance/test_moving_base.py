@@ -161,7 +161,7 @@ def test_refusals_and_the_way_there_and_back() -> None:
     with pytest.raises(InputError, match="given by matrices is not known"):
         sb.System(plain, base_excitation=base)
     with pytest.raises(InputError, match="integrated by the CPU engine alone"):
-        resolve("cuda", around=True)
+        resolve("cuda", environment=True)
     system = sb.System(model(2), default_values.CONTACT, striker, base_excitation=base)
     assert sb.System.from_mapping(system.to_mapping()) == system
     changed = system.replace(

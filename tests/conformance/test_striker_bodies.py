@@ -181,7 +181,7 @@ def test_early_termination_is_off_and_refusals() -> None:
     with pytest.raises(InputError, match="leave the mass out, or use a HertzContact"):
         sb.System(model, sb.Restitution(0.5), sb.Striker(drive=drive, mass=0.1))
     with pytest.raises(InputError, match="a striker with a mass is integrated by the CPU engine alone"):
-        resolve("cuda", body=True)
+        resolve("cuda", striker_with_mass=True)
     system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, mass=0.1))
     with pytest.raises(InputError, match="give no tangent, or no mass"):
         sb.advance(system, tangent=np.zeros((1, 2, 1)))

@@ -105,7 +105,7 @@ def lay_out_few(ensemble: Ensemble, packed: Packed, pieces: int) -> FewMemory:
 
 
 def _enter_pairs(m: _Array, of_modes: list[_Array], flow: int, distinct: int) -> None:
-    """What the flows follow from, for each pair of a mode and a distinct flow; those that fill a group stand still."""
+    """What the flows follow from, for each pair of a mode and a distinct flow; those that fill a group do not move."""
     modes = of_modes[0].size
     pairs = np.zeros((at.groups(modes, distinct) * WIDTH, 4))
     pairs[:, 0] = 1.0
