@@ -243,3 +243,28 @@ def test_what_is_given_beside_a_store_is_compared_with_the_store(tmp_path, monke
     assert refused.exit_code == 2
     differences = [line for line in refused.stderr.splitlines() if "in the checkpoint" in line]
     assert len(differences) == 1 and "cycles: 12 in the checkpoint, 13 requested" in differences[0]
+
+
+def test_options_complete_a_file(tmp_path):
+    """An axis or a value of an option is a parameter that the file needs and does not contain."""
+    from snapbeam.cli.parameter_options import configured
+    from snapbeam.util.validation import InputError
+
+    path = tmp_path / "harvester.toml"
+    path.write_text(
+        '[base_excitation]\ntype = "acceleration_sine"\nfrequency_ratio = 0.5\n'
+        '[harvester]\ntype = "coil"\nforce_factor = 0.1\n'
+    )
+    swept = configured(
+        {
+            "config": path,
+            "sweep": ["base_excitation.acceleration_amplitude=0.1,0.2", "harvester.resistance=1e3:1e6:3"],
+        }
+    )
+    assert swept.axes()["harvester.resistance"].size == 3
+    both = ["base_excitation.acceleration_amplitude=0.1", "harvester.resistance=1e4"]
+    assert configured({"config": path, "set_": both}).system.get("harvester.resistance") == 1e4
+    with pytest.raises(
+        InputError, match=r"harvester\.toml: \[base_excitation\] acceleration_amplitude: missing"
+    ):
+        configured({"config": path})

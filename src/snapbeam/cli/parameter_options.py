@@ -291,7 +291,8 @@ def configured(
     from snapbeam.model.parameters import lookup
     from snapbeam.util.validation import InputError
 
-    config = load_config(given["config"]) if given.get("config") is not None else Config()
+    file = given.get("config")
+    config = load_config(file, complete=False) if file is not None else Config()
     if given.get("from_") is not None:
         if given.get("config") is not None:
             raise InputError("from, config: give one of the two")
@@ -322,7 +323,7 @@ def configured(
             raise InputError(f"{same}: is given as a single value and as an axis")
     if axes:
         sections["sweep"] = sections.get("sweep", {}) | axes
-    config = override(config, sections)
+    config = override(config, sections, "" if file is None or sections else Path(file).name)
     if given.get("print_config"):
         from snapbeam.model.parameter_file import config_text
 
