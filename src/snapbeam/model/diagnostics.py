@@ -30,7 +30,7 @@ def doubts_of(model: ReducedModel, striker: Striker | None) -> tuple[Diagnostic,
             Diagnostic(
                 "monostable",
                 "this imperfection leaves one well: the beam is monostable, and crossings of its centre are no "
-                "change of wells",
+                f"change of wells; {model.two_well_limits}",
             )
         )
     return tuple(found)
