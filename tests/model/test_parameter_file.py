@@ -282,6 +282,17 @@ def test_an_axis_gives_a_required_parameter():
         config_from_mapping({"base_excitation": base | {"frequency_ratio": 1.0}, "harvester": patch})
 
 
+def test_one_file_for_every_command(tmp_path):
+    """Sections that only other commands read are left to them; a misspelt section is still refused."""
+    path = tmp_path / "switch.toml"
+    text = "[model]\nmodes = 2\n[uncertainty.of.'beam.thickness']\nuniform = 0.05\n[probability]\nruns = 8\n[design]\nx = 1\n"
+    path.write_text(text)
+    assert load_config(path).to_mapping() == {"model": {"modes": 2}}
+    path.write_text(text.replace("[design]", "[desing]"))
+    with pytest.raises(InputError, match=r"\[desing\]: unknown section"):
+        load_config(path)
+
+
 def test_physical_units_are_ratios_of_the_system():
     """100 Hz and 31 mm/s at 40 mm from the clamp, given as values and as axes."""
     config = config_from_mapping(

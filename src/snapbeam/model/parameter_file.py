@@ -136,6 +136,8 @@ SECTIONS = (
     "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "harvester", "initial_state",
     "sweep", "integration",
 )  # fmt: skip
+_OF_OTHER_COMMANDS = ("uncertainty", "probability", "design")
+"""Sections that a file may contain for other commands, which check them."""
 _KINDS: dict[str, Mapping[str, type]] = {
     "drive": DRIVES,
     "base_excitation": {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()},
@@ -700,7 +702,10 @@ def load_config(path: str | os.PathLike[str], *, complete: bool = True) -> Confi
         If it cannot be read or is no TOML, and for anything :func:`config_from_mapping` refuses.
     """
     file = file_path("config", path)
-    return config_from_mapping(read_toml("config", file), file.name, complete=complete)
+    sections = {
+        name: values for name, values in read_toml("config", file).items() if name not in _OF_OTHER_COMMANDS
+    }
+    return config_from_mapping(sections, file.name, complete=complete)
 
 
 def dump_config(config: Config, path: str | os.PathLike[str], comment: str = "") -> None:
