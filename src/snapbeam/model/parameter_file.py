@@ -136,6 +136,8 @@ SECTIONS = (
     "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "harvester", "initial_state",
     "sweep", "integration",
 )  # fmt: skip
+_OF_OTHER_COMMANDS = ("uncertainty", "probability", "design")
+"""Sections that a file may contain for other commands, which check them."""
 _KINDS: dict[str, Mapping[str, type]] = {
     "drive": DRIVES,
     "base_excitation": {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()},
@@ -393,6 +395,19 @@ class Config:
         """What was given of a section."""
         return dict(self.given.get(name, {}))
 
+    def _with_axes(self, name: str) -> dict[str, Any]:
+        """What was given of a section; a key that has an axis only takes the first value of the axis."""
+        found, known = self.section(name), parameters()
+        kind = law_of(found) if numbered(name)[0] == "contact" else found.get("type", "sine")
+        for axis, values in self.section("sweep").items():
+            section, _, key = (axis if axis in PHYSICAL else lookup(axis).name).partition(".")
+            if section != name or key in found or axis in PHYSICAL:
+                continue
+            row = known.get(f"{numbered(name)[0]}.{key}")
+            if row is None or (row.default is None and (not row.kinds or kind in row.kinds)):
+                found[key] = parsed_axis(axis, values)[0].item()
+        return found
+
     @cached_property
     def defaulted(self) -> tuple[str, ...]:
         """Names of what takes the value of the paper's beam although another beam was spoken of."""
@@ -477,10 +492,11 @@ class Config:
     def system(self) -> System:
         """The system; what is not given is the paper's.  Refused (InputError) if values do not go together."""
         sections: dict[str, Any] = {
-            name: values | self.section(name) for name, values in self._defaults().items()
+            name: values | (self._with_axes(name) if name in _STRIKING else self.section(name))
+            for name, values in self._defaults().items()
         }
-        optional = ("boundary", "imperfection", *_AROUND)
-        sections |= {name: self.section(name) for name in optional if self.section(name)}
+        sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
+        sections |= {name: self._with_axes(name) for name in _AROUND if self.section(name)}
         sections |= self._further
         if self._is_unstruck:
             for name in _STRIKING:
@@ -513,7 +529,8 @@ class Config:
         for name in self.given:
             kind, number = numbered(name)
             if number > 1:
-                found[name] = contact_of(self.section(name)) if kind == "contact" else self.section(name)
+                own = self._with_axes(name)
+                found[name] = contact_of(own) if kind == "contact" else own
                 if kind == "drive":
                     found[name].setdefault("type", "sine")
         return found
@@ -599,7 +616,7 @@ def _stand_in(name: str, value: Any) -> float:
     return 1.0 if name == "frequency_ratio" else 0.0 if name == "velocity_amplitude" else 0.5
 
 
-def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config:
+def config_from_mapping(sections: Mapping[str, Any], source: str = "", *, complete: bool = True) -> Config:
     """Check nested parameters, as a TOML file holds them.
 
     Parameters
@@ -608,6 +625,8 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config
         Values by section and name.
     source : str
         Where they come from, to stand before each refusal.
+    complete : bool
+        Whether they must describe a system.  If not, each value is checked, but others may complete them.
 
     Raises
     ------
@@ -618,7 +637,7 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config
     found, lines = checked_sections(sections)
     config = Config(found)
     lines = lines or contradictions(found)
-    if not lines:
+    if not lines and complete:
         try:
             config.model  # noqa: B018
             if config.model.length_scale is not None:
@@ -632,10 +651,10 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config
     return config
 
 
-def override(config: Config, sections: Mapping[str, Mapping[str, Any]]) -> Config:
+def override(config: Config, sections: Mapping[str, Mapping[str, Any]], source: str = "") -> Config:
     """The parameters with others laid over them; what they contradict is taken away, None is left alone.
 
-    A value takes an axis over the same parameter away.
+    A value takes an axis over the same parameter away.  Refusals begin with *source*.
     """
     instance("config", config, Config, "a Config")
     for name, own in mapping("sections", sections).items():
@@ -657,7 +676,7 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]]) -> Confi
             for name in own:
                 for same in same_axis(f"{section}.{name}"):
                     merged.get("sweep", {}).pop(same, None)
-    return config_from_mapping(merged)
+    return config_from_mapping(merged, source)
 
 
 def same_axis(name: str) -> set[str]:
@@ -674,8 +693,8 @@ def same_axis(name: str) -> set[str]:
 # Reading and writing parameter files.
 
 
-def load_config(path: str | os.PathLike[str]) -> Config:
-    """Read a parameter file.
+def load_config(path: str | os.PathLike[str], *, complete: bool = True) -> Config:
+    """Read a parameter file; unless it must be *complete*, options may add what a system needs.
 
     Raises
     ------
@@ -683,7 +702,10 @@ def load_config(path: str | os.PathLike[str]) -> Config:
         If it cannot be read or is no TOML, and for anything :func:`config_from_mapping` refuses.
     """
     file = file_path("config", path)
-    return config_from_mapping(read_toml("config", file), file.name)
+    sections = {
+        name: values for name, values in read_toml("config", file).items() if name not in _OF_OTHER_COMMANDS
+    }
+    return config_from_mapping(sections, file.name, complete=complete)
 
 
 def dump_config(config: Config, path: str | os.PathLike[str], comment: str = "") -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, Self
@@ -22,7 +23,7 @@ from snapbeam.model.buckling_modes import (
 )
 from snapbeam.model.equilibria import Equilibrium, Landscape, landscape_of, tangent_stiffness
 from snapbeam.model.imperfection import Imperfection, perfect_equilibria
-from snapbeam.model.quantity import ParameterField
+from snapbeam.model.quantity import ParameterField, quantities
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -340,14 +341,57 @@ class Wells:
         if self.beam is None:
             raise InputError(f"{what} needs a bistable structure: give a well_amplitude other than zero")
         if self.imperfection is not None:
-            raise InputError(
-                f"{what} needs two wells: this imperfection leaves one; a smaller one leaves two, "
-                "and so does a greater axial_load"
-            )
+            raise InputError(f"{what} needs two wells: this imperfection leaves one; {self.two_well_limits}")
         raise InputError(
             f"{what} needs a buckled beam: axial_load = {self.beam.axial_load:g} N must exceed the critical "
             f"load of {self.beam.critical_load:g} N"
         )
+
+    @cached_property
+    def two_well_limits(self) -> str:
+        """In words, the nearest imperfection and the least axial load with two wells, of a beam with one; computed."""
+        assert self.beam is not None
+        assert self.imperfection is not None
+        beam, given = self.beam, self.imperfection
+
+        def scaled(factor: float) -> bool:
+            return self._is_bistable_with(beam, given.scaled(factor))
+
+        def loaded(load: float) -> bool:
+            return self._is_bistable_with(beam.replace(axial_load=load), given)
+
+        steps = np.geomspace(1.0, _FURTHEST_IMPERFECTION, _HINT_STEPS).tolist()
+        found = []
+        for more in (True, False):
+            at = [step if more else 1.0 / step for step in steps]
+            first = next((i for i in range(1, len(at)) if scaled(at[i])), None)
+            if first is not None:
+                found.append((first, more, _first_true(scaled, at[first - 1], at[first])))
+        hints = []
+        for _, more, factor in sorted(found)[:1]:
+            bound = "at least" if more else "at most"
+            sizes = [
+                f"{'-' if value < 0.0 else ''}{name} of {bound} {_rounded(abs(factor * value), more):.4g} {item.unit}"
+                for name, item in quantities(Imperfection).items()
+                if item.kind is float and name != "point_location" and (value := getattr(given, name)) != 0.0
+            ]
+            if given.profile is not None:
+                sizes.append(f"{bound} {_rounded(factor, more):.4g} times the profile")
+            hints.append(f"{' and '.join(sizes)} (axial_load = {beam.axial_load:.4g} N)")
+        loads = np.linspace(
+            beam.axial_load, max(beam.axial_load, 0.0) + _FURTHEST_LOAD * beam.critical_load, _HINT_STEPS
+        )
+        first = next((i for i in range(1, loads.size) if loaded(float(loads[i]))), None)
+        if first is not None:
+            load = _first_true(loaded, float(loads[first - 1]), float(loads[first]))
+            hints.append(f"axial_load of at least {_rounded(load, True):.4g} N (this imperfection)")
+        if not hints:
+            return "no imperfection of the same shape and no axial load was found that leaves two"
+        return f"two wells need {', or '.join(hints)}"
+
+    def _is_bistable_with(self, beam: Beam, imperfection: Imperfection) -> bool:
+        modes = self.well_amplitude.size
+        return ReducedModel.from_beam(beam, modes, imperfection=imperfection).is_bistable
 
     @property
     def well_energy(self) -> float:
@@ -372,6 +416,29 @@ class Wells:
         kappa = np.sort(self.stiffness if self.stiffness.ndim == 1 else np.linalg.eigvalsh(self.stiffness))
         second = min(float(kappa[1]), 0.0) if kappa.size > 1 else 0.0
         return -(second**2) / (4.0 * self.nonlinear_stiffness) + 0.0
+
+
+_FURTHEST_IMPERFECTION = 100.0
+"""Greatest and, inverted, least factor of the imperfection at which two wells are looked for."""
+_FURTHEST_LOAD = 40.0
+"""Over the critical load."""
+_HINT_STEPS = 81
+
+
+def _first_true(holds: Callable[[float], bool], outside: float, inside: float) -> float:
+    """Where *holds* begins, between a value outside and one inside, to 4 digits and inside."""
+    while abs(inside - outside) > 5e-5 * abs(inside):
+        middle = 0.5 * (outside + inside)
+        outside, inside = (outside, middle) if holds(middle) else (middle, inside)
+    return inside
+
+
+def _rounded(value: float, up: bool) -> float:
+    """Four digits, not below the value or not above it."""
+    if value == 0.0:
+        return 0.0
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) - 3)
+    return (math.ceil if up else math.floor)(value / unit) * unit
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -273,7 +273,7 @@ class System:
 
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Diagnostics: values that look like another unit, and assumptions of the model that do not hold."""
-        return doubts_of(self.model, self.striker)
+        return doubts_of(self.model, self.striker, self.harvester)
 
     # ------------------------------------------------------------------ identity and files
 
