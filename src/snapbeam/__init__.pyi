@@ -31,6 +31,10 @@ from .model.drive.recorded_motion import RecordedMotion as RecordedMotion
 from .model.drive.sine import Sine as Sine
 from .model.drive.sum import SumDrive as SumDrive
 from .model.drive.two_tone import TwoTone as TwoTone
+from .model.external_force import ConstantForce as ConstantForce
+from .model.external_force import ExternalForce as ExternalForce
+from .model.external_force import HarmonicForce as HarmonicForce
+from .model.external_force import RecordedForce as RecordedForce
 from .model.harvester import ElectromagneticHarvester as ElectromagneticHarvester
 from .model.harvester import PiezoelectricHarvester as PiezoelectricHarvester
 from .model.imperfection import Imperfection as Imperfection

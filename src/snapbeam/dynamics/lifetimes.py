@@ -437,7 +437,7 @@ def require_excitation(system: System) -> None:
     if not system.moving:
         raise InputError(
             "striker = None: a beam that nothing strikes or shakes does not go on snapping; give a striker, a "
-            "base_excitation or an axial_load"
+            "base_excitation, an axial_load or an external_force"
         )
 
 

@@ -341,6 +341,7 @@ class StructureMatrices:
     damping_ratio: ArrayLike
     reference_frequency: float | None
     transverse_force: ArrayLike | None = None
+    base_shape: ArrayLike | None = None
 
 
 def damping_ratios(value: ArrayLike, count: int) -> _Array:
@@ -393,6 +394,7 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
         raise InputError(
             "well_amplitude with transverse_force: leave it out, the equilibria follow from the force"
         )
+    base_shape = None if given.base_shape is None else _shape("base_shape", given.base_shape, count)
     if force is None:
         equilibrium = _equilibrium(given.well_amplitude, stiffness, gamma, midspan_shape)
     else:
@@ -407,6 +409,7 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
         "damping_ratio": damping_ratios(given.damping_ratio, count),
         "midspan_shape": midspan_shape,
         "contact_shape": contact_shape,
+        "base_shape": base_shape,
         "given_reference_frequency": None
         if reference is None
         else positive("reference_frequency", reference, "Hz"),

@@ -20,6 +20,7 @@ from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
 from snapbeam.model.drive.base import DRIVES
+from snapbeam.model.external_force import FORCES
 from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import parts_from_mapping
@@ -133,7 +134,7 @@ def contact_rivals() -> list[tuple[set[str], set[str]]]:
 
 
 SECTIONS = (
-    "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "harvester", "initial_state",
+    "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "external_force", "harvester", "initial_state",
     "sweep", "integration",
 )  # fmt: skip
 _OF_OTHER_COMMANDS = ("uncertainty", "probability", "design")
@@ -142,6 +143,7 @@ _KINDS: dict[str, Mapping[str, type]] = {
     "drive": DRIVES,
     "base_excitation": {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()},
     "axial_load": LOADS,
+    "external_force": FORCES,
     "harvester": HARVESTERS,
 }
 """What a section may be of, where its ``type`` says so."""
@@ -369,7 +371,10 @@ Sections = Mapping[str, Mapping[str, Any]]
 DEFAULT_DRIVE = {"frequency_ratio": 1.21, "velocity_amplitude": 0.18}
 DEFAULT_AXES = {"drive.frequency_ratio": "0.1:4:64", "drive.velocity_amplitude": "0.01:0.65:40"}
 """Of a map for which no axis is named."""
-_AROUND, _STRIKING = ("base_excitation", "axial_load", "harvester"), ("contact", "striker", "drive")
+_AROUND, _STRIKING = (
+    ("base_excitation", "axial_load", "external_force", "harvester"),
+    ("contact", "striker", "drive"),
+)
 # What stands for the same thing in a section: giving one set takes the other away.
 _RIVALS: dict[str, list[tuple[set[str], set[str]]]] = {
     "beam": [({"buckling_level"}, {"axial_load"})],
@@ -537,16 +542,17 @@ class Config:
 
     @property
     def _is_unstruck(self) -> bool:
-        """Whether a base or an axial load moves the beam, and nothing was said of a striker."""
-        moved = self.section("base_excitation") or self.section("axial_load")
-        return bool(moved) and not any(self.section(name) for name in _STRIKING)
+        """Whether a base, an axial load or a force moves the beam, and nothing was said of a striker."""
+        return self._is_moved and not any(self.section(name) for name in _STRIKING)
 
     @property
     def _stands_still(self) -> bool:
-        """Whether there is a striker beside a base or an axial load, of whose motion nothing was said."""
-        return bool(self.section("base_excitation") or self.section("axial_load")) and not self.section(
-            "drive"
-        )
+        """Whether there is a striker beside a base, an axial load or a force, of whose motion nothing was said."""
+        return self._is_moved and not self.section("drive")
+
+    @property
+    def _is_moved(self) -> bool:
+        return any(self.section(name) for name in ("base_excitation", "axial_load", "external_force"))
 
     def _started(self, system: System) -> System:
         """The system with the start that was given."""

@@ -510,6 +510,8 @@ class ReducedModel(Wells):
         B, of a structure whose wells are unequal.
     imperfection : Imperfection or None
         What B follows from.
+    base_shape : array of shape (N,) or None
+        Displacement of each coordinate per unit of the base's, of a structure given by matrices.
     """
 
     mass: _Array
@@ -524,6 +526,7 @@ class ReducedModel(Wells):
     given_reference_frequency: float | None = None
     transverse_force: _Array | None = None
     imperfection: Imperfection | None = None
+    base_shape: _Array | None = None
 
     def __post_init__(self) -> None:
         for value in vars(self).values():
@@ -635,6 +638,7 @@ class ReducedModel(Wells):
         damping_ratio: ArrayLike = 0.0,
         reference_frequency: float | None = None,
         transverse_force: ArrayLike | None = None,
+        base_shape: ArrayLike | None = None,
     ) -> ReducedModel:
         """A model of any structure, given by its matrices; a free mass (stiffness 0) is one.
 
@@ -661,6 +665,9 @@ class ReducedModel(Wells):
             Frequency that normalises the excitation, Hz; needed if the first natural frequency is 0.
         transverse_force : array of shape (N,), optional
             Constant force B that makes the wells unequal; the equilibria then follow from it and are not given.
+        base_shape : array of shape (N,), optional
+            Displacement of each coordinate if the base moves by one unit and nothing deforms, r; needed for a
+            base excitation, whose inertial force is -m r y''.
 
         Raises
         ------
@@ -680,6 +687,7 @@ class ReducedModel(Wells):
                 damping_ratio=damping_ratio,
                 reference_frequency=reference_frequency,
                 transverse_force=transverse_force,
+                base_shape=base_shape,
             )
         )
         model = cls(**given)

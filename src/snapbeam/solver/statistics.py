@@ -336,7 +336,7 @@ _ROWS = (
         "high_frequency_energy_fraction", "float64", "1", "share of the modal energy above a multiple of omega_1, over time",
         _high_share, comment=_SHARE,
     ),
-    Statistic("base_work", "float64", "J", "work done by the base, in its frame", _seen("base_work")),
+    Statistic("base_work", "float64", "J", "work done by the base, in its frame, or by an external force", _seen("base_work")),
     Statistic("load_work", "float64", "J", "work done by the change of the axial load", _seen("load_work")),
     Statistic("energy_harvested", "float64", "J", "energy that ended in the harvester's load", _harvested),
     Statistic(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.base_excitation import BaseExcitation, rigid_mass
+from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.harvester import Harvester
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
@@ -77,7 +78,8 @@ class Structure:
     unequal_wells: UnequalWells | None = None
     """Of unequal wells."""
     base_load: _Array | None = None
-    """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi)."""
+    """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi).  Of an external force
+    F(t) along a row h: V^T h, where F stands for the acceleration."""
     tapped: _Array | None = None
     """Of a harvester: its coupling, scaled so that half the square of the circuit's coordinate is its energy."""
     circuit: bool = False
@@ -176,6 +178,7 @@ def structure_of(
     striker: Striker | None = None,
     base: BaseExcitation | None = None,
     harvester: Harvester | None = None,
+    force: ExternalForce | None = None,
 ) -> Structure:
     """The structure of a reduced model, about the well that a striker from *side* pushes away from.
 
@@ -200,11 +203,20 @@ def structure_of(
         equilibrium=equilibrium,
         model=model,
         unequal_wells=_uneven(model, sign),
-        base_load=None if base is None else -(modes.T @ rigid_mass(model)),
+        base_load=_base_load(model, base, force),
     )
     if striker is not None and striker.mass is not None:
         struck = _with_body(struck, striker, carried_by_base=base is not None and base.striker_on_base)
     return struck if harvester is None else _with_circuit(struck, harvester)
+
+
+def _base_load(
+    model: ReducedModel, base: BaseExcitation | None, force: ExternalForce | None
+) -> _Array | None:
+    """What the base's acceleration, or the external force, does to p."""
+    if force is not None:
+        return np.asarray(model.linear_modes.T @ force.row(model))
+    return None if base is None else -(model.linear_modes.T @ rigid_mass(model))
 
 
 def _uneven(model: ReducedModel, sign: float) -> UnequalWells | None:

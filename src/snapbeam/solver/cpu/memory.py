@@ -224,7 +224,8 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
     memory[stages.flow : table] = weights
     memory[table:] = ensemble.samples
     numbers: Any = ensemble.drive_numbers
-    if "table" in ensemble.drive.number_names:
+    sampled = [i for i, name in enumerate(ensemble.drive.number_names) if name in ("table", "base_table")]
+    if sampled:
         numbers = numbers.copy()
-        numbers[:, ensemble.drive.number_names.index("table")] += table
+        numbers[:, sampled] += table
     return Memory(memory, packed.blocks, (first, second), stages, numbers)
