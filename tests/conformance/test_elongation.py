@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.sparse import csr_array
 
 import snapbeam as sb
 from snapbeam.model import default_values
@@ -77,6 +78,11 @@ def test_identity_is_the_default() -> None:
     with_one = model(STIFF, np.eye(3))
     without = model(STIFF, None)
     np.testing.assert_allclose(with_one.tension_matrix, without.tension_matrix)
+    sparse = sb.ReducedModel.from_matrices(
+        csr_array(MASS), csr_array(STIFF), contact_shape=[1.0, 0.4, 0.2], elongation_matrix=csr_array(FULL),
+        nonlinear_stiffness=2.0,
+    )  # fmt: skip
+    np.testing.assert_array_equal(sparse.omega, without.omega)
 
 
 @pytest.mark.parametrize(

@@ -359,7 +359,7 @@ def damping_ratios(value: ArrayLike, count: int) -> _Array:
 
 def checked_structure(given: StructureMatrices) -> dict[str, Any]:
     """The fields of a reduced model for a structure, or an ``InputError`` that says what is wrong."""
-    mass = finite_array("mass", given.mass)
+    mass = finite_array("mass", _dense(given.mass))
     if mass.ndim != 2 or mass.shape[0] != mass.shape[1] or mass.size == 0:
         raise InputError(f"mass of shape {mass.shape}: must be a square matrix (N, N)")
     count = mass.shape[0]
@@ -369,10 +369,11 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
     except np.linalg.LinAlgError:
         lowest = np.linalg.eigvalsh(mass)[0]
         raise InputError(
-            f"mass: must be positive definite, but its lowest eigenvalue is {lowest:g}"
+            f"mass: must be positive definite, but its lowest eigenvalue is {lowest:g}; leave out fixed coordinates, and "
+            "condense those without mass"
         ) from None
 
-    stiffness = finite_array("stiffness", given.stiffness)
+    stiffness = finite_array("stiffness", _dense(given.stiffness))
     if stiffness.ndim == 2:
         _require_shape("stiffness", stiffness, (count, count), "as large as the mass matrix")
         stiffness = _symmetric("stiffness", stiffness)
@@ -421,8 +422,13 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
     }
 
 
+def _dense(matrix: Any) -> Any:
+    """A sparse matrix of SciPy as an array; anything else as it is."""
+    return matrix.toarray() if hasattr(matrix, "toarray") else matrix
+
+
 def _elongation(value: ArrayLike, count: int, gamma: float) -> _Array:
-    matrix = finite_array("elongation_matrix", value)
+    matrix = finite_array("elongation_matrix", _dense(value))
     _require_shape("elongation_matrix", matrix, (count, count), "as large as the mass matrix")
     matrix = _symmetric("elongation_matrix", matrix)
     eigenvalue = np.linalg.eigvalsh(matrix)
@@ -486,6 +492,7 @@ def _symmetric(name: str, matrix: _Array) -> _Array:
     if asymmetry.max() > _SYMMETRY * np.abs(matrix).max():
         i, j = (int(n) for n in np.unravel_index(np.argmax(asymmetry), matrix.shape))
         raise InputError(
-            f"{name}[{i}, {j}] = {matrix[i, j]:g}, {name}[{j}, {i}] = {matrix[j, i]:g}: must be symmetric"
+            f"{name}[{i}, {j}] = {matrix[i, j]:g}, {name}[{j}, {i}] = {matrix[j, i]:g}: must be symmetric; check the order "
+            "of the degrees of freedom in the export"
         )
     return 0.5 * (matrix + matrix.T)
