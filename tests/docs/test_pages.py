@@ -21,6 +21,7 @@ PAGES = sorted([*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md")])
 CODE = [
     "README.md",
     "accuracy_and_speed.md",
+    "finite_elements.md",
     "getting-started.md",
     "long_maps.md",
     "states.md",

@@ -172,7 +172,9 @@ class RecordedForce(ForceHistory, Timed):
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RecordedForce):
             return NotImplemented
-        return self.sampling_frequency == other.sampling_frequency and np.array_equal(self.record, other.record)
+        return self.sampling_frequency == other.sampling_frequency and np.array_equal(
+            self.record, other.record
+        )
 
     def __hash__(self) -> int:
         return hash((self.sampling_frequency, self.record.tobytes()))
