@@ -661,10 +661,10 @@ def _decisions(
     properties = system.contact is None or system.contact.properties.energy_bound
     if not integration.early_termination or not properties or system.further_contacts:
         return
-    if system.striker is not None and structure.unequal_wells is None:
+    if system.striker is not None and structure.wells_are_mirror_images:
         # elsewhere the class also depends on whether the other well is reached
         table["decide_crossings"] = int(time.cycles / 20.0)
     table["decide_reach"] = np.maximum(highest, 0.0)
-    if structure.unequal_wells is not None:
+    if not structure.wells_are_mirror_images:
         table["decide_reach"] = passed_heights(structure.model, location, highest)
     table["decide_energy"] = decidable_energy(structure.model, location, highest)

@@ -106,6 +106,22 @@ class Structure:
         beam[self.equilibrium.size] = 0.0
         return beam
 
+    @property
+    def wells_are_mirror_images(self) -> bool:
+        """Whether the two wells are; also of a structure with one."""
+        return self.unequal_wells is None
+
+    @property
+    def dividing_height(self) -> float:
+        """Displacement of the centre that divides the wells, m."""
+        return 0.0 if self.unequal_wells is None else self.unequal_wells.level
+
+    def about_second_well(self) -> tuple[_Array, _Array, _Array]:
+        """About the mirror image of the first well: g, the second well as q, and the force that is left over there."""
+        if self.unequal_wells is None:
+            return -self.well, np.zeros(self.omega.size), np.zeros(self.omega.size)
+        return -self.well, self.unequal_wells.second, self.unequal_wells.force
+
     def high_modes(self, omega: float) -> NDArray[np.bool_]:
         """Which modes are vibration modes of the beam above an angular frequency, rad/s; shape (N,)."""
         return (self.omega > omega) & (np.arange(self.omega.size) < self.equilibrium.size)

@@ -38,16 +38,15 @@ class FewMemory(NamedTuple):
 def suits(ensemble: Ensemble, packed: Packed, most: int = at.MOST) -> bool:
     """Whether the layout for few modes serves an ensemble, of *most* modes at most.
 
-    It knows equal wells, sinusoidal drives, laws that store energy and are plain arithmetic, modes whose flows
+    It knows a structure without terms and circuit, sinusoidal drives, laws that store energy and are plain arithmetic, modes whose flows
     polynomials serve, and the package's own statistics.
     """
     law, longest = ensemble.law, float(ensemble.step_times.max())
     flow = float(np.abs(COMPOSITIONS[ensemble.order].flow).max())
     return (
         packed.rows.size <= most
-        and ensemble.structure.unequal_wells is None
+        and not packed.layout.terms
         and ensemble.structure.tapped is None
-        and ensemble.others is None
         and ensemble.size > 1
         and ensemble.drive.harmonic
         and law.vectorizable
