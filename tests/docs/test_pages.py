@@ -108,7 +108,8 @@ def test_code_runs(name, tmp_path, monkeypatch, capsys):
         capsys.readouterr()
         exec(compile(block, name, "exec"), scope)
         if expected is not None:
-            assert capsys.readouterr().out == expected
+            printed = capsys.readouterr().out
+            assert [line.rstrip() for line in printed.splitlines()] == expected.splitlines()
     plt.close("all")
 
 
@@ -268,3 +269,30 @@ def test_supported_combinations():
     assert numbers == set(range(1, len(reasons) + 1))
     assert all(";" in reason for reason in reasons)
     assert len(second) > 15 and all(len(row) == 2 and len(row[1]) > 20 for row in second[2:])
+
+
+def test_glossary_is_sorted_and_complete():
+    """Terms of the axes, classes and tools; each has a definition."""
+    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    entries = dict(re.findall(r"^(\S.*)\n((?:  .*\n)+)", text.partition("```{glossary}\n")[2], re.MULTILINE))
+    assert list(entries) == sorted(entries, key=str.lower)
+    assert all(words.rstrip().endswith(".") for words in entries.values())
+    needed = {
+        "snap-through",
+        "penetration",
+        "excitation",
+        "checkpoint",
+        "axis",
+        "seed",
+        "tolerance",
+        "right-censored",
+    }
+    needed |= {
+        "frequency ratio",
+        "velocity amplitude",
+        "attractor",
+        "response class",
+        "early termination",
+        "status",
+    }
+    assert needed <= set(entries)
