@@ -176,7 +176,7 @@ def _command(title: str, command: Any, level: int) -> list[str]:
     parts = [f"{'#' * level} {title}\n\n{words}\n"]
     panels: dict[str, list[tuple[str, str]]] = {}
     for parameter in command.params:
-        if parameter.name == "help":
+        if parameter.name in ("help", "help_all"):
             continue
         panel = getattr(parameter, "rich_help_panel", None) or (
             "Arguments" if parameter.param_type_name == "argument" else "Options"

@@ -26,6 +26,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColum
 from rich.text import Text
 
 from snapbeam._version import __version__
+from snapbeam.cli.short_help import wants_all
 from snapbeam.util.files import VERSION, foreign_files_kept
 from snapbeam.util.interrupts import WORDS, during_command
 from snapbeam.util.validation import InputError
@@ -104,6 +105,21 @@ _FORCE = Annotated[
 ]  # fmt: skip
 
 
+def _print_all_options(ctx: typer.Context, wanted: bool) -> None:
+    if wanted:
+        wants_all(ctx)
+        typer.echo(ctx.get_help(), color=ctx.color)
+        raise typer.Exit
+
+
+_HELP_ALL = Annotated[
+    bool,
+    typer.Option(
+        "--help-all", help="Show all options and exit.", is_eager=True, callback=_print_all_options
+    ),
+]  # fmt: skip
+
+
 def out() -> Console:
     """Return the console of results: standard output, or a console that discards text with --quiet or --json -."""
     silent = _OUTPUT_OPTIONS.get().silent
@@ -176,7 +192,7 @@ def notes() -> Console:
 def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
     """Report errors of a command in one line and exit with the matching status.
 
-    The decorator adds ``--quiet`` and ``--force``, and ``--json`` if the command does not define it.  The JSON file
+    The decorator adds ``--quiet``, ``--force`` and ``--help-all``, and ``--json`` if the command does not define it.  The JSON file
     contains the values that the command passes to :func:`add_json`.
     """
     signature = inspect.signature(command, eval_str=True)
@@ -186,6 +202,7 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
     def guarded(*args: _P.args, **kwargs: _P.kwargs) -> _R:
         named = _named(kwargs.values())
         kept = nullcontext() if kwargs.pop("force", False) else foreign_files_kept(named)
+        kwargs.pop("help_all", None)
         quiet, path = bool(kwargs.pop("quiet", False)), kwargs.get(own) if own else kwargs.pop("json", None)
         asked = _OutputOptions(quiet, path if isinstance(path, Path) else None)
         token = _OUTPUT_OPTIONS.set(asked)
@@ -217,7 +234,7 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
 
     more = [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
-        for name, kind in (("quiet", _QUIET), ("force", _FORCE))
+        for name, kind in (("quiet", _QUIET), ("force", _FORCE), ("help_all", _HELP_ALL))
     ]
     if own is None:
         more.append(inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_JSON))
