@@ -285,9 +285,9 @@ def _questions() -> dict[str, Any]:
         try:
             resolve(
                 "cuda", modes=system.model.modes, law=ensemble.law, drive=ensemble.drive,
-                body=ensemble.structure.body_mass is not None,
+                striker_with_mass=ensemble.structure.body_mass is not None,
                 unequal_wells=ensemble.structure.unequal_wells is not None,
-                around=system.has_environment, several=bool(system.further_contacts),
+                environment=system.has_environment, several_strikers=bool(system.further_contacts),
             )  # fmt: skip
         except sb.InputError as error:
             if "by the CPU engine alone" in str(error):
