@@ -27,6 +27,7 @@ from rich.text import Text
 
 from snapbeam._version import __version__
 from snapbeam.cli.short_help import wants_all
+from snapbeam.util.compilation_notice import compile_seconds
 from snapbeam.util.files import VERSION, foreign_files_kept
 from snapbeam.util.interrupts import WORDS, during_command
 from snapbeam.util.validation import InputError
@@ -292,7 +293,8 @@ class _RateColumn(ProgressColumn):
         if not task.completed or not task.elapsed or task.total is None:
             return Text("starting")
         found = int(task.fields.get("found", 0))
-        return Text(pace(int(task.completed), int(task.total), task.elapsed, self.what, found))
+        elapsed = task.elapsed - (compile_seconds() - float(task.fields.get("compiled", 0.0)))
+        return Text(pace(int(task.completed), int(task.total), elapsed, self.what, found))
 
 
 def pace(done: int, total: int, elapsed: float, what: str = "points", found: int = 0) -> str:
@@ -318,11 +320,12 @@ def progress(
 
     *total* is None if it is not known in advance, *task* names the work, *what* names the counted things.  A terminal
     shows a bar; other outputs get a line for each tenth of the work.  The rate leaves out the results that existed
-    before the first call, and the time before it, in which a kernel may be compiled.
+    before the first call, the time before it, and the compilation of kernels.
     """
     console = errors()
     if _OUTPUT_OPTIONS.get().quiet:
-        yield lambda done, all_of_them: None
+        with show_compilation(console):
+            yield lambda done, all_of_them: None
     elif console.is_terminal:
         columns = (TextColumn(task), BarColumn(), MofNCompleteColumn(), _RateColumn(what))
         with Progress(*columns, console=console, transient=True) as bar, show_compilation(bar.console):
@@ -331,7 +334,7 @@ def progress(
             def update(done: int, all_of_them: int) -> None:
                 if not bar.tasks[0].started:
                     bar.start_task(shown)
-                    bar.update(shown, found=done)
+                    bar.update(shown, found=done, compiled=compile_seconds())
                 bar.update(shown, completed=done, total=all_of_them)
 
             yield update
@@ -343,10 +346,15 @@ def progress(
 @contextmanager
 def show_compilation(console: Console) -> Iterator[None]:
     """Show the messages that the solver logs when it compiles a kernel."""
-    if _OUTPUT_OPTIONS.get().quiet:
-        yield
-        return
     log = logging.getLogger("snapbeam")
+    if _OUTPUT_OPTIONS.get().quiet:
+        silent = logging.NullHandler()  # with a handler, scripts get no message either
+        log.addHandler(silent)
+        try:
+            yield
+        finally:
+            log.removeHandler(silent)
+        return
     handler = _Handler(console)
     before = log.level
     log.addHandler(handler)
@@ -374,6 +382,7 @@ class _Lines:
         self.total = total
         self.start: float | None = None
         self.found = self.tenths = 0
+        self.compiled = 0.0
         if total is not None:
             self.console.print(f"{count_text(total, what)} to compute")
 
@@ -383,14 +392,15 @@ class _Lines:
             self.console.print(f"{count_text(total, self.what)} {'in all now' if begun else 'to compute'}")
             self.total, self.tenths = total, 10 * done // total if begun and total else 0
         if self.start is None:
-            self.start, self.found = time.monotonic(), done
+            self.start, self.found, self.compiled = time.monotonic(), done, compile_seconds()
         tenths = 10 * done // total if total else 10
         if tenths <= self.tenths:
             return
         self.tenths = tenths
         text = f"{done} of {count_text(total, self.what)}"
         if done > self.found:
-            text += f", {pace(done, total, time.monotonic() - self.start, self.what, self.found)}"
+            elapsed = time.monotonic() - self.start - (compile_seconds() - self.compiled)
+            text += f", {pace(done, total, elapsed, self.what, self.found)}"
         self.console.print(text)
 
 

@@ -15,6 +15,7 @@ import typer
 from rich.markup import escape
 
 from snapbeam.cli.console import add_json, duration, notes, out, pace, progress
+from snapbeam.util.compilation_notice import compile_seconds
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -626,6 +627,7 @@ class LongReport:
         self._log = log
         self._start = self._last = time.monotonic()
         self._found = 0
+        self._compiled = 0.0
         self._before: int | None = None
         self._quiet = True
 
@@ -638,7 +640,7 @@ class LongReport:
         """Say how far the present stage is."""
         now = time.monotonic()
         if self._before is None or done < self._before:
-            self._start, self._found = now, done
+            self._start, self._found, self._compiled = now, done, compile_seconds()
         finished = done >= total and done != self._before
         self._before = done
         self._bar(done, total)
@@ -647,7 +649,7 @@ class LongReport:
             share = 100.0 * done / max(total, 1)
             text = f"{done} of {total} points ({share:.1f} %)"
             if done > self._found:
-                text += f", {pace(done, total, now - self._start, found=self._found)}"
+                text += f", {pace(done, total, now - self._start - (compile_seconds() - self._compiled), found=self._found)}"
             self.log(text)
 
     def log(self, text: str) -> None:

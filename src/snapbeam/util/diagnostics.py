@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from snapbeam.util.compilation_notice import compile_seconds
 from snapbeam.util.validation import InputError, InputTypeError, choice, shown
 
 __all__ = [
@@ -186,17 +187,21 @@ class _Line:
         self.what = what
         self.start = self.last = time.monotonic()
         self.begun: float | None = None
+        self.before = self.compiled = 0.0
         self.ended = False
 
     def say(self, share: float, words: str) -> None:
         now = time.monotonic()
-        self.begun = now if self.begun is None else self.begun  # what was compiled before is not counted
-        if self.ended or (now - self.last < _INTERVAL and share < 1.0):
+        if self.begun is None:
+            self.begun, self.before, self.compiled = now, share, compile_seconds()
+        if (self.ended and share >= 1.0) or (now - self.last < _INTERVAL and share < 1.0):
             return
         self.ended = share >= 1.0
         self.last = now
-        spent = now - self.begun
-        left = f", {spent * (1.0 - share) / share:.0f} s left" if 0.0 < share < 1.0 and spent > 1.0 else ""
+        spent, gained = now - self.begun - (compile_seconds() - self.compiled), share - self.before
+        left = (
+            f", {spent * (1.0 - share) / gained:.0f} s left" if gained > 0.0 and share < 1.0 < spent else ""
+        )
         end = "\n" if share >= 1.0 else ""
         sys.stderr.write(f"\r{self.what}: {words}{left}      {end}")
         sys.stderr.flush()
