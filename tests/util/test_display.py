@@ -13,9 +13,10 @@ from rich.console import Console
 import snapbeam as sb
 from snapbeam.cli import console
 from snapbeam.model import default_values
-from snapbeam.util import diagnostics
-from snapbeam.util.compilation_notice import announce_compilation, compile_seconds
+from snapbeam.util import work_rate
+from snapbeam.util.compilation_notice import announce_compilation
 from snapbeam.util.diagnostics import counting, sharing
+from snapbeam.util.work_rate import WorkRate, compile_seconds
 
 
 @pytest.fixture(scope="module")
@@ -131,9 +132,7 @@ def test_estimates_leave_out_compilation(monkeypatch, capsys):
     """A compilation in the middle of the work does not lengthen the remaining time."""
     now = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    compile_seconds()
-    monkeypatch.setattr(diagnostics, "compile_seconds", lambda: max(0.0, min(now[0] - 102.0, 30.0)))
-    monkeypatch.setattr(console, "compile_seconds", diagnostics.compile_seconds)
+    monkeypatch.setattr(work_rate, "compile_seconds", lambda: max(0.0, min(now[0] - 102.0, 30.0)))
     report, lines = counting(True, "map"), console._Lines(Console(stderr=True), None, "points")
     for seconds, done in ((0.0, 0), (34.0, 40)):
         now[0] = 100.0 + seconds
@@ -149,3 +148,17 @@ def test_seconds_of_compilation():
     with event.trigger_event("numba:compile"):
         assert np.isfinite(compile_seconds())
     assert compile_seconds() > before
+
+
+def test_rate_of_the_later_half(monkeypatch):
+    """A delay in the first half of the work, as of a compilation in a worker, is left out after it."""
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(work_rate, "compile_seconds", lambda: 0.0)
+    rate = WorkRate()
+    for seconds, done in ((0.0, 10), (40.0, 20), (41.0, 30), (42.0, 40)):
+        now[0] = seconds
+        rate.report(done)
+    assert rate.per_second == pytest.approx(10.0)
+    rate.report(5)
+    assert rate.per_second is None

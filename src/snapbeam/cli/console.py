@@ -9,7 +9,6 @@ import json
 import logging
 import math
 import sys
-import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
@@ -27,10 +26,10 @@ from rich.text import Text
 
 from snapbeam._version import __version__
 from snapbeam.cli.short_help import wants_all
-from snapbeam.util.compilation_notice import compile_seconds
 from snapbeam.util.files import VERSION, foreign_files_kept
 from snapbeam.util.interrupts import WORDS, during_command
 from snapbeam.util.validation import InputError
+from snapbeam.util.work_rate import WorkRate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -288,23 +287,21 @@ class _RateColumn(ProgressColumn):
     def __init__(self, what: str) -> None:
         super().__init__()
         self.what = what
+        self.rate = WorkRate()
 
     def render(self, task: Task) -> Text:
-        if not task.completed or not task.elapsed or task.total is None:
+        if self.rate.per_second is None or task.total is None:
             return Text("starting")
-        found = int(task.fields.get("found", 0))
-        elapsed = task.elapsed - (compile_seconds() - float(task.fields.get("compiled", 0.0)))
-        return Text(pace(int(task.completed), int(task.total), elapsed, self.what, found))
+        return Text(pace(int(task.completed), int(task.total), self.rate, self.what))
 
 
-def pace(done: int, total: int, elapsed: float, what: str = "points", found: int = 0) -> str:
-    """Return the rate and the remaining time as text.
-
-    *found* of the *done* points existed before the clock started.
-    """
-    rate = (done - found) / max(elapsed, 1e-9)
-    left = f", {duration((total - done) / rate)} left" if found < done < total else ""
-    return f"{rate:.3g} {what}/s{left}"
+def pace(done: int, total: int, rate: WorkRate, what: str = "points") -> str:
+    """Return the rate and the remaining time as text; empty while the rate is not known."""
+    speed = rate.per_second
+    if speed is None:
+        return ""
+    left = f", {duration((total - done) / speed)} left" if done < total else ""
+    return f"{speed:.3g} {what}/s{left}"
 
 
 def count_text(count: int, what: str = "points") -> str:
@@ -327,14 +324,15 @@ def progress(
         with show_compilation(console):
             yield lambda done, all_of_them: None
     elif console.is_terminal:
-        columns = (TextColumn(task), BarColumn(), MofNCompleteColumn(), _RateColumn(what))
+        speed = _RateColumn(what)
+        columns = (TextColumn(task), BarColumn(), MofNCompleteColumn(), speed)
         with Progress(*columns, console=console, transient=True) as bar, show_compilation(bar.console):
             shown = bar.add_task(task, total=total, start=False)
 
             def update(done: int, all_of_them: int) -> None:
                 if not bar.tasks[0].started:
                     bar.start_task(shown)
-                    bar.update(shown, found=done, compiled=compile_seconds())
+                speed.rate.report(done)
                 bar.update(shown, completed=done, total=all_of_them)
 
             yield update
@@ -380,9 +378,8 @@ class _Lines:
         self.console = console
         self.what = what
         self.total = total
-        self.start: float | None = None
-        self.found = self.tenths = 0
-        self.compiled = 0.0
+        self.tenths = 0
+        self.rate = WorkRate()
         if total is not None:
             self.console.print(f"{count_text(total, what)} to compute")
 
@@ -391,17 +388,13 @@ class _Lines:
             begun = self.total is not None
             self.console.print(f"{count_text(total, self.what)} {'in all now' if begun else 'to compute'}")
             self.total, self.tenths = total, 10 * done // total if begun and total else 0
-        if self.start is None:
-            self.start, self.found, self.compiled = time.monotonic(), done, compile_seconds()
+        self.rate.report(done)
         tenths = 10 * done // total if total else 10
         if tenths <= self.tenths:
             return
         self.tenths = tenths
-        text = f"{done} of {count_text(total, self.what)}"
-        if done > self.found:
-            elapsed = time.monotonic() - self.start - (compile_seconds() - self.compiled)
-            text += f", {pace(done, total, elapsed, self.what, self.found)}"
-        self.console.print(text)
+        texts = (f"{done} of {count_text(total, self.what)}", pace(done, total, self.rate, self.what))
+        self.console.print(", ".join(filter(None, texts)))
 
 
 # ----------------------------------------------------------------------------------------------------

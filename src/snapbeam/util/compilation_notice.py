@@ -1,16 +1,14 @@
-"""Compilation of kernels: a message in scripts and notebooks, and the seconds that it takes."""
+"""Compilation of kernels: a message in scripts and notebooks."""
 
 from __future__ import annotations
 
 import logging
 import sys
-from typing import Any
 
-__all__ = ["announce_compilation", "compile_seconds"]
+__all__ = ["announce_compilation"]
 
 
 _LOG = logging.getLogger("snapbeam")
-_TIMERS: list[Any] = []
 
 
 class _Notice(logging.Handler):
@@ -30,16 +28,3 @@ def announce_compilation() -> None:
         _LOG.addHandler(_Notice(logging.INFO))
         if _LOG.level == logging.NOTSET:
             _LOG.setLevel(logging.INFO)
-
-
-def compile_seconds() -> float:
-    """Seconds of compilation since the first call of this function; estimates of the remaining time leave them out."""
-    event = sys.modules.get("numba.core.event")
-    if event is None:
-        return 0.0
-    if not _TIMERS:
-        timer = event.TimingListener()
-        event.register("numba:compile", timer)
-        _TIMERS.append(timer)
-    timer = _TIMERS[0]
-    return float(timer.duration) if timer.done else 0.0

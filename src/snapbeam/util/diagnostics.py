@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from snapbeam.util.compilation_notice import compile_seconds
 from snapbeam.util.validation import InputError, InputTypeError, choice, shown
+from snapbeam.util.work_rate import WorkRate
 
 __all__ = [
     "Diagnostic",
@@ -185,23 +185,19 @@ class _Line:
 
     def __init__(self, what: str) -> None:
         self.what = what
-        self.start = self.last = time.monotonic()
-        self.begun: float | None = None
-        self.before = self.compiled = 0.0
+        self.last = time.monotonic()
+        self.rate = WorkRate()
         self.ended = False
 
     def say(self, share: float, words: str) -> None:
         now = time.monotonic()
-        if self.begun is None:
-            self.begun, self.before, self.compiled = now, share, compile_seconds()
+        self.rate.report(share)
         if (self.ended and share >= 1.0) or (now - self.last < _INTERVAL and share < 1.0):
             return
         self.ended = share >= 1.0
         self.last = now
-        spent, gained = now - self.begun - (compile_seconds() - self.compiled), share - self.before
-        left = (
-            f", {spent * (1.0 - share) / gained:.0f} s left" if gained > 0.0 and share < 1.0 < spent else ""
-        )
+        rate = self.rate.per_second
+        left = f", {(1.0 - share) / rate:.0f} s left" if rate is not None and share < 1.0 else ""
         end = "\n" if share >= 1.0 else ""
         sys.stderr.write(f"\r{self.what}: {words}{left}      {end}")
         sys.stderr.flush()
