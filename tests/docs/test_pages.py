@@ -42,8 +42,8 @@ CODE = [
     pytest.param("orbits.md", marks=pytest.mark.slow),
 ]
 """Pages whose Python blocks run in order in one namespace; those that take more than a few seconds are slow."""
-ELSEWHERE = {"extending.md"}
-"""Pages whose blocks are files, run by another test: ``tests/solver/test_extending.py``."""
+ELSEWHERE = {"extending.md", "tutorial_beam.md", "tutorial_sweep.md", "tutorial_waveform.md"}
+"""Pages that other tests run: ``tests/solver/test_extending.py`` and ``test_tutorials.py``."""
 NEEDS_FILES = ('open_dataset("map.nc")', 'open_recording("test.cihx"')
 """Beginnings of blocks that read a file which a command or a camera made."""
 SMALLER = {"modes=32": "modes=2", "4.0, 128)": "4.0, 3)", "0.65, 80)": "0.65, 3)"}

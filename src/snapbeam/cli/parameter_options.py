@@ -15,6 +15,7 @@ import typer
 from rich.markup import escape
 
 from snapbeam.cli.console import add_json, duration, notes, out, pace, progress
+from snapbeam.util.work_rate import WorkRate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -644,8 +645,8 @@ class LongReport:
     def __init__(self, bar: Any, log: Path | None) -> None:
         self._bar = bar
         self._log = log
-        self._start = self._last = time.monotonic()
-        self._found = 0
+        self._last = time.monotonic()
+        self._rate = WorkRate()
         self._before: int | None = None
         self._quiet = True
 
@@ -657,18 +658,15 @@ class LongReport:
     def progress(self, done: int, total: int) -> None:
         """Say how far the present stage is."""
         now = time.monotonic()
-        if self._before is None or done < self._before:
-            self._start, self._found = now, done
+        self._rate.report(done)
         finished = done >= total and done != self._before
         self._before = done
         self._bar(done, total)
         if finished or self._quiet or now - self._last >= self._INTERVAL:
             self._last, self._quiet = now, False
             share = 100.0 * done / max(total, 1)
-            text = f"{done} of {total} points ({share:.1f} %)"
-            if done > self._found:
-                text += f", {pace(done, total, now - self._start, found=self._found)}"
-            self.log(text)
+            texts = (f"{done} of {total} points ({share:.1f} %)", pace(done, total, self._rate))
+            self.log(", ".join(filter(None, texts)))
 
     def log(self, text: str) -> None:
         """Append a line with the time to the log file, if there is one."""
