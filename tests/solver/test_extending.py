@@ -21,7 +21,7 @@ from snapbeam.model import default_values
 from snapbeam.model.contact.base import LAWS
 from snapbeam.model.drive.base import DRIVES
 from snapbeam.model.parameters import lookup, parameters
-from snapbeam.solver.statistics import STATISTICS, unregister
+from snapbeam.solver.statistics import STATISTICS, unregister_statistic
 from snapbeam.util.validation import InputError
 
 PAGE = Path(__file__).parents[2] / "docs" / "extending.md"
@@ -58,7 +58,7 @@ def own(tmp_path_factory):
         yield import_module("own_law").LinearContact, statistic, law
     finally:
         sys.path[:] = [path for path in sys.path if path not in map(str, (statistic, law, drive))]
-        unregister("max_penetration")
+        unregister_statistic("max_penetration")
         del LAWS["linear"]
         DRIVES.pop("smooth_pulse", None)
         assert package_hash() == before

@@ -11,7 +11,7 @@ import pytest
 import snapbeam as sb
 from snapbeam.model import default_values
 from snapbeam.solver.cpu import driver
-from snapbeam.solver.statistics import Statistic, accumulators_dtype, register, unregister
+from snapbeam.solver.statistics import Statistic, accumulators_dtype, register_statistic, unregister_statistic
 
 ROOTS = {
     "displacement": "displacement_at_striker",
@@ -102,13 +102,13 @@ def test_a_statistic_that_is_registered_after_a_run_has_its_own_kernels() -> Non
     row = Statistic(
         "steps_counted", "float64", "1", "steps of the run", lambda reading, held: held, update=lambda held, _: held + 1.0
     )  # fmt: skip
-    register(row)
+    register_statistic(row)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             with_row = sb.simulate(system, how).summary
     finally:
-        unregister("steps_counted")
+        unregister_statistic("steps_counted")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         after = sb.simulate(system, how).summary
@@ -126,12 +126,12 @@ def test_no_layout_of_records_begins_as_another_one_does() -> None:
     layouts = []
     for count in range(3):
         for row in rows[:count]:
-            register(row)
+            register_statistic(row)
         try:
             layouts += [accumulators_dtype(others) for others in range(3)]
         finally:
             for row in rows[:count]:
-                unregister(row.name)
+                unregister_statistic(row.name)
     fields = [list(each.fields.items()) for each in layouts]
     for i, one in enumerate(fields):
         for j, other in enumerate(fields):

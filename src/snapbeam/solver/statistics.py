@@ -39,10 +39,10 @@ __all__ = [
     "accumulators_dtype",
     "empty_accumulators",
     "of_one_named",
-    "register",
+    "register_statistic",
     "rows_for",
     "statistics_of",
-    "unregister",
+    "unregister_statistic",
     "updated",
 ]
 
@@ -363,7 +363,7 @@ def updated() -> tuple[Statistic, ...]:
     return tuple(row for row in STATISTICS.values() if row.update is not None)
 
 
-def register(statistic: Statistic) -> None:
+def register_statistic(statistic: Statistic) -> None:
     """Add a statistic to the table; every run and map from now on has it.
 
     Raises
@@ -378,7 +378,7 @@ def register(statistic: Statistic) -> None:
     STATISTICS[statistic.name] = statistic
 
 
-def unregister(name: str) -> None:
+def unregister_statistic(name: str) -> None:
     """Take a registered statistic out of the table again.
 
     Raises
