@@ -88,6 +88,7 @@ def test_saved_and_read_back_equal(name: str, tmp_path) -> None:
     assert pickle.loads(pickle.dumps(system)) == system
 
 
+@pytest.mark.slow
 def test_what_is_read_back_runs_alike(tmp_path) -> None:
     for name in ("start", "recorded", "restitution"):
         SYSTEMS[name].save(tmp_path / "system.toml")

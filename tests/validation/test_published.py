@@ -9,7 +9,13 @@ from cases import CASES, Row
 from write_table import TABLE, rows_of
 
 
-@pytest.mark.parametrize("name", CASES)
+SLOW = ("basin_shares", "mass_on_a_stop", "bouncing_ball", "lyapunov")
+"""Cases whose kernels no other test of the quick run needs, or that take long."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in CASES]
+)
 def test_case(name: str) -> None:
     for row in CASES[name]():
         assert math.isfinite(row.ours), row
