@@ -102,9 +102,8 @@ SLOW = pytest.mark.slow
     ("name", "share"),
     [
         ("spring", 1.7),
-        ("friction", 1.7),
         *(pytest.param(name, 0.3, marks=SLOW) for name in (*FORCES, "friction")),
-        *(pytest.param(name, 1.7, marks=SLOW) for name in ("rotation", "drag")),
+        *(pytest.param(name, 1.7, marks=SLOW) for name in ("rotation", "drag", "friction")),
     ],
 )
 def test_against_an_independent_solution(name, share, friction):
