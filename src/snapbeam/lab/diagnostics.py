@@ -200,6 +200,18 @@ KINDS_COMPARISON = table(
         "the measured shaker moves {ratio:.3f} times as far as the simulated one: another test, or another scale",
     ),
     Kind(
+        "comparison.units", ERROR,
+        "measured points on the map, against the same points in another unit or with columns exchanged",
+        "{inside:.0f} of {points:.0f} measured points lie on the map; {fitting:.0f} would, and with its classes, if "
+        "{told}: look at the columns of the table and at their units",
+    ),
+    Kind(
+        "comparison.contradicting", WARNING,
+        "classes of measured points with the same coordinates",
+        "{points:.0f} measured points have the coordinates of another point and a different class: they do not "
+        "count; correct the table",
+    ),
+    Kind(
         "comparison.gaps", INFO,
         "share of the cycles that were measured",
         "{share_percent:.0f} % of the compared cycles were not measured",

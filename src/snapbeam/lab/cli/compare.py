@@ -70,8 +70,7 @@ def compare(
         check_writable(report, "json", (".json",))
     dataset = open_result(simulated)
     if measured.suffix.lower() == ".csv":
-        summary, figure = _map(measured, dataset, plot is not None)
-        diagnostics: tuple[Diagnostic, ...] = ()
+        summary, figure, diagnostics = _map(measured, dataset, plot is not None)
     else:
         summary, figure, diagnostics = _run(
             open_result(measured),
@@ -93,7 +92,7 @@ def compare(
         console.print(f"Written: {file_line(report)}")
 
 
-def _map(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | None]:
+def _map(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | None, tuple[Diagnostic, ...]]:
     from rich.table import Table
 
     from snapbeam.lab.map_comparison import compare_measured_points
@@ -123,12 +122,13 @@ def _map(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | No
     console.print(table)
     for note in result.notes:
         console.print(f"[yellow]note[/] {note}")
+    lab.print_diagnostics(console, result.diagnostics)
     figure = None
     if draw:
         from snapbeam.lab.plot.comparison import plot_map_comparison
 
         figure = plot_map_comparison(dataset, points, result)
-    return result.summary(), figure
+    return result.summary(), figure, result.diagnostics
 
 
 def _short(kind: ResponseClass) -> str:

@@ -169,4 +169,5 @@ def _on_map(target: Path, simulated: Path) -> Path:
         )
     for note in result.notes:
         console.print(f"[yellow]note[/] {note}")
+    lab.print_diagnostics(console, result.diagnostics)
     return save_figure(plot_map_comparison(dataset, points, result), target / "measurements.png")
