@@ -32,7 +32,15 @@ __all__ = [
 
 
 class DiagnosticWarning(UserWarning):
-    """Something that can be computed but is probably not what was meant."""
+    """Something that can be computed but is probably not what was meant.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import snapbeam as sb
+    >>> warnings.simplefilter("error", sb.DiagnosticWarning)  # a doubtful input then ends the script
+    >>> warnings.resetwarnings()
+    """
 
 
 class Severity(StrEnum):
@@ -63,6 +71,13 @@ class Diagnostic:
         The figures behind the words, by name.
     severity : Severity
         How much it takes from the result; its name does, too.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> diagnostic = sb.Diagnostic("beam.steep", "the slopes of the beam are not small", {"slope": 0.2})
+    >>> diagnostic.numbers["slope"]
+    0.2
     """
 
     code: str
