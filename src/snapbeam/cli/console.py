@@ -374,7 +374,8 @@ class _Lines:
     def __call__(self, done: int, total: int) -> None:
         if total != self.total:
             begun = self.total is not None
-            self.console.print(f"{count_text(total, self.what)} {'in all now' if begun else 'to compute'}")
+            less = self.total is not None and total < self.total
+            self.console.print(f"{count_text(total, self.what)} {'remain' if less else 'to compute'}")
             self.total, self.tenths = total, 10 * done // total if begun and total else 0
         self.rate.report(done)
         tenths = 10 * done // total if total else 10
