@@ -18,7 +18,7 @@ from snapbeam.lab.diagnostics import KINDS_SIGNAL
 from snapbeam.lab.signals import check_signal, even_sampling, si_unit
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.input_files import decoded
-from snapbeam.util.netcdf import hdf5_stream
+from snapbeam.util.netcdf import hdf5_stream, refuse_large
 from snapbeam.util.validation import InputError, positive
 
 if TYPE_CHECKING:
@@ -170,6 +170,7 @@ def read_hdf5(path: Path, _told: Told) -> list[Channel]:
     """Return the channels of an HDF5 file."""
     import h5py
 
+    refuse_large(path)
     channels: list[Channel] = []
     with h5py.File(path, "r") as file:
 
@@ -599,6 +600,7 @@ def _version_5(path: Path) -> dict[str, Any]:
 def _version_73(path: Path) -> dict[str, Any]:
     import h5py
 
+    refuse_large(path)
     values: dict[str, Any] = {}
     with h5py.File(path, "r") as file:
 
