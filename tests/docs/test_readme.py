@@ -96,4 +96,3 @@ def test_numbers_of_the_claims():
     total, hold, part, fail, close = re.findall(r"\d+", words)[:5]
     assert f"Of {total} statements of the paper that can be tested, {hold} hold, {part} hold in part" in PLAIN
     assert f"{fail} fail; {close} of these verdicts" in PLAIN
-
