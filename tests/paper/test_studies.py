@@ -63,7 +63,7 @@ def test_the_stored_harvester_is_of_a_real_material():
     found = xr.load_dataset(DATA / "harvesting.nc", group="power", engine="h5netcdf")
     power, kinds = 1e6 * found.power.values, found.kind.values
     assert np.median(power[kinds == ResponseClass.INTRAWELL]) == pytest.approx(4.6, abs=0.05)
-    assert np.median(power[kinds == ResponseClass.CONTINUOUS_INTERWELL]) == pytest.approx(250.0, abs=0.5)
+    assert np.median(power[kinds == ResponseClass.CONTINUOUS]) == pytest.approx(250.0, abs=0.5)
     assert power.max() == pytest.approx(531.0, abs=1.0)
 
 

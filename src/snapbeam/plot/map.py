@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 import warnings
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from snapbeam.plot.axes import axis_label, dress, edges_of, positions, symbol_of
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CLASS_COLORS,
+    base_and_load,
     beam_text,
     class_cells,
     figure_style,
@@ -56,6 +58,8 @@ UPWARD = ("velocity_amplitude", "location")
 
 _CURVES = ("min_midspan_displacement", "max_midspan_displacement")
 """Drawn over the classes of a map over one axis."""
+_LONGEST = 38
+"""Characters of a line beside a map of one column."""
 _NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
 
 
@@ -235,6 +239,7 @@ def subtitle(dataset: xr.Dataset, axes: tuple[str, ...]) -> str:
         value = _scalar(dataset, name)
         if name not in axes and value is not None:
             parts.append(f"{symbol_of(dataset, name)} = {value:.4g}")
+    parts += base_and_load(dataset)
     beam = "" if any(name.startswith("beam") for name in axes) else beam_text(dataset.attrs)
     return "\n".join(line for line in (beam, ", ".join(parts)) if line)
 
@@ -454,9 +459,9 @@ def _label(dataset: xr.Dataset, name: str, values: np.ndarray) -> tuple[float, s
     unit = str(attrs.get("units", row.unit if row else "1"))
     words = words[:1].upper() + words[1:]
     if unit == "1":
-        return 1.0, words
+        return 1.0, textwrap.fill(words, _LONGEST)
     factor, scaled = scale_of(values, unit)
-    return factor, f"{words} ({scaled})"
+    return factor, textwrap.fill(f"{words} ({scaled})", _LONGEST)
 
 
 # ----------------------------------------------------------------------------------------------------
