@@ -21,6 +21,7 @@ from snapbeam.plot.axes import axis_label, dress, edges_of, positions, symbol_of
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CLASS_COLORS,
+    SHAKER_COLOR,
     base_and_load,
     beam_text,
     class_cells,
@@ -361,7 +362,7 @@ def plot_statistic(
     Parameters
     ----------
     dataset : xarray.Dataset
-        A map.
+        A map, or a result of :func:`snapbeam.dynamics.hysteresis`, whose two sweeps are drawn as two lines.
     name : str
         One of :data:`snapbeam.STATISTICS`, or any other variable over the axes.
     ax : matplotlib.axes.Axes, optional
@@ -396,7 +397,9 @@ def plot_statistic(
         raise InputError(f"variable = {shown(name)}: the map has {', '.join(map(str, dataset.data_vars))}")
     if dataset[name].dims == ("point",):
         return plot_points(dataset, name, ax)
-    values = dataset[name].squeeze()
+    values = dataset[name].squeeze(
+        [each for each, size in dataset[name].sizes.items() if size == 1 and each != "sweep"]
+    )
     dims = [str(each) for each in values.dims]
     if not 1 <= len(dims) <= 2 or "point" in dims:
         sizes = ", ".join(f"{key} {size}" for key, size in values.sizes.items()) or "none"
@@ -412,7 +415,11 @@ def plot_statistic(
         if ax is None:
             ax = new_figure("single", 74.0).add_subplot()
         fix_ticks(ax)
-        if len(dims) == 1:
+        if dims[:1] == ["sweep"]:
+            _swept(ax, dataset, data, dims[1])
+            ax.set_ylabel(label)
+            ax.set_yscale("log" if log else "linear")
+        elif len(dims) == 1:
             points, _ = positions(dataset, dims[0])
             ax.plot(points, data.values, ".-", color=BEAM_COLOR, markersize=3)
             dress(ax.xaxis, dataset, dims[0])
@@ -434,6 +441,17 @@ def plot_statistic(
             dress(ax.yaxis, dataset, upward)
         ax.set_title(subtitle(dataset, (*dims,)), loc="left")
     return ax
+
+
+def _swept(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, name: str) -> None:
+    """Draw a statistic over a parameter that was swept up and down: filled and open markers."""
+    points, _ = positions(dataset, name)
+    looks = {"up": ("^-", BEAM_COLOR, BEAM_COLOR), "down": ("v--", SHAKER_COLOR, "white")}
+    for row, kind in zip(data.values, dataset["sweep"].values, strict=True):
+        look, color, face = looks[str(kind)]
+        ax.plot(points, row, look, color=color, markerfacecolor=face, markersize=3.5, label=f"swept {kind}")
+    dress(ax.xaxis, dataset, name)
+    ax.legend(loc="best")
 
 
 def scaled_values(dataset: xr.Dataset, name: str) -> tuple[_Array, str]:

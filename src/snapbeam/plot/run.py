@@ -356,7 +356,9 @@ def plot_run(
             rows, 2 if has_force else 1, width_ratios=(2.2, 1.0) if has_force else None,
             height_ratios=(1.6, *(1.0,) * (rows - 1)),
         )  # fmt: skip
-        scales = {name: scale_of(part[name].values, unit) for name, (_, unit) in _PANELS.items() if name in part}
+        scales = {
+            name: scale_of(part[name].values, unit) for name, (_, unit) in _PANELS.items() if name in part
+        }
         left = _column(figure, grid, 0, part, part[axis_name].values, scales)
         if "power_load" in part:
             _mean_power(left[-1], dataset, axis_name, scales["power_load"])
@@ -421,7 +423,12 @@ def _cut(dataset: xr.Dataset, across: str, window: tuple[float, float] | None) -
 
 
 def _column(
-    figure: Figure, grid: GridSpec, at: int, part: xr.Dataset, x: np.ndarray, scales: dict[str, tuple[float, str]]
+    figure: Figure,
+    grid: GridSpec,
+    at: int,
+    part: xr.Dataset,
+    x: np.ndarray,
+    scales: dict[str, tuple[float, str]],
 ) -> list[Axes]:
     rows = grid.nrows
     axes: list[Axes] = []
