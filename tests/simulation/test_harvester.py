@@ -89,6 +89,14 @@ def test_the_command_reports_the_harvester_and_no_striker(tmp_path, monkeypatch,
     assert "impacts" not in answer.stdout and "striker" not in answer.stdout
 
 
+def test_a_large_file_is_announced(tmp_path, monkeypatch, run):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("snapbeam.cli.simulate._LARGE_FILE", 1e4)
+    (tmp_path / "harvester.toml").write_text(FILE)
+    answer = CliRunner().invoke(app, ["simulate", "--config", "harvester.toml", "-o", "run.nc"])
+    assert f"run.nc: {run.dataset.sizes['time']} samples, about 1 MB" in answer.stderr
+
+
 def test_the_figure_shows_voltage_and_power(run):
     figure = run.plot().figure
     assert [ax.get_ylabel() for ax in figure.axes] == [

@@ -16,6 +16,7 @@ from snapbeam.cli.console import (
     duration,
     errors,
     file_line,
+    notes,
     out,
     show_compilation,
 )
@@ -136,6 +137,7 @@ def simulate(
     console.print(_summary_text(summary, time.monotonic() - start, system))
     if output is not None:
         if run is not None:
+            _warn_of_size(run.dataset, output)
             run.save(output)
         console.print(f"Written: {file_line(output)}")
     if run is not None and plot is not None:
@@ -146,6 +148,19 @@ def simulate(
     add_json(summary=summary, seconds=time.monotonic() - start, system=system.hash, files=files)
     if summary.status not in (sb.RunStatus.OK, sb.RunStatus.EARLY_STOP):
         raise typer.Exit(FAILED)
+
+
+_LARGE_FILE = 100e6
+"""Bytes of a run above which the command says so before it writes the file."""
+
+
+def _warn_of_size(dataset: xr.Dataset, path: Path) -> None:
+    if dataset.nbytes > _LARGE_FILE:
+        notes().print(
+            f"{path}: {dataset.sizes['time']} samples, about {dataset.nbytes / 1e6:.0f} MB; for a smaller file use fewer "
+            "samples per cycle, such as --samples 50",
+            markup=False,
+        )
 
 
 def _even(system: Any, integration: Any, samples: int | None) -> Any:

@@ -251,7 +251,7 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     Parameters
     ----------
     kinds : int8 array, optional
-        Classes of runs, whose shares then stand beside the names; unknown ones are named if there are any.
+        Classes of runs, whose shares then stand beside the names; classes without runs are left out.
 
     Examples
     --------
@@ -269,7 +269,7 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     handles: list[Patch | Line2D] = []
     for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
         count = 0 if kinds is None else int((kinds == kind).sum())
-        if count or kind is not ResponseClass.UNKNOWN:
+        if count or (kinds is None and kind is not ResponseClass.UNKNOWN):
             label = kind.label if kinds is None else f"{kind.label}, {_percent(count, kinds.size)}"
             handles.append(Patch(facecolor=CLASS_COLORS[kind], edgecolor="black", linewidth=0.4, label=label))
     return handles

@@ -301,6 +301,10 @@ _PANELS = {
     "power_load": ("Power in\nthe load", "W"),
 }
 """Variables below the displacements: label and unit."""
+_ENVELOPE = 100
+"""Cycles above which a run over cycles is drawn by its range in intervals, of which there are about so many."""
+_FEW = 200
+"""Samples below which a close-up shows each of them, and a smooth curve through them."""
 _MANY = 20_000  # samples above which a curve is stored as pixels in a vector file
 
 
@@ -310,7 +314,8 @@ def plot_run(
 ) -> Axes:
     """Draw the displacements, the penetration and the contact force of a run, and its hardest impact closer.
 
-    Left, over cycles of excitation: the whole run or a window.  Right, over time: the samples about
+    Left, over cycles of excitation: the whole run or a window.  More than 100 cycles are drawn by the range, minimum to
+    maximum, in intervals of whole cycles; choose a window to see each cycle.  Right, over time: the samples about
     the greatest contact force within the window, from a little before the contact to a little after it.  A
     measured run, which has no force, is drawn without what it lacks.
 
@@ -377,8 +382,11 @@ def plot_run(
             scale, unit = scale_of(seconds, "s")
             around = seconds / scale
             right = _column(figure, grid, 1, near, around, scales)
+            digits = _digits(near, axis_name)
             right[-1].set_xlabel(
-                f"Time after $\\tau$ = {peak:.4g} ({unit})" if axis_name == "cycle" else f"Time ({unit})"
+                f"Time after $\\tau$ = {peak:.{digits}f} ({unit})"
+                if axis_name == "cycle"
+                else f"Time ({unit})"
             )
             right[0].set_xlim(min(around[0], -0.12 * around[-1]), around[-1])
     return left[0]
@@ -438,8 +446,14 @@ def _column(
         axes[-1].tick_params(labelbottom=row == rows - 1)
         axes[-1].margins(x=0.0)
     pixels = x.size > _MANY
+    far = at == 0 and "cycle" in part.variables and float(x[-1] - x[0]) > _ENVELOPE
     for name, label, color in _curves(part):
-        axes[0].plot(x, part[name].values, color=color, label=label, rasterized=pixels)
+        if far:
+            _envelope(axes[0], x, part[name].values, color, f"{label} (range)")
+        elif at == 1 and x.size < _FEW:
+            axes[0].plot(*_smooth(x, part[name].values), color=color, label=label)
+        else:
+            axes[0].plot(x, part[name].values, color=color, label=label, rasterized=pixels)
     if at == 0:
         axes[0].axhline(0.0, color="0.6", linewidth=0.5, zorder=0)
     for row, name in enumerate((each for each in _PANELS if each in part), 1):
@@ -448,7 +462,13 @@ def _column(
         if name == "penetration_normalised":
             factor, unit = 1.0, "$10^{-3}\\,b$"
             values = 1e3 * np.maximum(part[name].values, 0.0)
-        axes[row].plot(x, values, color=BEAM_COLOR, rasterized=pixels)
+        if far:
+            _envelope(axes[row], x, values, BEAM_COLOR, None)
+        elif at == 1 and x.size < _FEW:
+            axes[row].plot(*_smooth(x, values), color=BEAM_COLOR)
+            axes[row].plot(x, values, ".", color=BEAM_COLOR, markersize=2.5)
+        else:
+            axes[row].plot(x, values, color=BEAM_COLOR, rasterized=pixels)
         if name != "voltage":
             axes[row].set_ylim(bottom=0.0)
         if at == 0:
@@ -468,6 +488,34 @@ def _mean_power(ax: Axes, dataset: xr.Dataset, across: str, scale: tuple[float, 
     ax.plot(x[late][[0, -1]], [mean / scale[0]] * 2, color=SHAKER_COLOR, linewidth=1.2, label=words)
     ax.set_ylim(0.0, 1.3 * ax.get_ylim()[1])
     ax.legend(loc="upper left")
+
+
+def _digits(near: xr.Dataset, across: str) -> int:
+    """Digits after the point of a cycle, so that rounding shifts the close-up by less than a hundredth of it."""
+    span = float(near[across][-1] - near[across][0])
+    return int(np.clip(np.ceil(-np.log10(max(span, 1e-12) / 50.0)), 0, 12))
+
+
+def _smooth(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a curve through samples that has no maximum between them (monotone cubic interpolation)."""
+    from scipy.interpolate import PchipInterpolator
+
+    good = np.isfinite(y)
+    if good.sum() < 3:
+        return x, y
+    dense = np.union1d(x[good], np.linspace(x[good][0], x[good][-1], 600))
+    return dense, PchipInterpolator(x[good], y[good])(dense)
+
+
+def _envelope(ax: Axes, x: np.ndarray, y: np.ndarray, color: str, label: str | None) -> None:
+    """Draw the range of a curve in each of about :data:`_ENVELOPE` intervals of whole cycles."""
+    width = np.ceil((x[-1] - x[0]) / _ENVELOPE)
+    interval = np.floor((x - x[0]) / width).astype(int)
+    starts = np.flatnonzero(np.diff(interval, prepend=-1))
+    low, high = (np.asarray(f.reduceat(y, starts)) for f in (np.fmin, np.fmax))
+    at = np.append(x[starts], x[-1])
+    look: dict[str, Any] = {"step": "post", "color": color, "linewidth": 0.6, "label": label}
+    ax.fill_between(at, np.append(low, low[-1]), np.append(high, high[-1]), alpha=0.35, **look)
 
 
 def _hardest_impact(part: xr.Dataset) -> tuple[xr.Dataset, np.ndarray, float]:
