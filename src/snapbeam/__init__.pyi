@@ -35,6 +35,7 @@ from .model.external_force import ConstantForce as ConstantForce
 from .model.external_force import ExternalForce as ExternalForce
 from .model.external_force import HarmonicForce as HarmonicForce
 from .model.external_force import RecordedForce as RecordedForce
+from .model.force_displacement import force_displacement as force_displacement
 from .model.harvester import ElectromagneticHarvester as ElectromagneticHarvester
 from .model.harvester import PiezoelectricHarvester as PiezoelectricHarvester
 from .model.imperfection import Imperfection as Imperfection

@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from snapbeam.cli.app import app
+from snapbeam.util.netcdf import read_netcdf
 
 
 def run(*arguments: object):
@@ -32,3 +33,23 @@ def test_what_explains_measured_wells() -> None:
     refused = run("equilibria", "--lower-frequency", 81.3)
     assert refused.exit_code != 0
     assert "give both" in refused.output
+
+
+def test_force_displacement_curve(tmp_path) -> None:
+    arch = ("--axial-load", 0, "--midspan-amplitude", 1e-3, "--modes", 3)
+    curve, figure = tmp_path / "curve.nc", tmp_path / "curve.png"
+    answer = run("equilibria", *arch, "--force-displacement", "-o", curve, "--plot", figure, "--json", "-")
+    assert answer.exit_code == 0, answer.output
+    found = json.loads(answer.stdout)
+    assert found["well"] == "upper"
+    assert found["snap_through_force"] == pytest.approx(-1.33, rel=0.01)
+    assert set(found["critical_kinds"]) == {"limit", "bifurcation"}
+    assert figure.stat().st_size > 10_000
+    dataset = read_netcdf(curve, "file")
+    assert float(dataset.snap_back_force) == found["snap_back_force"]
+    text = run("equilibria", *arch, "--force-displacement").output
+    assert "from the upper well (the only equilibrium)" in text
+    assert "snap-back: " in text
+    refused = run("equilibria", *arch, "--plot", figure)
+    assert refused.exit_code != 0
+    assert "--force-displacement" in refused.output

@@ -365,6 +365,15 @@ class Wells:
             f"load of {self.beam.critical_load:g} N"
         )
 
+    @property
+    def as_fabricated_well(self) -> str | None:
+        """The well on the side of the initial shape, "lower" or "upper"; None without an initial shape at the centre."""
+        if self.beam is None or self.imperfection is None:
+            return None
+        initial = self.imperfection.initial_shape(self.beam.buckling_modes(self.well_amplitude.size))
+        height = float(self.midspan_shape @ initial)
+        return None if height == 0.0 else "upper" if height > 0.0 else "lower"
+
     @cached_property
     def two_well_limits(self) -> str:
         """In words, the nearest imperfection and the least axial load with two wells, of a beam with one; computed."""
