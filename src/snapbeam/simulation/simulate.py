@@ -81,6 +81,9 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
         attrs |= _short(model.beam.boundary)
     if model.imperfection is not None:
         attrs |= _short(model.imperfection)
+    if model.transverse_force is not None:
+        start = system.initial_state or rest_state(model, system.striker)
+        attrs |= {"reference_well": model.reference_well, "initial_well": model.side_of(start.amplitude)}
     sections = system.to_mapping() if system.has_environment else {}
     for section in ("base_excitation", "axial_load", "external_force", "harvester"):
         for name, value in sections.get(section, {}).items():
