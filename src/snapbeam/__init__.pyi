@@ -67,6 +67,8 @@ from .sweeps.checkpoint.read import read_checkpoint as read_checkpoint
 from .sweeps.checkpoint.records import CheckpointError as CheckpointError
 from .sweeps.checkpointed_sweep import CheckpointOptions as CheckpointOptions
 from .sweeps.checkpointed_sweep import SweepReport as SweepReport
+from .sweeps.measured_points import MeasuredPoints as MeasuredPoints
+from .sweeps.measured_points import read_measured_points as read_measured_points
 from .sweeps.replicates import Replicates as Replicates
 from .sweeps.sweep import sweep as sweep
 from .sweeps.threshold import threshold as threshold

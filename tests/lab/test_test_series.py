@@ -63,6 +63,7 @@ def test_a_foreign_figure_is_kept_and_nothing_is_measured(tmp_path, name):
     assert [path.name for path in output.iterdir()] == [name]
 
 
+@pytest.mark.slow
 def test_a_good_test_and_a_spoiled_one(tmp_path):
     folder = tmp_path / "tests"
     folder.mkdir()

@@ -70,6 +70,12 @@ class InitialConditions:
         not press the beam at rest.  For a single striker with a sinusoidal motion.
     seed : int
         Seed of the initial conditions: number s comes from Philox with the key (seed, s).
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> sb.dynamics.InitialConditions(count=64, displacement=1e-4, seed=1).count
+    64
     """
 
     count: int = 32

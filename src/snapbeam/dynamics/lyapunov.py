@@ -89,6 +89,17 @@ def lyapunov_spectrum(
     ------
     InputError
         For bad input, and for a contact law whose force jumps or depends on the velocity: see :func:`largest_lyapunov`.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> result = sb.dynamics.lyapunov_spectrum(system, 2, periods=40, transient=20)
+    >>> result.exponent.dims, result.exponent.attrs["units"]
+    (('run', 'exponent_number'), '1/s')
     """
     flow = flow_of(system, integration)
     count = integer("k", k, 1, flow.dimension)
@@ -263,6 +274,17 @@ def largest_lyapunov(
     xarray.Dataset
         ``exponent`` (1/s) and ``exponent_error`` over ``run``.  An exponent is NaN, with a warning, if the two
         trajectories become equal to rounding within a period; the attribute ``merged`` counts such runs.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> result = sb.dynamics.largest_lyapunov(system, 40, transient=20)
+    >>> bool(result.exponent < 0.0)
+    True
     """
     import xarray as xr
 

@@ -33,6 +33,22 @@ class MapComparison:
     nearest point of the map), ``used`` (1 if it counts) and ``distance``, in steps of the map, to the
     nearest point that has the measured class (NaN if none has).  ``confusion[i, j]`` counts points of
     measured class i and simulated class j, in the order of ``classes``.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import lab, paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> axes = {"frequency_ratio": [1.0, 1.2], "velocity_amplitude": [0.02, 0.1, 0.2]}
+    >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
+    >>> measured = sb.MeasuredPoints(
+    ...     frequency_ratio=[1.0, 1.2], velocity_amplitude=[0.02, 0.2], location=[0.4762, 0.4762], response_class=[0, 3]
+    ... )
+    >>> comparison = lab.compare_measured_points(measured, dataset)
+    >>> comparison.agreement
+    0.5
     """
 
     table: xr.Dataset
@@ -107,6 +123,22 @@ def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -
     -----
     A point does not count if it lies more than half a step outside the map, was measured at another value of a
     coordinate that the map holds fixed (by more than 2 %), or has no class on either side.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import lab, paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> axes = {"frequency_ratio": [1.0, 1.2], "velocity_amplitude": [0.02, 0.1, 0.2]}
+    >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
+    >>> measured = sb.MeasuredPoints(
+    ...     frequency_ratio=[1.0, 1.2], velocity_amplitude=[0.02, 0.2], location=[0.4762, 0.4762], response_class=[0, 3]
+    ... )
+    >>> comparison = lab.compare_measured_points(measured, dataset)
+    >>> comparison.used
+    2
     """
     import xarray as xr
 

@@ -51,6 +51,14 @@ def read_channels(
     ------
     InputError
         If the file is missing, cut short, of no known kind, without sampling rate, or without a channel.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> path = lab.write_signal("velocity.csv", velocity)
+    >>> len(lab.read_channels(path))
+    1
     """
     if not isinstance(path, (str, os.PathLike)):
         raise InputTypeError(f"path = {shown(path)}: must be a path, not {type(path).__name__}")
@@ -130,6 +138,14 @@ def read_signal(
     InputError
         Naming the file and the field: a missing or contradicting unit, an unknown channel, NaN, times that
         do not increase or have gaps, a truncated file.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> path = lab.write_signal("velocity.csv", velocity)
+    >>> lab.read_signal(path).attrs["units"]
+    'm/s'
     """
     channels = read_channels(path, sampling_frequency, columns)
     names = [entry["name"] for entry in channels]
@@ -205,6 +221,13 @@ def write_signal(
     ------
     InputError
         If the path cannot be written, or a WAV would clip or needs a rate that is no whole number of hertz.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> lab.write_signal("velocity.wav", velocity, full_scale=0.1).name
+    'velocity.wav'
     """
     target = check_writable(path, "path", tuple(WRITERS))
     check_signal(signal)

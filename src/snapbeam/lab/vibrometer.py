@@ -585,6 +585,14 @@ class DriveMeasurement:
     ``flaws`` are samples (first, one past the last) that are no part of the motion, ``lines`` hum, which is taken
     out, and lines beside the sine; ``clipping`` the levels at which tops are cut off; ``diagnostics`` what makes the
     result doubtful.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> drive = lab.measure_drive(velocity, 100.0)
+    >>> f"{drive.steady.frequency:.1f} Hz"
+    '100.0 Hz'
     """
 
     steady: SineFit
@@ -676,6 +684,14 @@ def measure_drive(
     ------
     InputError
         If the signal is no such signal, or holds fewer than five cycles of steady motion.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> drive = lab.measure_drive(velocity, 100.0)
+    >>> f"{drive.steady.amplitude:.4f} m/s"
+    '0.0070 m/s'
     """
     samples = check_signal(signal, ("m/s", "m"), "signal")
     limit = finite("snr_limit", snr_limit)
@@ -911,6 +927,14 @@ def displacement_from_velocity(
     ------
     InputError
         As :func:`measure_drive`.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> drive = lab.measure_drive(velocity, 100.0)
+    >>> lab.displacement_from_velocity(velocity, drive).attrs["units"]
+    'm'
     """
     from scipy.interpolate import CubicSpline, make_smoothing_spline
 

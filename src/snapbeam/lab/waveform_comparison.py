@@ -127,6 +127,19 @@ def compare_waveforms(
     ------
     InputError
         If a run lacks the shaker, the two share fewer than two cycles, or no frequency is known.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import lab, paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> frequency = 1.2 * model.reference_frequency  # Hz
+    >>> comparison = lab.compare_waveforms(run.dataset, run.dataset, frequency, cycles=(2, 18))
+    >>> f"{comparison.amplitude_ratio:.2f}"
+    '1.00'
     """
     import xarray as xr
 
@@ -326,6 +339,17 @@ class MeasuredResponse:
     ``response_class`` is UNKNOWN where ``reasons`` say why.  ``zero_crossings`` is at least what happened: more may
     hide in dropouts.  ``noise`` and ``hysteresis`` are in units of b; ``final_well`` is -1 or 1, the sign
     at the end.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import lab, paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> lab.measure_response(run.dataset, cycles=20).response_class.label
+    'continuous interwell'
     """
 
     response_class: ResponseClass
@@ -382,6 +406,17 @@ def measure_response(
     ------
     InputError
         If the dataset is no run, or neither *frequency* nor ``cycle`` says how long a cycle is.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import lab, paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> lab.measure_response(run.dataset, cycles=20).zero_crossings
+    16
     """
     choice("at", at, ("displacement_at_striker", "midspan_displacement"))
     check_trajectory(run, require=(at,))

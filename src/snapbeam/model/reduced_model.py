@@ -566,6 +566,16 @@ class ReducedModel(Wells):
         Displacement of each coordinate per unit of the base's, of a structure given by matrices.
     elongation_matrix : array of shape (N, N) or None
         S of the term gamma (alpha . S alpha) S alpha, of a structure given by matrices; None for the identity.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=8, damping_ratio=0.005)
+    >>> round(model.reference_frequency, 2)
+    81.92
+    >>> model.is_bistable
+    True
     """
 
     mass: _Array

@@ -71,6 +71,15 @@ class State:
     ------
     InputError
         For shapes that do not fit each other, or numbers that are not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=0.005)
+    >>> start = sb.State(amplitude=1.1 * model.well_amplitude, velocity=np.zeros(2))
+    >>> system = sb.System(model, initial_state=start)
     """
 
     amplitude: _Array

@@ -97,6 +97,17 @@ def plot_response_map(
     ------
     InputError
         If the dataset is not a map of one or two axes.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> axes = {"drive.frequency_ratio": [0.7, 0.8], "drive.velocity_amplitude": [0.1, 0.2]}
+    >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_response_map(dataset)
     """
     import xarray as xr
 
@@ -235,6 +246,12 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     ----------
     kinds : int8 array, optional
         Classes of runs, whose shares then stand beside the names; unknown ones are named if there are any.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> [handle.get_label() for handle in sb.plot.class_handles()][:2]
+    ['intrawell', 'transient interwell 1']
     """
     if kinds is not None:
         try:
@@ -355,6 +372,17 @@ def plot_statistic(
     ------
     InputError
         If there is no such variable, or it is over more than two axes.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> axes = {"drive.frequency_ratio": [0.7, 0.8], "drive.velocity_amplitude": [0.1, 0.2]}
+    >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_statistic(dataset, "peak_force")
     """
     import xarray as xr
 
@@ -485,6 +513,23 @@ def plot_points(
     ------
     InputError
         If the dataset is not a list of points, or its points have no such variable or parameters.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> import xarray as xr
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> points = xr.Dataset(
+    ...     {
+    ...         "drive.frequency_ratio": ("point", [0.7, 0.75, 0.8]),
+    ...         "drive.velocity_amplitude": ("point", [0.1, 0.2, 0.3]),
+    ...     }
+    ... )
+    >>> dataset = sb.sweep(system, points, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_points(dataset, "peak_force")
     """
     import xarray as xr
 

@@ -84,6 +84,16 @@ def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, mode
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_modal_amplitudes(run, modes=2)
     """
     dataset = dataset_of(run, "modal_amplitude")
     count = min(integer("modes", modes, 1), dataset.sizes["mode"])
@@ -136,6 +146,16 @@ def plot_energies(run: Run | xr.Dataset, ax: Axes | None = None) -> Axes:
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_energies(run)
     """
     dataset = dataset_of(run, "energy_beam")
     name, label = across(dataset)
@@ -176,6 +196,16 @@ def plot_spectrum(
     -------
     matplotlib.axes.Axes
         Over the excitation frequency where the run has cycles, else over hertz.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_spectrum(run)
     """
     dataset = dataset_of(run, variable)
     choice(
@@ -225,6 +255,16 @@ def plot_phase_portrait(
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_phase_portrait(run)
     """
     at_midspan = choice("of", of, ("midspan", "striker")) == "midspan"
     names = ("midspan_displacement", "midspan_velocity")
@@ -285,6 +325,16 @@ def plot_run(
     ------
     InputError
         If the dataset is no run or the window holds less than two samples.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_run(run, window=(10.0, 15.0))
     """
     dataset = dataset_of(run, "displacement_at_striker")
     axis_name, label = across(dataset)

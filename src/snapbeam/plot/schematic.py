@@ -194,6 +194,15 @@ def plot_system(system: System, title: str = "") -> Figure:
     ------
     InputError
         For a structure given by matrices.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> figure = sb.plot.plot_system(system, title="Beam of the paper")
     """
     instance("system", system, System, "a System")
     instance("title", title, str, "text")

@@ -104,6 +104,12 @@ def figure_style() -> AbstractContextManager[None]:
 
     Matplotlib loads its backend first.  In a notebook the backend switches ``rcParams["interactive"]`` on, and the end
     of the context would switch it off again if the backend were loaded inside.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> with sb.plot.figure_style():
+    ...     figure = sb.plot.new_figure("single")
     """
     import matplotlib.pyplot as plt
 
@@ -127,6 +133,13 @@ def new_figure(width: str = "single", height: float = 75.0) -> Figure:
         One column (90 mm) or two (190 mm).
     height : float
         Height, mm.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> figure = sb.plot.new_figure("double", height=60.0)
+    >>> f"{25.4 * figure.get_figwidth():.0f} mm"
+    '190 mm'
     """
     import matplotlib.pyplot as plt
 
@@ -149,6 +162,17 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
     ------
     InputError
         If the path cannot be written or has another suffix.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> sb.plot.save_figure(run.plot(), "run.pdf").name
+    'run.pdf'
     """
     target = check_writable(path, "plot", FIGURE_SUFFIXES)
     if isinstance(figure, Axes):

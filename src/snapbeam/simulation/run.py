@@ -50,6 +50,20 @@ class Run:
         Error estimate, if a tolerance was given.
     final_state : State or None
         State at the end of the run; None if the run failed.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
+    ...     paper.CONTACT,
+    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18),
+    ... )
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> run.summary.response_class.label
+    'continuous interwell'
+    >>> displacement = run.dataset["midspan_displacement"]
     """
 
     dataset: xr.Dataset

@@ -401,6 +401,19 @@ def simulate(
     InputError
         For bad input, and for a run whose samples need more than 4 GiB.  A run that fails numerically does not
         raise: ``run.summary.status`` gives the reason.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
+    ...     paper.CONTACT,
+    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18),
+    ... )
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> run.summary.response_class.label
+    'continuous interwell'
     """
     if isinstance(system, (list, tuple)):
         return _several(system, integration, sample_times, progress)

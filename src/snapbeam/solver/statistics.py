@@ -140,6 +140,14 @@ class Statistic:
         What *update* begins with.
     comment : str
         Relative error of the integration over time, beside the error of the run.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> row = sb.Statistic(
+    ...     "mean_force", "float64", "N", "mean contact force",
+    ...     lambda reading: reading.seen("total_impulse") / reading.duration,
+    ... )
     """
 
     name: str
@@ -370,6 +378,19 @@ def register_statistic(statistic: Statistic) -> None:
     ------
     InputError
         If the name is taken or cannot name a variable.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> sb.register_statistic(
+    ...     sb.Statistic(
+    ...         "mean_force", "float64", "N", "mean contact force",
+    ...         lambda reading: reading.seen("total_impulse") / reading.duration,
+    ...     )
+    ... )
+    >>> "mean_force" in sb.STATISTICS
+    True
+    >>> sb.unregister_statistic("mean_force")
     """
     if not statistic.name.isidentifier():
         raise InputError(f"statistic {statistic.name!r}: must be a name, such as 'rms_force'")
@@ -385,6 +406,13 @@ def unregister_statistic(name: str) -> None:
     ------
     InputError
         If there is none of that name, or it is one of the package's own.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> row = sb.Statistic("impulse_per_second", "float64", "N", "impulse per second", lambda reading: 0.0)
+    >>> sb.register_statistic(row)
+    >>> sb.unregister_statistic("impulse_per_second")
     """
     if name not in list(STATISTICS) or STATISTICS[name] in _ROWS:
         raise InputError(f"statistic {name!r}: was not registered")

@@ -53,7 +53,14 @@ class _Incomplete(Exception):
 
 @dataclass
 class SweepReport:
-    """Counts of computed, resumed, damaged and failed tasks of a sweep."""
+    """Counts of computed, resumed, damaged and failed tasks of a sweep.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> report = sb.SweepReport()
+    >>> options = sb.CheckpointOptions("sweep.checkpoint", report=report)  # of sb.sweep(..., checkpoint=options)
+    """
 
     tasks: int = 0
     """Tasks of all stages."""
@@ -90,6 +97,11 @@ class CheckpointOptions:
         Function that receives a message about the computation, as ``note(text)``.
     report : SweepReport, optional
         Object that receives the counts of computed, resumed, damaged and failed tasks.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> options = sb.CheckpointOptions("sweep.checkpoint", points_per_task=64)
     """
 
     path: str | os.PathLike[str] | None = None

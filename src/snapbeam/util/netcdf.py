@@ -77,6 +77,12 @@ def write_netcdf(
         If *data* are no datasets, or nothing can be written to *path*, which ends in ``.nc``.
     NoRoomError
         If there is no room for the file; it says how much is needed, and where the file is kept instead.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> import xarray as xr
+    >>> sb.write_netcdf(xr.Dataset({"gap": ("time", [0.0, 1.0])}), "gap.nc")
     """
     import xarray as xr
     from xarray.backends import H5NetCDFStore

@@ -56,6 +56,15 @@ class ContactLaw:
     max(0, force + damping times the rate of penetration).
 
     They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone, and never allocate.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> law = sb.HertzContact(1e9)
+    >>> isinstance(law, sb.ContactLaw), law.is_dissipative
+    (True, False)
+    >>> f"{law.impact_duration(mass=1e-3, velocity=0.1):.2e} s"
+    '8.08e-05 s'
     """
 
     name: ClassVar[str] = ""

@@ -52,6 +52,22 @@ def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
         recorded motion, or other statistics.
     CheckpointError
         If the description is damaged.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
+    ...     paper.CONTACT,
+    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18),
+    ... )
+    >>> found = sb.sweep(
+    ...     system, {"drive.velocity_amplitude": [0.05, 0.2]}, sb.Integration(cycles=2),
+    ...     checkpoint=sb.CheckpointOptions("sweep.checkpoint"),
+    ... )
+    >>> sb.read_checkpoint("sweep.checkpoint")["response_class"].shape
+    (2,)
     """
     if not isinstance(checkpoint, (str, os.PathLike)):
         raise InputTypeError(f"checkpoint = {shown(checkpoint)}: must be a folder")

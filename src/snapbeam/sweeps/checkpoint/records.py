@@ -43,7 +43,17 @@ __all__ = [
 
 
 class CheckpointError(OSError):
-    """A checkpoint cannot be written or read, or its workers cannot compute; the message contains the remedy."""
+    """A checkpoint cannot be written or read, or its workers cannot compute; the message contains the remedy.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> try:
+    ...     sb.read_checkpoint("no_such_folder")
+    ... except (sb.CheckpointError, sb.InputError) as error:
+    ...     print(type(error).__name__)
+    InputError
+    """
 
 
 # ----------------------------------------------------------------------------------------------------
