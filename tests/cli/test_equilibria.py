@@ -35,6 +35,25 @@ def test_what_explains_measured_wells() -> None:
     assert "give both" in refused.output
 
 
+def test_the_well_that_normalises_is_named() -> None:
+    """An arch with two wells: the deepest one, and the one in which a run without a striker begins."""
+    silicon = (
+        "--length", 5e-4, "--width", 2e-5, "--thickness", 2e-6, "--density", 2330, "--young-modulus", 160e9,
+        "--axial-load", 0, "--modes", 3,
+    )  # fmt: skip
+    bistable = (*silicon, "--midspan-amplitude", 13e-6)
+    for command in ("equilibria", "frequencies"):
+        text = " ".join(run(command, *bistable).output.split())
+        assert "Omega = 1 is 190541.304 Hz, the first frequency about the upper well" in text
+        assert "a run without a striker begins in the upper well, as fabricated" in text
+        assert json.loads(run(command, *bistable, "--json", "-").stdout)["reference_well"] == "upper"
+    assert "centre (µm)" in run("equilibria", *bistable).output
+    shallow = run("equilibria", *silicon, "--midspan-amplitude", 6e-6).output
+    assert "the first frequency about the equilibrium" in " ".join(shallow.split())
+    given = run("equilibria", *bistable, "--reference-frequency", 1e5).output
+    assert "Omega = 1 is 100000.000 Hz, as given" in given
+
+
 def test_force_displacement_curve(tmp_path) -> None:
     arch = ("--axial-load", 0, "--midspan-amplitude", 1e-3, "--modes", 3)
     curve, figure = tmp_path / "curve.nc", tmp_path / "curve.png"

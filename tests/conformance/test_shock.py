@@ -75,7 +75,7 @@ def test_response_spectrum_of_a_half_sine() -> None:
         [[1.0]], [omega**2], contact_shape=[1.0], base_shape=[1.0], length_scale=1e-3
     )
     peak = 5.0 * GRAVITY
-    for cycles in (0.2, 0.4, 0.8, 1.3, 2.3):
+    for cycles in (0.2, 0.8, 2.3):
         duration = cycles / frequency
         rate = math.pi / duration
         ratio = rate / omega
@@ -91,6 +91,8 @@ def test_response_spectrum_of_a_half_sine() -> None:
         assert found * 1e-3 * omega**2 / peak == pytest.approx(exact, rel=1e-5), cycles
 
 
+@pytest.mark.filterwarnings("ignore:the lowest mode about the equilibrium")
+@pytest.mark.filterwarnings("ignore:this imperfection leaves one well")
 @pytest.mark.parametrize(("shape", "level"), [("half_sine", 5000.0), ("trapezoid", 2e5)])
 def test_arch_against_scipy(shape: str, level: float) -> None:
     """The silicon arch under 0.2 ms: 5000 g, and a shock so strong that the arch snaps."""
@@ -129,6 +131,7 @@ def test_arch_against_scipy(shape: str, level: float) -> None:
     start = np.concatenate((model.well_amplitude, np.zeros(modes)))
     truth = solve_ivp(rates, (0.0, end), start, "DOP853", times, rtol=1e-10, atol=1e-18, max_step=2e-6)
     exact = model.midspan_shape @ truth.y[:modes] / model.length_scale
+    assert run.dataset.attrs["reference_well"] == run.dataset.attrs["initial_well"] == "only"
     error = np.abs(run.dataset.midspan_displacement.values - exact).max()
     assert error < 1e-6
     assert run.summary.min_midspan_displacement == pytest.approx(exact.min(), abs=0.03)

@@ -86,6 +86,7 @@ def equilibria(
     from rich.table import Table
 
     from snapbeam.model.imperfection_identification import identify_imperfection
+    from snapbeam.util.si_prefixes import prefixed, scale_of
     from snapbeam.util.validation import InputError
 
     asked = [
@@ -121,37 +122,41 @@ def equilibria(
         )
     beam = model.beam
     assert beam is not None
-    heights = [1e3 * float(model.midspan_shape @ each.amplitude) for each in model.equilibria]
+    heights = [float(model.midspan_shape @ each.amplitude) for each in model.equilibria]
+    metres, length_unit = scale_of(heights, "m")
+    joules, energy_unit = scale_of([each.energy for each in model.equilibria], "J")
     table = Table(box=None, pad_edge=False)
-    for title in ("", "centre (mm)", "energy (µJ)", "unstable directions"):
+    for title in ("", f"centre ({length_unit})", f"energy ({energy_unit})", "unstable directions"):
         table.add_column(title, justify="right")
     kinds = {0: "well", 1: "saddle"}
     for each, height in zip(model.equilibria, heights, strict=True):
-        row = kinds.get(each.unstable_directions, "hilltop"), f"{height:.4f}", f"{1e6 * each.energy:.4f}"
-        table.add_row(*row, str(each.unstable_directions))
+        kind = kinds.get(each.unstable_directions, "hilltop")
+        values = f"{height / metres:.4f}", f"{each.energy / joules:.4f}"
+        table.add_row(kind, *values, str(each.unstable_directions))
     console.print(table)
     freq = model.well_frequencies[:, :3]
     if model.is_bistable:
         barriers = [model.saddle_energy - float(model.potential_energy(well)) for well in model.wells]
         for name, row, barrier in zip(("lower", "upper"), freq, barriers, strict=True):
             own = ", ".join(f"{each:.3f}" for each in row)
-            console.print(f"{name} well: {own} Hz; barrier {1e6 * barrier:.4f} µJ")
+            console.print(f"{name} well: {own} Hz; barrier {prefixed(barrier, 'J', 4)}")
     else:
         barriers = []
         console.print(f"monostable: {', '.join(f'{each:.3f}' for each in freq[0])} Hz")
         if model.imperfection is not None:
             console.print(model.two_well_limits)
+    console.print(model.reference_text)
     add_json(
         bistable=model.is_bistable,
         buckling_level=beam.buckling_level,
         imperfection={} if model.imperfection is None else {
             name: value for name, value in vars(model.imperfection).items() if isinstance(value, (float, str))
         },
-        centers=[1e-3 * each for each in heights],
+        centers=heights,
         energies=[each.energy for each in model.equilibria],
         unstable_directions=[each.unstable_directions for each in model.equilibria],
         frequencies=freq if model.is_bistable else freq[:1],
-        barriers=barriers,
+        barriers=barriers, reference_well=model.reference_well, reference_frequency=model.reference_frequency,
     )  # fmt: skip
     if with_force:
         _force_displacement(model, 0.5 if location is None else location, well, output, plot)

@@ -133,7 +133,7 @@ def simulate(
             run = sb.simulate(system, integration, sample_times=times, progress=progress)
             summary = run.summary
     console = out()
-    console.print(_summary_text(summary, time.monotonic() - start))
+    console.print(_summary_text(system, summary, time.monotonic() - start))
     if output is not None:
         if run is not None:
             run.save(output)
@@ -208,7 +208,7 @@ def _animated(dataset: xr.Dataset, path: Path, window: tuple[float, float] | Non
     return animate_run(dataset, path, window)
 
 
-def _summary_text(summary: Any, elapsed: float) -> str:
+def _summary_text(system: Any, summary: Any, elapsed: float) -> str:
     from snapbeam.util.si_prefixes import prefixed
     from snapbeam.util.status_codes import RunStatus
 
@@ -219,7 +219,17 @@ def _summary_text(summary: Any, elapsed: float) -> str:
     final = ", and stays there for certain" if summary.final_well_proven else ""
     crossings = f"{summary.zero_crossings}, {summary.zero_crossings_last_quarter} of them in the last quarter"
     contact = f"{summary.impacts}, in contact {100.0 * summary.contact_time_fraction:.3g} % of the time"
-    center = f"{summary.min_midspan_displacement:.4g} to {summary.max_midspan_displacement:.4g} b"
+    scale = prefixed(system.model.length_scale, "m", 4)
+    center = (
+        f"{summary.min_midspan_displacement:.4g} to {summary.max_midspan_displacement:.4g} b (b = {scale})"
+    )
+    end = f"in the {well} well{final}"
+    other = f"the other well was {'' if summary.other_well_reached else 'not '}reached"
+    if not system.model.is_bistable:
+        end, other = (
+            f"the centre is {'above' if summary.final_well > 0 else 'below'} 0",
+            "the beam has one well",
+        )
     force = (
         "no finite force"
         if summary.peak_force != summary.peak_force
@@ -229,13 +239,18 @@ def _summary_text(summary: Any, elapsed: float) -> str:
     lines = [
         f"[bold]{kind.label}[/] (in {duration(elapsed)}; {status.advice})",
         f"  zero crossings        {crossings}",
-        f"  at the end            in the {well} well{final}",
-        f"  centre displacement   {center}; the other well was {'' if summary.other_well_reached else 'not '}reached",
-        f"  at the striker        {summary.min_displacement:.4g} to {summary.max_displacement:.4g} b",
-        f"  impacts               {contact}",
-        f"  peak contact force    {force}",
-        f"  striker's work        {work}, {lost} dissipated",
+        f"  at the end            {end}",
+        f"  centre displacement   {center}; {other}",
     ]
+    if system.striker is None:
+        lines.append(f"  energy dissipated     {lost}")
+    else:
+        lines += [
+            f"  at the striker        {summary.min_displacement:.4g} to {summary.max_displacement:.4g} b",
+            f"  impacts               {contact}",
+            f"  peak contact force    {force}",
+            f"  striker's work        {work}, {lost} dissipated",
+        ]
     if summary.zero_crossings:
         lines.insert(2, f"  last crossing         at {prefixed(summary.last_zero_crossing, 's', 5)}")
     return "\n".join(lines)

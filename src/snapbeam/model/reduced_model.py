@@ -886,6 +886,22 @@ class ReducedModel(Wells):
             )
         return first
 
+    @property
+    def reference_text(self) -> str:
+        """In words, the frequency that normalises, its well, and the well where a run without a striker begins."""
+        names = {
+            "given": "as given",
+            "only": "the first frequency about the equilibrium",
+            "either": "the first frequency about either well",
+        }
+        well = names.get(self.reference_well, f"the first frequency about the {self.reference_well} well")
+        text = f"Omega = 1 is {self.reference_frequency:.3f} Hz, {well}"
+        if not self.is_bistable:
+            return text
+        start = self.as_fabricated_well
+        begins = "the lower well" if start is None else f"the {start} well, as fabricated"
+        return f"{text}; a run without a striker begins in {begins}"
+
 
 def _symmetric(matrix: _Array) -> _Array:
     """A matrix symmetric but for rounding, made exactly so and read-only."""

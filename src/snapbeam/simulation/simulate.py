@@ -15,7 +15,7 @@ from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import quantities
-from snapbeam.model.state import State
+from snapbeam.model.state import State, rest_state
 from snapbeam.model.striker import numbered
 from snapbeam.model.system import System
 from snapbeam.simulation.dataset import impact_table, joined, run_dataset
