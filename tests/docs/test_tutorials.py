@@ -57,7 +57,13 @@ def follow(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     plt.close("all")
 
 
-@pytest.mark.parametrize("name", ["tutorial_beam", pytest.param("tutorial_waveform", marks=pytest.mark.slow)])
+@pytest.mark.filterwarnings("ignore:the lowest mode about the equilibrium")
+@pytest.mark.filterwarnings("ignore:this imperfection leaves one well")
+@pytest.mark.parametrize("name", [
+    "tutorial_beam",
+    pytest.param("tutorial_waveform", marks=pytest.mark.slow),
+    pytest.param("mems_arch", marks=pytest.mark.slow),
+])  # fmt: skip
 def test_tutorial(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     follow(name, capsys)

@@ -133,7 +133,7 @@ def simulate(
             run = sb.simulate(system, integration, sample_times=times, progress=progress)
             summary = run.summary
     console = out()
-    console.print(_summary_text(system, summary, time.monotonic() - start))
+    console.print(_summary_text(summary, time.monotonic() - start, system))
     if output is not None:
         if run is not None:
             run.save(output)
@@ -208,7 +208,7 @@ def _animated(dataset: xr.Dataset, path: Path, window: tuple[float, float] | Non
     return animate_run(dataset, path, window)
 
 
-def _summary_text(system: Any, summary: Any, elapsed: float) -> str:
+def _summary_text(summary: Any, elapsed: float, system: Any) -> str:
     from snapbeam.util.si_prefixes import prefixed
     from snapbeam.util.status_codes import RunStatus
 
@@ -242,15 +242,16 @@ def _summary_text(system: Any, summary: Any, elapsed: float) -> str:
         f"  at the end            {end}",
         f"  centre displacement   {center}; {other}",
     ]
-    if system.striker is None:
-        lines.append(f"  energy dissipated     {lost}")
-    else:
+    if system.striker is not None:
         lines += [
             f"  at the striker        {summary.min_displacement:.4g} to {summary.max_displacement:.4g} b",
             f"  impacts               {contact}",
             f"  peak contact force    {force}",
-            f"  striker's work        {work}, {lost} dissipated",
+            f"  striker's work        {work}",
         ]
+    if system.base_excitation is not None:
+        lines.append(f"  work of the base      {prefixed(summary.base_work, 'J', 4)}")
+    lines.append(f"  dissipated            {lost}")
     if summary.zero_crossings:
         lines.insert(2, f"  last crossing         at {prefixed(summary.last_zero_crossing, 's', 5)}")
     return "\n".join(lines)
