@@ -63,6 +63,7 @@ def follow(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     "tutorial_beam",
     pytest.param("tutorial_waveform", marks=pytest.mark.slow),
     pytest.param("mems_arch", marks=pytest.mark.slow),
+    pytest.param("mems_switch", marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_tutorial(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
