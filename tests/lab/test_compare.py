@@ -133,8 +133,42 @@ def test_dropouts_stay_dropouts(synthetic_run):
 def test_runs_that_cannot_be_compared(synthetic_run, change, word):
     with pytest.raises(InputError, match=word):
         compare_waveforms(measured_of(synthetic_run), synthetic_run, **{"frequency": 100.0, **change})
-    with pytest.raises(InputError, match="measured: run without striker_displacement"):
-        compare_waveforms(synthetic_run.drop_vars("striker_displacement"), synthetic_run)
+    alone = synthetic_run.drop_vars(["striker_displacement", "cycle"])
+    with pytest.raises(InputError, match=r"start \(--start\): must be given"):
+        compare_waveforms(alone, synthetic_run, 100.0)
+
+
+def test_a_displacement_sensor_without_the_shaker(synthetic_run, program, tmp_path):
+    """A record of 2 kHz at midspan, zero midway between the wells: aligned by the start of the excitation alone."""
+    length, start = 0.335e-3, 0.05
+    run = synthetic_run.assign_attrs(length_scale=length)
+    time = np.arange(0.0, 0.12, 1.0 / 2000.0)
+    exact = np.interp(time, run["time"].values + start, run["midspan_displacement"].values)
+    noise = 0.01 * np.random.default_rng(1).standard_normal(time.size)
+    signal = make_signal(length * (exact + noise), "m", time=time, name="laser")
+    found = compare_waveforms(signal, run, 100.0, at="midspan_displacement", start=start)
+    assert found.rms_difference == pytest.approx(0.01, rel=0.2) and found.correlation > 0.98
+    assert [one.code for one in found.diagnostics] == ["comparison.no_shaker"] and np.isnan(
+        found.amplitude_ratio
+    )
+    with pytest.raises(InputError, match="must be in m"):
+        compare_waveforms(make_signal(exact, "m/s", time=time), run, 100.0, start=start)
+    write_signal(tmp_path / "laser.csv", signal)
+    run.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
+    told = program(
+        "compare", tmp_path / "laser.csv", tmp_path / "run.nc", "--at", "midspan", "--frequency", "100",
+        "--start", str(start), "--cycles", "7", "--plot", tmp_path / "waves.png", "--overlay", "--json", "-",
+    )  # fmt: skip
+    assert told.exit_code == 0, told.output
+    assert json.loads(told.stdout)["rms_difference_b"] == pytest.approx(found.rms_difference, rel=1e-6)
+
+
+def test_a_coarse_record_of_the_shaker_has_its_amplitude(synthetic_run):
+    """Eight samples a cycle: the amplitude is that of the samples, not of straight lines between them."""
+    seen = measured_of(synthetic_run, noise=0.0)
+    every = seen.sizes["time"] // 85
+    found = compare_waveforms(seen.isel(time=slice(None, None, every)), synthetic_run, 100.0, start=0.0123)
+    assert found.amplitude_ratio == pytest.approx(1.0, abs=0.002)
 
 
 def test_pictures(synthetic_map, synthetic_run):

@@ -194,6 +194,13 @@ KINDS_COMPARISON = table(
         ("start",),
     ),
     Kind(
+        "comparison.no_shaker", INFO,
+        "whether the measured run has the displacement of the shaker",
+        "the shaker was not recorded: start (--start) alone aligns the runs, and its error shifts them; amplitude and phase "
+        "of the drive are not compared",
+        ("start",),
+    ),
+    Kind(
         "comparison.amplitude", WARNING,
         "the amplitude of both shakers",
         "the measured shaker moves {ratio:.3f} times as far as the simulated one: another test, or another scale",

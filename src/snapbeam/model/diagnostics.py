@@ -19,6 +19,8 @@ _STEEP = 0.2
 """Greatest slope of the buckled beam, pi b / L, up to which w is small against L."""
 _STOCKY = 0.1
 """Thickness over length up to which shear and rotary inertia may be left out."""
+_CENTRAL = 0.05
+"""Distance of a striker from the centre, over the length, below which it hardly excites antisymmetric modes."""
 _LARGEST_RATIO = 20.0
 _LARGEST_AMPLITUDE = 20.0
 
@@ -31,7 +33,7 @@ def doubts_of(
     model: ReducedModel, striker: Striker | None, harvester: Harvester | None = None
 ) -> tuple[Diagnostic, ...]:
     """Diagnostics about a structure, what strikes it and its harvester."""
-    found = [] if model.beam is None else _of_beam(model.beam) + _of_modes(model, model.beam)
+    found = [] if model.beam is None else _of_beam(model.beam) + _of_modes(model, model.beam, striker)
     if striker is not None and isinstance(striker.drive, Sine):
         found += _of_sine(striker.drive, model)
     if isinstance(harvester, PiezoelectricHarvester) and model.beam is not None:
@@ -94,7 +96,7 @@ def _of_beam(beam: Beam) -> list[Diagnostic]:
     return found
 
 
-def _of_modes(model: ReducedModel, beam: Beam) -> list[Diagnostic]:
+def _of_modes(model: ReducedModel, beam: Beam, striker: Striker | None) -> list[Diagnostic]:
     if model.modes < 2 or model.given_reference_frequency is not None:
         return []
     well = model.about_reference_well
@@ -106,13 +108,14 @@ def _of_modes(model: ReducedModel, beam: Beam) -> list[Diagnostic]:
     name = words.get(model.reference_well, "a well")
     perfect = f"b/r = {level:.3g}: " if model.imperfection is None else ""
     limit = " (of a clamped beam above 6.21)" if model.imperfection is None else ""
+    central = striker is None or abs(striker.location - 0.5) < _CENTRAL
+    hint = ", which a striker at the centre does not excite" if central else ""
     return [
         Diagnostic(
             "first-mode-antisymmetric",
             f"{perfect}the lowest mode about {name} is antisymmetric{limit}, and omega_1, by which Omega and V are "
-            f"normalised, is its frequency ({well.natural_frequencies[0]:.5g} Hz), although a striker at the centre "
-            f"cannot excite it; set model.reference_frequency = {symmetric[0]:.5g} Hz to normalise by the first "
-            "symmetric mode",
+            f"normalised, is its frequency ({well.natural_frequencies[0]:.5g} Hz){hint}; set "
+            f"model.reference_frequency = {symmetric[0]:.5g} Hz to normalise by the first symmetric mode",
             {"buckling_level_over_radius": level, "symmetric_frequencies": float(symmetric[0])},
         )
     ]

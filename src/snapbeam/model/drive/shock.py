@@ -125,9 +125,10 @@ class Shock(Timed):
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
         """It goes on and on, at its last velocity."""
         found = self.shape_numbers(columns, scale)
-        per = {"half_sine": 2.0 / math.pi, "haversine": 0.5, "trapezoid": found["fall"] / found["duration"]}
-        speed = per[self.shape] * found["peak"] * found["duration"]
-        return np.where(speed > 0.0, np.inf, 0.0), np.asarray(speed)
+        mean = {"half_sine": 2.0 / math.pi, "haversine": 0.5}
+        length = found["fall"] if self.shape == "trapezoid" else mean[self.shape] * found["duration"]
+        speed = found["peak"] * length
+        return np.where(speed > 0.0, np.inf, 0.0), speed
 
     def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """It never goes the other way."""
