@@ -143,6 +143,7 @@ def test_no_branch_is_missed(rise: float, location: float) -> None:
             assert unstable in curve.unstable_directions.values[max(best - 2, 0) : best + 3]
 
 
+@pytest.mark.slow
 def test_finite_elements_with_springs() -> None:
     """An arch on rotational springs against Hermite elements with the same tension."""
     unit = BEAM.bending_stiffness / BEAM.length
