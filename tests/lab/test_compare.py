@@ -20,7 +20,7 @@ from snapbeam.lab.signal_files import write_signal
 from snapbeam.lab.signals import make_signal
 from snapbeam.lab.waveform_comparison import compare_waveforms
 from snapbeam.simulation.dataset import trajectory_dataset
-from snapbeam.sweeps.measured_points import MeasuredPoints
+from snapbeam.sweeps.measured_points import MeasuredPoints, read_measured_points
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError
 
@@ -62,6 +62,60 @@ def test_the_confusion_table_counts_every_swap(synthetic_map):
     assert found.agreement == pytest.approx(1.0 - 7.0 / found.used)
     assert found.snap_agreement == pytest.approx(1.0 - 7.0 / found.used)
     assert (found.table["distance"].values[at] >= 1.0).all()
+
+
+FIRST, LEVEL = 80.0, 0.33e-3
+UNITS = {
+    "rad/s": ("frequency_hz,velocity_m_s", lambda f, v: (2.0 * np.pi * f, v), "rad/s"),
+    "mm/s": ("frequency_hz,velocity_m_s", lambda f, v: (f, 1e3 * v), "mm/s"),
+    "exchanged": ("frequency_hz,velocity_m_s", lambda f, v: (v, f), "exchanged"),
+    "ratios exchanged": (
+        "frequency_ratio,velocity_amplitude",
+        lambda f, v: (v / (2.0 * np.pi * LEVEL * FIRST), f / FIRST),
+        "exchanged",
+    ),
+    "Hz as ratio": ("frequency_ratio,velocity_m_s", lambda f, v: (f, v), "in Hz"),
+}
+
+
+def written(path, heads, points, change):
+    frequency = points.frequency_ratio * FIRST
+    velocity = points.velocity_amplitude * 2.0 * np.pi * LEVEL * FIRST
+    columns = zip(*change(frequency, velocity), points.response_class, strict=True)
+    rows = "".join(f"{one:.9g},{other:.9g},{kind}\n" for one, other, kind in columns)
+    path.write_text(f"{heads},response_class\n{rows}", encoding="utf-8")
+    return read_measured_points(path, reference_frequency=FIRST, buckling_level=LEVEL)
+
+
+@pytest.mark.parametrize("kind", UNITS)
+def test_a_table_in_other_units_is_told(synthetic_map, tmp_path, kind):
+    known = synthetic_map.assign_attrs(reference_frequency=FIRST, beam_buckling_level=LEVEL)
+    points = points_of(known, 30, seed=4)
+    good = compare_measured_points(
+        written(tmp_path / "good.csv", "frequency_hz,velocity_m_s", points, lambda f, v: (f, v)), known
+    )
+    assert good.agreement == 1.0 and not good.diagnostics
+    heads, change, words = UNITS[kind]
+    found = compare_measured_points(written(tmp_path / "bad.csv", heads, points, change), known)
+    (told,) = found.diagnostics
+    assert told.code == "comparison.units" and told.severity == "error"
+    assert words in told.message and found.summary()["diagnostics"]
+
+
+def test_points_that_stand_twice_count_once_and_not_if_they_contradict(synthetic_map):
+    points = points_of(synthetic_map, 30, seed=5)
+    kinds = points.response_class
+    at = np.flatnonzero(kinds >= 0)[:3]
+    again = np.concatenate([np.arange(30), at])
+    changed = kinds[again].copy()
+    changed[-1] = 0 if kinds[at[2]] else 1
+    columns = (points.frequency_ratio, points.velocity_amplitude, points.location)
+    found = compare_measured_points(MeasuredPoints(*(one[again] for one in columns), changed), synthetic_map)
+    assert found.used == compare_measured_points(points, synthetic_map).used - 1
+    assert any("2 of 33 measured points do not count: repeated" in note for note in found.notes)
+    (told,) = found.diagnostics
+    assert (told.code, told.numbers["points"]) == ("comparison.contradicting", 2.0)
+    assert len(plot_map_comparison(synthetic_map, points, found).texts) > 0
 
 
 def test_points_that_do_not_belong_are_left_out_and_said(synthetic_map):

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
+    "LEAST_CYCLES",
+    "TOO_SHORT",
     "MeasuredResponse",
     "WaveformComparison",
     "compare_waveforms",
@@ -395,6 +397,8 @@ def _impacts(
 
 
 _HYSTERESIS = 5.0  # in standard deviations of the noise
+TOO_SHORT = "too short"
+"""First words of the reason that too few cycles were recorded; the status of such a test."""
 LEAST_CYCLES = 20  # the rule of more than n/5 crossings in n cycles means nothing below n = 5
 _WHOLE = 0.98  # share of the wanted cycles that counts as all of them
 
@@ -525,10 +529,10 @@ def measure_response(
     if first == 0 or final == 0:
         reasons.append("the displacement never leaves the hysteresis about zero")
     if wanted < LEAST_CYCLES:
-        reasons.append(f"too short to tell: {wanted} cycles, the rule needs {LEAST_CYCLES}")
+        reasons.append(f"{TOO_SHORT} to tell: {wanted} cycles, the rule needs {LEAST_CYCLES}")
     certain_continuous = late > wanted / 20.0
     if total < _WHOLE * wanted and not certain_continuous:
-        reasons.append(f"too short to tell: {total:.1f} of {wanted} cycles recorded")
+        reasons.append(f"{TOO_SHORT} to tell: {total:.1f} of {wanted} cycles recorded")
     typical = float(np.median(gaps)) if gaps.size else 0.0
     if longest > max(0.25, 4.0 * typical) and not certain_continuous:
         reasons.append(f"a dropout of {longest:.2f} cycles could hide crossings")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -19,7 +20,7 @@ from snapbeam.util.validation import InputError, InputTypeError, axis, finite_ar
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Columns", "Grid", "PointList", "Points", "labels_of", "points_of"]
+__all__ = ["Columns", "Grid", "PointList", "Points", "labels_of", "points_of", "require_memory"]
 
 
 Columns = dict[str, NDArray[Any]]
@@ -70,7 +71,7 @@ class Grid:
     @property
     def size(self) -> int:
         """Number of points."""
-        return int(np.prod(self.shape, dtype=np.int64))
+        return math.prod(self.shape)
 
     def take(self, which: NDArray[np.int64]) -> Columns:
         """Return the values of the points with the given numbers."""
@@ -150,6 +151,19 @@ class PointList:
 
 
 Points = Grid | PointList
+
+_POINT_BYTES = 700
+"""Memory of a point of a sweep until its dataset is complete."""
+_MEMORY = 4 * 2**30
+
+
+def require_memory(points: int, remedy: str) -> None:
+    """Refuse a sweep whose results do not fit into the memory, before any of them is computed or read."""
+    size = points * _POINT_BYTES
+    if size > _MEMORY:
+        raise InputError(
+            f"{points} points would take {size / 2**30:.3g} GiB of memory, the limit is {_MEMORY / 2**30:.0f} GiB: {remedy}"
+        )
 
 
 def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:

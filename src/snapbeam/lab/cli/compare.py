@@ -83,8 +83,7 @@ def compare(
     dataset = open_result(simulated)
     place = choice("at", at, tuple(_AT))
     if "time" not in dataset.dims:
-        summary, figure = _map(measured, dataset, plot is not None)
-        diagnostics: tuple[Diagnostic, ...] = ()
+        summary, figure, diagnostics = _map(measured, dataset, plot is not None)
     else:
         if measured.suffix.lower() == ".nc":
             run = open_result(measured)
@@ -110,7 +109,7 @@ def compare(
     add_json(**summary)
 
 
-def _map(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | None]:
+def _map(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | None, tuple[Diagnostic, ...]]:
     from rich.table import Table
 
     from snapbeam.lab.map_comparison import compare_measured_points
@@ -140,12 +139,13 @@ def _map(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | No
     console.print(table)
     for note in result.notes:
         console.print(f"[yellow]note[/] {note}")
+    lab.print_diagnostics(console, result.diagnostics)
     figure = None
     if draw:
         from snapbeam.lab.plot.comparison import plot_map_comparison
 
         figure = plot_map_comparison(dataset, points, result)
-    return result.summary(), figure
+    return result.summary(), figure, result.diagnostics
 
 
 def _short(kind: ResponseClass) -> str:

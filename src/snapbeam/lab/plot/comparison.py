@@ -44,7 +44,9 @@ def plot_map_comparison(dataset: xr.Dataset, points: MeasuredPoints, result: Map
     and what does not is red and bold, each the darker the greater its share of the measured class is.
     """
     with figure_style():
-        figure = new_figure("double", 92.0)
+        told = result.diagnostics
+        figure = new_figure("double", 92.0 + diagnostics_height(told, COLUMN_WIDTHS["double"], 3))
+        draw_diagnostics(figure, told, 3)
         grid = figure.add_gridspec(1, 2, width_ratios=(1.15, 1.0))
         left = plot_response_map(dataset, figure.add_subplot(grid[0]), measurements=points)
         _mark_disagreeing(left, dataset, result)
