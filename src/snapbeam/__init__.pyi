@@ -28,6 +28,7 @@ from .model.drive.fixed_stop import FixedStop as FixedStop
 from .model.drive.half_sine import HalfSine as HalfSine
 from .model.drive.noise import BandLimitedNoise as BandLimitedNoise
 from .model.drive.recorded_motion import RecordedMotion as RecordedMotion
+from .model.drive.shock import Shock as Shock
 from .model.drive.sine import Sine as Sine
 from .model.drive.sum import SumDrive as SumDrive
 from .model.drive.two_tone import TwoTone as TwoTone
@@ -35,6 +36,7 @@ from .model.external_force import ConstantForce as ConstantForce
 from .model.external_force import ExternalForce as ExternalForce
 from .model.external_force import HarmonicForce as HarmonicForce
 from .model.external_force import RecordedForce as RecordedForce
+from .model.force_displacement import force_displacement as force_displacement
 from .model.harvester import ElectromagneticHarvester as ElectromagneticHarvester
 from .model.harvester import PiezoelectricHarvester as PiezoelectricHarvester
 from .model.imperfection import Imperfection as Imperfection

@@ -46,6 +46,8 @@ CODE = [
 ELSEWHERE = {
     "extending.md",
     "howto_harvester.md",
+    "mems_arch.md",
+    "mems_switch.md",
     "tutorial_beam.md",
     "tutorial_sweep.md",
     "tutorial_waveform.md",

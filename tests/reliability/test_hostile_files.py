@@ -20,10 +20,6 @@ from snapbeam.model import default_values
 from snapbeam.util.provenance import parameter_hash
 from snapbeam.util.validation import InputError
 
-try:
-    from snapbeam.explorer.maps import opened
-except ImportError:  # the explorer's extra is not installed
-    opened = sb.load
 GIB = 2**30
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pipes and sparse files are POSIX here")
 
@@ -229,15 +225,14 @@ def texts(file):
 
 @pytest.mark.parametrize("make", [fill, compressed, axis, group, texts], ids=lambda make: make.__name__)
 def test_hdf5_files_that_fill_the_memory(tmp_path, at_most, tried, make):
-    """Refused as a run, as a map, as a recorded drive and by the explorer."""
+    """Refused as a run."""
     path = tmp_path / "x.nc"
     with h5py.File(path, "w") as file:
         make(file)
     assert path.stat().st_size < 10**6
-    for call in (sb.load, opened):
-        with pytest.raises(InputError, match=r"GiB of memory|has 1000000 texts"):
-            at_most(100, call, path)
-        tried("NetCDF files that would fill the memory")
+    with pytest.raises(InputError, match=r"GiB of memory|has 1000000 texts"):
+        at_most(100, sb.load, path)
+    tried("NetCDF files that would fill the memory")
 
 
 def test_the_limit_follows_the_size_of_the_file(tmp_path, monkeypatch):
@@ -252,45 +247,19 @@ def test_the_limit_follows_the_size_of_the_file(tmp_path, monkeypatch):
     assert sb.load(tmp_path / "run.nc").dataset.nbytes > 1000
 
 
-@pytest.mark.parametrize("suffix", [".h5", ".mat"])
-def test_signals_that_fill_the_memory(tmp_path, at_most, tried, suffix):
-    lab = pytest.importorskip("snapbeam.lab", reason="the part lab is not installed", exc_type=ImportError)
-    path = tmp_path / f"x{suffix}"
-    with h5py.File(path, "w") as file:
-        file.create_dataset("a", (2**33,), "f8", chunks=(2**20,)).attrs["units"] = "m/s"
-    with pytest.raises(InputError, match="would take 64 GiB of memory"):
-        at_most(100, lambda: lab.read_channels(path, 1e3))
-    tried("signals that would fill the memory")
-
-
 # ----------------------------------------------------------------------------------------------------
 
 
 @posix
 @pytest.mark.parametrize("kind", ["pipe", "device"])
-@pytest.mark.parametrize(
-    "suffix", [".toml", ".csv", ".nc", ".wav", ".npy", ".cih", ".cihx", ".mraw", ".tif", ".mp4"]
-)
+@pytest.mark.parametrize("suffix", [".toml", ".csv", ".nc"])
 def test_only_regular_files_are_read(tmp_path, tried, kind, suffix):
     """Where a path is read: a pipe would be waited for without end, /dev/zero is read without end."""
     from snapbeam.model.parameter_file import load_config
 
     path = tmp_path / f"x{suffix}"
     os.mkfifo(path) if kind == "pipe" else path.symlink_to("/dev/zero")
-    calls = [load_config, sb.load, sb.System.load, opened]
-    calls += _of_the_laboratory()
-    for call in calls:
+    for call in (load_config, sb.load, sb.System.load):
         with pytest.raises(InputError):
             call(path)
         tried("pipes and devices in place of files")
-
-
-def _of_the_laboratory():
-    try:
-        from snapbeam.lab.image_sources import load_image, open_source
-        from snapbeam.lab.photron import read_fields
-        from snapbeam.lab.signal_files import read_channels
-        from snapbeam.sweeps.measured_points import read_measured_points
-    except ImportError:
-        return []
-    return [open_source, load_image, read_fields, read_channels, read_measured_points]

@@ -43,6 +43,7 @@ __all__ = [
     "cli_command",
     "count_text",
     "draw_dynamics",
+    "draw_force_displacement",
     "draw_map",
     "draw_run",
     "draw_statistic",
@@ -464,6 +465,16 @@ def draw_threshold(dataset: xr.Dataset, path: Path) -> Path:
     from snapbeam.plot.threshold import plot_threshold
 
     return _save(plot_threshold(dataset), path)
+
+
+def draw_force_displacement(dataset: xr.Dataset, path: Path) -> Path:
+    """Draw a force-displacement curve to a picture file."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from snapbeam.plot.force_displacement import plot_force_displacement
+
+    return _save(plot_force_displacement(dataset), path)
 
 
 def draw_run(dataset: xr.Dataset, path: Path, window: tuple[float, float] | None) -> Path:

@@ -254,7 +254,17 @@ def _summary_text(summary: Any, elapsed: float, system: Any) -> str:
     final = ", and stays there for certain" if summary.final_well_proven else ""
     crossings = f"{summary.zero_crossings}, {summary.zero_crossings_last_quarter} of them in the last quarter"
     contact = f"{summary.impacts}, in contact {100.0 * summary.contact_time_fraction:.3g} % of the time"
-    center = f"{summary.min_midspan_displacement:.4g} to {summary.max_midspan_displacement:.4g} b"
+    scale = prefixed(system.model.length_scale, "m", 4)
+    center = (
+        f"{summary.min_midspan_displacement:.4g} to {summary.max_midspan_displacement:.4g} b (b = {scale})"
+    )
+    end = f"in the {well} well{final}"
+    other = f"the other well was {'' if summary.other_well_reached else 'not '}reached"
+    if not system.model.is_bistable:
+        end, other = (
+            f"the centre is {'above' if summary.final_well > 0 else 'below'} 0",
+            "the beam has one well",
+        )
     force = (
         "no finite force"
         if summary.peak_force != summary.peak_force
@@ -264,8 +274,8 @@ def _summary_text(summary: Any, elapsed: float, system: Any) -> str:
     lines = [
         f"[bold]{kind.label}[/] (in {duration(elapsed)}; {status.advice})",
         f"  zero crossings        {crossings}",
-        f"  at the end            in the {well} well{final}",
-        f"  centre displacement   {center}; the other well was {'' if summary.other_well_reached else 'not '}reached",
+        f"  at the end            {end}",
+        f"  centre displacement   {center}; {other}",
     ]
     if system.striker is not None:
         lines += [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from snapbeam.model.beam import Beam
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.harvester import Harvester, PiezoelectricHarvester
@@ -95,25 +97,26 @@ def _of_beam(beam: Beam) -> list[Diagnostic]:
 
 
 def _of_modes(model: ReducedModel, beam: Beam, striker: Striker | None) -> list[Diagnostic]:
-    if (
-        model.modes < 2
-        or not beam.is_buckled
-        or model.parity[0] >= 0
-        or model.given_reference_frequency is not None
-    ):
+    if model.modes < 2 or model.given_reference_frequency is not None:
         return []
-    symmetric = float(model.natural_frequencies[model.parity > 0][0])
+    well = model.about_reference_well
+    symmetric = well.natural_frequencies[well.parity > 0]
+    if well.parity[0] >= 0 or not symmetric.size or not np.any(well.well_amplitude):
+        return []
     level = beam.buckling_level / beam.radius_of_gyration
+    words = {"upper": "the upper well", "lower": "the lower well", "only": "the equilibrium"}
+    name = words.get(model.reference_well, "a well")
+    perfect = f"b/r = {level:.3g}: " if model.imperfection is None else ""
+    limit = " (of a clamped beam above 6.21)" if model.imperfection is None else ""
     central = striker is None or abs(striker.location - 0.5) < _CENTRAL
     hint = ", which a striker at the centre does not excite" if central else ""
     return [
         Diagnostic(
             "first-mode-antisymmetric",
-            f"b/r = {level:.3g}: the lowest mode about a well is antisymmetric (of the beam itself above 6.21), and "
-            "omega_1, by which Omega and V are normalised, is its frequency "
-            f"({model.natural_frequencies[0]:.5g} Hz){hint}; set "
-            f"model.reference_frequency = {symmetric:.5g} Hz to normalise by the first symmetric mode",
-            {"buckling_level_over_radius": level, "symmetric_frequencies": symmetric},
+            f"{perfect}the lowest mode about {name} is antisymmetric{limit}, and omega_1, by which Omega and V are "
+            f"normalised, is its frequency ({well.natural_frequencies[0]:.5g} Hz){hint}; set "
+            f"model.reference_frequency = {symmetric[0]:.5g} Hz to normalise by the first symmetric mode",
+            {"buckling_level_over_radius": level, "symmetric_frequencies": float(symmetric[0])},
         )
     ]
 

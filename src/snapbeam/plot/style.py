@@ -202,8 +202,9 @@ def beam_text(attrs: Any) -> str:
     if not {"beam_length", "beam_thickness"} <= set(attrs):
         return ""
     words = [f"beam {prefixed(attrs['beam_length'], 'm')} × {prefixed(attrs['beam_thickness'], 'm')}"]
-    if attrs.get("beam_buckling_level"):
-        words.append(f"$b$ = {prefixed(attrs['beam_buckling_level'], 'm')}")
+    # an arch without axial load: the height of its centre at rest
+    if scale := attrs.get("beam_buckling_level") or attrs.get("length_scale"):
+        words.append(f"$b$ = {prefixed(scale, 'm')}")
     return ", ".join(words)
 
 

@@ -299,7 +299,11 @@ class SweepSetup:
                 "longest_contact_step",
                 "shortest_contact_step",
                 "length_scale",
+                "reference_well",
+                "initial_well",
             }
+        if any(name == "striker.side" or name.startswith("initial_state.") for name in self.points.names):
+            varied.add("initial_well")
         beam = self.system.model.beam
         if beam is not None and any(name.startswith(("beam.", "boundary.")) for name in self.points.names):
             # the one that follows from the other differs at every point
