@@ -21,7 +21,7 @@ WORKERS ?= 2
 # Where the benchmarks write; the docs show what is in docs/images
 BENCH ?= out/bench
 
-.PHONY: help map tables prose explorer-deps test quick-tests test-slow test-oldest lint docs bench audit dist clean
+.PHONY: help map tables prose explorer-deps test quick-tests test-slow test-oldest lint docs bench lock audit dist clean
 
 help:
 	@echo "make map        compute the response map ($(MAP), $(PLOT)); variables: MODES CYCLES FREQUENCY_RATIO"
@@ -34,6 +34,7 @@ help:
 	@echo "make tables     the tables of the reference pages, from the program"
 	@echo "make prose      a report on the sentences of the pages"
 	@echo "make bench      the benchmarks, in out/bench; variable: BENCH"
+	@echo "make lock       the versions and hashes of all packages, in constraints.txt"
 	@echo "make audit      known vulnerabilities of the pinned packages"
 	@echo "make dist       wheel and source archive, each installed alone and run"
 	@echo "make clean      remove what was built (not the environment, not results)"
@@ -41,22 +42,30 @@ help:
 $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
+# $(call install,EXTRAS) installs the packages that constraints.txt names, only with the hashes that it states.
+define install
+$(BIN)/python tests/release/locked.py $(1) > $(VENV)/locked.txt
+$(PIP) install --require-hashes --no-deps --requirement $(VENV)/locked.txt
+$(PIP) install --no-deps --no-build-isolation --editable .
+endef
+
 # One stamp per set of packages: a second make installs nothing again.
 $(VENV)/.installed-run: pyproject.toml constraints.txt | $(BIN)/python
-	$(PIP) install --constraint constraints.txt --editable .
+	$(call install)
 	@touch $@
 
 $(VENV)/.installed-test: pyproject.toml constraints.txt $(VENV)/.installed-run
-	$(PIP) install --constraint constraints.txt --editable ".[dev,lab,cluster,video]"
+	$(call install,dev lab cluster video)
 	@touch $@
 
 $(VENV)/.installed-docs: pyproject.toml constraints.txt $(VENV)/.installed-run
-	$(PIP) install --constraint constraints.txt --editable ".[docs,lab,cluster,video]"
+	$(call install,docs lab cluster video)
 	@touch $@
 
 $(VENV)/.installed-bench: pyproject.toml constraints.txt $(VENV)/.installed-test
-	$(PIP) install --constraint constraints.txt --editable ".[bench]"
-	$(PIP) install --constraint constraints.txt --editable ".[bench-fortran]" \
+	$(call install,bench)
+	$(BIN)/python tests/release/locked.py bench-fortran > $(VENV)/locked.txt
+	$(PIP) install --require-hashes --no-deps --requirement $(VENV)/locked.txt \
 		|| echo "numbalsoda left out: building it needs a Fortran compiler"
 	@touch $@
 
@@ -66,7 +75,7 @@ map: $(VENV)/.installed-run
 
 # The browser is the system's: its tests are skipped, with a line, where there is none.
 explorer-deps: $(VENV)/.installed-test
-	$(PIP) install --constraint constraints.txt --editable ".[explorer,explorer-test]"
+	$(call install,explorer explorer-test)
 	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null \
 		|| echo "no Chromium: install it with the system's packages (Debian: apt-get install chromium), or set CHROMIUM"
 
@@ -112,12 +121,17 @@ prose: $(VENV)/.installed-run
 bench: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks -o $(BENCH)
 
+lock: $(VENV)/.installed-run
+	$(PIP) install uv
+	$(BIN)/uv pip compile pyproject.toml --all-extras --universal --python-version 3.11.5 --generate-hashes \
+		--annotation-style line --custom-compile-command "make lock" --output-file constraints.txt --quiet
+
 audit: $(VENV)/.installed-test
-	$(PIP) install --constraint constraints.txt pip-audit
+	$(PIP) install pip-audit
 	$(BIN)/python -m pip_audit --requirement constraints.txt --no-deps --disable-pip
 
 dist: $(VENV)/.installed-test
-	$(PIP) install --constraint constraints.txt build
+	$(PIP) install build
 	rm -rf dist
 	$(BIN)/python -m build --outdir dist .
 	$(BIN)/python tests/release/alone.py dist

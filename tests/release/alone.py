@@ -79,6 +79,10 @@ class Alone:
         self._environment = {key: value for key, value in os.environ.items() if key not in hidden}
         self._environment["NUMBA_CACHE_DIR"] = str(code)  # the same code need not be compiled in each
         venv.create(folder / "env")
+        # without hashes, which an archive that is installed does not have
+        self._versions = folder / "versions.txt"
+        lines = re.findall(r"^[\w.-]+==[^\\\n]+", CONSTRAINTS.read_text(encoding="utf-8"), re.MULTILINE)
+        self._versions.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
     def install(self, archive: Path, extra: str) -> None:
         """Install the archive, with an extra or none."""
@@ -92,7 +96,7 @@ class Alone:
             str(self._binaries / "python"),
             "--disable-pip-version-check",
         ]
-        words = ["install", "--quiet", "--no-compile", "--constraint", str(CONSTRAINTS), named]
+        words = ["install", "--quiet", "--no-compile", "--constraint", str(self._versions), named]
         done = subprocess.run([*pip, *words], capture_output=True, text=True, cwd=self.folder)
         if done.returncode:
             raise SystemExit(f"{' '.join(words)}\n{done.stdout}\n{done.stderr}")
