@@ -101,6 +101,6 @@ def test_what_was_there_before_is_no_part_of_the_rate(monkeypatch) -> None:
         "1000 runs to compute",
         "900 of 1000 runs",
         "1000 of 1000 runs, 10 runs/s",
-        "2000 runs in all now",
+        "2000 runs to compute",
         "1400 of 2000 runs, 10 runs/s, 1 min 0 s left",
     ]

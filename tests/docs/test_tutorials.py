@@ -57,7 +57,7 @@ def follow(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     plt.close("all")
 
 
-@pytest.mark.parametrize("name", ["tutorial_beam", "tutorial_waveform"])
+@pytest.mark.parametrize("name", ["tutorial_beam", pytest.param("tutorial_waveform", marks=pytest.mark.slow)])
 def test_tutorial(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     follow(name, capsys)

@@ -279,6 +279,18 @@ class AdvancedStates:
     """Of the way, by name, shape (runs,)."""
     hidden: Any = None
     """What it takes to go on without losing a bit."""
+    hidden_every: tuple[Any, ...] | None = None
+    """The same after each period, with *every*."""
+
+    def beginnings(self, later: AdvancedStates) -> AdvancedStates:
+        """Where the periods of *later* began, which went on from here: the runs of each period one after the other."""
+        assert later.every is not None
+        states = np.concatenate([self.states, *later.every.transpose(1, 0, 2)[:-1]])
+        if later.hidden_every is None:
+            return AdvancedStates(states, None, None, hidden=states)
+        return AdvancedStates(
+            states, None, None, hidden=_joined_states([self.hidden, *later.hidden_every[:-1]])
+        )
 
 
 @runtime_checkable
@@ -612,9 +624,6 @@ class Stroboscope:
         for array in (last, whole, moved):
             if array is not None:
                 array[failed] = np.nan
-        q, p = (np.where(failed[:, None], 0.0, values[:, -1]) for values in (landings.q, landings.p))
-        ticks = ensemble.runs["end"]
-        hidden = states_of(ensemble, q, p, landings.well_sign[:, -1], landings.contact_ticks[:, -1], ticks)
         status = np.where(
             failed,
             np.where(
@@ -622,10 +631,23 @@ class Stroboscope:
             ),
             0,
         )
-        # after a period every motion is where it began
-        hidden = replace(hidden, phase=ensemble.runs["phase"].copy(), statistics={"status": status})
+
+        def after(landing: int) -> State:
+            q, p = (np.where(failed[:, None], 0.0, values[:, landing]) for values in (landings.q, landings.p))
+            found = states_of(
+                ensemble, q, p, landings.well_sign[:, landing], landings.contact_ticks[:, landing], ensemble.runs["end"]
+            )  # fmt: skip
+            # after a period every motion is where it began
+            return replace(found, phase=ensemble.runs["phase"].copy(), statistics={"status": status})
+
+        ends = range(landings.q.shape[1])[each]
         return AdvancedStates(
-            last, whole, moved, statistics_of(ensemble, landings.accumulators_of_runs), hidden
+            last,
+            whole,
+            moved,
+            statistics_of(ensemble, landings.accumulators_of_runs),
+            after(-1),
+            tuple(after(landing) for landing in ends) if every else None,
         )
 
     def _require_period(self, own: Mapping[str, _Array]) -> None:
@@ -662,6 +684,12 @@ def _joined(parts: list[AdvancedStates]) -> AdvancedStates:
         stacked([part.tangents for part in parts]),
         statistics,
         _joined_states([part.hidden for part in parts]),
+        None
+        if parts[0].hidden_every is None
+        else tuple(
+            _joined_states(list(each))
+            for each in zip(*(part.hidden_every or () for part in parts), strict=True)
+        ),
     )
 
 

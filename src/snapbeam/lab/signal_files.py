@@ -16,7 +16,7 @@ import numpy as np
 
 from snapbeam.lab.signal_formats import READERS, WRITERS, Channel, Told
 from snapbeam.lab.signals import check_signal, make_signal, parse_sensitivity, si_unit
-from snapbeam.util.diagnostics import DiagnosticWarning
+from snapbeam.util.diagnostics import DiagnosticWarning, to_json
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError, InputTypeError, positive, shown
@@ -45,7 +45,7 @@ def read_channels(
     -------
     list of dict
         Keys ``data``, ``name``, ``unit_str``, and ``fs`` [Hz] or ``time`` [s].  ``unit_str`` is None
-        where the file states no unit.
+        where the file states no unit.  ``diagnostics`` lists what contradicts the header.
 
     Raises
     ------
@@ -198,7 +198,10 @@ def _to_signal(entry: Channel, units: str | None, sensitivity: str | None, sourc
     kwargs: dict[str, Any] = {"time": entry["time"]} if "time" in entry else {}
     if not kwargs:
         kwargs = {"sampling_frequency": entry["fs"], "start": entry.get("time_offset", 0.0)}
-    signal = make_signal(data * factor, base, name=name, attrs={"source": source}, **kwargs)
+    attrs = {"source": source}
+    if entry.get("diagnostics"):
+        attrs["diagnostics"] = to_json(entry["diagnostics"])
+    signal = make_signal(data * factor, base, name=name, attrs=attrs, **kwargs)
     check_signal(signal, name=name)
     return signal
 

@@ -28,7 +28,7 @@ from snapbeam.lab.sine_fit import (
     spectral_peak,
     stuck_runs,
 )
-from snapbeam.util.diagnostics import Diagnostic, doubtful
+from snapbeam.util.diagnostics import Diagnostic, diagnostics_of, doubtful
 from snapbeam.util.validation import InputError, finite, positive, within
 
 if TYPE_CHECKING:
@@ -743,6 +743,7 @@ def measure_drive(
         startup = _start_up(onset, uncertainty, settled, period, amplitudes, steady.amplitude, tol)
         broken = _broken_start(samples, onset, onset + settled * period, steady, clipping)
     diagnostics = [
+        *diagnostics_of(signal),
         *_flaw_diagnostics(samples, everywhere, broken, clipping),
         *_doubts(steady, limit, wander, stray, frequency, stated),
         *_start_diagnostics(startup, period),

@@ -170,7 +170,9 @@ class CheckpointRunner:
         total, done = sum(sizes.values()), 0
         if total < stage.size and not self.only_damaged:
             self.note(
-                f"{stage.name}: {stage.size - total} of {stage.size} points are finished, {total} remain"
+                f"checkpoint: {stage.size - total} of {stage.size} points are finished, {total} remain"
+                if stage.name == "base"
+                else f"{stage.name}: {stage.size - total} of {stage.size} points are finished, {total} remain"
             )
 
         def report(inside: int) -> None:

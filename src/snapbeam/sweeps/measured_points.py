@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.util.input_files import input_text
+from snapbeam.util.input_files import decoded, input_bytes
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, InputTypeError, file_path, positive
 
@@ -124,7 +124,7 @@ def read_measured_points(
     array([1.094])
     """
     file = file_path("path", path)
-    text = input_text("measurements", file)
+    text = decoded(input_bytes("measurements", file), file.name)
     first = next(
         (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), ""
     )

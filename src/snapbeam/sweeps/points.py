@@ -20,7 +20,7 @@ from snapbeam.util.validation import InputError, InputTypeError, axis, finite_ar
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Columns", "Grid", "PointList", "Points", "points_of", "require_memory"]
+__all__ = ["Columns", "Grid", "PointList", "Points", "labels_of", "points_of", "require_memory"]
 
 
 Columns = dict[str, NDArray[Any]]
@@ -137,7 +137,7 @@ class PointList:
     def coordinates(self) -> dict[str, Any]:
         """Return dimension, values and attributes of each parameter and label, by name."""
         found: dict[str, Any] = {
-            lookup(name).short: ((POINT,), values, _labels(lookup(name)))
+            lookup(name).short: ((POINT,), values, labels_of(lookup(name)))
             for name, values in self.columns.items()
         }
         return found | {name: ((POINT,), values, {}) for name, values in self.labels.items()}
@@ -289,9 +289,10 @@ def _length(columns: Mapping[str, NDArray[Any]]) -> int:
     return max((values.size for values in columns.values() if values.ndim == 1), default=1)
 
 
-def _labels(row: Parameter) -> dict[str, Any]:
+def labels_of(row: Parameter) -> dict[str, Any]:
+    """Attributes of a coordinate that holds values of a parameter."""
     return {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
 
 
 def _coordinate(row: Parameter, values: NDArray[Any]) -> tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]:
-    return (row.short,), values, _labels(row)
+    return (row.short,), values, labels_of(row)

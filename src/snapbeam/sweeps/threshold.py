@@ -155,7 +155,7 @@ def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
     symbol = f" {row.quantity.symbol}" if row.quantity.symbol else ""
     padded = np.append(values, np.nan)
     for name, text in (
-        ("lower_threshold", f"lowest {words}{symbol} that makes an interwell response"),
+        ("lower_threshold", f"lower threshold of the interwell response: {words}{symbol}"),
         ("upper_threshold", f"{words}{symbol} above which all runs are interwell"),
         ("last_intrawell", f"highest {words}{symbol} run below that without snap-through"),
         ("lower_threshold_min", f"lowest {words}{symbol} that may be interwell, failed runs included"),

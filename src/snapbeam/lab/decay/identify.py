@@ -28,6 +28,7 @@ from snapbeam.lab.decay.window import find_centres, noise_fall, prepared, undone
 from snapbeam.lab.diagnostics import KINDS_DECAY
 from snapbeam.lab.signals import SignalSamples, check_signal
 from snapbeam.lab.sine_fit import white_variance
+from snapbeam.util.diagnostics import diagnostics_of
 from snapbeam.util.validation import InputError, choice, finite_array, integer, positive
 
 if TYPE_CHECKING:
@@ -168,7 +169,7 @@ def identify_decay(
         misfit=misfit.ratio,
         lines=decay.lines,
         poles=diagram,
-        diagnostics=(*decay.diagnostics, *told, *doubts),
+        diagnostics=(*diagnostics_of(signal), *decay.diagnostics, *told, *doubts),
         backbone_amplitude=amplitude,
         backbone_frequency=freq,
         backbone_frequency_se=freq_se,
