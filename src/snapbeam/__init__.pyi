@@ -76,5 +76,6 @@ from .util.netcdf import write_netcdf as write_netcdf
 from .util.status_codes import ResponseClass as ResponseClass
 from .util.status_codes import RunStatus as RunStatus
 from .util.status_codes import classify as classify
+from .util.tables import write_table as write_table
 from .util.validation import InputError as InputError
 from .util.validation import InputTypeError as InputTypeError

@@ -57,7 +57,13 @@ def follow(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     plt.close("all")
 
 
-@pytest.mark.parametrize("name", ["tutorial_beam", pytest.param("tutorial_waveform", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "tutorial_beam",
+        *(pytest.param(each, marks=pytest.mark.slow) for each in ("tutorial_waveform", "howto_harvester")),
+    ],
+)
 def test_tutorial(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     follow(name, capsys)

@@ -45,6 +45,7 @@ __all__ = [
     "draw_dynamics",
     "draw_map",
     "draw_run",
+    "draw_statistic",
     "draw_threshold",
     "duration",
     "errors",
@@ -443,6 +444,16 @@ def draw_map(dataset: xr.Dataset, path: Path, overlay: Any, quasi_static_line: b
     from snapbeam.plot.map import plot_response_map
 
     return _save(plot_response_map(dataset, measurements=overlay, quasi_static_line=quasi_static_line), path)
+
+
+def draw_statistic(dataset: xr.Dataset, path: Path, name: str) -> Path:
+    """Draw a statistic of a map to a picture file."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from snapbeam.plot.map import plot_statistic
+
+    return _save(plot_statistic(dataset, name), path)
 
 
 def draw_threshold(dataset: xr.Dataset, path: Path) -> Path:

@@ -36,6 +36,15 @@ def plot(
             metavar="NAME=VALUE",
         ),
     ] = None,
+    statistic: Annotated[
+        str | None,
+        typer.Option(
+            help="Statistic of a map to draw instead of the response class, such as "
+            "harvested_power_last_quarter.",
+            rich_help_panel=_SLICE,
+            metavar="NAME",
+        ),
+    ] = None,
     measurements: opt.Measurements = None,
     quasi_static_line: opt.QuasiStaticLine = False,
     window: opt.Window = None,
@@ -45,13 +54,22 @@ def plot(
         check_pictures,
         draw_map,
         draw_run,
+        draw_statistic,
         draw_threshold,
         open_result,
         read_overlay,
     )
+    from snapbeam.util.validation import InputError
 
     check_pictures(("output", output))
     dataset = open_result(file)
+    if statistic is not None and ("time" in dataset.dims or "lower_threshold" in dataset):
+        raise InputError(f"statistic = {statistic!r}: must be left out; {file} is not a map")
+    if statistic is not None and (measurements is not None or quasi_static_line):
+        raise InputError(
+            f"statistic = {statistic!r}: measured responses and the quasi-static line are drawn over response classes; "
+            "leave them out"
+        )
     if "time" in dataset.dims:
         draw_run(dataset, output, opt.parse_window(window))
     elif "lower_threshold" in dataset:
@@ -63,6 +81,11 @@ def plot(
             "location": location,
         }
         dataset = _sliced(dataset, wanted, at or [])
+        if statistic is not None:
+            draw_statistic(dataset, output, statistic)
+            add_json(files=[output])
+            out().print(f"Written: {file_line(output)}")
+            return
         attrs = dataset.attrs
         overlay = read_overlay(
             measurements, attrs.get("reference_frequency"), attrs.get("beam_buckling_level")

@@ -200,8 +200,8 @@ def require_map(system: System) -> None:
     """
     if system.harvester is not None:
         raise InputError(
-            "harvester: has a state of its own, which the dynamics tools do not include; integrate such a system by "
-            "sb.advance(system, save_every_period=True), which returns the state after each cycle"
+            "harvester: has a state of its own, which the dynamics tools do not include; sweep a parameter of "
+            "such a system by sb.dynamics.hysteresis, or integrate it by sb.advance(system, save_every_period=True)"
         )
     if system.striker is not None and system.striker.mass is not None:
         raise InputError(

@@ -518,9 +518,9 @@ def read_lvm(path: Path, _told: Told) -> list[Channel]:
         clock: dict[str, Any] = {"fs": 1.0 / step, "time_offset": start if math.isfinite(start) else 0.0}
         if len(rows) != samples:
             kind = KINDS_SIGNAL["cut" if len(rows) < samples else "appended"]
-            numbers = {"promised": float(samples), "found": float(len(rows))}
-            told = [kind.found(told=path.name, **numbers)]
-            tell([kind.found(told=str(path), **numbers)])
+            promised, present = float(samples), float(len(rows))
+            told = [kind.found(told=path.name, promised=promised, found=present)]
+            tell([kind.found(told=str(path), promised=promised, found=present)])
             if names[0].lower() == "x_value" and rows[0][1][0].strip():
                 clock = {"time": np.array([to_number(row[0], comma) for _, row in rows])}
         data = np.array([to_number(cell, comma) for cell in cells])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 import warnings
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,8 @@ from snapbeam.plot.axes import axis_label, dress, edges_of, positions, symbol_of
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CLASS_COLORS,
+    SHAKER_COLOR,
+    base_and_load,
     beam_text,
     class_cells,
     figure_style,
@@ -56,6 +59,8 @@ UPWARD = ("velocity_amplitude", "location")
 
 _CURVES = ("min_midspan_displacement", "max_midspan_displacement")
 """Drawn over the classes of a map over one axis."""
+_LONGEST = 38
+"""Characters of a line beside a map of one column."""
 _NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
 
 
@@ -235,6 +240,7 @@ def subtitle(dataset: xr.Dataset, axes: tuple[str, ...]) -> str:
         value = _scalar(dataset, name)
         if name not in axes and value is not None:
             parts.append(f"{symbol_of(dataset, name)} = {value:.4g}")
+    parts += base_and_load(dataset)
     beam = "" if any(name.startswith("beam") for name in axes) else beam_text(dataset.attrs)
     return "\n".join(line for line in (beam, ", ".join(parts)) if line)
 
@@ -245,7 +251,7 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     Parameters
     ----------
     kinds : int8 array, optional
-        Classes of runs, whose shares then stand beside the names; unknown ones are named if there are any.
+        Classes of runs, whose shares then stand beside the names; classes without runs are left out.
 
     Examples
     --------
@@ -263,7 +269,7 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     handles: list[Patch | Line2D] = []
     for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
         count = 0 if kinds is None else int((kinds == kind).sum())
-        if count or kind is not ResponseClass.UNKNOWN:
+        if count or (kinds is None and kind is not ResponseClass.UNKNOWN):
             label = kind.label if kinds is None else f"{kind.label}, {_percent(count, kinds.size)}"
             handles.append(Patch(facecolor=CLASS_COLORS[kind], edgecolor="black", linewidth=0.4, label=label))
     return handles
@@ -356,7 +362,7 @@ def plot_statistic(
     Parameters
     ----------
     dataset : xarray.Dataset
-        A map.
+        A map, or a result of :func:`snapbeam.dynamics.hysteresis`, whose two sweeps are drawn as two lines.
     name : str
         One of :data:`snapbeam.STATISTICS`, or any other variable over the axes.
     ax : matplotlib.axes.Axes, optional
@@ -391,7 +397,9 @@ def plot_statistic(
         raise InputError(f"variable = {shown(name)}: the map has {', '.join(map(str, dataset.data_vars))}")
     if dataset[name].dims == ("point",):
         return plot_points(dataset, name, ax)
-    values = dataset[name].squeeze()
+    values = dataset[name].squeeze(
+        [each for each, size in dataset[name].sizes.items() if size == 1 and each != "sweep"]
+    )
     dims = [str(each) for each in values.dims]
     if not 1 <= len(dims) <= 2 or "point" in dims:
         sizes = ", ".join(f"{key} {size}" for key, size in values.sizes.items()) or "none"
@@ -407,7 +415,11 @@ def plot_statistic(
         if ax is None:
             ax = new_figure("single", 74.0).add_subplot()
         fix_ticks(ax)
-        if len(dims) == 1:
+        if dims[:1] == ["sweep"]:
+            _swept(ax, dataset, data, dims[1])
+            ax.set_ylabel(label)
+            ax.set_yscale("log" if log else "linear")
+        elif len(dims) == 1:
             points, _ = positions(dataset, dims[0])
             ax.plot(points, data.values, ".-", color=BEAM_COLOR, markersize=3)
             dress(ax.xaxis, dataset, dims[0])
@@ -429,6 +441,17 @@ def plot_statistic(
             dress(ax.yaxis, dataset, upward)
         ax.set_title(subtitle(dataset, (*dims,)), loc="left")
     return ax
+
+
+def _swept(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, name: str) -> None:
+    """Draw a statistic over a parameter that was swept up and down: filled and open markers."""
+    points, _ = positions(dataset, name)
+    looks = {"up": ("^-", BEAM_COLOR, BEAM_COLOR), "down": ("v--", SHAKER_COLOR, "white")}
+    for row, kind in zip(data.values, dataset["sweep"].values, strict=True):
+        look, color, face = looks[str(kind)]
+        ax.plot(points, row, look, color=color, markerfacecolor=face, markersize=3.5, label=f"swept {kind}")
+    dress(ax.xaxis, dataset, name)
+    ax.legend(loc="best")
 
 
 def scaled_values(dataset: xr.Dataset, name: str) -> tuple[_Array, str]:
@@ -454,9 +477,9 @@ def _label(dataset: xr.Dataset, name: str, values: np.ndarray) -> tuple[float, s
     unit = str(attrs.get("units", row.unit if row else "1"))
     words = words[:1].upper() + words[1:]
     if unit == "1":
-        return 1.0, words
+        return 1.0, textwrap.fill(words, _LONGEST)
     factor, scaled = scale_of(values, unit)
-    return factor, f"{words} ({scaled})"
+    return factor, textwrap.fill(f"{words} ({scaled})", _LONGEST)
 
 
 # ----------------------------------------------------------------------------------------------------

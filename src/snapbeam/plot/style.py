@@ -35,6 +35,7 @@ __all__ = [
     "COLUMN_WIDTHS",
     "FIGURE_SUFFIXES",
     "SHAKER_COLOR",
+    "base_and_load",
     "beam_text",
     "caption",
     "cell_edges",
@@ -231,10 +232,36 @@ def caption(dataset: xr.Dataset, lines: int = 1) -> str:
         how.append(text)
     if "location" in attrs and "location" not in dataset.dims:
         how.append(rf"$x_\mathrm{{s}}$ = {attrs['location']:.3g}")
+    how += base_and_load(dataset)
     parts = [", ".join(part for part in each if part) for each in (what, how)]
     text = ("\n" if lines > 1 else ", ").join(part for part in parts if part)
     kind = attrs.get("response_class")
     return f"{text}: {kind}" if isinstance(kind, str) and text else text
+
+
+_GRAVITY = 9.80665
+
+
+def base_and_load(dataset: xr.Dataset) -> list[str]:
+    """The base excitation in Hz and g, and the load resistance of a harvester."""
+    attrs, words, given = dataset.attrs, [], {}
+    for name in (
+        "base_excitation_frequency_ratio", "base_excitation_acceleration_amplitude", "harvester_resistance",
+    ):  # fmt: skip
+        if name in dataset.coords and dataset[name].size == 1:
+            given[name] = float(dataset[name].squeeze())
+        elif name in attrs and name not in dataset.dims:
+            given[name] = attrs[name]
+    omega = 2.0 * np.pi * attrs.get("reference_frequency", np.nan)
+    unit = omega**2 * attrs.get("length_scale", np.nan)
+    for name, value in given.items():
+        if name.endswith("resistance"):
+            words.append(f"$R$ = {prefixed(value, 'Ω')}")
+        elif name.endswith("ratio") and np.isfinite(omega):
+            words.append(f"base {prefixed(value * omega / (2.0 * np.pi), 'Hz')}")
+        elif name.endswith("amplitude") and np.isfinite(unit):
+            words.append(f"{value * unit / _GRAVITY:.3g} $g$")
+    return words
 
 
 # ----------------------------------------------------------------------------------------------------

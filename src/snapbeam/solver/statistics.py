@@ -103,6 +103,7 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
     ("lost", np.float64, 0.0),  # in contact
     *((name, np.float64, 0.0) for name in WORKS),
     ("circuit_energy", np.float64, 0.0),  # lost in a harvester's circuit, load included
+    ("circuit_energy_last_quarter", np.float64, 0.0),
     ("peak_circuit", np.float64, 0.0),  # maximum voltage or current, as the circuit's coordinate
     ("first_energy", np.float64, 0.0),
     ("energy", np.float64, 0.0),  # at the end, contact included
@@ -243,6 +244,27 @@ def _harvested_per_cycle(reading: Reading) -> Values:
         return np.where(done > 0.0, _harvested(reading) / done, np.nan)
 
 
+def _late_load_power(reading: Reading) -> Values:
+    """Mean power in the circuit over the last quarter of the run; NaN for a run that ended before it."""
+    runs = reading.ensemble.runs
+    inside = (reading.accumulators["time"] - runs["last_quarter"]) * runs["tick"]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(inside > 0.0, reading.seen("circuit_energy_last_quarter") / inside, np.nan)
+
+
+def _late_harvested_power(reading: Reading) -> Values:
+    tapped = reading.ensemble.tapped
+    return _late_load_power(reading) * (0.0 if tapped is None else tapped.share)
+
+
+def _late_voltage(reading: Reading) -> Values:
+    tapped = reading.ensemble.tapped
+    if tapped is None:
+        return _late_load_power(reading) * 0.0
+    per_square = tapped.rate if reading.ensemble.structure.circuit else 1.0 / tapped.rate
+    return np.sqrt(_late_load_power(reading) / per_square) * np.abs(tapped.volts)
+
+
 def _peak_voltage(reading: Reading) -> Values:
     tapped = reading.ensemble.tapped
     return reading.seen("peak_circuit") * (0.0 if tapped is None else np.abs(tapped.volts))
@@ -352,6 +374,14 @@ _ROWS = (
     Statistic(
         "harvested_per_cycle", "float64", "J", "energy in the harvester's load over the cycles of the run",
         _harvested_per_cycle,
+    ),
+    Statistic(
+        "harvested_power_last_quarter", "float64", "W", "power in the harvester's load, last quarter of the run",
+        _late_harvested_power,
+    ),
+    Statistic(
+        "rms_voltage_last_quarter", "float64", "V", "root mean square voltage across the load, last quarter of the run",
+        _late_voltage,
     ),
     Statistic("peak_voltage", "float64", "V", "greatest voltage across the load at the end of a step", _peak_voltage),
 )  # fmt: skip
