@@ -111,6 +111,25 @@ def test_measured_points_that_are_no_numbers_or_classes():
         MeasuredPoints(np.zeros(1), np.zeros(1), np.zeros(1), np.array([99]))
 
 
+@pytest.mark.parametrize("columns", [(LONG,) * 4, ([1, [2, 3]],) * 4, ({"a": 1},) * 4])
+def test_measured_points_that_are_no_arrays(columns):
+    with pytest.raises(InputError):
+        MeasuredPoints(*columns)
+
+
+def test_statistics_that_are_none(run):
+    """One of them entered the table, and every later call failed."""
+    before = list(sb.STATISTICS)
+    for value in ([2], 3.0, "a", sb.RunStatus.OK, run):
+        with pytest.raises(InputError, match="statistic"):
+            sb.register_statistic(value)
+        with pytest.raises(InputError, match="statistic"):
+            sb.unregister_statistic(value)
+    with pytest.raises(InputError, match="was not registered"):
+        sb.unregister_statistic(np.zeros((2, 3)))
+    assert list(sb.STATISTICS) == before
+
+
 def test_data_frames_where_settings_belong(system, run, tmp_path):
     for name in ("integration", "sample_times", "progress", "path"):
         named = {"integration": SHORT, "path": tmp_path / "x.nc"} | {name: run.dataset.to_dataframe()}

@@ -21,7 +21,7 @@ from snapbeam.model.early_termination import crossing_energy, decidable_energy, 
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.terms import WORKS
 from snapbeam.util.status_codes import ResponseClass, RunStatus, class_of
-from snapbeam.util.validation import InputError, NamedTable
+from snapbeam.util.validation import InputError, NamedTable, instance, shown
 
 __all__ = [
     "ACCUMULATORS",
@@ -422,7 +422,8 @@ def register_statistic(statistic: Statistic) -> None:
     True
     >>> sb.unregister_statistic("mean_force")
     """
-    if not statistic.name.isidentifier():
+    instance("statistic", statistic, Statistic, "a Statistic")
+    if not isinstance(statistic.name, str) or not statistic.name.isidentifier():
         raise InputError(f"statistic {statistic.name!r}: must be a name, such as 'rms_force'")
     if statistic.name in STATISTICS:
         raise InputError(f"statistic {statistic.name!r}: there is one of that name")
@@ -444,8 +445,8 @@ def unregister_statistic(name: str) -> None:
     >>> sb.register_statistic(row)
     >>> sb.unregister_statistic("impulse_per_second")
     """
-    if name not in list(STATISTICS) or STATISTICS[name] in _ROWS:
-        raise InputError(f"statistic {name!r}: was not registered")
+    if not isinstance(name, str) or name not in list(STATISTICS) or STATISTICS[name] in _ROWS:
+        raise InputError(f"statistic {shown(name)}: was not registered")
     del STATISTICS[name]
 
 

@@ -7,6 +7,7 @@ import math
 import os
 import re
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +63,7 @@ class MeasuredPoints:
     response_class: NDArray[np.int8]
 
     def __post_init__(self) -> None:
-        columns = [np.asarray(getattr(self, item.name)) for item in fields(self)]
+        columns = [_column(item.name, getattr(self, item.name)) for item in fields(self)]
         if len({each.shape for each in columns}) > 1 or columns[0].ndim != 1:
             raise InputError("MeasuredPoints: must be one-dimensional arrays of the same length")
         if any(each.dtype.kind not in "iuf" for each in columns):
@@ -75,6 +76,13 @@ class MeasuredPoints:
 
     def __len__(self) -> int:
         return len(self.response_class)
+
+
+def _column(name: str, values: Any) -> NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except (ValueError, TypeError, RuntimeError, MemoryError) as error:
+        raise InputError(f"{name}: must be an array of numbers, {error}") from None
 
 
 def read_measured_points(
