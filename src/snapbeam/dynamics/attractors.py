@@ -19,6 +19,7 @@ from snapbeam.dynamics.lyapunov import lyapunov_spectrum
 from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, orbit_tolerance, shoot
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
+from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, finite_array, integer, within
 
 if TYPE_CHECKING:
@@ -180,8 +181,9 @@ class Attractor:
         return balls_of(self.orbit) if self.orbit is not None else cloud_of(self.points)
 
     def __repr__(self) -> str:
-        what = f"period {self.period}" if self.orbit is not None else "chaotic"
-        return f"<Attractor: {what}, exponent {self.exponent:.4g} +- {self.exponent_error:.2g}>"
+        if self.orbit is not None:
+            return f"<Attractor: period {self.period}, exponent {self.exponent:.4g} from its multipliers>"
+        return f"<Attractor: chaotic, exponent {self.exponent:.4g} +- {self.exponent_error:.2g}>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,6 +227,10 @@ class Attractors:
             f"<{len(self.attractors)} attractors, {100 * self.undecided:.3g} % of {self.labels.size} states undecided, "
             f"others have less than {100 * self.unseen_share():.2g} % of the sampled states at 95 %>"
         )
+
+    def plot(self, ax: Any = None, **options: Any) -> Any:
+        """Draw the attractors once a period, with the share of the states that go to each; returns the axes."""
+        return plotter("plot_dataset")(self.to_dataset(), None, ax, **options)
 
     def to_dataset(self) -> xr.Dataset:
         """Kinds, periods, exponents, shares and points, labelled."""

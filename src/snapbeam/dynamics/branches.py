@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from snapbeam.dynamics.periodic_orbits import (
     orbit_tolerance,
 )
 from snapbeam.util.diagnostics import tell, to_json
+from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, choice, integer, shown, within
 
 if TYPE_CHECKING:
@@ -95,6 +96,10 @@ class Branch:
     def is_stable(self) -> NDArray[np.bool_]:
         """Of each orbit."""
         return np.array([orbit.is_stable for orbit in self.orbits])
+
+    def plot(self, variable: str | None = None, ax: Any = None, **options: Any) -> Any:
+        """Draw the branch: ``"midspan_displacement"`` over the parameter, or ``"multipliers"``; returns the axes."""
+        return plotter("plot_dataset")(self.to_dataset(), variable, ax, **options)
 
     def to_dataset(self) -> xr.Dataset:
         """Return the branch as a dataset.

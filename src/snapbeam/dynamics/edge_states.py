@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,7 @@ from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit,
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
+from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, integer, positive
 
 if TYPE_CHECKING:
@@ -47,6 +48,10 @@ class EdgeState:
     """The unstable orbit that it comes to, if it comes to one."""
     termination_reason: str
     """Why the tracking stopped, whether the bisection reached its threshold, and why there is no orbit."""
+
+    def plot(self, ax: Any = None, **options: Any) -> Any:
+        """Draw the motion once a period, and the unstable orbit that it settles on; returns the axes."""
+        return plotter("plot_dataset")(self.to_dataset(), None, ax, **options)
 
     def to_dataset(self) -> xr.Dataset:
         """The motion, labelled."""

@@ -83,7 +83,8 @@ def lyapunov_spectrum(
         ``exponent`` (1/s, over ``exponent_number`` and the axes or runs) with ``exponent_error``, one standard error
         from the means of blocks; ``exponent_snapping`` and ``exponent_settled``, of the periods before and after the
         last crossing (NaN if there are none), with ``periods_snapping``; and, without axes, ``running``, the estimate
-        after each period, and the attribute ``period`` (s): multiply by it for exponents per period.
+        after each period, and the attribute ``period`` (s); with axes ``excitation_period`` (s) of each point: multiply by
+        it for exponents per period.
 
     Raises
     ------
@@ -207,6 +208,9 @@ def _dataset(
         labels = {"units": unit, "long_name": "exponent so far"}
         dataset["running"] = (("period", *dims, "exponent_number"), running, labels)
         dataset.attrs["period"] = flow.period
+    else:
+        labels = {"units": "s", "long_name": "period of the excitation"}
+        dataset["excitation_period"] = (dims, arranged(_periods(flow, points)), labels)
     return dataset
 
 

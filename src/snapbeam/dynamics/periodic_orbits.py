@@ -18,7 +18,9 @@ from snapbeam.model.system import System
 from snapbeam.simulation.simulate import simulate
 from snapbeam.solver.cpu.driver import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, tell, to_json
+from snapbeam.util.display import plotter
 from snapbeam.util.validation import (
+    choice,
     InputError,
     InputTypeError,
     checked,
@@ -439,6 +441,32 @@ class PeriodicOrbit:
         if not isinstance(self.flow, Stroboscope):
             raise InputTypeError("orbit: its flow is not a System")
         return self.flow
+
+    def plot(self, kind: str = "phase_portrait", ax: Any = None, **options: Any) -> Any:
+        """Draw the orbit over its whole period, or its Floquet multipliers.
+
+        Parameters
+        ----------
+        kind : {"phase_portrait", "multipliers"}
+        ax : matplotlib.axes.Axes, optional
+        **options
+            Options of :func:`snapbeam.plot.plot_phase_portrait` or :func:`snapbeam.plot.plot_multipliers`.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        InputError
+            For another kind, and for the phase portrait of an orbit of a map.
+        """
+        if choice("kind", kind, ("phase_portrait", "multipliers")) == "multipliers":
+            return plotter("plot_multipliers")(self.to_dataset(), ax=ax, **options)
+        flow = self._stroboscope
+        cycles = self.period * flow.cycles_per_period
+        run = simulate(self.system, flow.integration.replace(cycles=cycles, early_termination=False))
+        return plotter("plot_phase_portrait")(run, ax=ax, **options)
 
     def to_dataset(self) -> xr.Dataset:
         """The orbit once a period, and its multipliers, labelled."""
