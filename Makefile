@@ -21,7 +21,7 @@ WORKERS ?= 2
 # Where the benchmarks write; the docs show what is in docs/images
 BENCH ?= out/bench
 
-.PHONY: help map explorer-deps test test-slow test-oldest lint docs bench audit dist clean
+.PHONY: help map tables prose explorer-deps test quick-tests test-slow test-oldest lint docs bench audit dist clean
 
 help:
 	@echo "make map        compute the response map ($(MAP), $(PLOT)); variables: MODES CYCLES FREQUENCY_RATIO"
@@ -31,6 +31,8 @@ help:
 	@echo "make explorer-deps   what the explorer and its tests in a browser need"
 	@echo "make test-oldest  the tests with the oldest packages that are allowed, on Python 3.11"
 	@echo "make docs       the documentation, in docs/_build/html"
+	@echo "make tables     the tables of the reference pages, from the program"
+	@echo "make prose      a report on the sentences of the pages"
 	@echo "make bench      the benchmarks, in out/bench; variable: BENCH"
 	@echo "make audit      known vulnerabilities of the pinned packages"
 	@echo "make dist       wheel and source archive, each installed alone and run"
@@ -74,7 +76,11 @@ lint: $(VENV)/.installed-test
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-test: lint
+# The linters take one minute beside the tests.
+test:
+	$(MAKE) --no-print-directory --jobs 2 lint quick-tests
+
+quick-tests: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -m "not slow" --durations=15 -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 test-slow: $(VENV)/.installed-test
@@ -96,6 +102,12 @@ test-oldest: $(OLDEST)/.installed
 
 docs: $(VENV)/.installed-docs
 	$(BIN)/python -m sphinx -W --keep-going -b html docs docs/_build/html
+
+tables: $(VENV)/.installed-test
+	$(BIN)/python docs/_ext/reference.py
+
+prose: $(VENV)/.installed-run
+	$(BIN)/python tests/docs/prose.py
 
 bench: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks -o $(BENCH)

@@ -31,7 +31,6 @@ version = release = __version__
 extensions = [
     "myst_parser",
     "formulas",
-    "reference",
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",

@@ -24,7 +24,7 @@ system = sb.System(
 run = sb.simulate(system, sb.Integration(cycles=40))
 
 # %%
-# What it did, from statistics that are kept while it runs:
+# The summary contains the response class and the statistics of the run:
 
 print(run.summary.response_class.label)
 print(
@@ -34,13 +34,13 @@ print(
 print(f"{run.summary.impacts} impacts, the hardest {run.summary.peak_force:.2f} N")
 
 # %%
-# The waveform, and the hardest impact closer:
+# The waveform, and the impact with the maximum force:
 
 ax = run.plot(window=(0.0, 20.0))
 
 # %%
-# The law of contact dissipates nothing, so the work of the shaker is in the beam, in the contact or lost to
-# damping:
+# The contact law dissipates no energy. The work of the shaker is therefore stored in the beam or in the contact, or
+# dissipated by damping:
 
 energy = run.dataset
 balance = (

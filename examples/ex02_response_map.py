@@ -3,8 +3,8 @@ A map of response types
 =======================
 
 Frequency and amplitude of the shaker decide whether the beam stays in its well (intrawell), snaps through and
-settles (transient interwell) or goes on snapping (continuous interwell). Here on a coarse grid, with four
-modes, so that the page is quick to make; ``make map`` computes it with 32 modes on a finer one.
+settles (transient interwell) or continues to snap through (continuous interwell). This example has a coarse grid
+and four modes; ``make map`` computes 32 modes on a finer grid.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ ds = sb.sweep(system, axes, sb.Integration(cycles=80))
 
 # %%
 # The dashed line is the quasi-static threshold of one mode, :math:`V_\mathrm{QS1} = \Omega \sin^2 \pi x_s`
-# (Eq. 21). At low frequency the border of the intrawell responses follows it; above, impacts need far less.
+# (Eq. 21). At low frequency the boundary of the intrawell responses follows it. At higher frequency, impacts need much lower amplitudes.
 
 ax = plot_response_map(ds, quasi_static_line=True)
 

@@ -2,8 +2,8 @@
 The beam and the shaker
 =======================
 
-Fig. 2 of the paper: the buckled beam in the well it starts in (solid) and in the other (dashed), and the
-shaker, with their symbols. The shapes are those of the model.
+Fig. 2 of the paper: the buckled beam in its initial well (solid) and in the other well (dashed), the shaker,
+and their symbols. The model gives the shapes.
 """
 
 from snapbeam import paper

@@ -2,8 +2,8 @@ r"""
 Through the unstable equilibrium
 ================================
 
-Fig. 5: while the first modal amplitude passes zero, the shape of the beam is that of the higher modes, most often the
-third. Grey: where they are together greater than the first.
+Fig. 5: while the first modal amplitude passes zero, the higher modes determine the shape of the beam, most often the
+third mode. Grey: the higher modes together exceed the first.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ others = np.sqrt((alpha[near, 1:] ** 2).sum(axis=1))
 print(f"{100 * (others > np.abs(alpha[near, 0])).mean():.0f} %")
 
 # %%
-# And which of them is the greatest?
+# Which of the higher modes is the largest?
 
 leading = np.abs(alpha[near, 1:]).argmax(axis=1) + 2
 for mode in np.unique(leading):

@@ -3,9 +3,9 @@ Frequency and amplitude, 200 cycles
 ===================================
 
 Fig. 6: the response over frequency and amplitude for one mode and for 32. The light-blue band of one mode at
-:math:`V` = 0.26 is the first impact: the shaker sets out at its greatest speed :math:`V b \omega_1`, the beam leaves at
-twice that, and in the quartic potential of one mode that carries it over the barrier for :math:`V > 1/4` (a little more
-with damping); just above, it has too little energy left to come back.
+:math:`V` = 0.26 is the first impact. The shaker starts at its maximum speed :math:`V b \omega_1`, and the beam leaves it at
+twice that speed. In the quartic potential of one mode this is enough to pass the barrier for :math:`V > 1/4` (slightly more
+with damping). Just above this value the beam has too little energy to return.
 """
 
 import numpy as np

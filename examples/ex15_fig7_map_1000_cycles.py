@@ -2,7 +2,7 @@
 Frequency and amplitude, 1000 cycles
 ====================================
 
-Fig. 7: the same after 1000 cycles, with the quasi-static threshold of one mode (dashed), and, below, the
+Fig. 7: the map of Fig. 6 after 1000 cycles, with the quasi-static threshold of one mode (dashed), and, below, the
 points that changed their class since cycle 200.
 """
 
@@ -13,7 +13,7 @@ results = paper.shared_results()
 figure = paper.fig7(results=results)
 
 # %%
-# Shares of the classes, before and after:
+# Class fractions after 200 and after 1000 cycles:
 
 for name, long in results["fig7"].items():
     for ds in (results["fig6"][name], long):

@@ -2,7 +2,7 @@
 Resonances
 ==========
 
-Fig. B.10: greatest displacement at the contact over frequency, at two drives that do not snap the beam
+Fig. B.10: maximum displacement at the contact over frequency, for two amplitudes at which the beam does not snap
 through.
 """
 

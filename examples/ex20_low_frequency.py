@@ -2,7 +2,7 @@ r"""
 Slow shakers
 ============
 
-How the interwell threshold approaches the quasi-static one, :math:`V_\mathrm{QS1}` of Eq. (21).
+At low frequency the interwell threshold approaches the quasi-static threshold :math:`V_\mathrm{QS1}` of Eq. (21).
 """
 
 from snapbeam import paper

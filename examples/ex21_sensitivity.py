@@ -1,10 +1,10 @@
 r"""
-What the paper leaves open
-==========================
+Unspecified properties of the paper's model
+===========================================
 
-One map, and the points that change class when something is changed that the paper does not state, or that
-should not matter: the ninth decimal of the drive, the step, the contact stiffness, how damping is applied,
-what :math:`\omega_1` normalises one mode.
+This example shows one map and the points whose class depends on a property that the paper does not state: the ninth
+decimal of the drive, the step, the contact stiffness, the kind of damping, and the :math:`\omega_1` that normalises the model
+of one mode.
 """
 
 from snapbeam import paper
@@ -14,7 +14,7 @@ results = paper.shared_results()
 figure = paper.sensitivity(results=results)
 
 # %%
-# What chaos does by itself, a change of the drive in the ninth decimal, is the measure for the others:
+# A change of the drive in the ninth decimal shows the effect of chaos alone. Compare the other changes with it:
 
 data = results["sensitivity"]
 for name in ("perturbed", "half_step", "soft_contact", "buckling_damping"):

@@ -1,9 +1,9 @@
 r"""
-What the paper says, measured
-=============================
+Claims of the paper
+===================
 
-Every statement of the paper that a simulation can test, with the rule its verdict follows from.  These are the
-numbers of a sketch where no data are stored; those of full size are in the page on the reproduction.
+This example measures every statement of the paper that a simulation can test, with the rule of its verdict. Without
+stored data the numbers are those of a sketch; the page on the reproduction has the full-size numbers.
 """
 
 from snapbeam import paper
@@ -14,7 +14,7 @@ rows = measure_claims(paper.shared_results(), paper.Results())
 print(summary(rows))
 
 # %%
-# A row is numbers, a verdict and the words for both:
+# A row contains numbers, a verdict and their description:
 
 row = next(row for row in rows if row.number == "9d")
 print(f"{row.says} ({row.source})")
@@ -24,7 +24,7 @@ for name, quantity in row.quantities.items():
 print(row.verdict)
 
 # %%
-# The natural frequency of one mode is right to a few percent; the frequencies at which a shaker moves the beam most
-# are not.  They fall as the shaker moves faster, until the beam snaps through:
+# The natural frequency of one mode is right to a few percent; the frequencies of maximum response
+# are not.  They decrease with the velocity of the shaker, until the beam snaps through:
 
 figure = paper.resonance(results=paper.shared_results())

@@ -2,15 +2,15 @@
 Extended models
 ===============
 
-The paper's shaker moves as prescribed and its contact loses nothing.  Here are a shaker with a mass on a suspension,
-which comes and goes in a burst and loses energy in contact, and a sphere that is thrown at the beam, each drawn from
-the system itself.
+The paper's shaker has a prescribed motion, and its contact dissipates no energy.  This example simulates a shaker with a
+mass on a suspension, a thrown sphere, unequal wells, elastic supports and harvesters, and draws each system.
 """
 
 # %%
 # A burst from a shaker of 20 g
 # -----------------------------
-# Its mass and suspension let the contact force move it; the loss of the contact follows from a wanted restitution.
+# Because of its mass and suspension, the contact force moves the shaker. The contact loss follows from the requested
+# restitution.
 
 import snapbeam as sb
 from snapbeam import paper
@@ -35,7 +35,7 @@ system = sb.System(model, lossy, shaker)
 plot_system(system)
 
 # %%
-# Of the work that the striker does, part is lost in contact and part in the beam.
+# The contact and the beam each dissipate a part of the work of the striker.
 
 run = sb.simulate(system, sb.Integration(cycles=8))
 print(
@@ -47,7 +47,7 @@ plot_run(run.dataset)
 # %%
 # A sphere of 2 g
 # ---------------
-# Thrown at the middle of the beam from above, at :math:`0.4\,b\,\omega_1`.
+# The sphere is thrown at mid-span from above, at :math:`0.4\,b\,\omega_1`.
 
 sphere = sb.Striker(
     drive=sb.ConstantVelocity(speed=0.4),
@@ -69,9 +69,9 @@ print(
 plot_run(run.dataset)
 
 # %%
-# Unequal wells and ends that turn
-# --------------------------------
-# An initial shape and a side load make the wells unequal; each end may turn on a spring of its own.
+# Unequal wells and elastic supports
+# ----------------------------------
+# An initial shape and a side load make the wells unequal; each end has a rotational spring.
 
 soft = paper.BEAM.replace(
     boundary=sb.BoundaryConditions(
@@ -98,9 +98,9 @@ plot_system(
 )
 
 # %%
-# A harvester on a base that moves
-# --------------------------------
-# Nothing strikes but a stop that is carried along; layers next to the clamp feed a resistor.
+# A harvester on a moving base
+# ----------------------------
+# The only striker is a stop that moves with the base. Piezoelectric layers next to the clamp supply a resistor.
 
 motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25)
 stop = sb.Striker(drive=sb.FixedStop(), gap=0.2 * level)
@@ -121,8 +121,8 @@ shaken = sb.System(
 plot_system(shaken)
 
 # %%
-# A coil, under a load that changes
-# ---------------------------------
+# A coil and a changing axial load
+# --------------------------------
 
 coil = sb.ElectromagneticHarvester(
     force_factor=1.5, resistance=30.0, coil_resistance=10.0, location=0.4

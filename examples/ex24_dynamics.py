@@ -1,17 +1,16 @@
 """
-How long, how likely, and where orbits are born
+Lifetimes, bifurcations, basins and edge states
 ===============================================
 
-A class after some hundred cycles is one sample.  Here are four questions to one mode and to two whose answers hold: how
-long snapping lasts, which motions there are over the amplitude of the shaker, which of them is reached from where, and
-what the orbits are that no run settles on.
+A class after several hundred cycles is one sample.  This example computes four more robust results with one and two
+modes: the lifetime of snap-through, the motions over the amplitude of the shaker, their basins, and unstable orbits.
 """
 
 # %%
-# How long does snapping last?
-# ----------------------------
-# 120 starts at two points of the plane of Fig. 6, two modes.  Lines are exponentials with the lifetimes found;
-# what still snaps at the end counts as such.
+# How long does snap-through last?
+# --------------------------------
+# 120 initial conditions at two points of the plane of Fig. 6, two modes.  Lines are exponentials with the estimated
+# lifetimes. Runs that still snap at the end are right-censored.
 
 import numpy as np
 import xarray as xr
@@ -43,10 +42,10 @@ for i in range(2):
 plot_survival(lifetimes, labels=["1.21, 0.25", "2.5, 0.55"])
 
 # %%
-# Which motions are there, and where are they born?
-# -------------------------------------------------
-# One mode with more damping, struck slowly enough that its motions can be counted: the diagram of runs that are carried
-# on up and down, over it the orbits that a branch follows, stable or not, with what happens to them.
+# Which motions exist, and where do they begin?
+# ---------------------------------------------
+# One mode with more damping and a slow shaker, so that few motions exist. The bifurcation diagram is swept up and down. The
+# stable and unstable orbits of a branch, and their bifurcations, are plotted over it.
 
 one = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.03),
@@ -77,9 +76,9 @@ for branch in branches:
 plot_diagram(diagram, branches=[branch.to_dataset() for branch in branches])
 
 # %%
-# Which of them is reached from where?
-# ------------------------------------
-# States of the mode in the plane of displacement and velocity, from the tip's mid-position on, which stays where it is.
+# Which initial states go to which motion?
+# ----------------------------------------
+# Initial states of the mode in the plane of displacement and velocity. The mid-position of the tip is fixed.
 
 found = sb.dynamics.find_attractors(one, 100)
 grid = {

@@ -1,9 +1,9 @@
 """
-How likely, at which amplitude, and what matters most
-=====================================================
+Probabilities, thresholds and sensitivities
+===========================================
 
-A system that is built is not the one that was drawn: its beam, contact and place are known to a tolerance, and the
-drive begins at any phase.  Every answer is counted over draws of such systems, and none is given without its interval.
+The parameters of a real system have tolerances: beam, contact and location, and the drive begins at any phase.  Every
+result of this example is counted over random samples of such systems, and has a confidence interval.
 
 This is a sketch with one mode and few runs.
 """
@@ -11,7 +11,7 @@ This is a sketch with one mode and few runs.
 # %%
 # How likely is it to snap?
 # -------------------------
-# Lines of equal probability; a small cross where the interval is wider than asked for.
+# Lines of equal probability; a small cross marks an interval that is wider than requested.
 
 import numpy as np
 
@@ -51,7 +51,8 @@ plot_probability(probability)
 # %%
 # At which amplitude?
 # -------------------
-# Where the probability is 0.05, 0.5 and 0.95, with bands of 95 %; a cross where it is seen to fall again.
+# Amplitudes with the probabilities 0.05, 0.5 and 0.95, with bands of 95 %. A cross marks a probability that decreases
+# again.
 
 threshold = sb.uncertainty.quantile_threshold(
     system,
@@ -67,7 +68,7 @@ plot_quantiles(threshold)
 # %%
 # What matters most?
 # ------------------
-# For each parameter one standard score down and up; how much that is in its own unit stands beside it.
+# Each parameter is changed by one standard score down and up; the label gives the change in the unit of the parameter.
 
 sensitivity = sb.uncertainty.sensitivity(
     system,

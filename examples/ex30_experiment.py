@@ -1,11 +1,11 @@
 r"""
-A whole experiment
-==================
+From a recording to measured points on a map
+============================================
 
-From the free decays of a beam to measured responses on a simulated map, in the order of a week in the laboratory.
-The laboratory here is synthetic, so that each step can be held against the truth: a simulated beam stands on the
-bench, and from here on only the files that camera and vibrometer would have written are used. With files of your
-own, leave the bench out; the page on experiments has the same steps as commands.
+This example goes from the free decays of a beam to measured responses on a simulated map. The measurements are
+synthetic, so that each step can be compared with the true values: a simulated beam replaces the test specimen. All
+later steps use only files such as camera and vibrometer write. With your own files, omit the simulation; the page on
+experiments has the same steps as commands.
 """
 
 import dataclasses
@@ -41,9 +41,9 @@ def on_the_bench(buckling_level):
 # %%
 # The beam: free decays about both wells
 # --------------------------------------
-# No real beam is quite symmetric. The paper's has 81.3 Hz about one well and 80.5 Hz about the other; about each,
-# the one on the bench vibrates as a symmetric beam of another buckling level would. It is deflected by a tenth of
-# that and let go, and the displacement of its centre is recorded at 5 kHz for half a second, the sine at the start
+# No real beam is exactly symmetric. The paper's beam has 81.3 Hz about one well and 80.5 Hz about the other. The
+# simulated beam vibrates about each well like a symmetric beam of another buckling level. It is deflected by a tenth of
+# that level and released. The displacement at mid-span is recorded at 5 kHz for half a second; the initial sine is
 # 20 dB above the noise.
 
 rate, wells = 5e3, {}
@@ -81,8 +81,8 @@ for well, level in (("lower", 0.3323e-3), ("upper", 0.3289e-3)):
 print(lab.compare_wells(wells["lower"], wells["upper"]).statement)
 
 # %%
-# The beam softens: its frequency is lower while it moves far. What is wanted is the frequency of vanishing
-# amplitude, to which the fit continues the backbone (below, right).
+# The beam softens: its frequency is lower while it moves far. The fit extrapolates the
+# backbone curve to the frequency of zero amplitude (below, right).
 
 figure = plot_decay(lab.read_signal(files / "decay_upper.csv"), wells["upper"])
 
@@ -90,9 +90,9 @@ figure = plot_decay(lab.read_signal(files / "decay_upper.csv"), wells["upper"])
 # Calibration
 # -----------
 # With the paper's frequencies of the straight beam, 80 and 221 Hz, and those of the wells, the thickness and the
-# buckling level follow by least squares. They are the model's, not the gauge's (0.44 and 0.5 mm): clamps that give
-# way and a beam that is not quite straight go into them. The errors of the frequencies are left at half a percent:
-# the wells differ by far more than the errors of their decays, and the symmetric model cannot follow that.
+# buckling level follow by least squares. They are values of the model and differ from the measured ones (0.44 and 0.5 mm),
+# because they include elastic clamps and an initial deflection. The standard errors of the frequencies are half a
+# percent: the difference of the wells is much larger than the errors of the decays, and a symmetric model cannot show it.
 
 measured = lab.Measurements(
     straight_frequencies=(80.0, 221.0),

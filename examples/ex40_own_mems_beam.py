@@ -1,9 +1,9 @@
 r"""
-A beam of one's own
-===================
+Your own beam: a silicon microbeam
+==================================
 
-From a parameter file of a silicon beam, 400 µm long and 2 µm thick, to a figure for a journal. The steps are those
-of a shell; here they are run by Python, and what the program suggests next is run too.
+This example goes from the parameter file of a silicon beam, 400 µm long and 2 µm thick, to a figure for a journal. The
+steps are shell commands, run here from Python. The commands that the program suggests are run too.
 """
 
 import re
@@ -58,12 +58,12 @@ def shell(command: str) -> str:
 
 
 # %%
-# The frequencies first. What the file leaves to the paper's beam would be told.
+# First the frequencies. The command reports values that are missing in the file and taken from the paper's beam.
 
 print(shell(f"snapbeam frequencies --config {beam} --count 4"))
 
 # %%
-# Then the map, and its picture at the width of a column, as PDF for the journal.
+# Then the map, and its figure at column width, as PDF for the journal.
 
 said = shell(
     f"snapbeam map --config {beam} -o {files}/mems.nc --plot {files}/mems.pdf"
@@ -71,7 +71,7 @@ said = shell(
 print(said.replace(f"{files}/", ""))
 
 # %%
-# The program says what to look at next. Each suggestion is a whole command, of this very system:
+# The program suggests next steps. Each suggestion is a complete command for this system:
 
 for line in re.findall(r"^  .*?(snapbeam (?:simulate|plot).*)$", said, re.MULTILINE):
     command = re.sub(r"(--plot|-o) (\S+)", rf"\1 {files}/\2", line)
@@ -79,7 +79,7 @@ for line in re.findall(r"^  .*?(snapbeam (?:simulate|plot).*)$", said, re.MULTIL
 plt.close("all")  # their pictures are in files
 
 # %%
-# The run that it chose, as it drew it:
+# The suggested run:
 
 picture = plt.imread(files / "run.png")
 figure = plt.figure(figsize=(7.5, 7.5 * picture.shape[0] / picture.shape[1]))

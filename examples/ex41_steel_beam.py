@@ -2,8 +2,8 @@ r"""
 A steel beam of 300 mm
 ======================
 
-How much amplitude does it take to snap a beam through, and does it depend on its thickness? The first mode of this
-beam is compared with the exact one before anything is believed, and how sure the answer is stands beside it.
+Which amplitude is necessary for snap-through, and does it depend on the thickness? This example first compares the
+first mode of the beam with the exact one. It also shows how certain the result is.
 """
 
 import numpy as np
@@ -55,7 +55,7 @@ for thickness, value in zip(found.beam_thickness.values, low.values, strict=True
     print(f"h = {1e3 * thickness:.1f} mm: snaps through from V = {value:.2f}")
 
 # %%
-# How sure is a point near it? Repeats from slightly different starts say.
+# How certain is a point near the threshold? Replicates with slightly different initial conditions show it.
 
 near = {"velocity_amplitude": np.linspace(0.05, 0.35, 7)}
 sure = sb.sweep(
@@ -67,7 +67,7 @@ sure = sb.sweep(
 print(sure.class_fraction.max("class_code").values)
 
 # %%
-# And one run, with everything that it did:
+# One run, with its summary:
 
 run = sb.simulate(system, sb.Integration(cycles=60))
 print(run.summary.to_text())

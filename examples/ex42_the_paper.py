@@ -1,8 +1,8 @@
 r"""
-The paper, from the shell
-=========================
+The paper's results from the shell
+==================================
 
-A figure of the paper, its numbers, and the run in its notch, by commands alone.
+This example computes a figure of the paper, its numbers, and a run in its notch, with commands only.
 """
 
 import json
@@ -35,12 +35,12 @@ found = json.loads(shell("frequencies", "--count", "3", "--json", "-"))
 print([f"{each:.1f} Hz" for each in found["reduced"]])
 
 # %%
-# A figure, as a sketch; ``--full`` takes the size of the paper:
+# A figure, as a sketch; ``--full`` computes it at the size of the paper:
 
 print(shell("reproduce", "figA9", "-o", "OUT"))
 
 # %%
-# The run of Fig. 5, as numbers for a script and as a picture for the eye:
+# The run of Fig. 5, as numbers for a script and as a figure:
 
 run = "simulate --frequency-ratio 1.21 --velocity-amplitude 0.18 --cycles 40"
 files_of_it = "-o OUT/run.nc --plot OUT/run.png --window 0:20 --json -"
@@ -53,7 +53,7 @@ figure.add_axes((0, 0, 1, 1)).imshow(picture)
 figure.axes[0].axis("off")
 
 # %%
-# The file is enough to go on from: here with another striker's location, everything else the same.
+# The file contains all parameters. Here the location of the striker changes, and everything else is the same.
 
 print(
     shell("simulate", "--from", "OUT/run.nc", "--location", "0.3", "--cycles", "40")

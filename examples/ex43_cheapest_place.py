@@ -1,12 +1,12 @@
 """
-The cheapest place to strike
-============================
+Where to strike: an optimised location
+======================================
 
-The paper ends on a trade-off: near a clamp the striker need not go far, near the centre it need not push hard.  Here
-place, frequency and amplitude are chosen so that the beam snaps in at least 95 % of cases, under small tolerances, for
-little speed and little force.  What is reported has intervals from draws that the search did not see.
+The paper describes a trade-off: near a clamp the displacement of the striker is small, near the centre its force.  This
+example optimises location, frequency and amplitude. The beam must snap in at least 95 % of cases under small tolerances, with
+low speed and low force.  Intervals are from independent samples.
 
-This is a sketch with one mode and little effort; the page on design has the numbers of eight modes.
+This is a sketch with one mode and few runs; the page on verification has the numbers of eight modes.
 """
 
 from matplotlib import pyplot as plt

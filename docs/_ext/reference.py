@@ -1,17 +1,27 @@
-"""Generated reference pages: commands, keys of parameter files, variables and codes, supported combinations.
+"""Tables of the reference pages: commands, keys of parameter files, variables and codes, supported combinations.
 
-The text comes from the program itself: its commands, its tables of parameters and statistics, and its refusals.
+The text comes from the program itself: its commands, its tables of parameters and statistics, and its refusals.  The
+pages are committed, so that they are complete on the page of the repository too.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-__all__ = ["command_line", "parameter_tables", "setup", "support_tables", "variable_tables", "write_pages"]
+__all__ = [
+    "command_line",
+    "pages",
+    "parameter_tables",
+    "status_tables",
+    "support_tables",
+    "variable_tables",
+    "write_pages",
+    "written",
+]
 
 _SECTIONS = {
     "beam": "Geometry and material. Give one of `buckling_level` and `axial_load`.",
@@ -88,8 +98,20 @@ def parameter_tables() -> str:
         header = ["key", "meaning", "unit", "allowed", "default", "level", "types"]
         if not any(row[-1] for row in rows):
             header, rows = header[:-1], [row[:-1] for row in rows]
-        parts.append(f"## [{section}]\n\n{words.format(**listed)}\n\n" + _table(header, rows))
+        text = f"## [{section}]\n\n{words.format(**listed)}\n\n"
+        if section in types:
+            text += _keys_by_type(types[section], [row[0] for row in rows]) + "\n"
+        parts.append(text + _table(header, rows))
     return "\n".join(parts)
+
+
+def _keys_by_type(types: Mapping[str, Any], keys: Sequence[str]) -> str:
+    """Return a table of the keys that each type has."""
+    rows = [
+        (f"`{name}`", ", ".join(key for key in keys if key.strip("`") in _fields(kind)) or "–")
+        for name, kind in types.items()
+    ]
+    return _table(("type", "its keys"), rows)
 
 
 def _listed(names: Iterable[str]) -> str:
@@ -111,21 +133,28 @@ def variable_tables() -> str:
     """Return tables of the variables of runs, impacts and maps, and of the codes."""
     from snapbeam.simulation.dataset import IMPACT_COLUMNS, SCHEMA
     from snapbeam.solver.statistics import STATISTICS
-    from snapbeam.util.status_codes import ResponseClass, RunStatus
 
     runs = [(f"`{name}`", ", ".join(row.dims), row.units, row.long_name) for name, row in SCHEMA.items()]
     impacts = [(f"`{name}`", unit, words) for name, unit, words in IMPACT_COLUMNS]
     statistics = [(f"`{row.name}`", row.dtype, row.unit, row.long_name) for row in STATISTICS.values()]
-    classes = [(int(kind), kind.name, kind.label) for kind in ResponseClass]
-    statuses = [(int(kind), kind.name, kind.advice) for kind in RunStatus]
     return "\n".join((
         "## A run\n", _table(("variable", "dimensions", "unit", "meaning"), runs),
         "## Impacts of a run\n", "Dimension `impact`.\n", _table(("variable", "unit", "meaning"), impacts),
         "## Statistics\n",
         "Variables of maps, and attributes of `run.summary`.\n",
         _table(("variable", "kind", "unit", "meaning"), statistics),
-        "## Response classes\n", _table(("code", "name", "class"), classes),
+    ))  # fmt: skip
+
+
+def status_tables() -> str:
+    """Return tables of the statuses of runs, with remedies, and of the response classes."""
+    from snapbeam.util.status_codes import ResponseClass, RunStatus
+
+    statuses = [(int(kind), f"`{kind.name}`", kind.advice) for kind in RunStatus]
+    classes = [(int(kind), f"`{kind.name}`", kind.label) for kind in ResponseClass]
+    return "\n".join((
         "## Statuses of runs\n", _table(("code", "name", "meaning and remedy"), statuses),
+        "## Response classes\n", _table(("code", "name", "class"), classes),
     ))  # fmt: skip
 
 
@@ -147,7 +176,7 @@ def _command(title: str, command: Any, level: int) -> list[str]:
     parts = [f"{'#' * level} {title}\n\n{words}\n"]
     panels: dict[str, list[tuple[str, str]]] = {}
     for parameter in command.params:
-        if parameter.name == "help":
+        if parameter.name in ("help", "help_all"):
             continue
         panel = getattr(parameter, "rich_help_panel", None) or (
             "Arguments" if parameter.param_type_name == "argument" else "Options"
@@ -256,9 +285,9 @@ def _questions() -> dict[str, Any]:
         try:
             resolve(
                 "cuda", modes=system.model.modes, law=ensemble.law, drive=ensemble.drive,
-                body=ensemble.structure.body_mass is not None,
+                striker_with_mass=ensemble.structure.body_mass is not None,
                 unequal_wells=ensemble.structure.unequal_wells is not None,
-                around=system.has_environment, several=bool(system.further_contacts),
+                environment=system.has_environment, several_strikers=bool(system.further_contacts),
             )  # fmt: skip
         except sb.InputError as error:
             if "by the CPU engine alone" in str(error):
@@ -399,26 +428,28 @@ def _refused_systems() -> dict[str, Any]:
     }
 
 
-def write_pages(folder: Path) -> None:
-    """Write the generated pages into a folder; unchanged files are not rewritten."""
-    folder.mkdir(parents=True, exist_ok=True)
-    pages = {
-        "parameters": parameter_tables, "variables": variable_tables, "command_line": command_line,
-        "support": support_tables,
+MARK = "<!-- From here on the text is written by `python docs/_ext/reference.py`; a test compares it with the program. -->"
+
+
+def pages() -> dict[str, Any]:
+    """Functions that write the second part of a page, by the name of the page."""
+    return {
+        "parameters": parameter_tables, "variables": variable_tables, "status_codes": status_tables,
+        "command_line": command_line, "support": support_tables,
     }  # fmt: skip
-    bench = folder.parent / "images" / "rivals.inc"
-    pages["rivals"] = lambda: (
-        bench.read_text(encoding="utf-8")
-        if bench.exists()
-        else "The comparison has not been run for this version: `python -m benchmarks rivals -o docs/images`.\n"
-    )
-    for name, make in pages.items():
-        target, text = folder / f"{name}.md", make()
-        if not target.exists() or target.read_text(encoding="utf-8") != text:
-            target.write_text(text, encoding="utf-8")
 
 
-def setup(app: Any) -> dict[str, Any]:
-    """Connect to Sphinx."""
-    app.connect("builder-inited", lambda app: write_pages(Path(app.srcdir) / "_generated"))
-    return {"parallel_read_safe": True}
+def written(text: str, tables: str) -> str:
+    """Return a page with these tables in place of those that stand there."""
+    return text.partition(MARK)[0].rstrip() + f"\n\n{MARK}\n\n" + tables.strip() + "\n"
+
+
+def write_pages(folder: Path) -> None:
+    """Write the tables into the pages of a folder."""
+    for name, make in pages().items():
+        target = folder / f"{name}.md"
+        target.write_text(written(target.read_text(encoding="utf-8"), make()), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_pages(Path(__file__).parents[1])

@@ -31,10 +31,15 @@ from .model.drive.recorded_motion import RecordedMotion as RecordedMotion
 from .model.drive.sine import Sine as Sine
 from .model.drive.sum import SumDrive as SumDrive
 from .model.drive.two_tone import TwoTone as TwoTone
+from .model.external_force import ConstantForce as ConstantForce
+from .model.external_force import ExternalForce as ExternalForce
+from .model.external_force import HarmonicForce as HarmonicForce
+from .model.external_force import RecordedForce as RecordedForce
 from .model.harvester import ElectromagneticHarvester as ElectromagneticHarvester
 from .model.harvester import PiezoelectricHarvester as PiezoelectricHarvester
 from .model.imperfection import Imperfection as Imperfection
 from .model.integration import Integration as Integration
+from .model.quantity import quantity as quantity
 from .model.reduced_model import ReducedModel as ReducedModel
 from .model.state import State as State
 from .model.striker import ContactPair as ContactPair
@@ -51,6 +56,8 @@ from .simulation.tolerance import ErrorEstimate as ErrorEstimate
 from .simulation.tolerance import perturbation_growth as perturbation_growth
 from .solver.statistics import STATISTICS as STATISTICS
 from .solver.statistics import Statistic as Statistic
+from .solver.statistics import register_statistic as register_statistic
+from .solver.statistics import unregister_statistic as unregister_statistic
 from .sweeps.checkpoint.read import read_checkpoint as read_checkpoint
 from .sweeps.checkpoint.records import CheckpointError as CheckpointError
 from .sweeps.checkpointed_sweep import CheckpointOptions as CheckpointOptions

@@ -24,6 +24,7 @@ for name in sys.argv[1:]:
 """
 
 
+@pytest.mark.slow
 def test_every_benchmark_can_be_imported():
     names = [
         name

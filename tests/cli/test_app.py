@@ -48,7 +48,7 @@ def test_version_and_help(cli):
         text = cli(name, "--help")
         assert text.exit_code == 0
         assert "\\" not in text.stdout, "a formula's markup is no word for a terminal"
-    assert "N/m^1.5" in re.sub(r"\s+", " ", cli("map", "--help").stdout)
+    assert "N/m^1.5" in re.sub(r"\s+", " ", cli("map", "--help-all").stdout)
 
 
 REFUSALS = [

@@ -44,7 +44,8 @@ def test_while_modules_are_imported(tmp_path, number, name):
     assert os.listdir(tmp_path) == []
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_while_a_kernel_is_compiled(tmp_path, number):
     """The main thread is in the compiler for seconds; the program does not wait for it."""
     command = ["map", "--modes", "3", "--cycles", "2", "-o", "map.nc"]

@@ -243,3 +243,68 @@ def test_what_is_given_beside_a_store_is_compared_with_the_store(tmp_path, monke
     assert refused.exit_code == 2
     differences = [line for line in refused.stderr.splitlines() if "in the checkpoint" in line]
     assert len(differences) == 1 and "cycles: 12 in the checkpoint, 13 requested" in differences[0]
+
+
+def test_options_complete_a_file(tmp_path):
+    """An axis or a value of an option is a parameter that the file needs and does not contain."""
+    from snapbeam.cli.parameter_options import configured
+    from snapbeam.util.validation import InputError
+
+    path = tmp_path / "harvester.toml"
+    path.write_text(
+        '[base_excitation]\ntype = "acceleration_sine"\nfrequency_ratio = 0.5\n'
+        '[harvester]\ntype = "coil"\nforce_factor = 0.1\n'
+    )
+    swept = configured(
+        {
+            "config": path,
+            "sweep": ["base_excitation.acceleration_amplitude=0.1,0.2", "harvester.resistance=1e3:1e6:3"],
+        }
+    )
+    assert swept.axes()["harvester.resistance"].size == 3
+    both = ["base_excitation.acceleration_amplitude=0.1", "harvester.resistance=1e4"]
+    assert configured({"config": path, "set_": both}).system.get("harvester.resistance") == 1e4
+    with pytest.raises(
+        InputError, match=r"harvester\.toml: \[base_excitation\] acceleration_amplitude: missing"
+    ):
+        configured({"config": path})
+
+
+def test_no_striker_is_added_to_a_base(tmp_path, capsys):
+    """The drive of a striker that the file does not have is refused; with a striker it is one.  No empty note is printed."""
+    from snapbeam.cli.parameter_options import configured
+    from snapbeam.util.validation import InputError
+
+    path = tmp_path / "base.toml"
+    path.write_text(
+        "[beam]\nlength = 0.1\nwidth = 0.01\nthickness = 3e-4\ndensity = 7850\nyoung_modulus = 2e11\n"
+        "buckling_level = 5e-4\n[model]\nmodes = 2\ndamping_ratio = 0.01\n"
+        '[base_excitation]\ntype = "sine"\nfrequency_ratio = 0.5\nvelocity_amplitude = 0.1\n'
+    )
+    assert configured({"config": path}).system.striker is None
+    assert "taken from the paper" not in "".join(capsys.readouterr())
+    for given in (
+        {"drive.frequency_hz": 20.0},
+        {"drive.frequency_ratio": "0.1:1:3"},
+        {"set_": ["drive.velocity_amplitude=0.3"]},
+    ):
+        with pytest.raises(InputError, match="there is no striker to drive, base_excitation moves the beam"):
+            configured({"config": path} | given)
+    both = configured({"config": path, "drive.frequency_ratio": 1.0, "striker.location": 0.5})
+    assert both.system.striker is not None
+
+
+def test_frequencies_of_an_arch_are_about_its_equilibrium(tmp_path):
+    """The exact frequencies of the straight beam are none of a curved one, and are not printed."""
+    path = tmp_path / "arch.toml"
+    path.write_text(
+        "[beam]\nlength = 500e-6\nwidth = 20e-6\nthickness = 2e-6\ndensity = 2330\nyoung_modulus = 160e9\n"
+        "axial_load = 0.0\n[imperfection]\nmidspan_amplitude = 6e-6\n[model]\nmodes = 4\n"
+    )
+    target = tmp_path / "found.json"
+    done = RUNNER.invoke(app, ["frequencies", "--config", str(path), "--count", "3", "--json", str(target)])
+    assert done.exit_code == 0, done.output
+    found = json.loads(target.read_text())
+    assert "exact" not in found
+    assert found["wells"] == ["equilibrium"]
+    assert found["reduced"][0] == pytest.approx(load_config(path).model.natural_frequencies[:3].tolist())

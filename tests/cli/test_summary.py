@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import shlex
+import time
 
 import numpy as np
 import pytest
@@ -90,8 +91,8 @@ def test_what_was_there_before_is_no_part_of_the_rate(monkeypatch) -> None:
 
     from snapbeam.cli import console
 
-    clock = iter([0.0, 10.0, 50.0])
-    monkeypatch.setattr(console.time, "monotonic", lambda: next(clock))
+    clock = iter([0.0, 10.0, 10.0, 50.0])
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
     written = io.StringIO()
     lines = console._Lines(Console(file=written, width=100), None, "runs")
     for done, total in ((900, 1000), (1000, 1000), (1000, 2000), (1400, 2000)):

@@ -177,7 +177,7 @@ MEASURED = sb.Imperfection(
 
 SYSTEMS: dict[str, ExtendedSystem] = {
     "the paper's": ExtendedSystem(struck(sine()), SINE | PLACE, own_kernel=False),
-    "restitution": ExtendedSystem(struck(sine(), sb.Restitution(0.6)), SINE | PLACE, modes=1, own_kernel=False),
+    "restitution": ExtendedSystem(struck(sine(), sb.Restitution(0.6)), SINE | PLACE, modes=1),
     "power": ExtendedSystem(struck(sine(), sb.PowerLaw.from_stiffness(4e11, 2.0)), SINE | PLACE),
     "layer": ExtendedSystem(struck(sine(), sb.LayeredHertz(stiffness=4e8, layer_stiffness=1e10)), SINE | PLACE),
     "hunt_crossley": ExtendedSystem(
@@ -220,7 +220,7 @@ SYSTEMS: dict[str, ExtendedSystem] = {
     "recorded": ExtendedSystem(record, PLACE, cycles=11),
     "still": ExtendedSystem(struck(sb.FixedStop(), gap=-1e-4), {"striker.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
     "a body": ExtendedSystem(
-        struck(sine(), mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7), SINE | PLACE, own_kernel=False, decides=False
+        struck(sine(), mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7), SINE | PLACE, decides=False
     ),
     "a sphere": ExtendedSystem(
         struck(sb.ConstantVelocity(speed=0.4), mass=2e-3, gap=5e-5), {"drive.speed": (0.1, 2.0)} | PLACE, decides=False

@@ -17,6 +17,7 @@ def system_of(drive: sb.Chirp) -> sb.System:
     return sb.System(MODEL, default_values.CONTACT, sb.Striker(drive=drive))
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:the energy-balance error")
 @pytest.mark.parametrize("accuracy", ["standard", "reference"])
 @pytest.mark.parametrize(("start", "stop", "velocity"), [(1.0, 8.0, 0.3), (4.0, 0.5, 0.3), (1.0, 20.0, 0.1)])

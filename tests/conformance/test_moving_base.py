@@ -158,10 +158,10 @@ def test_refusals_and_the_way_there_and_back() -> None:
     plain = sb.ReducedModel.from_matrices(
         [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, well_amplitude=[-1.0]
     )
-    with pytest.raises(InputError, match="given by matrices is not known"):
+    with pytest.raises(InputError, match="give base_shape to"):
         sb.System(plain, base_excitation=base)
     with pytest.raises(InputError, match="integrated by the CPU engine alone"):
-        resolve("cuda", around=True)
+        resolve("cuda", environment=True)
     system = sb.System(model(2), default_values.CONTACT, striker, base_excitation=base)
     assert sb.System.from_mapping(system.to_mapping()) == system
     changed = system.replace(

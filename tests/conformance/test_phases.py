@@ -20,9 +20,8 @@ PERIODS = 3
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
 RATIO, VELOCITY, HARDEST = 1.2, 0.15, 0.2
 PHASES = {"striker": 0.7, "base": -0.9, "load": 1.3}
-QUICK = (("base",),)
 MIXTURES = [
-    pytest.param(names, marks=() if names in QUICK else SLOW, id="+".join(names))
+    pytest.param(names, marks=SLOW, id="+".join(names))
     for count in (1, 2, 3)
     for names in itertools.combinations(PHASES, count)
 ]

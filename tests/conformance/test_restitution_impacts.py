@@ -10,7 +10,8 @@ import snapbeam as sb
 from snapbeam.model import default_values
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 10))])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
 def test_impacts_against_an_independent_solution(seed: int) -> None:
     """DOP853 with events, on the equation of the paper: onsets to 1e-7 s, the first impulses to 3e-5."""
     rng = np.random.default_rng(seed)

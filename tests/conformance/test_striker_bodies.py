@@ -139,6 +139,7 @@ def test_heavy_body_is_the_shaker() -> None:
     assert errors[2] < 1e-7
 
 
+@pytest.mark.slow
 def test_going_on_and_mirror() -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
     body = {"mass": 0.01, "suspension_stiffness": 300.0, "suspension_damping": 0.4}
@@ -180,7 +181,7 @@ def test_early_termination_is_off_and_refusals() -> None:
     with pytest.raises(InputError, match="leave the mass out, or use a HertzContact"):
         sb.System(model, sb.Restitution(0.5), sb.Striker(drive=drive, mass=0.1))
     with pytest.raises(InputError, match="a striker with a mass is integrated by the CPU engine alone"):
-        resolve("cuda", body=True)
+        resolve("cuda", striker_with_mass=True)
     system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, mass=0.1))
     with pytest.raises(InputError, match="give no tangent, or no mass"):
         sb.advance(system, tangent=np.zeros((1, 2, 1)))

@@ -43,7 +43,10 @@ def swept(name: str, count: int, seed: int, *, mirrored: bool = False, modes: in
 
 
 def test_none_is_missing() -> None:
-    """Every kind of law, drive, motion of a base, load and harvester, and every parameter but those of runs."""
+    """Every kind of law, drive, motion of a base, load and harvester, and every parameter but those of runs.
+
+    ``test_external_force.py`` compares external forces with independent solutions.
+    """
     systems = [extended.system() for extended in SYSTEMS.values()]
     there = {(section, type(drive).name) for each in systems for section, drive in each.moving}
     there |= {("contact", type(each.contact).name) for each in systems}
@@ -62,7 +65,9 @@ def test_none_is_missing() -> None:
         assert not missing, f"{section}: no extended system has {missing}"
     own = set().union(*(each.parameters for each in systems))
     missing = {
-        name for name, row in parameters().items() if row.section not in ("integration", "initial_state")
+        name
+        for name, row in parameters().items()
+        if row.section not in ("integration", "initial_state", "external_force")
     } - own
     assert not missing
 

@@ -19,13 +19,9 @@ def smooth(x: float) -> tuple[float, float]:
     return x**3 * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * x * x * (1.0 - x) ** 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("modes", "at_standard", "at_reference"),
-    [
-        pytest.param(1, 1e-3, 1e-7, marks=pytest.mark.slow),
-        (3, 1e-4, 1e-7),
-        pytest.param(8, 1e-5, 1e-8, marks=pytest.mark.slow),
-    ],
+    ("modes", "at_standard", "at_reference"), [(1, 1e-3, 1e-7), (3, 1e-4, 1e-7), (8, 1e-5, 1e-8)]
 )
 def test_burst(modes, at_standard, at_reference) -> None:
     """Two cycles up, one as it is, half a cycle down, and the tip withdrawn."""

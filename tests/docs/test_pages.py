@@ -20,21 +20,36 @@ ROOT = Path(__file__).parents[2]
 PAGES = sorted([*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md")])
 CODE = [
     "README.md",
-    "accuracy_and_speed.md",
+    "accuracy.md",
+    "contacts.md",
+    "finite_elements.md",
     "getting-started.md",
     "long_maps.md",
     "states.md",
+    "status_codes.md",
+    "strikers.md",
     "sweeps.md",
     "systems.md",
+    "thresholds.md",
+    pytest.param("base_and_load.md", marks=pytest.mark.slow),
+    pytest.param("basins.md", marks=pytest.mark.slow),
+    pytest.param("beams.md", marks=pytest.mark.slow),
     pytest.param("design.md", marks=pytest.mark.slow),
-    pytest.param("extended_models.md", marks=pytest.mark.slow),
-    pytest.param("dynamics.md", marks=pytest.mark.slow),
+    pytest.param("exponents.md", marks=pytest.mark.slow),
+    pytest.param("harvesters.md", marks=pytest.mark.slow),
+    pytest.param("lifetimes.md", marks=pytest.mark.slow),
+    pytest.param("optimisation.md", marks=pytest.mark.slow),
+    pytest.param("orbits.md", marks=pytest.mark.slow),
 ]
 """Pages whose Python blocks run in order in one namespace; those that take more than a few seconds are slow."""
+ELSEWHERE = {"extending.md", "tutorial_beam.md", "tutorial_sweep.md", "tutorial_waveform.md"}
+"""Pages that other tests run: ``tests/solver/test_extending.py`` and ``test_tutorials.py``."""
 NEEDS_FILES = ('open_dataset("map.nc")', 'open_recording("test.cihx"')
 """Beginnings of blocks that read a file which a command or a camera made."""
 SMALLER = {"modes=32": "modes=2", "4.0, 128)": "4.0, 3)", "0.65, 80)": "0.65, 3)"}
 """The map of the page on long maps, with fewer modes and points."""
+REFERENCE = runpy.run_path(str(ROOT / "docs" / "_ext" / "reference.py"))
+API = "\n".join(path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs").glob("api*.md")))
 COMMANDS = typer.main.get_command(app).commands
 
 
@@ -50,6 +65,13 @@ def blocks(path: Path, kind: str) -> list[str]:
         elif inside == kind:
             found[-1].append(line)
     return ["\n".join(lines) + "\n" for lines in found]
+
+
+def outputs(path: Path) -> dict[str, str]:
+    """The output that a page shows directly below a block of Python, by the block."""
+    text = path.read_text(encoding="utf-8")
+    pattern = r"^```python\n((?:(?!```).*\n)*)```\n\n```\n((?:(?!```|snapbeam |pip ).*\n)+)```$"
+    return dict(re.findall(pattern, text, re.MULTILINE))
 
 
 def commands(path: Path) -> list[list[str]]:
@@ -74,14 +96,20 @@ def test_code_runs(name, tmp_path, monkeypatch, capsys):
     path = next(page for page in PAGES if page.name == name)
     monkeypatch.chdir(tmp_path)
     scope: dict[str, object] = {}
+    shown = outputs(path)
     for block in blocks(path, "python"):
+        expected = shown.get(block)
         if any(words in block for words in NEEDS_FILES):
             continue
         if name == "long_maps.md":
             for words, fewer in SMALLER.items():
                 assert words in block
                 block = block.replace(words, fewer)
+        capsys.readouterr()
         exec(compile(block, name, "exec"), scope)
+        if expected is not None:
+            printed = capsys.readouterr().out
+            assert [line.rstrip() for line in printed.splitlines()] == expected.splitlines()
     plt.close("all")
 
 
@@ -90,7 +118,7 @@ def test_every_page_with_code_runs():
     run = {name if isinstance(name, str) else name.values[0] for name in CODE}
     for page in (ROOT / "docs").glob("*.md"):
         free = [b for b in blocks(page, "python") if not any(words in b for words in NEEDS_FILES)]
-        assert not free or page.name in run, page.name
+        assert not free or page.name in run | ELSEWHERE, page.name
 
 
 def test_parameter_files_of_pages_are_valid(tmp_path):
@@ -131,7 +159,7 @@ def test_there_are_commands_in_the_pages():
     "snapbeam.explorer",
 ])  # fmt: skip
 def test_interface_page_is_complete(module):
-    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    text = API
     named = set(re.findall(r"(?:auto\w+|py:data)::\s*(\S+)$", text, re.MULTILINE))
     if block := re.search(
         rf"automodule:: {re.escape(module)}\n   :members:\n(?:   :exclude-members: (.*))?", text
@@ -142,10 +170,12 @@ def test_interface_page_is_complete(module):
         }
         return
     package = import_module(module)
+    elsewhere = {"Diagnostic", "Severity"} if module == "snapbeam.lab" else set()  # by the names of the core
     missing = [
         name
         for name in package.__all__
         if f"{module}.{name}" not in named
+        and name not in elsewhere
         and not name.startswith("_")
         and not isinstance(getattr(package, name), ModuleType)
     ]
@@ -153,20 +183,37 @@ def test_interface_page_is_complete(module):
 
 
 def test_modules_of_the_interface_page_exist():
-    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    text = API
     for name in re.findall(r"automodule:: (\S+)", text):
         import_module(name)
 
 
 def test_names_stand_once_on_the_interface_page():
-    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    text = API
     named = re.findall(r"auto(?:class|function|exception|data)::\s*(\S+)$", text, re.MULTILINE)
     assert len(named) > 50
     assert sorted({name for name in named if named.count(name) > 1}) == []
 
 
+@pytest.mark.parametrize("path", sorted((ROOT / "docs").glob("api_*.md")), ids=lambda path: path.name)
+def test_interface_pages_are_short(path):
+    """At most 20 names, those of whole modules included."""
+    count = 0
+    for directive in re.split(r"^(?=\.\. )", path.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]:
+        module = re.match(r"\.\. automodule:: (\S+)", directive)
+        members = re.search(r":members: (.+)", directive)
+        left_out = re.search(r":exclude-members: (.+)", directive)
+        if not module:
+            count += 1
+        elif members:
+            count += len(members[1].split(","))
+        else:
+            count += len(import_module(module[1]).__all__) - len(left_out[1].split(",") if left_out else ())
+    assert 0 < count <= 20
+
+
 def test_every_page_is_in_the_tree():
-    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    index = "\n".join((ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("index.md", "api.md"))
     listed = {
         line.strip()
         for tree in re.findall(r"```\{toctree\}(.*?)```", index, re.DOTALL)
@@ -176,9 +223,24 @@ def test_every_page_is_in_the_tree():
     assert pages <= listed, pages - listed
 
 
+@pytest.mark.parametrize("name", [
+    "parameters", "variables", "status_codes", "command_line", pytest.param("support", marks=pytest.mark.slow),
+])  # fmt: skip
+def test_tables_of_pages_are_those_of_the_program(name):
+    """``python docs/_ext/reference.py`` writes them again."""
+    text = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    assert text == REFERENCE["written"](text, REFERENCE["pages"]()[name]())
+
+
+def test_parameters_are_listed_by_type():
+    text = REFERENCE["parameter_tables"]()
+    assert "| `hunt_crossley` | `stiffness`, `damping_factor` |" in text
+    assert "| `constant_velocity` |" in text and "## [harvester]" in text
+
+
 def test_options_in_the_page_of_commands_are_code():
     """As words, ``--checkpoint`` would be set with a dash."""
-    text = runpy.run_path(str(ROOT / "docs" / "_ext" / "reference.py"))["command_line"]()
+    text = REFERENCE["command_line"]()
     words = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
     bare = re.findall(r"(?<![\w`-])--[a-z][\w-]*", re.sub(r"`[^`]*`", "", words))
     assert not bare
@@ -188,7 +250,7 @@ def test_options_in_the_page_of_commands_are_code():
 @pytest.mark.slow  # the step sizes of thirty systems
 def test_supported_combinations():
     """Every row has an answer to each question; every refusal has a reason and a remedy."""
-    text = runpy.run_path(str(ROOT / "docs" / "_ext" / "reference.py"))["support_tables"]()
+    text = REFERENCE["support_tables"]()
     first, second = (
         [line.strip("| ").split(" | ") for line in part.splitlines() if line.startswith("| ")]
         for part in text.split("These systems are refused as a whole:")
@@ -207,3 +269,30 @@ def test_supported_combinations():
     assert numbers == set(range(1, len(reasons) + 1))
     assert all(";" in reason for reason in reasons)
     assert len(second) > 15 and all(len(row) == 2 and len(row[1]) > 20 for row in second[2:])
+
+
+def test_glossary_is_sorted_and_complete():
+    """Terms of the axes, classes and tools; each has a definition."""
+    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    entries = dict(re.findall(r"^(\S.*)\n((?:  .*\n)+)", text.partition("```{glossary}\n")[2], re.MULTILINE))
+    assert list(entries) == sorted(entries, key=str.lower)
+    assert all(words.rstrip().endswith(".") for words in entries.values())
+    needed = {
+        "snap-through",
+        "penetration",
+        "excitation",
+        "checkpoint",
+        "axis",
+        "seed",
+        "tolerance",
+        "right-censored",
+    }
+    needed |= {
+        "frequency ratio",
+        "velocity amplitude",
+        "attractor",
+        "response class",
+        "early termination",
+        "status",
+    }
+    assert needed <= set(entries)

@@ -51,6 +51,7 @@ def drawn(folder, drift):
     return scene, scene.write(folder / "scene.cihx")
 
 
+@pytest.mark.slow
 def test_the_drift_of_the_camera_is_taken_out(tmp_path):
     scene, path = drawn(tmp_path, 3.0)
     truth = scene.truth["displacement_mm"].values

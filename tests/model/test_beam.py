@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from snapbeam.model.beam import Beam
 from snapbeam.model.default_values import BEAM
+from snapbeam.model.quasi_static import quasi_static_threshold
 from snapbeam.util.validation import InputError, InputTypeError
 
 STEEL = {"length": 0.161, "thickness": 0.4e-3, "width": 15e-3, "density": 7800.0, "young_modulus": 200e9}
@@ -109,3 +110,12 @@ def test_refuses_other_input() -> None:
         Beam(**STEEL)
     with pytest.raises(InputError, match=r"buckling_level = 0.001, axial_load = 30.0: give exactly one"):
         Beam(**STEEL, buckling_level=1e-3, axial_load=30.0)
+
+
+def test_quasi_static_threshold_needs_a_buckled_beam():
+    """A straight beam has no unstable equilibrium that a slow striker could carry it over."""
+    buckled = Beam(**STEEL, buckling_level=0.335e-3)
+    threshold = quasi_static_threshold(0.3, 1.0, buckled)
+    assert float(threshold) == pytest.approx(math.sin(0.3 * math.pi) ** 2)
+    with pytest.raises(InputError, match="must be buckled"):
+        quasi_static_threshold(0.3, 1.0, buckled.replace(axial_load=0.0))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -90,6 +92,32 @@ def test_gone_past_a_fold() -> None:
     assert "monostable" in [each.code for each in system.diagnostics()]
     with pytest.raises(InputError, match="this imperfection leaves one"):
         past.saddle_energy  # noqa: B018
+
+
+def test_two_well_limits_are_computed() -> None:
+    """A curved silicon arch without load needs a greater rise, not a smaller one; each limit named is the limit."""
+    beam = sb.Beam(
+        length=500e-6, width=20e-6, thickness=2e-6, density=2330.0, young_modulus=160e9, axial_load=0.0
+    )
+
+    def arch(rise: float, load: float = 0.0) -> sb.ReducedModel:
+        return sb.ReducedModel.from_beam(
+            beam.replace(axial_load=load), 4, imperfection=sb.Imperfection(midspan_amplitude=rise)
+        )
+
+    said = arch(6e-6).two_well_limits
+    rise, load = (float(number) for number in re.findall(r"at least ([\d.e+-]+) (?:m|N)", said))
+    assert arch(rise).is_bistable
+    assert not arch(0.999 * rise).is_bistable
+    assert arch(6e-6, load).is_bistable
+    assert not arch(6e-6, 0.999 * load).is_bistable
+    with pytest.raises(InputError, match="midspan_amplitude of at least"):
+        arch(6e-6).require_bistable("a threshold")
+    # a buckled beam keeps two wells if its imperfection is small
+    said = model_of(midspan_amplitude=1e-4).two_well_limits
+    limit = float(re.search(r"midspan_amplitude of at most ([\d.e+-]+) m", said)[1])
+    assert model_of(midspan_amplitude=0.999 * limit).is_bistable
+    assert not model_of(midspan_amplitude=1.001 * limit).is_bistable
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 
 import numpy as np
@@ -120,3 +121,30 @@ def test_axes_are_doubted_too() -> None:
     levels = default_values.BEAM.radius_of_gyration * np.array([3.0, 6.3])
     said = told(lambda: sb.sweep(system(modes=2), {"beam.buckling_level": levels}, asked))
     assert len(said) == 1 and "antisymmetric" in said[0]
+
+
+def test_a_coupling_that_no_material_has_is_doubted():
+    """Layers of PZT on the paper's beam are in order; the same capacitance with forty times their moment is not."""
+    beam = default_values.BEAM
+    layers = sb.PiezoelectricHarvester.from_material(
+        stress_constant=-16.6, permittivity=25.55e-9, layer_thickness=0.2e-3, layer_width=15e-3, beam=beam,
+        resistance=1e4,
+    )  # fmt: skip
+
+    def codes(harvester):
+        system = sb.System(
+            sb.ReducedModel.from_beam(beam, 2),
+            base_excitation=sb.BaseExcitation(motion=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.1)),
+            harvester=harvester,
+        )
+        return {each.code: each for each in system.diagnostics()}
+
+    assert "unphysical-coupling" not in codes(layers)
+    strong = dataclasses.replace(layers, moment_per_volt=40.0 * layers.moment_per_volt)
+    doubt = codes(strong)["unphysical-coupling"]
+    most = doubt.numbers["greatest_moment_per_volt"]
+    assert "unphysical-coupling" in codes(dataclasses.replace(layers, moment_per_volt=1.001 * most))
+    assert "unphysical-coupling" not in codes(dataclasses.replace(layers, moment_per_volt=0.999 * most))
+    assert doubt.numbers["coupling"] == pytest.approx(
+        strong.moment_per_volt**2 * 0.25 * beam.length / (strong.capacitance * beam.bending_stiffness)
+    )

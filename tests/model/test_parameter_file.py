@@ -265,6 +265,34 @@ def test_an_option_takes_a_contradicting_value_or_axis_away():
     assert after({"contact": {"coefficient": 0.3}, "model": {"modes": 1}})["contact"] == {"coefficient": 0.3}
 
 
+def test_an_axis_gives_a_required_parameter():
+    """A load resistance and a base frequency that only an axis gives, and a drive whose length only an axis gives."""
+    base = {"type": "acceleration_sine", "acceleration_amplitude": 0.5}
+    patch = {"type": "piezo", "moment_per_volt": 1e-5, "capacitance": 2e-8}
+    axes = {"harvester.resistance": [1e3, 1e6], "base_excitation.frequency_ratio": "0.2:0.5:4"}
+    config = config_from_mapping({"base_excitation": base, "harvester": patch, "sweep": axes})
+    assert config.system.get("harvester.resistance") == 1e3
+    assert config.system.get("base_excitation.frequency_ratio") == 0.2
+    assert config.axes()["harvester.resistance"].tolist() == [1e3, 1e6]
+    assert config_from_mapping(config.whole().to_mapping()).system == config.system
+    burst = {"type": "burst", "frequency_ratio": 1.2, "velocity_amplitude": 0.2}
+    config = config_from_mapping({"drive": burst, "sweep": {"drive.duration_cycles": [10.0, 20.0]}})
+    assert config.system.get("drive.duration_cycles") == 10.0
+    with pytest.raises(InputError, match="resistance: missing"):
+        config_from_mapping({"base_excitation": base | {"frequency_ratio": 1.0}, "harvester": patch})
+
+
+def test_one_file_for_every_command(tmp_path):
+    """Sections that only other commands read are left to them; a misspelt section is still refused."""
+    path = tmp_path / "switch.toml"
+    text = "[model]\nmodes = 2\n[uncertainty.of.'beam.thickness']\nuniform = 0.05\n[probability]\nruns = 8\n[design]\nx = 1\n"
+    path.write_text(text)
+    assert load_config(path).to_mapping() == {"model": {"modes": 2}}
+    path.write_text(text.replace("[design]", "[desing]"))
+    with pytest.raises(InputError, match=r"\[desing\]: unknown section"):
+        load_config(path)
+
+
 def test_physical_units_are_ratios_of_the_system():
     """100 Hz and 31 mm/s at 40 mm from the clamp, given as values and as axes."""
     config = config_from_mapping(

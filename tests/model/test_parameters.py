@@ -198,9 +198,14 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
         "ramp": sb.LoadRamp(change=1.0, duration=1.0),
         "sine": sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0),
     }
+    forces = {
+        "harmonic_force": sb.HarmonicForce(frequency_ratio=2.0, amplitude=1.0),
+        "constant_force": sb.ConstantForce(force=1.0),
+    }
     around = {
         "base_excitation": lambda kind: sb.BaseExcitation(motion=drives.get(kind, sb.Sine(**pair))),
         "axial_load": lambda kind: sb.AxialLoadModulation(motion=loads[kind]),
+        "external_force": lambda kind: sb.ExternalForce(history=forces[kind], location=0.5),
         "harvester": lambda kind: sb.PiezoelectricHarvester(
             moment_per_volt=1e-3, capacitance=1e-8, resistance=1e4
         ),

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-import xarray as xr
 
 import snapbeam as sb
 from snapbeam.model.parameter_file import Config
 from snapbeam.plot.dynamics import plot_attractors, plot_exponents, plot_multipliers
+from snapbeam.util.datasets import xr
+
+SMALL = Config().system.replace(**{"model.modes": 1})
 
 
 @pytest.fixture(autouse=True)
@@ -52,10 +58,31 @@ def test_a_map_is_drawn_by_what_it_is(synthetic_map) -> None:
         table.snapbeam.plot("force")
 
 
+def test_the_dataset_of_a_sweep_draws_itself() -> None:
+    table = sb.sweep(SMALL, {"drive.velocity_amplitude": [0.05, 0.1]}, sb.Integration(cycles=2))
+    assert table.snapbeam.plot("peak_force").get_ylabel() == "Peak contact force (N)"
+
+
+def test_a_stored_run_draws_itself_in_a_program_that_imports_snapbeam_alone(tmp_path) -> None:
+    sb.simulate(SMALL, sb.Integration(cycles=2)).save(tmp_path / "run.nc")
+    script = (
+        "import sys, snapbeam as sb; assert 'xarray' not in sys.modules\n"
+        f"print(sb.load({str(tmp_path / 'run.nc')!r}).dataset.snapbeam.plot('phase_portrait').get_xlabel())"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | {"MPLBACKEND": "Agg"},
+    )
+    assert "isplacement" in ended.stdout
+
+
 def test_a_run_is_drawn_by_what_it_is(synthetic_run) -> None:
     _, ax = plt.subplots()
     assert synthetic_run.snapbeam.plot("spectrum", ax=ax) is ax
-    with pytest.raises(sb.InputError, match="of this run; choose one of run, spectrum$"):
+    with pytest.raises(sb.InputError, match=r"of this run; choose one of run, spectrum$"):
         synthetic_run.snapbeam.plot("class")
 
 

@@ -67,7 +67,7 @@ def test_colours_keep_the_meaning_of_the_paper():
     assert green[3] > max(red[3], blue[3])
 
 
-@pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
+@pytest.mark.parametrize("suffix", ["png", pytest.param("pdf", marks=pytest.mark.slow), "svg"])
 def test_saved_whole_and_the_same_again(tmp_path, suffix):
     figure = new_figure("single", 50.0)
     figure.add_subplot().plot([0, 1], [0, 1])

@@ -119,7 +119,9 @@ class Alone:
             found = re.search(r"http://\S+", line)
             if found is None:
                 raise SystemExit(f"{program} {' '.join(words)}\n{line}{served.communicate()[0]}")
-            with urllib.request.urlopen(found[0], timeout=300) as page:
+            # the address with the token sets a cookie, and leads to the page
+            opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+            with opener.open(found[0], timeout=300) as page:
                 text: str = page.read().decode()
             assert "snapbeam" in text
             return f"a page of {len(text)} characters"

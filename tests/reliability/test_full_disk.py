@@ -106,8 +106,8 @@ def test_a_run_that_cannot_be_saved_is_not_lost(mounted, tmp_path, monkeypatch, 
     xr.testing.assert_identical(sb.load(kept).impacts, run.impacts)
 
 
-@pytest.mark.parametrize("kind", ["pdf", "png", "svg"])
-@pytest.mark.parametrize("size", ["4k", "12k", "20k"])
+@pytest.mark.parametrize("kind", [pytest.param("pdf", marks=pytest.mark.slow), "png", "svg"])
+@pytest.mark.parametrize("size", ["4k", pytest.param("12k", marks=pytest.mark.slow), "20k"])
 def test_a_figure_that_does_not_fit(mounted, synthetic_run, tried, size, kind):
     """Matplotlib's writer of PDF files raises errors of other kinds when the disk is full."""
     disk = mounted("disk", f"size={size}")

@@ -78,7 +78,13 @@ def test_kept_and_loaded(tmp_path):
     assert started(tmp_path) == (42.0, "loaded")
 
 
-@pytest.mark.parametrize("harm", ["flipped", "cut", "emptied", "foreign", "folder"])
+@pytest.mark.parametrize(
+    "harm",
+    [
+        "cut",
+        *(pytest.param(harm, marks=pytest.mark.slow) for harm in ("flipped", "emptied", "foreign", "folder")),
+    ],
+)
 def test_damaged_code_is_compiled_again(tmp_path, tried, harm):
     """Any damage: the function is compiled again, and the file is good from then on."""
     started(tmp_path)
@@ -103,6 +109,7 @@ def test_damaged_code_is_compiled_again(tmp_path, tried, harm):
             tried("damaged files of compiled code")
 
 
+@pytest.mark.slow
 def test_a_full_disk_keeps_no_code(small, mounted, tried):
     """Said once; the answer is the same."""
     disk = mounted("disk", "size=16k")

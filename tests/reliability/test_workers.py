@@ -90,6 +90,7 @@ def test_a_worker_that_dies_before_it_delivers(tmp_path, work, whole, client, be
     assert report.computed == 7 and not report.failed and not between
 
 
+@pytest.mark.slow
 def test_a_worker_that_never_delivers(tmp_path, work, client, monkeypatch):
     """One that lives and gives nothing: the task is given up after as many tries as any other."""
     from distributed import Future

@@ -33,6 +33,7 @@ def check(seen, races):
     assert seen["refused"] > 0
 
 
+@pytest.mark.slow
 def test_three_writers_at_once(tmp_path, tried):
     check(raced(tmp_path, 3, 1), 3)
     tried("races of three writers", 3)

@@ -83,7 +83,9 @@ CALLS = {
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="interrupts are POSIX signals here")
-@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name == "simulate" else ()) for name in CALLS]
+)
 def test_an_interrupt_ends_a_run_of_minutes(name: str) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", PROGRAM.format(call=CALLS[name])], stdout=subprocess.PIPE, stderr=subprocess.PIPE,

@@ -10,7 +10,7 @@ import pytest
 import snapbeam as sb
 from snapbeam.model import default_values
 from snapbeam.model.state import rest_state
-from snapbeam.solver.statistics import Statistic, register, unregister
+from snapbeam.solver.statistics import Statistic, register_statistic, unregister_statistic
 from snapbeam.sweeps.replicates import Replicates, perturbed_start
 
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
@@ -61,12 +61,12 @@ def test_a_sphere_that_flies_away_leaves_no_trace_in_the_statistics() -> None:
         "own_peak", "float64", "m", "maximum displacement at the end of a step",
         lambda reading, held: held, update=_peak,
     )  # fmt: skip
-    register(own)
+    register_statistic(own)
     try:
         how = sb.Integration(cycles=6, high_frequency_ratio=2.0)
         run = recorded(sb.System(MODEL, default_values.CONTACT, SPHERE), how)
     finally:
-        unregister("own_peak")
+        unregister_statistic("own_peak")
     assert float(run.final_state.striker_rate) < -0.1, "it flies away"
     assert_of_beam(run)
     peak = float(np.abs(run.dataset.displacement_at_striker).max()) * MODEL.length_scale

@@ -158,16 +158,19 @@ def test_the_names_that_a_law_gives_are_part_of_it(tmp_path, monkeypatch) -> Non
 def test_a_statistic_of_somebody_is_never_kept() -> None:
     """It stands for functions from anywhere; two of them must not share a kernel."""
     from snapbeam.solver.registered_statistics import extras_of_table
-    from snapbeam.solver.statistics import Statistic, register, unregister
+    from snapbeam.solver.statistics import Statistic, register_statistic, unregister_statistic
 
     assert fingerprint((HertzContact, Sine, type(extras_of_table()).owner)) is not None
-    register(Statistic("own", "float64", "s", "time marched", lambda r, h: h, update=lambda held, step: held))
+    register_statistic(
+        Statistic("own", "float64", "s", "time of the run", lambda r, h: h, update=lambda held, step: held)
+    )
     try:
         assert fingerprint((HertzContact, Sine, type(extras_of_table()).owner)) is None
     finally:
-        unregister("own")
+        unregister_statistic("own")
 
 
+@pytest.mark.slow
 def test_a_law_typed_at_a_prompt_is_never_kept() -> None:
     """Its source cannot be read, so nothing tells two of them apart."""
     code = LAW.format(factor="1.0", more="") + (

@@ -19,13 +19,14 @@ import pytest
 import snapbeam as sb
 from snapbeam.model import default_values
 from snapbeam.model.contact.base import LAWS
+from snapbeam.model.drive.base import DRIVES
 from snapbeam.model.parameters import lookup, parameters
-from snapbeam.solver.statistics import STATISTICS, unregister
+from snapbeam.solver.statistics import STATISTICS, unregister_statistic
 from snapbeam.util.validation import InputError
 
-PAGE = Path(__file__).parents[2] / "CONTRIBUTING.md"
+PAGE = Path(__file__).parents[2] / "docs" / "extending.md"
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-"""The code of the page: a contact law, the function of a statistic, the row of the statistic."""
+"""The code of the page: a contact law, the function of a statistic, its row, a drive, a script that uses all."""
 MASS, SPEED = 2e-3, 0.05
 
 
@@ -41,19 +42,25 @@ def own(tmp_path_factory):
     """The three files, imported; taken back again afterwards."""
     before = package_hash()
     statistic, law = tmp_path_factory.mktemp("statistic"), tmp_path_factory.mktemp("law")
+    drive = tmp_path_factory.mktemp("drive")
     for path, text in zip(
-        (law / "own_law.py", statistic / "deepest.py", statistic / "my_statistics.py"), BLOCKS, strict=True
-    ):
+        (
+            law / "own_law.py", statistic / "deepest.py", statistic / "my_statistics.py", drive / "own_drive.py",
+            drive / "run_own.py",
+        ),
+        BLOCKS, strict=True,
+    ):  # fmt: skip
         path.write_text(text, encoding="utf-8")
-    sys.path[:0] = [str(statistic), str(law)]
+    sys.path[:0] = [str(statistic), str(law), str(drive)]
     invalidate_caches()
     try:
         import_module("my_statistics")
         yield import_module("own_law").LinearContact, statistic, law
     finally:
-        sys.path[:] = [path for path in sys.path if path not in (str(statistic), str(law))]
-        unregister("max_penetration")
+        sys.path[:] = [path for path in sys.path if path not in map(str, (statistic, law, drive))]
+        unregister_statistic("max_penetration")
         del LAWS["linear"]
+        DRIVES.pop("smooth_pulse", None)
         assert package_hash() == before
 
 
@@ -134,3 +141,11 @@ def test_a_parameter_that_the_law_does_not_have_is_refused(own) -> None:
         sb.sweep(thrown(law, 1e6), {"contact.stiffness": [1e8, 2e8]}, sb.Integration(cycles=1))
     with pytest.raises(InputError, match="linear_stiffness = 0: must be a finite number greater than 0 N/m"):
         law(0)
+
+
+@pytest.mark.slow
+def test_the_script_of_the_page(own, capsys) -> None:
+    """It runs with the drive, the law and the statistic, and prints the output of the page."""
+    import_module("run_own")
+    printed = re.search(r"run_own\.py.*?```\n\n```\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert capsys.readouterr().out == printed[1]

@@ -11,7 +11,7 @@ import pytest
 import snapbeam as sb
 from snapbeam.model import default_values
 from snapbeam.solver.cpu import driver
-from snapbeam.solver.statistics import Statistic, accumulators_dtype, register, unregister
+from snapbeam.solver.statistics import Statistic, accumulators_dtype, register_statistic, unregister_statistic
 
 ROOTS = {
     "displacement": "displacement_at_striker",
@@ -72,7 +72,8 @@ def test_random_runs_with_contact(modes: int, accuracy: str) -> None:
             assert run.summary.high_frequency_energy_fraction == pytest.approx(wanted, rel=SHARE[accuracy])
 
 
-@pytest.mark.parametrize("accuracy", [pytest.param("standard", marks=pytest.mark.slow), "reference"])
+@pytest.mark.slow
+@pytest.mark.parametrize("accuracy", ["standard", "reference"])
 def test_unequal_wells(accuracy: str) -> None:
     model = sb.ReducedModel.from_beam(
         default_values.BEAM, modes=4, imperfection=sb.Imperfection(midspan_amplitude=2e-6)
@@ -91,6 +92,7 @@ def test_unequal_wells(accuracy: str) -> None:
     assert reached, "a run that passes from one well to the other"
 
 
+@pytest.mark.slow
 def test_a_statistic_that_is_registered_after_a_run_has_its_own_kernels() -> None:
     """No record is taken for one of another layout: Numba says nothing, and the results are the same."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
@@ -100,13 +102,13 @@ def test_a_statistic_that_is_registered_after_a_run_has_its_own_kernels() -> Non
     row = Statistic(
         "steps_counted", "float64", "1", "steps of the run", lambda reading, held: held, update=lambda held, _: held + 1.0
     )  # fmt: skip
-    register(row)
+    register_statistic(row)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             with_row = sb.simulate(system, how).summary
     finally:
-        unregister("steps_counted")
+        unregister_statistic("steps_counted")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         after = sb.simulate(system, how).summary
@@ -124,12 +126,12 @@ def test_no_layout_of_records_begins_as_another_one_does() -> None:
     layouts = []
     for count in range(3):
         for row in rows[:count]:
-            register(row)
+            register_statistic(row)
         try:
             layouts += [accumulators_dtype(others) for others in range(3)]
         finally:
             for row in rows[:count]:
-                unregister(row.name)
+                unregister_statistic(row.name)
     fields = [list(each.fields.items()) for each in layouts]
     for i, one in enumerate(fields):
         for j, other in enumerate(fields):

@@ -11,7 +11,7 @@ import pytest
 from snapbeam.model.contact.base import LAWS, ContactLaw
 from snapbeam.model.drive.base import DRIVES
 from snapbeam.solver.registered_statistics import extras_of_table
-from snapbeam.solver.statistics import Statistic, register, unregister
+from snapbeam.solver.statistics import Statistic, register_statistic, unregister_statistic
 
 PROGRAM = """
 import json, sys
@@ -51,11 +51,13 @@ def test_types_of_numbers_are_named_apart() -> None:
     """Compiled code is linked by names: those of every law and drive differ, and of a law that was read anew."""
     kinds = [kind.numbers_type() for kind in (*LAWS.values(), *DRIVES.values())]
     before = type(extras_of_table())
-    register(Statistic("own", "float64", "s", "time marched", lambda r, h: h, update=lambda held, step: held))
+    register_statistic(
+        Statistic("own", "float64", "s", "time of the run", lambda r, h: h, update=lambda held, step: held)
+    )
     try:
         kinds += [before, type(extras_of_table())]
     finally:
-        unregister("own")
+        unregister_statistic("own")
 
     def law() -> type[ContactLaw]:
         class Somebodys(ContactLaw):

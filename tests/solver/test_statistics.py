@@ -15,8 +15,8 @@ from snapbeam.solver.statistics import (
     Statistic,
     accumulators_dtype,
     empty_accumulators,
-    register,
-    unregister,
+    register_statistic,
+    unregister_statistic,
 )
 from snapbeam.util.validation import InputError
 
@@ -164,7 +164,7 @@ def test_a_formula_of_what_is_kept_costs_no_compilation() -> None:
         lambda reading: reading.seen("total_impulse") / reading.duration,
     )  # fmt: skip
     system = sb.System(MODEL, default_values.CONTACT, sb.Shaker(frequency_ratio=1.4, velocity_amplitude=0.02))
-    register(row)
+    register_statistic(row)
     try:
         run = sb.simulate(system, sb.Integration(cycles=4))
         duration = 4.0 / (1.4 * MODEL.reference_frequency)
@@ -175,7 +175,7 @@ def test_a_formula_of_what_is_kept_costs_no_compilation() -> None:
         assert "mean_force" in run.summary.to_text()
         assert accumulators_dtype() == ACCUMULATORS
     finally:
-        unregister("mean_force")
+        unregister_statistic("mean_force")
     assert "mean_force" not in sb.simulate(system, sb.Integration(cycles=1)).summary
 
 
@@ -188,7 +188,7 @@ def test_what_cannot_be_registered() -> None:
         ("two words", "statistic 'two words': must be a name, such as 'rms_force'"),
     ):
         with pytest.raises(InputError, match=message):
-            register(Statistic(name, "float64", "1", "what it is", value))
+            register_statistic(Statistic(name, "float64", "1", "what it is", value))
     for name in ("impacts", "nothing"):
         with pytest.raises(InputError, match=f"statistic '{name}': was not registered"):
-            unregister(name)
+            unregister_statistic(name)

@@ -93,6 +93,7 @@ def test_nothing_listens_to_the_network(client):
         assert set(heard) <= {"127.0.0.1"}
 
 
+@pytest.mark.slow
 def test_workers_that_are_killed_in_mid_task(tmp_path, small, whole, client):
     """By SIGKILL and by a segmentation fault: the same numbers, to the last bit."""
     work, stage = trouble(small, tmp_path, once={1: "kill", 4: "segfault"})

@@ -110,6 +110,7 @@ def test_the_order_of_the_axes_is_kept_before_anything_is_computed(system, tmp_p
         assert read.attrs["points_done"] == 0
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of memory are POSIX limits here")
 @pytest.mark.parametrize("where", ["map.json", "zarr.json"])
 def test_a_foreign_task_size_takes_no_memory(whole, tmp_path, where):

@@ -103,6 +103,7 @@ def test_killed_command_goes_on_from_its_store_alone(tmp_path, monkeypatch):
     assert refused.exit_code == 2 and "cycles: 60 in the checkpoint, 61 requested" in refused.stderr
 
 
+@pytest.mark.slow
 def test_interrupt_keeps_what_is_finished(tmp_path):
     command = [sys.executable, "-m", "snapbeam", "map", "--modes", "1"]
     command += ["--cycles", "2000", "--frequency-ratio", "0.5:2:8", "--velocity-amplitude", "0.05:0.6:8"]
@@ -121,7 +122,7 @@ def test_interrupt_keeps_what_is_finished(tmp_path):
     assert sorted(file.name for file in tmp_path.iterdir()) == ["store"]
 
 
-@pytest.mark.parametrize("early", [False, True])
+@pytest.mark.parametrize("early", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_bits_do_not_depend_on_tasks_order_or_threads(tmp_path, small, early):
     """Over location too, where the rows of a task's structure are computed together, and with repeats."""
     asked = dict(small, location=[0.21, 0.3, 0.4762], early_termination=early)

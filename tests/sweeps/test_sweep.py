@@ -137,6 +137,7 @@ def test_the_file_is_the_map(whole, system, tmp_path) -> None:
     xr.testing.assert_identical(file, expected)
 
 
+@pytest.mark.slow
 def test_on_a_cluster(whole, system, tmp_path) -> None:
     pytest.importorskip("distributed")
     there = sb.sweep(

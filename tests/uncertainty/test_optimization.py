@@ -77,6 +77,7 @@ def test_asking_again_changes_nothing() -> None:
         one.tell(np.zeros((8, 1)), np.zeros(8))
 
 
+@pytest.mark.slow
 def test_the_quasi_static_optimum(tmp_path) -> None:
     """One mode at Omega = 0.02: the least V that snaps with P = 0.9 under a spread of 2 % is V_QS1 (1 + 1.28 x 2 %).
 

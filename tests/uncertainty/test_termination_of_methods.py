@@ -61,7 +61,9 @@ ITERATIONS = {
 }
 
 
-@pytest.mark.parametrize("value", TOLERANCES)
+@pytest.mark.parametrize(
+    "value", [TOLERANCES[0], *(pytest.param(value, marks=pytest.mark.slow) for value in TOLERANCES[1:])]
+)
 @pytest.mark.parametrize("name", ITERATIONS)
 def test_every_iteration_ends_and_says_why(name: str, value: float) -> None:
     try:

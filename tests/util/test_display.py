@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import logging
+import time
+
+import numpy as np
 import pytest
+from numba.core import event
+from rich.console import Console
 
 import snapbeam as sb
+from snapbeam.cli import console
 from snapbeam.model import default_values
+from snapbeam.util import work_rate
+from snapbeam.util.compilation_notice import announce_compilation
 from snapbeam.util.diagnostics import counting, sharing
+from snapbeam.util.work_rate import WorkRate, compile_seconds
 
 
 @pytest.fixture(scope="module")
@@ -56,3 +66,99 @@ def test_several_systems_at_once(system):
     with pytest.raises(sb.InputTypeError, match=r"system\[1\] = 3: must be a System"):
         sb.simulate([system, 3])
     assert sb.simulate([]) == []
+
+
+@pytest.fixture(scope="module")
+def free(system):
+    """Without snap-through, so that every analysis ends soon."""
+    return system.replace(**{
+        "model.damping_ratio": 0.05, "drive.frequency_ratio": 1.6, "drive.velocity_amplitude": 0.03,
+    })  # fmt: skip
+
+
+def test_progress_of_dynamics(free, capsys):
+    """``progress=True`` writes a line that ends with the whole."""
+    orbit = sb.dynamics.periodic_orbit(free)
+    calls = {
+        "Lyapunov spectrum: 32 of 32 periods": lambda: sb.dynamics.lyapunov_spectrum(free, periods=32, progress=True),
+        "largest Lyapunov exponent: 32 of 32 periods": lambda: sb.dynamics.largest_lyapunov(
+            free, periods=32, progress=True
+        ),
+        "bifurcation diagram: 2 of 2 values": lambda: sb.dynamics.bifurcation_diagram(
+            free, "velocity_amplitude", [0.02, 0.03], sweeps=("up",), periods=(5, 4), progress=True
+        ),
+        "lifetimes: 1 of 1 points": lambda: sb.dynamics.lifetime_map(
+            free, integration=sb.Integration(cycles=60), initial_conditions=8, progress=True
+        ),
+        "branch: 3 of 3 orbits": lambda: sb.dynamics.continuation(
+            orbit, "velocity_amplitude", (0.02, 0.05), max_points=3, progress=True
+        ),
+    }  # fmt: skip
+    for words, call in calls.items():
+        capsys.readouterr()
+        call()
+        assert words in capsys.readouterr().err
+    found = sb.dynamics.find_attractors(free, 8, progress=True)
+    assert "attractors: 4 of 4 parts" in capsys.readouterr().err
+    grid = {"amplitude[1]": [-1.1, -1.0], "velocity[1]": [0.0, 0.05]}
+    sb.dynamics.basins_of_attraction(found, grid, progress=True)
+    assert "basins: " in (line := capsys.readouterr().err) and line.endswith("periods      \n")
+
+
+def test_progress_of_uncertainty(system, capsys):
+    uncertain = sb.uncertainty.ParameterUncertainty(
+        of={"drive.velocity_amplitude": sb.uncertainty.Normal(0.02)}
+    )
+    how = sb.Integration(cycles=3)
+    sb.uncertainty.sensitivity(system, "peak_force", uncertain, samples=4, integration=how, progress=True)
+    assert "sensitivity: 8 of 8 runs" in capsys.readouterr().err
+
+
+def test_compilation_is_announced(monkeypatch, capsys):
+    """A script without handlers of its own gets the message on standard error; others get it where they log."""
+    log = logging.getLogger("snapbeam")
+    announce_compilation()
+    for each in (log, logging.getLogger()):
+        monkeypatch.setattr(each, "handlers", [h for h in each.handlers if type(h).__name__ == "_Notice"])
+    log.info("compiling a kernel, once on this machine")
+    log.info("another message")
+    assert capsys.readouterr().err == "snapbeam: compiling a kernel, once on this machine\n"
+    with console.show_compilation(Console(stderr=True)):
+        log.info("compiling a kernel, once on this machine")
+    assert capsys.readouterr().err == "compiling a kernel, once on this machine\n"
+
+
+def test_estimates_leave_out_compilation(monkeypatch, capsys):
+    """A compilation in the middle of the work does not lengthen the remaining time."""
+    now = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(work_rate, "compile_seconds", lambda: max(0.0, min(now[0] - 102.0, 30.0)))
+    report, lines = counting(True, "map"), console._Lines(Console(stderr=True), None, "points")
+    for seconds, done in ((0.0, 0), (34.0, 40)):
+        now[0] = 100.0 + seconds
+        report(done, 100)
+        lines(done, 100)
+    told = capsys.readouterr().err
+    assert "40 of 100 points, 6 s left" in told  # 4 s of work for 40 points
+    assert "40 of 100 points, 10 points/s, 6.0 s left" in told
+
+
+def test_seconds_of_compilation():
+    before = compile_seconds()
+    with event.trigger_event("numba:compile"):
+        assert np.isfinite(compile_seconds())
+    assert compile_seconds() > before
+
+
+def test_rate_of_the_later_half(monkeypatch):
+    """A delay in the first half of the work, as of a compilation in a worker, is left out after it."""
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(work_rate, "compile_seconds", lambda: 0.0)
+    rate = WorkRate()
+    for seconds, done in ((0.0, 10), (40.0, 20), (41.0, 30), (42.0, 40)):
+        now[0] = seconds
+        rate.report(done)
+    assert rate.per_second == pytest.approx(10.0)
+    rate.report(5)
+    assert rate.per_second is None

@@ -7,8 +7,8 @@ from importlib import import_module
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
+from snapbeam.cli.short_help import ShortHelpCommand, ShortHelpGroup
 from snapbeam.parts import PARTS, installed_parts
 from snapbeam.util.packages import needs
 
@@ -84,13 +84,13 @@ def _load_command(name: str, place: str, part: str) -> Any:
         command: Any = typer.main.get_group(found)
     else:
         alone = typer.Typer(rich_markup_mode="markdown", pretty_exceptions_enable=False, add_completion=False)
-        alone.command(name)(found)
+        alone.command(name, cls=ShortHelpCommand)(found)
         command = typer.main.get_command(alone)
     command.name = name
     return command
 
 
-class _Program(TyperGroup):
+class _Program(ShortHelpGroup):
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         self.commands = _Commands()

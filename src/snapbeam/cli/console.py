@@ -9,7 +9,6 @@ import json
 import logging
 import math
 import sys
-import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
@@ -26,9 +25,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColum
 from rich.text import Text
 
 from snapbeam._version import __version__
+from snapbeam.cli.short_help import wants_all
 from snapbeam.util.files import VERSION, foreign_files_kept
 from snapbeam.util.interrupts import WORDS, during_command
 from snapbeam.util.validation import InputError
+from snapbeam.util.work_rate import WorkRate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -97,6 +98,21 @@ _FORCE = Annotated[
     bool,
     typer.Option(
         "--force", help="Overwrite files that snapbeam did not write, and input files.", rich_help_panel="Output"
+    ),
+]  # fmt: skip
+
+
+def _print_all_options(ctx: typer.Context, wanted: bool) -> None:
+    if wanted:
+        wants_all(ctx)
+        typer.echo(ctx.get_help(), color=ctx.color)
+        raise typer.Exit
+
+
+_HELP_ALL = Annotated[
+    bool,
+    typer.Option(
+        "--help-all", help="Show all options and exit.", is_eager=True, callback=_print_all_options
     ),
 ]  # fmt: skip
 
@@ -173,7 +189,7 @@ def notes() -> Console:
 def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
     """Report errors of a command in one line and exit with the matching status.
 
-    The decorator adds ``--quiet`` and ``--force``, and ``--json`` if the command does not define it.  The JSON file
+    The decorator adds ``--quiet``, ``--force`` and ``--help-all``, and ``--json`` if the command does not define it.  The JSON file
     contains the values that the command passes to :func:`add_json`.
     """
     signature = inspect.signature(command, eval_str=True)
@@ -183,6 +199,7 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
     def guarded(*args: _P.args, **kwargs: _P.kwargs) -> _R:
         named = _named(kwargs.values())
         kept = nullcontext() if kwargs.pop("force", False) else foreign_files_kept(named)
+        kwargs.pop("help_all", None)
         quiet, path = bool(kwargs.pop("quiet", False)), kwargs.get(own) if own else kwargs.pop("json", None)
         asked = _OutputOptions(quiet, path if isinstance(path, Path) else None)
         token = _OUTPUT_OPTIONS.set(asked)
@@ -214,7 +231,7 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
 
     more = [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
-        for name, kind in (("quiet", _QUIET), ("force", _FORCE))
+        for name, kind in (("quiet", _QUIET), ("force", _FORCE), ("help_all", _HELP_ALL))
     ]
     if own is None:
         more.append(inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_JSON))
@@ -267,22 +284,21 @@ class _RateColumn(ProgressColumn):
     def __init__(self, what: str) -> None:
         super().__init__()
         self.what = what
+        self.rate = WorkRate()
 
     def render(self, task: Task) -> Text:
-        if not task.completed or not task.elapsed or task.total is None:
+        if self.rate.per_second is None or task.total is None:
             return Text("starting")
-        found = int(task.fields.get("found", 0))
-        return Text(pace(int(task.completed), int(task.total), task.elapsed, self.what, found))
+        return Text(pace(int(task.completed), int(task.total), self.rate, self.what))
 
 
-def pace(done: int, total: int, elapsed: float, what: str = "points", found: int = 0) -> str:
-    """Return the rate and the remaining time as text.
-
-    *found* of the *done* points existed before the clock started.
-    """
-    rate = (done - found) / max(elapsed, 1e-9)
-    left = f", {duration((total - done) / rate)} left" if found < done < total else ""
-    return f"{rate:.3g} {what}/s{left}"
+def pace(done: int, total: int, rate: WorkRate, what: str = "points") -> str:
+    """Return the rate and the remaining time as text; empty while the rate is not known."""
+    speed = rate.per_second
+    if speed is None:
+        return ""
+    left = f", {duration((total - done) / speed)} left" if done < total else ""
+    return f"{speed:.3g} {what}/s{left}"
 
 
 def count_text(count: int, what: str = "points") -> str:
@@ -298,20 +314,22 @@ def progress(
 
     *total* is None if it is not known in advance, *task* names the work, *what* names the counted things.  A terminal
     shows a bar; other outputs get a line for each tenth of the work.  The rate leaves out the results that existed
-    before the first call, and the time before it, in which a kernel may be compiled.
+    before the first call, the time before it, and the compilation of kernels.
     """
     console = errors()
     if _OUTPUT_OPTIONS.get().quiet:
-        yield lambda done, all_of_them: None
+        with show_compilation(console):
+            yield lambda done, all_of_them: None
     elif console.is_terminal:
-        columns = (TextColumn(task), BarColumn(), MofNCompleteColumn(), _RateColumn(what))
+        speed = _RateColumn(what)
+        columns = (TextColumn(task), BarColumn(), MofNCompleteColumn(), speed)
         with Progress(*columns, console=console, transient=True) as bar, show_compilation(bar.console):
             shown = bar.add_task(task, total=total, start=False)
 
             def update(done: int, all_of_them: int) -> None:
                 if not bar.tasks[0].started:
                     bar.start_task(shown)
-                    bar.update(shown, found=done)
+                speed.rate.report(done)
                 bar.update(shown, completed=done, total=all_of_them)
 
             yield update
@@ -323,10 +341,15 @@ def progress(
 @contextmanager
 def show_compilation(console: Console) -> Iterator[None]:
     """Show the messages that the solver logs when it compiles a kernel."""
-    if _OUTPUT_OPTIONS.get().quiet:
-        yield
-        return
     log = logging.getLogger("snapbeam")
+    if _OUTPUT_OPTIONS.get().quiet:
+        silent = logging.NullHandler()  # with a handler, scripts get no message either
+        log.addHandler(silent)
+        try:
+            yield
+        finally:
+            log.removeHandler(silent)
+        return
     handler = _Handler(console)
     before = log.level
     log.addHandler(handler)
@@ -352,8 +375,8 @@ class _Lines:
         self.console = console
         self.what = what
         self.total = total
-        self.start: float | None = None
-        self.found = self.tenths = 0
+        self.tenths = 0
+        self.rate = WorkRate()
         if total is not None:
             self.console.print(f"{count_text(total, what)} to compute")
 
@@ -362,16 +385,13 @@ class _Lines:
             begun = self.total is not None
             self.console.print(f"{count_text(total, self.what)} {'in all now' if begun else 'to compute'}")
             self.total, self.tenths = total, 10 * done // total if begun and total else 0
-        if self.start is None:
-            self.start, self.found = time.monotonic(), done
+        self.rate.report(done)
         tenths = 10 * done // total if total else 10
         if tenths <= self.tenths:
             return
         self.tenths = tenths
-        text = f"{done} of {count_text(total, self.what)}"
-        if done > self.found:
-            text += f", {pace(done, total, time.monotonic() - self.start, self.what, self.found)}"
-        self.console.print(text)
+        texts = (f"{done} of {count_text(total, self.what)}", pace(done, total, self.rate, self.what))
+        self.console.print(", ".join(filter(None, texts)))
 
 
 # ----------------------------------------------------------------------------------------------------

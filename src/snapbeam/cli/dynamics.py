@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
-from typer.core import TyperGroup
 
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import add_json, cli_command, duration, file_line, out, progress
@@ -23,6 +22,7 @@ from snapbeam.cli.parameter_options import (
     configured,
     with_parameters,
 )
+from snapbeam.cli.short_help import ShortHelpCommand, ShortHelpGroup
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["dynamics"]
 
 
-class _Analyses(TyperGroup):
+class _Analyses(ShortHelpGroup):
     """The commands, with a suggestion for a name that is part of a command or a word of its description."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -106,7 +106,7 @@ def _finish(dataset: xr.Dataset, output: Path, plot: Path | None, lines: list[st
     out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
 
 
-@dynamics.command("lifetimes")
+@dynamics.command("lifetimes", cls=ShortHelpCommand)
 @cli_command
 @with_parameters(*_ALL, axes=_AXES)
 def lifetimes(
@@ -134,7 +134,7 @@ def lifetimes(
     plot: opt.Plot = None,
     threads: opt.Threads = None,
 ) -> None:
-    """Compute the lifetime of snap-through motion and its final well, with confidence intervals.
+    """Compute lifetimes of snap-through and the final wells, with confidence intervals.
 
     snapbeam integrates many initial conditions at each point.
 
@@ -177,7 +177,7 @@ def lifetimes(
     _finish(dataset, output, plot, lines)
 
 
-@dynamics.command("bifurcation-diagram")
+@dynamics.command("bifurcation-diagram", cls=ShortHelpCommand)
 @cli_command
 @with_parameters(*_ALL)
 def bifurcation_diagram(
@@ -196,7 +196,7 @@ def bifurcation_diagram(
     plot: opt.Plot = None,
     threads: opt.Threads = None,
 ) -> None:
-    """Compute a bifurcation diagram with an upward and a downward sweep; each value starts from the last state.
+    """Compute a bifurcation diagram, with an upward and a downward sweep; each value starts from the last state.
 
     Example: snapbeam dynamics bifurcation-diagram --modes 8 --frequency-ratio 1.4 --values 0.01:0.3:400 --plot diagram.png
     """
@@ -220,7 +220,7 @@ def bifurcation_diagram(
     _finish(dataset, output, plot, lines)
 
 
-@dynamics.command("lyapunov-spectrum")
+@dynamics.command("lyapunov-spectrum", cls=ShortHelpCommand)
 @cli_command
 @with_parameters(*_ALL, axes=_AXES[:3])
 def lyapunov_spectrum(
@@ -266,7 +266,7 @@ def lyapunov_spectrum(
     _finish(dataset, output, plot, lines)
 
 
-@dynamics.command("poincare-section")
+@dynamics.command("poincare-section", cls=ShortHelpCommand)
 @cli_command
 @with_parameters(*_ALL)
 def poincare_section(
@@ -297,7 +297,7 @@ def poincare_section(
     _finish(dataset, output, plot, [f"{dataset.sizes['point']} points"])
 
 
-@dynamics.command("branch")
+@dynamics.command("branch", cls=ShortHelpCommand)
 @cli_command
 @with_parameters(*_ALL)
 def branch(
@@ -319,7 +319,7 @@ def branch(
     output: Output = Path("branch.nc"),
     plot: opt.Plot = None,
 ) -> None:
-    """Compute a periodic orbit and continue it along a parameter; folds, flips and grazing are located.
+    """Continue a periodic orbit along a parameter, and locate folds, flips and grazing.
 
     Example: snapbeam dynamics branch --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --bounds 0.005:0.3
     """
@@ -349,7 +349,7 @@ def branch(
     _finish(found.to_dataset(), output, plot, lines)
 
 
-@dynamics.command("basins")
+@dynamics.command("basins", cls=ShortHelpCommand)
 @cli_command
 @with_parameters(*_ALL)
 def basins(
@@ -375,7 +375,7 @@ def basins(
     plot: opt.Plot = None,
     threads: opt.Threads = None,
 ) -> None:
-    """Find and verify attractors; compute their basins over the first modal amplitude and its velocity.
+    """Find and verify attractors, and compute their basins over the first modal amplitude and its velocity.
 
     The search draws amplitude[1] from -1.4 to 1.4 and velocity[1] from -0.6 to 0.6, and discards 16 time constants, at
     least 1000 periods; its bound for attractors that were not found applies to that region, not to the plane.
@@ -431,7 +431,7 @@ def _entropy_lines(entropy: BasinEntropy) -> list[str]:
     return lines
 
 
-@dynamics.command("edge")
+@dynamics.command("edge", cls=ShortHelpCommand)
 @cli_command
 @with_parameters(*_ALL)
 def edge(
@@ -451,7 +451,7 @@ def edge(
     output: Output = Path("edge.nc"),
     plot: opt.Plot = None,
 ) -> None:
-    """Track the edge between snapping and non-snapping motion, and find the unstable orbit on it.
+    """Track the edge state between two outcomes, and find the unstable orbit on it.
 
     Example: snapbeam dynamics edge --modes 1 --damping-ratio 0.05 --frequency-ratio 0.7 --velocity-amplitude 0.14
     --plot edge.png

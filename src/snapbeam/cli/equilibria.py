@@ -79,6 +79,8 @@ def equilibria(
     else:
         barriers = []
         console.print(f"monostable: {', '.join(f'{each:.3f}' for each in freq[0])} Hz")
+        if model.imperfection is not None:
+            console.print(model.two_well_limits)
     add_json(
         bistable=model.is_bistable,
         buckling_level=beam.buckling_level,

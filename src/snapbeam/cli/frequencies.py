@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import add_json, cli_command, out
 from snapbeam.cli.parameter_options import BEAM, BOUNDARY, MODEL, configured, with_parameters
+
+if TYPE_CHECKING:
+    from snapbeam.model.reduced_model import ReducedModel
 
 __all__ = ["frequencies"]
 
@@ -20,7 +23,8 @@ def frequencies(
     """Print the natural frequencies about the equilibrium: reduced, exact, and without load.
 
     The exact ones solve the eigenvalue problem of the buckled beam (Nayfeh, Kreider and Anderson 1995);
-    the error of the reduced model is relative to them.
+    the error of the reduced model is relative to them.  They are of a perfect beam: with an imperfection the command prints
+    the frequencies of the reduced model about each well.
     """
     from rich.table import Table
 
@@ -32,6 +36,9 @@ def frequencies(
     model = configured(given).model
     beam = model.beam
     assert beam is not None
+    if model.imperfection is not None:
+        _print_wells(model, count)
+        return
     reduced = model.natural_frequencies
     exact = exact_natural_frequencies(beam, count=count)
     straight = exact_natural_frequencies(beam.replace(axial_load=0.0), count=count)
@@ -56,3 +63,30 @@ def frequencies(
             f"{straight[at]:.3f}",
         )
     console.print(table)
+
+
+def _print_wells(model: ReducedModel, count: int) -> None:
+    """Print the frequencies about each well of an imperfect beam, for which no exact ones are known."""
+    from rich.table import Table
+
+    names = ["lower well", "upper well"] if model.is_bistable else ["equilibrium"]
+    freq = model.well_frequencies[: len(names), :count]
+    heights = [float(model.midspan_shape @ well) for well in model.wells[: len(names)]]
+    add_json(
+        modes=model.modes, bistable=model.is_bistable, wells=names, centers=heights, reduced=freq,
+        reference_frequency=model.reference_frequency,
+    )  # fmt: skip
+    console = out()
+    console.print(
+        f"imperfect beam, {model.modes} modes, reduced model; exact frequencies are of perfect beams only"
+    )
+    table = Table(box=None, pad_edge=False)
+    for title in (
+        "",
+        *(f"{name}, centre at {1e6 * at:.4g} µm (Hz)" for name, at in zip(names, heights, strict=True)),
+    ):
+        table.add_column(title, justify="right")
+    for at in range(freq.shape[1]):
+        table.add_row(str(at + 1), *(f"{row[at]:.3f}" for row in freq))
+    console.print(table)
+    console.print(f"Omega = 1 is {model.reference_frequency:.3f} Hz")

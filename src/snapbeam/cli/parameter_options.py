@@ -15,6 +15,7 @@ import typer
 from rich.markup import escape
 
 from snapbeam.cli.console import add_json, duration, notes, out, pace, progress
+from snapbeam.util.work_rate import WorkRate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -291,7 +292,8 @@ def configured(
     from snapbeam.model.parameters import lookup
     from snapbeam.util.validation import InputError
 
-    config = load_config(given["config"]) if given.get("config") is not None else Config()
+    file = given.get("config")
+    config = load_config(file, complete=False) if file is not None else Config()
     if given.get("from_") is not None:
         if given.get("config") is not None:
             raise InputError("from, config: give one of the two")
@@ -320,9 +322,10 @@ def configured(
     for name in axes:
         for same in sorted(same_axis(name) & single):
             raise InputError(f"{same}: is given as a single value and as an axis")
+    _require_striker(config, sections, axes)
     if axes:
         sections["sweep"] = sections.get("sweep", {}) | axes
-    config = override(config, sections)
+    config = override(config, sections, "" if file is None or sections else Path(file).name)
     if given.get("print_config"):
         from snapbeam.model.parameter_file import config_text
 
@@ -332,11 +335,29 @@ def configured(
         raise typer.Exit
     if config.defaulted:
         whole = config.whole().to_mapping()
-        values = ", ".join(
-            f"{name} = {_shown(whole, name)}" for name in config.defaulted if name.partition(".")[0] in whole
-        )
-        notes().print(f"[bold yellow]note:[/] taken from the paper's beam: {escape(values)}")
+        taken = [name for name in config.defaulted if name.partition(".")[0] in whole]
+        values = ", ".join(f"{name} = {_shown(whole, name)}" for name in taken)
+        if taken:
+            notes().print(f"[bold yellow]note:[/] taken from the paper's beam: {escape(values)}")
     return config
+
+
+def _require_striker(config: Config, sections: Mapping[str, Any], axes: Mapping[str, Any]) -> None:
+    """Refuse the drive of a striker that neither the file nor an option gives, beside what the file does move."""
+    from snapbeam.model.parameter_axes import physical_name
+    from snapbeam.model.parameters import lookup
+    from snapbeam.util.validation import InputError
+
+    moved = [name for name in ("base_excitation", "axial_load") if config.section(name) or sections.get(name)]
+    given = [f"drive.{field}" for field in sections.get("drive", {})]
+    swept = [physical_name(name) or lookup(name).name for name in axes]
+    given += [name for name in swept if name.startswith("drive.")]
+    others = {*sections, *(name.partition(".")[0] for name in swept), *config.given}
+    if moved and given and not others & {"striker", "contact"} and not config.section("drive"):
+        raise InputError(
+            f"{', '.join(given)}: there is no striker to drive, {moved[0]} moves the beam; use --set or --sweep "
+            f"{moved[0]}.NAME=..., or add a [striker]"
+        )
 
 
 def _shown(sections: Mapping[str, Mapping[str, Any]], name: str) -> str:
@@ -624,8 +645,8 @@ class LongReport:
     def __init__(self, bar: Any, log: Path | None) -> None:
         self._bar = bar
         self._log = log
-        self._start = self._last = time.monotonic()
-        self._found = 0
+        self._last = time.monotonic()
+        self._rate = WorkRate()
         self._before: int | None = None
         self._quiet = True
 
@@ -637,18 +658,15 @@ class LongReport:
     def progress(self, done: int, total: int) -> None:
         """Say how far the present stage is."""
         now = time.monotonic()
-        if self._before is None or done < self._before:
-            self._start, self._found = now, done
+        self._rate.report(done)
         finished = done >= total and done != self._before
         self._before = done
         self._bar(done, total)
         if finished or self._quiet or now - self._last >= self._INTERVAL:
             self._last, self._quiet = now, False
             share = 100.0 * done / max(total, 1)
-            text = f"{done} of {total} points ({share:.1f} %)"
-            if done > self._found:
-                text += f", {pace(done, total, now - self._start, found=self._found)}"
-            self.log(text)
+            texts = (f"{done} of {total} points ({share:.1f} %)", pace(done, total, self._rate))
+            self.log(", ".join(filter(None, texts)))
 
     def log(self, text: str) -> None:
         """Append a line with the time to the log file, if there is one."""

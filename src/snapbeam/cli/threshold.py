@@ -54,7 +54,7 @@ def threshold(
     plot: opt.Plot = None,
     threads: opt.Threads = None,
 ) -> None:
-    """Find the threshold of the interwell response over frequency ratio, location or any parameters, as a band.
+    """Find the interwell threshold, as a band, over frequency ratio, location or any parameters.
 
     The boundary is fractal in places, so the file contains two curves: the lowest amplitude with an interwell response,
     and the amplitude above which every response is interwell.  snapbeam runs every point of the grid.

@@ -157,7 +157,7 @@ def design(
     yes: Yes = False,
     threads: opt.Threads = None,
 ) -> None:
-    """Optimise the excitation under constraints that hold with a stated probability.
+    """Optimise the excitation, under constraints that hold with a stated probability.
 
     The TOML file has the sections of a parameter file, [uncertainty], and [design] with the objectives,
     [design.variables] (name = [low, high]), [[design.constraints]] and [design.settings].
@@ -268,7 +268,7 @@ def probability(
     yes: Yes = False,
     threads: opt.Threads = None,
 ) -> None:
-    """Map the probability of snap-through and of each final well under parameter uncertainty.
+    """Map the probability of snap-through and final wells, under parameter uncertainty.
 
     The TOML file has the sections of a parameter file, [uncertainty], the axes in [sweep], and the sampling plan in
     [probability].

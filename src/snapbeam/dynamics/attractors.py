@@ -19,6 +19,7 @@ from snapbeam.dynamics.lyapunov import lyapunov_spectrum
 from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, orbit_tolerance, shoot
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
+from snapbeam.util.diagnostics import counting
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, finite_array, integer, within
 
@@ -234,7 +235,7 @@ class Attractors:
 
     def to_dataset(self) -> xr.Dataset:
         """Kinds, periods, exponents, shares and points, labelled."""
-        import xarray as xr
+        from snapbeam.util.datasets import xr
 
         size = max((len(each.points) for each in self.attractors), default=1)
         points = np.full((len(self.attractors), size, self.flow.dimension), np.nan)
@@ -301,7 +302,7 @@ def find_attractors(
     seed: int = 0,
     tolerance: float = 1e-10,
     integration: Integration | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> Attractors:
     """Find the attractors that many states lead to, and verify each; other states are undecided.
 
@@ -333,7 +334,7 @@ def find_attractors(
         Of the orbits, as in :func:`periodic_orbit`.
     integration : Integration, optional
     progress : callable, optional
-        Called as ``progress(done, total)`` with parts of the work.
+        Called as ``progress(done, total)`` with parts of the work; True writes a line to standard error.
 
     Returns
     -------
@@ -354,9 +355,11 @@ def find_attractors(
     rows = _states_of(flow, states, seed)
     allowed = orbit_tolerance(tolerance)
 
+    told = counting(progress, "attractors", "parts")
+
     def report(done: int) -> None:
-        if progress is not None:
-            progress(done, 4)
+        if told is not None:
+            told(done, 4)
 
     report(0)
     there = flow.advance(rows, leave)

@@ -12,7 +12,7 @@ from scipy import ndimage, stats
 from snapbeam.dynamics.attractors import UNDECIDED, Attractors, Cloud
 from snapbeam.dynamics.flow import Flow, Stroboscope, settling_periods
 from snapbeam.model.state import State
-from snapbeam.util.diagnostics import Diagnostic, tell, to_json
+from snapbeam.util.diagnostics import Diagnostic, counting, tell, to_json
 from snapbeam.util.validation import InputError, InputTypeError, axis, checked, finite_array, integer, shown
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def basins_of_attraction(
     fixed_coordinates: State | ArrayLike | None = None,
     periods: int | None = None,
     every: int = 10,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
     """Compute the attractor that each state of a plane goes to.
 
@@ -68,7 +68,7 @@ def basins_of_attraction(
     every : int
         Periods between two checks.
     progress : callable, optional
-        Called as ``progress(done, total)`` with periods.
+        Called as ``progress(done, total)`` with periods; True writes a line to standard error.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def basins_of_attraction(
         else (integer("periods", periods, 1, 10**6), "as given")
     )
     names, columns, rows = _plane(flow, grid, fixed_coordinates)
-    label, after = _labelled(attractors, flow, rows, total, step, progress)
+    label, after = _labelled(attractors, flow, rows, total, step, counting(progress, "basins", "periods"))
     dataset = _dataset(attractors, names, columns, label, after, total)
     dataset.attrs["termination_reason"] = (
         f"{total} periods ({rule})" if (label == UNDECIDED).any() else "every state is decided"
@@ -178,6 +178,8 @@ def _labelled(
         open_, x = open_[~taken & ~lost], x[~taken & ~lost]
         if progress is not None:
             progress(done, total)
+    if progress is not None and done < total:
+        progress(total, total)
     return label, after
 
 
@@ -189,7 +191,7 @@ def _dataset(
     after: _Array,
     total: int,
 ) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     shape = tuple(column.size for column in columns)
     words = {"units": "1", "long_name": "number of the attractor that a state goes to; -1: undecided"}

@@ -14,6 +14,7 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.state import rest_state
 from snapbeam.model.system import System
+from snapbeam.util.diagnostics import counting
 from snapbeam.util.validation import InputError, InputTypeError, axis, checked, choice, flag, integer, shown
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def bifurcation_diagram(
     initial_conditions: InitialConditions | int = 0,
     periods: tuple[int | None, int] = (None, 32),
     grazing: bool = False,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
     """Compute a bifurcation diagram: states once a period over one parameter that is swept up and down.
 
@@ -64,7 +65,7 @@ def bifurcation_diagram(
     grazing : bool
         Whether to look at every approach within four of the kept periods: ``clearance``, ``min_penetration``.
     progress : callable, optional
-        Called as ``progress(done, total)`` with values.
+        Called as ``progress(done, total)`` with values; True writes a line to standard error.
 
     Returns
     -------
@@ -99,13 +100,13 @@ def bifurcation_diagram(
     leave, rule = settling_periods(flow) if given is None else (given, "as given")
     diagram = _Diagram(flow, row.name, points, leave, keep)
     total = points.size * (bool(kinds) + (many.count if many is not None else 0))
-    done = 0
+    done, told = 0, counting(progress, "bifurcation diagram", "values")
 
     def report(steps: int) -> None:
         nonlocal done
         done += steps
-        if progress is not None:
-            progress(done, total)
+        if told is not None:
+            told(done, total)
 
     if kinds:
         diagram.carry(kinds, report)
@@ -201,7 +202,7 @@ class _Diagram:
 
     def dataset(self, grazing: bool) -> xr.Dataset:
         """The diagram, labelled."""
-        import xarray as xr
+        from snapbeam.util.datasets import xr
 
         row, rows, counts = lookup(self.name), np.array(self.rows), np.array(self.counts)
         system, modes = self.flow.system, self.flow.modes

@@ -7,6 +7,7 @@ branch and corrected on the plane across it (Keller, in Applications of Bifurcat
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -24,7 +25,7 @@ from snapbeam.dynamics.periodic_orbits import (
     Spot,
     orbit_tolerance,
 )
-from snapbeam.util.diagnostics import tell, to_json
+from snapbeam.util.diagnostics import counting, tell, to_json
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, choice, integer, shown, within
 
@@ -107,9 +108,8 @@ class Branch:
         Over ``orbit``: the parameter, the state, the multipliers, stability, impacts and the mid-span displacement,
         once and at every ``return``.  Over ``special_point``: kind, value, error, state and the orbit before it.
         """
-        import xarray as xr
-
         from snapbeam.model.parameters import lookup
+        from snapbeam.util.datasets import xr
 
         first = self.orbits[0]
         names = getattr(first.flow, "names", tuple(f"x[{i + 1}]" for i in range(first.coordinates.size)))
@@ -417,6 +417,7 @@ def continuation(
     step: float = 0.01,
     max_step: float = 0.02,
     tolerance: float = _TOLERANCE,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> Branch:
     """Follow a periodic orbit, stable or not, along one parameter.
 
@@ -441,6 +442,9 @@ def continuation(
         for the parameter; between 1e-8 and 1.
     tolerance : float
         Of the orbits, as in :func:`periodic_orbit`.
+    progress : callable, optional
+        Called as ``progress(done, total)`` with orbits, of which there are at most *max_points*; True writes a line to
+        standard error.
 
     Returns
     -------
@@ -468,7 +472,15 @@ def continuation(
     sign = np.zeros(y.size)
     sign[-1] = 1.0 if direction == "up" else -1.0
     first = Spot(y, corrector.tangent(came, slope, sign), came, slope, orbit.iterations)
-    return _follow(corrector, first, (low, high), count, min(length, max_step), max_step)
+    return _follow(
+        corrector,
+        first,
+        (low, high),
+        count,
+        min(length, max_step),
+        max_step,
+        counting(progress, "branch", "orbits"),
+    )
 
 
 def _limits(bounds: tuple[float, float]) -> tuple[float, float]:
@@ -488,6 +500,7 @@ def _follow(
     max_points: int,
     length: float,
     max_step: float,
+    progress: Callable[[int, int], object] | None,
 ) -> Branch:
     spots, events = [first], list[SpecialPoint]()
     end = f"{max_points} orbits, the maximum (max_points)"
@@ -523,6 +536,8 @@ def _follow(
             continue
         events += between(corrector, last, spot, len(spots) - 1)
         spots.append(spot)
+        if progress is not None:
+            progress(len(spots), max_points)
         if over is not None:
             end = "limit of the parameter"
             break
@@ -537,6 +552,8 @@ def _follow(
             length = min(1.4 * length, max_step)
         elif spot.iterations >= _HARD or turned < 0.8:
             length *= 0.6
+    if progress is not None and len(spots) < max_points:
+        progress(len(spots), len(spots))
     orbits = [corrector.orbit(spot) for spot in spots]
     assert corrector.family.name is not None
     impacts = [spot.came.impacts for spot in spots]

@@ -15,6 +15,7 @@ from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit,
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
+from snapbeam.util.diagnostics import counting
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, integer, positive
 
@@ -55,7 +56,7 @@ class EdgeState:
 
     def to_dataset(self) -> xr.Dataset:
         """The motion, labelled."""
-        import xarray as xr
+        from snapbeam.util.datasets import xr
 
         names = getattr(self.flow, "names", tuple(f"x[{i + 1}]" for i in range(self.flow.dimension)))
         labels = {"units": "1", "long_name": "state on the border once a period"}
@@ -106,6 +107,7 @@ def edge_tracking(
     diverge_threshold: float = 1e-5,
     outcome: Callable[[Flow, _Array, int], NDArray[np.bool_]] | None = None,
     integration: Integration | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> EdgeState:
     """Follow the border between snapping and not (Skufca, Yorke and Eckhardt, Phys. Rev. Lett. 96 (2006) 174101).
 
@@ -127,6 +129,8 @@ def edge_tracking(
     outcome : callable, optional
         ``outcome(flow, states, horizon) -> bool array``, in place of snapping.
     integration : Integration, optional
+    progress : callable, optional
+        Called as ``progress(done, total)`` with periods; True writes a line to standard error.
 
     Returns
     -------
@@ -162,6 +166,7 @@ def edge_tracking(
     states, distances, closest = [], [], 0.0
     stopped = f"{total} periods"
     begin = True
+    report = counting(progress, "edge tracking", "periods")
     for period in range(total):
         if begin:
             bracket = _bisect(flow, low, high, near, ahead, decide)
@@ -186,6 +191,10 @@ def edge_tracking(
             )
             break
         begin = size > far
+        if report is not None:
+            report(period + 1, total)
+    if report is not None and len(states) < total:
+        report(len(states), len(states))
     if closest > near:
         stopped += (
             f"; rounding stopped the bisection at a distance of {closest:.2g}, "

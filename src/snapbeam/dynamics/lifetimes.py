@@ -23,6 +23,7 @@ from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, compute_table
 from snapbeam.sweeps.points import Columns, PointList
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
 from snapbeam.sweeps.tasks import PointWork, ResultTable
+from snapbeam.util.diagnostics import counting
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, checked, integer, nonnegative, shown, within
 
@@ -362,7 +363,7 @@ def lifetime_map(
     after: ArrayLike | None = None,
     checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
     cluster: str | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
     """Compute the lifetime of snap-through and the probability of each final well, over any parameters.
 
@@ -422,7 +423,7 @@ def lifetime_map(
     setup = _setup(held_in_space(system), axes, integration)
     work = LifetimeWork(setup, None, starts_of(initial_conditions))
     keeping = checkpoint if isinstance(checkpoint, CheckpointOptions) else CheckpointOptions(checkpoint)
-    table, made = compute_table(work, keeping, cluster=cluster, progress=progress)
+    table, made = compute_table(work, keeping, cluster=cluster, progress=counting(progress, "lifetimes"))
     dataset = _runs(work, table, made)
     return _single(setup, refit(dataset, settings, cycles_after))
 
@@ -437,7 +438,7 @@ def require_excitation(system: System) -> None:
     if not system.moving:
         raise InputError(
             "striker = None: a beam that nothing strikes or shakes does not go on snapping; give a striker, a "
-            "base_excitation or an axial_load"
+            "base_excitation, an axial_load or an external_force"
         )
 
 
@@ -477,7 +478,7 @@ def _single(setup: SweepSetup, dataset: xr.Dataset) -> xr.Dataset:
 
 def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Dataset:
     """What was kept of every run, labelled."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     setup, points = work.setup, work.setup.points
     more = made | {

@@ -16,7 +16,7 @@ from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.simulation.request import cycle_of
 from snapbeam.sweeps.points import Points, points_of
-from snapbeam.util.diagnostics import Diagnostic, tell, to_json
+from snapbeam.util.diagnostics import Diagnostic, counting, tell, to_json
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -50,7 +50,7 @@ def lyapunov_spectrum(
     states: State | ArrayLike | None = None,
     axes: Mapping[str, Any] | None = None,
     integration: Integration | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
     """The largest Lyapunov exponents, by the tangent flow with a QR factorisation at every whole period.
 
@@ -75,7 +75,7 @@ def lyapunov_spectrum(
         point from the first state.
     integration : Integration, optional
     progress : callable, optional
-        Called as ``progress(done, total)`` with periods.
+        Called as ``progress(done, total)`` with periods; True writes a line to standard error.
 
     Returns
     -------
@@ -107,13 +107,14 @@ def lyapunov_spectrum(
     runs = advanced.states.shape[0]
     frame = np.tile(np.eye(flow.dimension)[:count], (runs, 1, 1))
     growth, crossed = np.empty((total, runs, count)), np.zeros((total, runs), dtype=bool)
+    report = counting(progress, "Lyapunov spectrum", "periods")
     for period in range(total):
         advanced = flow.advance(advanced, 1, tangents=frame, points=columns)
         frame, growth[period] = _orthogonal(advanced)
         if "zero_crossings" in advanced.statistics:
             crossed[period] = advanced.statistics["zero_crossings"] > 0
-        if progress is not None:
-            progress(period + 1, total)
+        if report is not None:
+            report(period + 1, total)
     dataset = _dataset(flow, growth, crossed, points, before)
     dataset.attrs["termination_reason"] = _stopped(total, before, rule)
     return dataset
@@ -167,7 +168,7 @@ def _orthogonal(advanced: AdvancedStates) -> tuple[_Array, _Array]:
 def _dataset(
     flow: Flow, growth: _Array, crossed: NDArray[np.bool_], points: Points | None, before: int
 ) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     total, _, count = growth.shape
     rate = growth / flow.period if points is None else growth / _periods(flow, points)[None, :, None]
@@ -248,6 +249,7 @@ def largest_lyapunov(
     states: State | ArrayLike | None = None,
     distance: float = 1e-8,
     integration: Integration | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
     """The largest exponent from two trajectories, brought back to a small distance at every whole period.
 
@@ -255,7 +257,7 @@ def largest_lyapunov(
 
     Parameters
     ----------
-    system, periods, transient, states, integration
+    system, periods, transient, states, integration, progress
         As in :func:`lyapunov_spectrum`.
     distance : float
         To which they are brought back, in units of the well's amplitude; in [1e-12, 1e-3].
@@ -266,7 +268,7 @@ def largest_lyapunov(
         ``exponent`` (1/s) and ``exponent_error`` over ``run``.  An exponent is NaN, with a warning, if the two
         trajectories become equal to rounding within a period; the attribute ``merged`` counts such runs.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     flow = flow_of(system, integration)
     total = integer("periods", periods, _BLOCKS, 10**7)
@@ -277,6 +279,7 @@ def largest_lyapunov(
     runs = here.shape[0]
     along = np.tile(np.ones(flow.dimension) / np.sqrt(flow.dimension), (runs, 1))
     growth = np.empty((total, runs))
+    report = counting(progress, "largest Lyapunov exponent", "periods")
     for period in range(total):
         both = flow.advance(np.concatenate([here, here + size * along]), 1).states
         here, apart = both[:runs], both[runs:] - both[:runs]
@@ -284,6 +287,8 @@ def largest_lyapunov(
         with np.errstate(divide="ignore", invalid="ignore"):
             growth[period] = np.where(away > 0.0, np.log(away / size), np.nan)
             along = np.where((away > 0.0)[:, None], apart / away[:, None], along)
+        if report is not None:
+            report(period + 1, total)
     rate = growth / flow.period
     edges = np.linspace(0, total, _BLOCKS + 1).astype(int)
     means = np.array([_sums(rate[a:b]) / (b - a) for a, b in pairwise(edges)])

@@ -20,10 +20,10 @@ from snapbeam.solver.cpu.driver import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, tell, to_json
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import (
-    choice,
     InputError,
     InputTypeError,
     checked,
+    choice,
     finite_array,
     integer,
     shown,
@@ -470,7 +470,7 @@ class PeriodicOrbit:
 
     def to_dataset(self) -> xr.Dataset:
         """The orbit once a period, and its multipliers, labelled."""
-        import xarray as xr
+        from snapbeam.util.datasets import xr
 
         names = getattr(self.flow, "names", tuple(f"x[{i + 1}]" for i in range(self.coordinates.size)))
         values = self.multipliers

@@ -811,7 +811,7 @@ def stiffness_from_impacts(impacts: xr.Dataset, effective_mass: float) -> Contac
     InputError
         If fewer than three impacts can be used.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     mass = positive("effective_mass", effective_mass, "kg")
     if not isinstance(impacts, xr.Dataset):

@@ -311,9 +311,10 @@ def recorded_drive(
         If the result could not hold the bandwidth, the record is too short for the filter, or its start-up is
         broken by a dropout.
     """
-    import xarray as xr
     from scipy.interpolate import CubicSpline
     from scipy.signal import fftconvolve, firwin, kaiserord, resample_poly
+
+    from snapbeam.util.datasets import xr
 
     samples = check_signal(velocity, "m/s", "velocity")
     rate = positive("sampling_frequency", sampling_frequency, "Hz")

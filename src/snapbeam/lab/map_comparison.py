@@ -108,7 +108,7 @@ def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -
     A point does not count if it lies more than half a step outside the map, was measured at another value of a
     coordinate that the map holds fixed (by more than 2 %), or has no class on either side.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not isinstance(dataset, xr.Dataset) or "response_class" not in dataset:
         raise InputError("dataset: must be a map with the variable response_class")

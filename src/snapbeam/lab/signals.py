@@ -217,7 +217,7 @@ def make_signal(
     InputError
         For an unknown unit, numbers that are not finite, or a time axis that is not even.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     array = finite_array(name, values, 1)
     factor, unit = si_unit(name, units)
@@ -252,7 +252,7 @@ def check_signal(
     InputError
         Naming what is wrong: the dimensions, a missing or wrong unit, NaN, times that do not increase.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not isinstance(signal, xr.DataArray):
         raise InputTypeError(

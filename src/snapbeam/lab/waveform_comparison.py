@@ -128,7 +128,7 @@ def compare_waveforms(
     InputError
         If a run lacks the shaker, the two share fewer than two cycles, or no frequency is known.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     for name, run in (("measured", measured), ("simulated", simulated)):
         try:
@@ -283,7 +283,7 @@ def _on(grid: _Array, clock: _Array, values: NDArray[Any]) -> _Array:
 
 
 def _spectra(grid: _Array, step: float, columns: dict[str, _Array]) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     window = np.hanning(grid.size)
     data = {}

@@ -77,18 +77,21 @@ class BaseExcitation:
 
 
 def rigid_mass(model: ReducedModel) -> NDArray[np.float64]:
-    """rho S integral(phi_i), kg m^-0.5, shape (N,): what an acceleration of the frame acts on.
+    """rho S integral(phi_i), kg m^-0.5, or m r of a structure given by matrices, shape (N,): what a base accelerates.
 
     Raises
     ------
     InputError
-        For a structure given by matrices, of which it is not known.
+        For a structure given by matrices without a base_shape.
     """
     beam = model.beam
     if beam is None:
-        raise InputError(
-            "base: shakes a beam; how the frame's acceleration pulls at a structure given by matrices is not known"
-        )
+        if model.base_shape is None:
+            raise InputError(
+                "base_excitation: needs the displacement of each coordinate per unit of the base's; give base_shape to "
+                "ReducedModel.from_matrices"
+            )
+        return np.asarray(model.mass @ model.base_shape)
     modes = modes_between(beam.boundary, beam.length, beam.bending_stiffness, model.modes)
     return np.asarray(beam.mass_per_length * modes.integral)
 

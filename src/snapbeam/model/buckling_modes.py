@@ -341,6 +341,8 @@ class StructureMatrices:
     damping_ratio: ArrayLike
     reference_frequency: float | None
     transverse_force: ArrayLike | None = None
+    base_shape: ArrayLike | None = None
+    elongation_matrix: ArrayLike | None = None
 
 
 def damping_ratios(value: ArrayLike, count: int) -> _Array:
@@ -357,7 +359,7 @@ def damping_ratios(value: ArrayLike, count: int) -> _Array:
 
 def checked_structure(given: StructureMatrices) -> dict[str, Any]:
     """The fields of a reduced model for a structure, or an ``InputError`` that says what is wrong."""
-    mass = finite_array("mass", given.mass)
+    mass = finite_array("mass", _dense(given.mass))
     if mass.ndim != 2 or mass.shape[0] != mass.shape[1] or mass.size == 0:
         raise InputError(f"mass of shape {mass.shape}: must be a square matrix (N, N)")
     count = mass.shape[0]
@@ -367,10 +369,11 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
     except np.linalg.LinAlgError:
         lowest = np.linalg.eigvalsh(mass)[0]
         raise InputError(
-            f"mass: must be positive definite, but its lowest eigenvalue is {lowest:g}"
+            f"mass: must be positive definite, but its lowest eigenvalue is {lowest:g}; leave out fixed coordinates, and "
+            "condense those without mass"
         ) from None
 
-    stiffness = finite_array("stiffness", given.stiffness)
+    stiffness = finite_array("stiffness", _dense(given.stiffness))
     if stiffness.ndim == 2:
         _require_shape("stiffness", stiffness, (count, count), "as large as the mass matrix")
         stiffness = _symmetric("stiffness", stiffness)
@@ -393,10 +396,14 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
         raise InputError(
             "well_amplitude with transverse_force: leave it out, the equilibria follow from the force"
         )
+    base_shape = None if given.base_shape is None else _shape("base_shape", given.base_shape, count)
+    elongation = None
+    if given.elongation_matrix is not None:
+        elongation = _elongation(given.elongation_matrix, count, gamma)
     if force is None:
-        equilibrium = _equilibrium(given.well_amplitude, stiffness, gamma, midspan_shape)
+        equilibrium = _equilibrium(given.well_amplitude, stiffness, gamma, midspan_shape, elongation)
     else:
-        equilibrium = landscape_of(stiffness, gamma, force, midspan_shape).lower.amplitude
+        equilibrium = landscape_of(stiffness, gamma, force, midspan_shape, elongation).lower.amplitude
     return {
         "mass": mass,
         "stiffness": stiffness,
@@ -407,13 +414,43 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
         "damping_ratio": damping_ratios(given.damping_ratio, count),
         "midspan_shape": midspan_shape,
         "contact_shape": contact_shape,
+        "base_shape": base_shape,
+        "elongation_matrix": elongation,
         "given_reference_frequency": None
         if reference is None
         else positive("reference_frequency", reference, "Hz"),
     }
 
 
-def _equilibrium(value: ArrayLike | None, stiffness: _Array, gamma: float, midspan_shape: _Array) -> _Array:
+def _dense(matrix: Any) -> Any:
+    """A sparse matrix of SciPy as an array; anything else as it is."""
+    return matrix.toarray() if hasattr(matrix, "toarray") else matrix
+
+
+def _elongation(value: ArrayLike, count: int, gamma: float) -> _Array:
+    matrix = finite_array("elongation_matrix", _dense(value))
+    _require_shape("elongation_matrix", matrix, (count, count), "as large as the mass matrix")
+    matrix = _symmetric("elongation_matrix", matrix)
+    eigenvalue = np.linalg.eigvalsh(matrix)
+    if eigenvalue[0] < -1e-12 * max(abs(float(eigenvalue[-1])), 1e-300) or not matrix.any():
+        raise InputError(
+            f"elongation_matrix: its lowest eigenvalue is {eigenvalue[0]:g}; must be at least 0, and the greatest greater "
+            "than 0; give the geometric stiffness matrix of a unit tension"
+        )
+    if gamma == 0.0:
+        raise InputError(
+            "elongation_matrix with nonlinear_stiffness = 0: has no effect; give nonlinear_stiffness"
+        )
+    return matrix
+
+
+def _equilibrium(
+    value: ArrayLike | None,
+    stiffness: _Array,
+    gamma: float,
+    midspan_shape: _Array,
+    elongation: _Array | None = None,
+) -> _Array:
     if value is None:
         return np.zeros(midspan_shape.size)
     a = finite_array("well_amplitude", value)
@@ -424,7 +461,8 @@ def _equilibrium(value: ArrayLike | None, stiffness: _Array, gamma: float, midsp
     if gamma == 0.0:
         raise InputError(f"{given}: must be zero unless nonlinear_stiffness is greater than 0")
     bent = stiffness * a if stiffness.ndim == 1 else stiffness @ a
-    stretched = gamma * (a @ a) * a
+    pulled = a if elongation is None else elongation @ a
+    stretched = gamma * (a @ pulled) * pulled
     residual = float(np.abs(bent + stretched).max())
     if residual > _BALANCE * max(float(np.abs(bent).max()), float(np.abs(stretched).max())):
         raise InputError(f"{given}: must satisfy K0 a + gamma (a . a) a = 0, but leaves {residual:g}")
@@ -454,6 +492,7 @@ def _symmetric(name: str, matrix: _Array) -> _Array:
     if asymmetry.max() > _SYMMETRY * np.abs(matrix).max():
         i, j = (int(n) for n in np.unravel_index(np.argmax(asymmetry), matrix.shape))
         raise InputError(
-            f"{name}[{i}, {j}] = {matrix[i, j]:g}, {name}[{j}, {i}] = {matrix[j, i]:g}: must be symmetric"
+            f"{name}[{i}, {j}] = {matrix[i, j]:g}, {name}[{j}, {i}] = {matrix[j, i]:g}: must be symmetric; check the order "
+            "of the degrees of freedom in the export"
         )
     return 0.5 * (matrix + matrix.T)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from snapbeam.model.beam import Beam
 from snapbeam.model.drive.sine import Sine
+from snapbeam.model.harvester import Harvester, PiezoelectricHarvester
 from snapbeam.model.quantity import quantities
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
@@ -20,17 +21,25 @@ _LARGEST_RATIO = 20.0
 _LARGEST_AMPLITUDE = 20.0
 
 
-def doubts_of(model: ReducedModel, striker: Striker | None) -> tuple[Diagnostic, ...]:
-    """Diagnostics about a structure and what strikes it."""
+_STRONGEST_COUPLING = 1.0
+"""Theta^2 (x_2 - x_1) L/(C E I) that no layers reach: e^2/(eps c) of the material, which stiffens the beam too."""
+
+
+def doubts_of(
+    model: ReducedModel, striker: Striker | None, harvester: Harvester | None = None
+) -> tuple[Diagnostic, ...]:
+    """Diagnostics about a structure, what strikes it and its harvester."""
     found = [] if model.beam is None else _of_beam(model.beam) + _of_modes(model, model.beam)
     if striker is not None and isinstance(striker.drive, Sine):
         found += _of_sine(striker.drive, model)
+    if isinstance(harvester, PiezoelectricHarvester) and model.beam is not None:
+        found += _of_layers(harvester, model.beam)
     if model.imperfection is not None and not model.is_bistable:
         found.append(
             Diagnostic(
                 "monostable",
                 "this imperfection leaves one well: the beam is monostable, and crossings of its centre are no "
-                "change of wells",
+                f"change of wells; {model.two_well_limits}",
             )
         )
     return tuple(found)
@@ -101,6 +110,24 @@ def _of_modes(model: ReducedModel, beam: Beam) -> list[Diagnostic]:
             f"({model.natural_frequencies[0]:.5g} Hz), although a striker at the centre cannot excite it; set "
             f"model.reference_frequency = {symmetric:.5g} Hz to normalise by the first symmetric mode",
             {"buckling_level_over_radius": level, "symmetric_frequencies": symmetric},
+        )
+    ]
+
+
+def _of_layers(harvester: PiezoelectricHarvester, beam: Beam) -> list[Diagnostic]:
+    covered = (harvester.patch_end - harvester.patch_start) * beam.length
+    stiffness = harvester.capacitance * beam.bending_stiffness
+    coupling = harvester.moment_per_volt**2 * covered / stiffness
+    if coupling < _STRONGEST_COUPLING:
+        return []
+    most = (_STRONGEST_COUPLING * stiffness / covered) ** 0.5
+    return [
+        Diagnostic(
+            "unphysical-coupling",
+            f"harvester.moment_per_volt = {harvester.moment_per_volt:g} N m/V with capacitance = "
+            f"{harvester.capacitance:g} F: must be below {most:.3g} N m/V; Theta^2 (x_2 - x_1) L/(C E I) is "
+            f"{coupling:.3g}, and no material reaches 1; use PiezoelectricHarvester.from_material",
+            {"coupling": coupling, "greatest_moment_per_volt": most},
         )
     ]
 

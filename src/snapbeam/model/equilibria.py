@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,10 @@ from numpy.typing import NDArray
 from snapbeam.util.validation import InputError
 
 __all__ = [
+    "Condensed",
     "Equilibrium",
     "Landscape",
+    "condensed",
     "equilibria_of",
     "landscape_of",
     "least_energy_through",
@@ -253,14 +256,65 @@ class Landscape:
         return self.saddle is not None
 
 
-def tangent_stiffness(stiffness: _Array, gamma: float, alpha: _Array) -> _Array:
-    """K0 + gamma (s Id + 2 alpha alpha^T), shape (N, N)."""
+def tangent_stiffness(
+    stiffness: _Array, gamma: float, alpha: _Array, elongation: _Array | None = None
+) -> _Array:
+    """K0 + gamma (s S + 2 S alpha alpha^T S), shape (N, N), with s = alpha . S alpha; S is the identity by default."""
     k0 = np.diag(stiffness) if stiffness.ndim == 1 else stiffness
-    tangent: _Array = k0 + gamma * (float(alpha @ alpha) * np.eye(alpha.size) + 2.0 * np.outer(alpha, alpha))
+    matrix = np.eye(alpha.size) if elongation is None else elongation
+    pulled = alpha if elongation is None else elongation @ alpha
+    tangent: _Array = k0 + gamma * (float(alpha @ pulled) * matrix + 2.0 * np.outer(pulled, pulled))
     return tangent
 
 
-def landscape_of(stiffness: _Array, gamma: float, force: _Array, midspan_shape: _Array) -> Landscape:
+class Condensed(NamedTuple):
+    """A structure in the coordinates r that its elongation r . r consists of; the others follow from them."""
+
+    stiffness: _Array
+    force: _Array
+    back: _Array
+    """alpha per unit of r, shape (N, R)."""
+    rest: _Array
+    """alpha at r = 0, shape (N,)."""
+    unstable: int
+    """Negative eigenvalues of the stiffness of the other coordinates."""
+
+
+def condensed(stiffness: _Array, force: _Array, elongation: _Array) -> Condensed:
+    """Eliminate the coordinates that do not change the elongation alpha . S alpha, by static condensation.
+
+    Raises
+    ------
+    InputError
+        If the stiffness of these coordinates is singular.
+    """
+    full = np.diag(stiffness) if stiffness.ndim == 1 else stiffness
+    value, axes = np.linalg.eigh(elongation)
+    stretched = value > 1e-12 * value[-1]
+    own, other = axes[:, stretched] / np.sqrt(value[stretched]), axes[:, ~stretched]
+    if not other.size:
+        return Condensed(own.T @ full @ own, own.T @ force, own, np.zeros(force.size), 0)
+    held = other.T @ full @ other
+    kappa = np.linalg.eigvalsh(held)
+    if np.abs(kappa).min() <= 1e-14 * max(float(np.abs(full).max()), 1e-300):
+        raise InputError(
+            "stiffness: is singular for a motion that elongation_matrix does not change; add a spring, or leave "
+            "elongation_matrix out"
+        )
+    follow = -np.linalg.solve(held, other.T @ full @ own)
+    rest = other @ np.linalg.solve(held, other.T @ force)
+    back = own + other @ follow
+    reduced = back.T @ full @ back
+    return Condensed(0.5 * (reduced + reduced.T), back.T @ force, back, rest, int((kappa < 0.0).sum()))
+
+
+def landscape_of(
+    stiffness: _Array,
+    gamma: float,
+    force: _Array,
+    midspan_shape: _Array,
+    elongation: _Array | None = None,
+) -> Landscape:
     """All equilibria under the transverse force B, told apart.
 
     At most two of them are stable: beyond the second eigenvalue of K0 + gamma s the term 2 gamma alpha alpha^T, of rank
@@ -272,10 +326,18 @@ def landscape_of(stiffness: _Array, gamma: float, force: _Array, midspan_shape: 
         If no equilibrium is stable, or two wells cannot be told apart by the centre.
     """
     found = []
-    for alpha, unstable in equilibria_of(stiffness, gamma, force):
+    if elongation is None:
+        solved = equilibria_of(stiffness, gamma, force)
+    else:
+        own = condensed(stiffness, force, elongation)
+        solved = [
+            (own.rest + own.back @ r, unstable + own.unstable)
+            for r, unstable in equilibria_of(own.stiffness, gamma, own.force)
+        ]
+    for alpha, unstable in solved:
         alpha.setflags(write=False)
         bent = stiffness * alpha if stiffness.ndim == 1 else stiffness @ alpha
-        square = float(alpha @ alpha)
+        square = float(alpha @ (alpha if elongation is None else elongation @ alpha))
         energy = 0.5 * float(alpha @ bent) + 0.25 * gamma * square * square - float(force @ alpha)
         found.append(Equilibrium(amplitude=alpha, energy=energy, unstable_directions=unstable))
     found.sort(key=lambda each: each.energy)

@@ -162,11 +162,15 @@ class Imperfection:
     @property
     def mirrored(self) -> Imperfection:
         """The mirror image, upper and lower exchanged."""
+        return self.scaled(-1.0)
+
+    def scaled(self, factor: float) -> Imperfection:
+        """The same imperfection, *factor* times as large."""
         names = ("midspan_amplitude", "antisymmetric_amplitude", "point_load", "uniform_load", "gravity")
-        negated: dict[str, Any] = {name: -getattr(self, name) for name in names}
+        changed: dict[str, Any] = {name: factor * getattr(self, name) for name in names}
         if self.profile is not None:
-            negated["profile"] = self.profile * np.array([[1.0], [-1.0]])
-        return dataclasses.replace(self, **negated)
+            changed["profile"] = self.profile * np.array([[1.0], [factor]])
+        return dataclasses.replace(self, **changed)
 
     def initial_shape(self, modes: Modes) -> _Array:
         """alpha0_i, the integrals of w0' phi_i', m^0.5, shape (N,)."""

@@ -14,6 +14,7 @@ from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import CLAMPED, BoundaryConditions
 from snapbeam.model.contact.base import LAWS, ContactLaw
 from snapbeam.model.drive.base import DRIVES, Drive
+from snapbeam.model.external_force import FORCES, ExternalForce
 from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.quantity import quantities
@@ -35,6 +36,7 @@ SECTIONS = (
     "drive",
     "base_excitation",
     "axial_load",
+    "external_force",
     "harvester",
     "initial_state",
 )
@@ -43,6 +45,7 @@ SECTIONS = (
 _MATRICES = (
     "mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "well_amplitude", "length_scale",
 )  # fmt: skip
+_OPTIONAL = ("base_shape", "elongation_matrix")
 _START = (
     "amplitude",
     "velocity",
@@ -81,6 +84,7 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
         if model.transverse_force is not None:
             section.pop("well_amplitude")  # follows from the force
             section["transverse_force"] = model.transverse_force
+        section |= {name: getattr(model, name) for name in _OPTIONAL if getattr(model, name) is not None}
     section["damping_ratio"] = float(damping[0]) if uniform else np.array(damping)
     if model.given_reference_frequency is not None:
         section["reference_frequency"] = model.given_reference_frequency
@@ -107,6 +111,11 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
         )
     if system.axial_load is not None:
         sections["axial_load"] = {"type": system.axial_load.motion.name} | _fields(system.axial_load.motion)
+    if system.external_force is not None:
+        own = {name: getattr(system.external_force, name) for name in quantities(ExternalForce)}
+        own = {name: value for name, value in own.items() if value is not None}
+        history = system.external_force.history
+        sections["external_force"] = {"type": history.name} | own | _fields(history)
     if system.harvester is not None:
         sections["harvester"] = {"type": system.harvester.name} | _fields(system.harvester)
     if start is not None:
@@ -152,6 +161,12 @@ def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, A
     if "axial_load" in sections:
         parts["axial_load"] = AxialLoadModulation(
             motion=_chosen(sections["axial_load"], "axial_load", "type", LOADS)
+        )
+    if "external_force" in sections:
+        own = dict(sections["external_force"])
+        of_force = {name: own.pop(name) for name in quantities(ExternalForce) if name in own}
+        parts["external_force"] = ExternalForce(
+            history=_chosen(own, "external_force", "type", FORCES), **of_force
         )
     if "harvester" in sections:
         parts["harvester"] = _chosen(sections["harvester"], "harvester", "type", HARVESTERS)
@@ -203,7 +218,7 @@ def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
         raise InputError(
             "[imperfection]: belongs to a beam; give the transverse_force of a structure given by matrices"
         )
-    _only(own, "model", [*_MATRICES, "transverse_force", "damping_ratio", "reference_frequency"])
+    _only(own, "model", [*_MATRICES, *_OPTIONAL, "transverse_force", "damping_ratio", "reference_frequency"])
     for name in ("mass", "stiffness", "contact_shape"):
         if name not in own:
             raise InputError(f"[model] {name} is missing: give it, or a section [beam]")
@@ -266,6 +281,7 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         "striker",
         "base_excitation",
         "axial_load",
+        "external_force",
         "harvester",
         "initial_state",
     ):
@@ -289,7 +305,7 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
     if "striker" in inside:
         found["striker"] = _changed(found["striker"], "striker", inside["striker"])
     found["further_contacts"] = _others_replacing(found.get("further_contacts", ()), whole, inside)
-    for name in ("base_excitation", "axial_load"):
+    for name in ("base_excitation", "axial_load", "external_force"):
         if name in inside:
             found[name] = _around(found.get(name), name, inside[name])
     if "harvester" in inside:
@@ -349,11 +365,12 @@ def _changed(part: Any, section: str, values: Mapping[str, Any]) -> Any:
 
 
 def _around(part: Any, section: str, values: Mapping[str, Any]) -> Any:
-    """A base or a load with some of its own quantities changed, or of its motion's."""
+    """A base, a load or a force with some of its own quantities changed, or of its motion's."""
     own = quantities(type(_there(part, section)))
     of_motion = {name: value for name, value in values.items() if name not in own}
     if of_motion:
-        part = dataclasses.replace(part, motion=_changed(part.motion, section, of_motion))
+        moves = "history" if section == "external_force" else "motion"
+        part = dataclasses.replace(part, **{moves: _changed(getattr(part, moves), section, of_motion)})
     return dataclasses.replace(part, **{name: value for name, value in values.items() if name in own})
 
 
@@ -404,6 +421,7 @@ def _model_replacing(
             "midspan_shape",
             "nonlinear_stiffness",
             "well_amplitude",
+            *_OPTIONAL,
         )
         rest = {name: getattr(model, name) for name in names}
         if model.transverse_force is not None:

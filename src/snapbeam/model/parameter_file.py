@@ -20,6 +20,7 @@ from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
 from snapbeam.model.drive.base import DRIVES
+from snapbeam.model.external_force import FORCES
 from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import parts_from_mapping
@@ -133,13 +134,16 @@ def contact_rivals() -> list[tuple[set[str], set[str]]]:
 
 
 SECTIONS = (
-    "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "harvester", "initial_state",
+    "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "external_force", "harvester", "initial_state",
     "sweep", "integration",
 )  # fmt: skip
+_OF_OTHER_COMMANDS = ("uncertainty", "probability", "design")
+"""Sections that a file may contain for other commands, which check them."""
 _KINDS: dict[str, Mapping[str, type]] = {
     "drive": DRIVES,
     "base_excitation": {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()},
     "axial_load": LOADS,
+    "external_force": FORCES,
     "harvester": HARVESTERS,
 }
 """What a section may be of, where its ``type`` says so."""
@@ -367,7 +371,10 @@ Sections = Mapping[str, Mapping[str, Any]]
 DEFAULT_DRIVE = {"frequency_ratio": 1.21, "velocity_amplitude": 0.18}
 DEFAULT_AXES = {"drive.frequency_ratio": "0.1:4:64", "drive.velocity_amplitude": "0.01:0.65:40"}
 """Of a map for which no axis is named."""
-_AROUND, _STRIKING = ("base_excitation", "axial_load", "harvester"), ("contact", "striker", "drive")
+_AROUND, _STRIKING = (
+    ("base_excitation", "axial_load", "external_force", "harvester"),
+    ("contact", "striker", "drive"),
+)
 # What stands for the same thing in a section: giving one set takes the other away.
 _RIVALS: dict[str, list[tuple[set[str], set[str]]]] = {
     "beam": [({"buckling_level"}, {"axial_load"})],
@@ -392,6 +399,19 @@ class Config:
     def section(self, name: str) -> dict[str, Any]:
         """What was given of a section."""
         return dict(self.given.get(name, {}))
+
+    def _with_axes(self, name: str) -> dict[str, Any]:
+        """What was given of a section; a key that has an axis only takes the first value of the axis."""
+        found, known = self.section(name), parameters()
+        kind = law_of(found) if numbered(name)[0] == "contact" else found.get("type", "sine")
+        for axis, values in self.section("sweep").items():
+            section, _, key = (axis if axis in PHYSICAL else lookup(axis).name).partition(".")
+            if section != name or key in found or axis in PHYSICAL:
+                continue
+            row = known.get(f"{numbered(name)[0]}.{key}")
+            if row is None or (row.default is None and (not row.kinds or kind in row.kinds)):
+                found[key] = parsed_axis(axis, values)[0].item()
+        return found
 
     @cached_property
     def defaulted(self) -> tuple[str, ...]:
@@ -477,10 +497,11 @@ class Config:
     def system(self) -> System:
         """The system; what is not given is the paper's.  Refused (InputError) if values do not go together."""
         sections: dict[str, Any] = {
-            name: values | self.section(name) for name, values in self._defaults().items()
+            name: values | (self._with_axes(name) if name in _STRIKING else self.section(name))
+            for name, values in self._defaults().items()
         }
-        optional = ("boundary", "imperfection", *_AROUND)
-        sections |= {name: self.section(name) for name in optional if self.section(name)}
+        sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
+        sections |= {name: self._with_axes(name) for name in _AROUND if self.section(name)}
         sections |= self._further
         if self._is_unstruck:
             for name in _STRIKING:
@@ -513,23 +534,25 @@ class Config:
         for name in self.given:
             kind, number = numbered(name)
             if number > 1:
-                found[name] = contact_of(self.section(name)) if kind == "contact" else self.section(name)
+                own = self._with_axes(name)
+                found[name] = contact_of(own) if kind == "contact" else own
                 if kind == "drive":
                     found[name].setdefault("type", "sine")
         return found
 
     @property
     def _is_unstruck(self) -> bool:
-        """Whether a base or an axial load moves the beam, and nothing was said of a striker."""
-        moved = self.section("base_excitation") or self.section("axial_load")
-        return bool(moved) and not any(self.section(name) for name in _STRIKING)
+        """Whether a base, an axial load or a force moves the beam, and nothing was said of a striker."""
+        return self._is_moved and not any(self.section(name) for name in _STRIKING)
 
     @property
     def _stands_still(self) -> bool:
-        """Whether there is a striker beside a base or an axial load, of whose motion nothing was said."""
-        return bool(self.section("base_excitation") or self.section("axial_load")) and not self.section(
-            "drive"
-        )
+        """Whether there is a striker beside a base, an axial load or a force, of whose motion nothing was said."""
+        return self._is_moved and not self.section("drive")
+
+    @property
+    def _is_moved(self) -> bool:
+        return any(self.section(name) for name in ("base_excitation", "axial_load", "external_force"))
 
     def _started(self, system: System) -> System:
         """The system with the start that was given."""
@@ -599,7 +622,7 @@ def _stand_in(name: str, value: Any) -> float:
     return 1.0 if name == "frequency_ratio" else 0.0 if name == "velocity_amplitude" else 0.5
 
 
-def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config:
+def config_from_mapping(sections: Mapping[str, Any], source: str = "", *, complete: bool = True) -> Config:
     """Check nested parameters, as a TOML file holds them.
 
     Parameters
@@ -608,6 +631,8 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config
         Values by section and name.
     source : str
         Where they come from, to stand before each refusal.
+    complete : bool
+        Whether they must describe a system.  If not, each value is checked, but others may complete them.
 
     Raises
     ------
@@ -618,7 +643,7 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config
     found, lines = checked_sections(sections)
     config = Config(found)
     lines = lines or contradictions(found)
-    if not lines:
+    if not lines and complete:
         try:
             config.model  # noqa: B018
             if config.model.length_scale is not None:
@@ -632,10 +657,10 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config
     return config
 
 
-def override(config: Config, sections: Mapping[str, Mapping[str, Any]]) -> Config:
+def override(config: Config, sections: Mapping[str, Mapping[str, Any]], source: str = "") -> Config:
     """The parameters with others laid over them; what they contradict is taken away, None is left alone.
 
-    A value takes an axis over the same parameter away.
+    A value takes an axis over the same parameter away.  Refusals begin with *source*.
     """
     instance("config", config, Config, "a Config")
     for name, own in mapping("sections", sections).items():
@@ -657,7 +682,7 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]]) -> Confi
             for name in own:
                 for same in same_axis(f"{section}.{name}"):
                     merged.get("sweep", {}).pop(same, None)
-    return config_from_mapping(merged)
+    return config_from_mapping(merged, source)
 
 
 def same_axis(name: str) -> set[str]:
@@ -674,8 +699,8 @@ def same_axis(name: str) -> set[str]:
 # Reading and writing parameter files.
 
 
-def load_config(path: str | os.PathLike[str]) -> Config:
-    """Read a parameter file.
+def load_config(path: str | os.PathLike[str], *, complete: bool = True) -> Config:
+    """Read a parameter file; unless it must be *complete*, options may add what a system needs.
 
     Raises
     ------
@@ -683,7 +708,10 @@ def load_config(path: str | os.PathLike[str]) -> Config:
         If it cannot be read or is no TOML, and for anything :func:`config_from_mapping` refuses.
     """
     file = file_path("config", path)
-    return config_from_mapping(read_toml("config", file), file.name)
+    sections = {
+        name: values for name, values in read_toml("config", file).items() if name not in _OF_OTHER_COMMANDS
+    }
+    return config_from_mapping(sections, file.name, complete=complete)
 
 
 def dump_config(config: Config, path: str | os.PathLike[str], comment: str = "") -> None:

@@ -21,6 +21,7 @@ from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import BoundaryConditions
 from snapbeam.model.contact.base import LAWS
 from snapbeam.model.drive.base import DRIVES
+from snapbeam.model.external_force import FORCES, ExternalForce
 from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.integration import Integration
@@ -111,6 +112,8 @@ def _rows() -> Iterable[Parameter]:
         yield from _of_class(section, part)
     for row in _of_class("base_excitation", BaseExcitation):
         yield dataclasses.replace(row, short=f"base_excitation_{row.short}")
+    for row in _of_class("external_force", ExternalForce):
+        yield dataclasses.replace(row, short=f"external_force_{row.short}")
     for name, (item, default) in MODEL_QUANTITIES.items():
         yield Parameter(f"model.{name}", item.short or name, item, default)
     shaking = {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()}
@@ -119,6 +122,7 @@ def _rows() -> Iterable[Parameter]:
         ("drive", DRIVES),
         ("base_excitation", shaking),
         ("axial_load", LOADS),
+        ("external_force", FORCES),
         ("harvester", HARVESTERS),
     )
     for section, known in several:
@@ -128,7 +132,7 @@ def _rows() -> Iterable[Parameter]:
                 yield dataclasses.replace(row, kinds=(kind_name,))
 
 
-_AROUND = {"base_excitation": "the base", "axial_load": "", "harvester": ""}
+_AROUND = {"base_excitation": "the base", "axial_load": "", "external_force": "", "harvester": ""}
 """Sections of what surrounds a beam, whose names in datasets say so, and what words of a drive are said of."""
 
 
@@ -138,7 +142,7 @@ def _around(row: Parameter) -> Parameter:
     of = _AROUND[section]
     words = f"{row.quantity.long_name}, of {of}" if of else row.quantity.long_name
     plain = name if row.short == name or section == "base_excitation" else row.short
-    plain = plain.removeprefix("load_")
+    plain = plain.removeprefix("load_").removeprefix("force_")
     return dataclasses.replace(
         row, short=f"{section}_{plain}", quantity=dataclasses.replace(row.quantity, long_name=words)
     )
@@ -153,7 +157,7 @@ def _of_class(section: str, kind: type) -> Iterable[Parameter]:
 
 def parameters() -> dict[str, Parameter]:
     """Every parameter by its dotted name, those of registered laws and drives included."""
-    return dict(_table(tuple(tuple(known.items()) for known in (LAWS, DRIVES, LOADS, HARVESTERS))))
+    return dict(_table(tuple(tuple(known.items()) for known in (LAWS, DRIVES, LOADS, FORCES, HARVESTERS))))
 
 
 @lru_cache(maxsize=4)
@@ -165,7 +169,7 @@ def _table(registered: tuple[tuple[tuple[str, type], ...], ...]) -> dict[str, Pa
             row = dataclasses.replace(row, kinds=(*table[row.name].kinds, *row.kinds))
         table[row.name] = row
     order = (
-        "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "harvester", "initial_state",
+        "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "external_force", "harvester", "initial_state",
         "integration",
     )  # fmt: skip
     return dict(sorted(table.items(), key=lambda item: order.index(item[1].section)))

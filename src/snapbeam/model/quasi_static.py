@@ -27,7 +27,8 @@ def quasi_static_threshold(
     frequency_ratio : array_like
         Omega, each greater than 0.  The two broadcast against each other.
     beam : Beam, optional
-        Whose first buckling mode it is, where its ends turn; between clamps it is the same for every beam.
+        Whose first buckling mode it is, where its ends turn; between clamps it is the same for every beam.  It must be
+        buckled.
 
     Returns
     -------
@@ -46,6 +47,11 @@ def quasi_static_threshold(
         raise InputError(
             f"location of shape {x.shape}, frequency_ratio of shape {ratio.shape}: must go together"
         ) from None
+    if beam is not None and not beam.is_buckled:
+        raise InputError(
+            f"beam with axial_load = {beam.axial_load:g} N: must be buckled, by more than {beam.critical_load:g} N; "
+            "a beam that is not has no unstable equilibrium at 0 to be carried over"
+        )
     if beam is not None and beam.boundary.is_elastic:
         shape = beam.buckling_modes(1).shape
         share = shape(x * beam.length)[0] / float(shape(0.5 * beam.length)[0])

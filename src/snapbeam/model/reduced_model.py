@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, Self
@@ -20,9 +21,9 @@ from snapbeam.model.buckling_modes import (
     checked_structure,
     damping_ratios,
 )
-from snapbeam.model.equilibria import Equilibrium, Landscape, landscape_of, tangent_stiffness
+from snapbeam.model.equilibria import Equilibrium, Landscape, condensed, landscape_of, tangent_stiffness
 from snapbeam.model.imperfection import Imperfection, perfect_equilibria
-from snapbeam.model.quantity import ParameterField
+from snapbeam.model.quantity import ParameterField, quantities
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -166,9 +167,13 @@ def linear_modes_of_beam(beam: Beam, count: int) -> LinearModes:
 
 
 def linear_modes_of_structure(
-    mass: _Array, stiffness: _Array, nonlinear_stiffness: float, equilibrium: _Array
+    mass: _Array,
+    stiffness: _Array,
+    nonlinear_stiffness: float,
+    equilibrium: _Array,
+    elongation: _Array | None = None,
 ) -> LinearModes:
-    """Linear modes of the tangent K0 + gamma (|a|^2 Id + 2 a a^T) at the equilibrium a.
+    """Linear modes of the tangent K0 + gamma (s S + 2 S a a^T S), s = a . S a, at the equilibrium a.
 
     An eigenvalue that rounding cannot tell from 0 is 0.
 
@@ -180,8 +185,7 @@ def linear_modes_of_structure(
     import scipy.linalg
 
     a = equilibrium
-    tangent = np.diag(stiffness) if stiffness.ndim == 1 else stiffness
-    tangent = tangent + nonlinear_stiffness * (a @ a * np.eye(a.size) + 2.0 * np.outer(a, a))
+    tangent = tangent_stiffness(stiffness, nonlinear_stiffness, a, elongation)
     eigenvalue, vectors = scipy.linalg.eigh(tangent, mass)
     rounding = 8.0 * a.size * np.finfo(np.float64).eps * np.abs(eigenvalue).max()
     if eigenvalue[0] < -rounding:
@@ -246,12 +250,13 @@ class Wells:
     beam: Beam | None
     natural_frequencies: Any
     mass: _Array
+    elongation_matrix: _Array | None
 
     def potential_energy(self, alpha: ArrayLike) -> _Array:
         """Potential energy, J, of amplitudes of shape (..., N); 0 for the straight structure."""
         a = self._amplitudes("alpha", alpha)
         bent = a * self.stiffness if self.stiffness.ndim == 1 else a @ self.stiffness
-        square = np.sum(a * a, axis=-1)
+        square = np.sum(a * (a if self.elongation_matrix is None else a @ self.elongation_matrix), axis=-1)
         energy: _Array = 0.5 * np.sum(a * bent, axis=-1) + 0.25 * self.nonlinear_stiffness * square**2
         return energy if self.transverse_force is None else energy - a @ self.transverse_force
 
@@ -275,7 +280,11 @@ class Wells:
         if self.transverse_force is None:
             return None
         return landscape_of(
-            self.stiffness, self.nonlinear_stiffness, self.transverse_force, self.midspan_shape
+            self.stiffness,
+            self.nonlinear_stiffness,
+            self.transverse_force,
+            self.midspan_shape,
+            self.elongation_matrix,
         )
 
     @cached_property
@@ -283,7 +292,17 @@ class Wells:
         """Every shape in which the structure can rest, by energy, with its stability."""
         if self.landscape is not None:
             return self.landscape.equilibria
-        return perfect_equilibria(self.stiffness, self.nonlinear_stiffness)
+        if self.elongation_matrix is None:
+            return perfect_equilibria(self.stiffness, self.nonlinear_stiffness)
+        own = condensed(self.stiffness, np.zeros(self.well_amplitude.size), self.elongation_matrix)
+        return tuple(
+            dataclasses.replace(
+                each,
+                amplitude=own.back @ each.amplitude,
+                unstable_directions=each.unstable_directions + own.unstable,
+            )
+            for each in perfect_equilibria(own.stiffness, self.nonlinear_stiffness)
+        )
 
     @property
     def wells(self) -> _Array:
@@ -340,14 +359,57 @@ class Wells:
         if self.beam is None:
             raise InputError(f"{what} needs a bistable structure: give a well_amplitude other than zero")
         if self.imperfection is not None:
-            raise InputError(
-                f"{what} needs two wells: this imperfection leaves one; a smaller one leaves two, "
-                "and so does a greater axial_load"
-            )
+            raise InputError(f"{what} needs two wells: this imperfection leaves one; {self.two_well_limits}")
         raise InputError(
             f"{what} needs a buckled beam: axial_load = {self.beam.axial_load:g} N must exceed the critical "
             f"load of {self.beam.critical_load:g} N"
         )
+
+    @cached_property
+    def two_well_limits(self) -> str:
+        """In words, the nearest imperfection and the least axial load with two wells, of a beam with one; computed."""
+        assert self.beam is not None
+        assert self.imperfection is not None
+        beam, given = self.beam, self.imperfection
+
+        def scaled(factor: float) -> bool:
+            return self._is_bistable_with(beam, given.scaled(factor))
+
+        def loaded(load: float) -> bool:
+            return self._is_bistable_with(beam.replace(axial_load=load), given)
+
+        steps = np.geomspace(1.0, _FURTHEST_IMPERFECTION, _HINT_STEPS).tolist()
+        found = []
+        for more in (True, False):
+            at = [step if more else 1.0 / step for step in steps]
+            first = next((i for i in range(1, len(at)) if scaled(at[i])), None)
+            if first is not None:
+                found.append((first, more, _first_true(scaled, at[first - 1], at[first])))
+        hints = []
+        for _, more, factor in sorted(found)[:1]:
+            bound = "at least" if more else "at most"
+            sizes = [
+                f"{'-' if value < 0.0 else ''}{name} of {bound} {_rounded(abs(factor * value), more):.4g} {item.unit}"
+                for name, item in quantities(Imperfection).items()
+                if item.kind is float and name != "point_location" and (value := getattr(given, name)) != 0.0
+            ]
+            if given.profile is not None:
+                sizes.append(f"{bound} {_rounded(factor, more):.4g} times the profile")
+            hints.append(f"{' and '.join(sizes)} (axial_load = {beam.axial_load:.4g} N)")
+        loads = np.linspace(
+            beam.axial_load, max(beam.axial_load, 0.0) + _FURTHEST_LOAD * beam.critical_load, _HINT_STEPS
+        )
+        first = next((i for i in range(1, loads.size) if loaded(float(loads[i]))), None)
+        if first is not None:
+            load = _first_true(loaded, float(loads[first - 1]), float(loads[first]))
+            hints.append(f"axial_load of at least {_rounded(load, True):.4g} N (this imperfection)")
+        if not hints:
+            return "no imperfection of the same shape and no axial load was found that leaves two"
+        return f"two wells need {', or '.join(hints)}"
+
+    def _is_bistable_with(self, beam: Beam, imperfection: Imperfection) -> bool:
+        modes = self.well_amplitude.size
+        return ReducedModel.from_beam(beam, modes, imperfection=imperfection).is_bistable
 
     @property
     def well_energy(self) -> float:
@@ -369,9 +431,35 @@ class Wells:
         self.require_bistable("saddle_energy")
         if self.landscape is not None and self.landscape.saddle is not None:
             return self.landscape.saddle.energy
-        kappa = np.sort(self.stiffness if self.stiffness.ndim == 1 else np.linalg.eigvalsh(self.stiffness))
+        matrix = self.stiffness
+        if self.elongation_matrix is not None:
+            matrix = condensed(matrix, np.zeros(self.well_amplitude.size), self.elongation_matrix).stiffness
+        kappa = np.sort(matrix if matrix.ndim == 1 else np.linalg.eigvalsh(matrix))
         second = min(float(kappa[1]), 0.0) if kappa.size > 1 else 0.0
         return -(second**2) / (4.0 * self.nonlinear_stiffness) + 0.0
+
+
+_FURTHEST_IMPERFECTION = 100.0
+"""Greatest and, inverted, least factor of the imperfection at which two wells are looked for."""
+_FURTHEST_LOAD = 40.0
+"""Over the critical load."""
+_HINT_STEPS = 81
+
+
+def _first_true(holds: Callable[[float], bool], outside: float, inside: float) -> float:
+    """Where *holds* begins, between a value outside and one inside, to 4 digits and inside."""
+    while abs(inside - outside) > 5e-5 * abs(inside):
+        middle = 0.5 * (outside + inside)
+        outside, inside = (outside, middle) if holds(middle) else (middle, inside)
+    return inside
+
+
+def _rounded(value: float, up: bool) -> float:
+    """Four digits, not below the value or not above it."""
+    if value == 0.0:
+        return 0.0
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) - 3)
+    return (math.ceil if up else math.floor)(value / unit) * unit
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -443,6 +531,10 @@ class ReducedModel(Wells):
         B, of a structure whose wells are unequal.
     imperfection : Imperfection or None
         What B follows from.
+    base_shape : array of shape (N,) or None
+        Displacement of each coordinate per unit of the base's, of a structure given by matrices.
+    elongation_matrix : array of shape (N, N) or None
+        S of the term gamma (alpha . S alpha) S alpha, of a structure given by matrices; None for the identity.
     """
 
     mass: _Array
@@ -457,6 +549,8 @@ class ReducedModel(Wells):
     given_reference_frequency: float | None = None
     transverse_force: _Array | None = None
     imperfection: Imperfection | None = None
+    base_shape: _Array | None = None
+    elongation_matrix: _Array | None = None
 
     def __post_init__(self) -> None:
         for value in vars(self).values():
@@ -568,6 +662,8 @@ class ReducedModel(Wells):
         damping_ratio: ArrayLike = 0.0,
         reference_frequency: float | None = None,
         transverse_force: ArrayLike | None = None,
+        base_shape: ArrayLike | None = None,
+        elongation_matrix: ArrayLike | None = None,
     ) -> ReducedModel:
         """A model of any structure, given by its matrices; a free mass (stiffness 0) is one.
 
@@ -594,6 +690,13 @@ class ReducedModel(Wells):
             Frequency that normalises the excitation, Hz; needed if the first natural frequency is 0.
         transverse_force : array of shape (N,), optional
             Constant force B that makes the wells unequal; the equilibria then follow from it and are not given.
+        base_shape : array of shape (N,), optional
+            Displacement of each coordinate if the base moves by one unit and nothing deforms, r; needed for a
+            base excitation, whose inertial force is -m r y''.
+        elongation_matrix : array of shape (N, N), optional
+            S of the term gamma (alpha . S alpha) S alpha, symmetric and without negative eigenvalues; the identity by
+            default.  For a beam it is the geometric stiffness matrix of a unit tension, with gamma = E A/(2 L); for a
+            cubic spring k_3 between coordinates it is h h^T with gamma = k_3, where h . alpha is its elongation.
 
         Raises
         ------
@@ -613,6 +716,8 @@ class ReducedModel(Wells):
                 damping_ratio=damping_ratio,
                 reference_frequency=reference_frequency,
                 transverse_force=transverse_force,
+                base_shape=base_shape,
+                elongation_matrix=elongation_matrix,
             )
         )
         model = cls(**given)
@@ -668,13 +773,19 @@ class ReducedModel(Wells):
 
     def _linear_modes(self) -> LinearModes:
         if self.transverse_force is not None or (self.beam is not None and self.beam.boundary.is_elastic):
-            tangent = tangent_stiffness(self.stiffness, self.nonlinear_stiffness, self.well_amplitude)
+            tangent = tangent_stiffness(
+                self.stiffness, self.nonlinear_stiffness, self.well_amplitude, self.elongation_matrix
+            )
             parity = None if self.beam is None else self.beam.buckling_modes(self.modes).parity
             return linear_modes_about(self.mass, tangent, parity)
         if self.beam is not None:
             return linear_modes_of_beam(self.beam, self.modes)
         return linear_modes_of_structure(
-            self.mass, self.stiffness, self.nonlinear_stiffness, self.well_amplitude
+            self.mass,
+            self.stiffness,
+            self.nonlinear_stiffness,
+            self.well_amplitude,
+            self.elongation_matrix,
         )
 
     @cached_property
@@ -705,8 +816,12 @@ class ReducedModel(Wells):
 
     @cached_property
     def tension_matrix(self) -> _Array:
-        """G = V^T V, through which the tension couples the linear modes; exactly 0 across parities."""
-        return _symmetric(self.linear_modes.T @ self.linear_modes)
+        """G = V^T S V, through which the tension couples the linear modes; exactly 0 across parities of a beam."""
+        return _symmetric(self.linear_modes.T @ self.pulled(self.linear_modes))
+
+    def pulled(self, amplitude: _Array) -> _Array:
+        """Return S alpha, the row that the tension acts along, for amplitudes of shape (N,) or (N, columns)."""
+        return amplitude if self.elongation_matrix is None else self.elongation_matrix @ amplitude
 
     @cached_property
     def damping_matrix(self) -> _Array:

@@ -20,6 +20,7 @@ from snapbeam.model.diagnostics import doubts_of
 from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.drive.fixed_stop import FixedStop
 from snapbeam.model.drive.recorded_motion import RecordedMotion
+from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.harvester import Harvester
 from snapbeam.model.mapping import parts_from_mapping, parts_to_mapping, replaced
 from snapbeam.model.reduced_model import ReducedModel
@@ -41,6 +42,7 @@ __all__ = ["System", "check_environment"]
 _A = {
     "base_excitation": "a BaseExcitation(motion=AccelerationSine(...))",
     "axial_load": "an AxialLoadModulation(motion=HarmonicLoad(...))",
+    "external_force": "an ExternalForce(history=HarmonicForce(...))",
     "harvester": "a PiezoelectricHarvester(...) or an ElectromagneticHarvester(...)",
 }
 
@@ -48,21 +50,31 @@ _A = {
 def check_environment(system: Any) -> None:
     """Refuse surroundings that are none, or that do not go with the rest of a :class:`~snapbeam.System`."""
     base, load, harvester = system.base_excitation, system.axial_load, system.harvester
+    force = system.external_force
     for name, part, kind in (
         ("base_excitation", base, BaseExcitation),
         ("axial_load", load, AxialLoadModulation),
+        ("external_force", force, ExternalForce),
         ("harvester", harvester, Harvester),
     ):
         if part is not None and not isinstance(part, kind):
             raise InputTypeError(f"{name} = {shown(part)}: must be {_A[name]}")
     if base is not None:
         rigid_mass(system.model)
+    if force is not None:
+        force.row(system.model)
+        if base is not None:
+            raise InputError(
+                "external_force with base_excitation: the solver has one excitation row; add the inertial force of the "
+                "base to the external force, or leave one out"
+            )
     if harvester is not None:
         harvester.row(system.model)
-    if base is None and load is None and harvester is None:
+    if base is None and load is None and harvester is None and force is None:
         return
     words = "a harvester" if harvester is not None else "a changing axial load"
     words = "a moving base" if base is not None else words
+    words = "an external force" if force is not None else words
     contact, striker = system.contact, system.striker
     if contact is not None and contact.impulsive:
         raise InputError(
@@ -77,7 +89,7 @@ def check_environment(system: Any) -> None:
     if (
         striker is not None
         and isinstance(striker.drive, RecordedMotion)
-        and (base is not None or load is not None)
+        and (base is not None or load is not None or force is not None)
     ):
         raise InputError(
             f"drive = 'recorded_motion' with {words}: a recording has its own time axis; use a drive given by a formula, "
@@ -108,6 +120,8 @@ class System:
         The motion of what both ends of the beam are mounted on.
     axial_load : AxialLoadModulation, optional
         How the axial load changes in time.
+    external_force : ExternalForce, optional
+        A force on the structure; not beside a base excitation.
     harvester : PiezoelectricHarvester or ElectromagneticHarvester, optional
         A circuit that turns motion into power in a resistor.
     initial_state : State, optional
@@ -143,6 +157,7 @@ class System:
     axial_load: AxialLoadModulation | None = None
     harvester: Harvester | None = None
     further_contacts: tuple[ContactPair, ...] = ()
+    external_force: ExternalForce | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.striker, (list, tuple)) or isinstance(self.contact, (list, tuple)):
@@ -201,7 +216,7 @@ class System:
         ``beam.thickness``, ``model.modes``, ``contact.stiffness``, ``striker.location`` and
         ``drive.frequency_ratio`` (of the second striker ``striker_2.location``, ``drive_2.frequency_ratio``,
         ``contact_2.stiffness``), or whole parts: ``beam``, ``model``, ``contact``, ``striker``, ``drive``, ``initial_state``,
-        ``base_excitation``, ``axial_load``, ``harvester``.
+        ``base_excitation``, ``axial_load``, ``external_force``, ``harvester``.
 
         Raises
         ------
@@ -251,7 +266,8 @@ class System:
             for number, each in enumerate(self.further_contacts, 2)
             if not isinstance(each.striker.drive, FixedStop)
         ]
-        alone = self.base_excitation is None and self.axial_load is None and not more
+        around = self.base_excitation, self.axial_load, self.external_force
+        alone = all(each is None for each in around) and not more
         if self.striker is not None and (alone or not isinstance(self.striker.drive, FixedStop)):
             found.append(("drive", self.striker.drive))
         found += more
@@ -259,12 +275,15 @@ class System:
             found.append(("base_excitation", self.base_excitation.motion))
         if self.axial_load is not None:
             found.append(("axial_load", self.axial_load.motion))
+        if self.external_force is not None:
+            found.append(("external_force", self.external_force.history))
         return tuple(found)
 
     @property
     def has_environment(self) -> bool:
-        """Whether a base moves, the axial load changes or a harvester taps the beam."""
-        return self.base_excitation is not None or self.axial_load is not None or self.harvester is not None
+        """Whether a base moves, the axial load changes, an external force acts or a harvester taps the beam."""
+        around = self.base_excitation, self.axial_load, self.external_force, self.harvester
+        return any(each is not None for each in around)
 
     @property
     def primary_excitation(self) -> tuple[str, Drive] | None:
@@ -273,7 +292,7 @@ class System:
 
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Diagnostics: values that look like another unit, and assumptions of the model that do not hold."""
-        return doubts_of(self.model, self.striker)
+        return doubts_of(self.model, self.striker, self.harvester)
 
     # ------------------------------------------------------------------ identity and files
 

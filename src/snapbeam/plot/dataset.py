@@ -1,4 +1,4 @@
-"""The figure of any result: the painter follows from the dataset; runs, maps and analyses need no other name."""
+"""The figure of any result: the dataset decides which function draws it."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["painters_of", "plot_dataset"]
+__all__ = ["figures_of", "plot_dataset"]
 
 
-_Painter = Callable[..., "Axes"]
+_Draws = Callable[..., "Axes"]
 _RUN = {
     "run": (plot_run, "displacement_at_striker"),
     "modal_amplitudes": (plot_modal_amplitudes, "modal_amplitude"),
@@ -43,31 +43,31 @@ _RUN = {
     "spectrum": (plot_spectrum, "midspan_displacement"),
     "phase_portrait": (plot_phase_portrait, "midspan_velocity"),
 }
-"""Painter of each figure of a run, and a variable that it needs."""
+"""The function that draws each figure of a run, and a variable that it needs."""
 
 
 class _Kind(NamedTuple):
-    """A kind of result: variables and dimensions that all its datasets have, and their painters."""
+    """A kind of result: variables and dimensions that all its datasets have, and the functions that draw them."""
 
     words: str
     variables: set[str]
     dimensions: set[str]
-    painters: Callable[[xr.Dataset], dict[str, _Painter]]
+    figures: Callable[[xr.Dataset], dict[str, _Draws]]
 
 
 def _branch(dataset: xr.Dataset, ax: Axes | None = None, **options: Any) -> Axes:
     return plot_diagram(None, ax, branches=[dataset], **options)
 
 
-def _named(painter: Callable[..., Axes], name: str) -> _Painter:
-    return lambda dataset, ax=None, **options: painter(dataset, name, ax, **options)
+def _named(function: Callable[..., Axes], name: str) -> _Draws:
+    return lambda dataset, ax=None, **options: function(dataset, name, ax, **options)
 
 
-def _run(dataset: xr.Dataset) -> dict[str, _Painter]:
-    return {name: painter for name, (painter, needed) in _RUN.items() if needed in dataset}
+def _run(dataset: xr.Dataset) -> dict[str, _Draws]:
+    return {name: function for name, (function, needed) in _RUN.items() if needed in dataset}
 
 
-def _map(dataset: xr.Dataset) -> dict[str, _Painter]:
+def _map(dataset: xr.Dataset) -> dict[str, _Draws]:
     over = set(dataset["response_class"].dims)
     others = [
         str(name)
@@ -77,33 +77,33 @@ def _map(dataset: xr.Dataset) -> dict[str, _Painter]:
     return {"response_class": plot_response_map} | {name: _named(plot_statistic, name) for name in others}
 
 
-def _lifetimes(dataset: xr.Dataset) -> dict[str, _Painter]:
-    painters: dict[str, _Painter] = {"lifetime": plot_lifetimes, "survival": plot_survival}
-    return painters if dataset["lifetime"].ndim else {"survival": plot_survival}
+def _lifetimes(dataset: xr.Dataset) -> dict[str, _Draws]:
+    figures: dict[str, _Draws] = {"lifetime": plot_lifetimes, "survival": plot_survival}
+    return figures if dataset["lifetime"].ndim else {"survival": plot_survival}
 
 
-def _section(dataset: xr.Dataset) -> dict[str, _Painter]:
+def _section(dataset: xr.Dataset) -> dict[str, _Draws]:
     pairs = ("midspan_displacement", "displacement_at_striker")
     return {
         name: lambda data, ax=None, x=name: plot_section(data, ax, x=x) for name in pairs if name in dataset
     }
 
 
-def _designs(dataset: xr.Dataset) -> dict[str, _Painter]:
-    def painter(name: str | None) -> _Painter:
+def _designs(dataset: xr.Dataset) -> dict[str, _Draws]:
+    def function(name: str | None) -> _Draws:
         return lambda data, ax=None: plot_designs(data, name, ax)
 
     tried = [str(name).removeprefix("tried_") for name in dataset.data_vars if str(name).startswith("tried_")]
     over = [name for name in tried if not name.startswith("objective_")]
-    return {"objectives": painter(None)} | {name: painter(name) for name in over}
+    return {"objectives": function(None)} | {name: function(name) for name in over}
 
 
-def _diagram(dataset: xr.Dataset) -> dict[str, _Painter]:
-    def painter(name: str) -> _Painter:
+def _diagram(dataset: xr.Dataset) -> dict[str, _Draws]:
+    def function(name: str) -> _Draws:
         return lambda data, ax=None, **options: plot_diagram(data, ax, variable=name, **options)
 
     names = [str(name) for name, item in dataset.data_vars.items() if {"sweep", "period"} <= set(item.dims)]
-    return {name: painter(name) for name in sorted(names, key=lambda each: each != "midspan_displacement")}
+    return {name: function(name) for name in sorted(names, key=lambda each: each != "midspan_displacement")}
 
 
 _KINDS = (
@@ -133,8 +133,8 @@ _KINDS = (
 )  # fmt: skip
 
 
-def painters_of(dataset: xr.Dataset) -> tuple[str, dict[str, _Painter]]:
-    """Return the kind of a dataset, and a painter for each name that can be drawn, the default first.
+def figures_of(dataset: xr.Dataset) -> tuple[str, dict[str, _Draws]]:
+    """Return the kind of a dataset, and a function that draws for each name that can be drawn, the default first.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def painters_of(dataset: xr.Dataset) -> tuple[str, dict[str, _Painter]]:
         if kind.variables <= set(map(str, dataset.variables)) and kind.dimensions <= set(
             map(str, dataset.dims)
         ):
-            return kind.words, kind.painters(dataset)
+            return kind.words, kind.figures(dataset)
     known = ", ".join(map(str, dataset.data_vars)) or "none"
     raise InputError(
         f"dataset: must be a result of snapbeam that has a figure ({', '.join(k.words for k in _KINDS)}); "
@@ -179,13 +179,13 @@ def plot_dataset(
     InputError
         If the dataset has no such figure; the message lists those that it has.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
-    words, painters = painters_of(dataset)
-    name = next(iter(painters), "") if variable is None else variable
-    if name not in painters:
+    words, figures = figures_of(dataset)
+    name = next(iter(figures), "") if variable is None else variable
+    if name not in figures:
         raise InputError(
-            f"variable = {shown(name)}: is not drawn of this {words}; choose one of {', '.join(painters) or 'none'}"
+            f"variable = {shown(name)}: is not drawn of this {words}; choose one of {', '.join(figures) or 'none'}"
         )
-    return painters[name](dataset, ax=ax, **options)
+    return figures[name](dataset, ax=ax, **options)

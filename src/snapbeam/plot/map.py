@@ -98,7 +98,7 @@ def plot_response_map(
     InputError
         If the dataset is not a map of one or two axes.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "response_class" in dataset and dataset["response_class"].dims == ("point",):
@@ -189,7 +189,7 @@ def _draw_line(ax: Axes, dataset: xr.Dataset, name: str) -> None:
 
 
 def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "response_class" not in dataset:
@@ -356,7 +356,7 @@ def plot_statistic(
     InputError
         If there is no such variable, or it is over more than two axes.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if instance("name", name, str, "text") not in dataset:
@@ -486,7 +486,7 @@ def plot_points(
     InputError
         If the dataset is not a list of points, or its points have no such variable or parameters.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if instance("name", name, str, "text") not in dataset.data_vars or dataset[name].dims != ("point",):

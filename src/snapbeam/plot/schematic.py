@@ -424,7 +424,7 @@ def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
     cycles = np.linspace(0.0, 2.0 if isinstance(drive, ConstantVelocity) else _CYCLES, 1601)
     phase = float(columns.get("phase", np.zeros(1))[0])
     moved = motion_of(drive, columns, scale, cycles * period, phase)
-    per = 1.0 if section == "axial_load" else scale.length
+    per = 1.0 if section in ("axial_load", "external_force") else scale.length
     down = (
         section == "base_excitation"
         and system.base_excitation is not None
@@ -434,7 +434,12 @@ def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
     ax.plot(cycles, (-moved if down else moved) / per, color=color)
     ax.set_xlabel("Cycles of the drive" if section == "drive" else "Cycles")
     ax.set_ylabel(
-        {"drive": "Tip / $b$", "base_excitation": "Base $y/b$", "axial_load": r"$P(t) - P$ (N)"}[section]
+        {
+            "drive": "Tip / $b$",
+            "base_excitation": "Base $y/b$",
+            "axial_load": r"$P(t) - P$ (N)",
+            "external_force": "$F(t)$ (N)",
+        }[section]
     )
     ax.set_xlim(0.0, cycles[-1])
     ax.set_title(drive.name.replace("_", " "), loc="left")

@@ -55,7 +55,7 @@ def plot_threshold(
     InputError
         If the dataset holds no threshold curve.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if not set(_NEEDED) <= set(dataset.variables):

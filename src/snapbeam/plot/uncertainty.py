@@ -53,7 +53,7 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     InputError
         If the dataset holds no designs, or nothing of that name.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "constraints_satisfied" not in dataset or "tried" not in dataset.dims:
@@ -156,7 +156,7 @@ def plot_probability(
     InputError
         If the dataset holds no such map.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "probability" not in dataset or "outcome" not in dataset["probability"].dims:
@@ -279,7 +279,7 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
     InputError
         If the dataset holds no such thresholds, or those over more than one parameter.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "threshold" not in dataset or "quantile" not in dataset["threshold"].dims:
@@ -355,7 +355,7 @@ def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     InputError
         If the dataset holds no sensitivities.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "parameter" not in dataset.dims or not {"effect", "first_order"} & set(map(str, dataset.variables)):

@@ -71,6 +71,8 @@ SCHEMA: dict[str, Variable] = {
     "base_displacement": Variable(("time",), "1", "displacement of the base, over b"),
     "base_velocity": Variable(("time",), "1", "velocity of the base, over b omega_1"),
     "base_work": Variable(("time",), "J", "work done by the base, in its frame"),
+    "external_force": Variable(("time",), "N", "external force"),
+    "force_work": Variable(("time",), "J", "work done by the external force"),
     "load_change": Variable(("time",), "N", "change of the axial load"),
     "load_work": Variable(("time",), "J", "work done by the change of the axial load"),
     "voltage": Variable(("time",), "V", "voltage across the harvester's load"),
@@ -119,7 +121,7 @@ def trajectory_dataset(
     InputError
         For an unknown name, a wrong shape, times that do not increase, or numbers that are not finite.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     coords: dict[str, Any] = {"time": _labelled("time", axis("time", time, -np.inf, np.inf, closed="both"))}
     if cycle is not None:
@@ -173,7 +175,7 @@ def check_trajectory(
         If ``time`` or a required variable is missing, dimensions or units differ from :data:`SCHEMA`, times do not
         increase strictly, or a number is not finite although its sample is valid.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not isinstance(dataset, xr.Dataset):
         raise InputTypeError(f"dataset: must be an xarray.Dataset, not {type(dataset).__name__}")
@@ -386,9 +388,9 @@ def _harvested(
 
 
 def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Array) -> dict[str, _Array]:
-    """Return the variables of a base excitation and of a changing axial load."""
+    """Return the variables of a base excitation, of a changing axial load and of an external force."""
     found: dict[str, _Array] = {}
-    if system.base_excitation is None and system.axial_load is None:
+    if system.base_excitation is None and system.axial_load is None and system.external_force is None:
         return found
     motions = motions_of(ensemble, system, recorded.times)
     if system.base_excitation is not None:
@@ -398,12 +400,15 @@ def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Arr
     if system.axial_load is not None:
         found["load_change"] = motions["axial_load"][0]
         found["load_work"] = values[:, 8]
+    if system.external_force is not None:
+        found["external_force"] = motions["external_force"][0]
+        found["force_work"] = values[:, 7]
     return found
 
 
 def impact_table(table: _Array, attrs: dict[str, Any]) -> xr.Dataset:
     """Return the table of the impacts of a run."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     data = {
         name: (

@@ -82,7 +82,7 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
     if model.imperfection is not None:
         attrs |= _short(model.imperfection)
     sections = system.to_mapping() if system.has_environment else {}
-    for section in ("base_excitation", "axial_load", "harvester"):
+    for section in ("base_excitation", "axial_load", "external_force", "harvester"):
         for name, value in sections.get(section, {}).items():
             short = f"{section}_type" if name == "type" else lookup(f"{section}.{name}").short
             attrs[short] = int(value) if isinstance(value, bool) else value

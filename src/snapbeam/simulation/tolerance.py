@@ -109,7 +109,7 @@ def perturbation_growth(
     InputError
         For bad input.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     size = positive("perturbation", perturbation)
     level = choice("accuracy", accuracy, ACCURACIES)

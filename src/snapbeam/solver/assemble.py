@@ -16,6 +16,7 @@ from snapbeam.model.drive.base import HORIZON, Drive
 from snapbeam.model.drive.combined import joined
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.early_termination import decidable_energy, passed_heights
+from snapbeam.model.external_force import RecordedForce
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import RUN as RUN_SCOPE
 from snapbeam.model.quantity import quantities
@@ -186,7 +187,10 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
 
     Nothing is said of how high the tip comes to be used: no such run is decided by it.
     """
-    scale, names = system.scale, {"drive": "tip", "base_excitation": "base", "axial_load": "load"}
+    scale, names = (
+        system.scale,
+        {"drive": "tip", "base_excitation": "base", "axial_load": "load", "external_force": "base"},
+    )
     names |= {f"drive_{number}": f"tip{number - 1}" for number in range(2, 2 + len(system.further_contacts))}
     kinds: dict[str, type[Drive]] = {}
     found: dict[str, _Array] = {}
@@ -208,32 +212,39 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
         found["base_hardest"] = base.motion.peak_acceleration(own, scale)
         found["base_sign"], found["base_follow"] = np.full(runs, sign), np.full(runs, follow)
         speed = speed + abs(follow) * base.motion.bounds(own, scale)[1]
+    samples = np.empty(0)
+    if system.external_force is not None:
+        history = system.external_force.history
+        own = _own_driven(columns, "external_force", runs)
+        found["base_hardest"] = history.peak_acceleration(own, scale)
+        found["base_sign"], found["base_follow"] = np.ones(runs), np.zeros(runs)
+        samples = history.samples()
     kind, cycle = joined(kinds), cycles_of(system, columns)
     only = next(iter(kinds)) if kind.alone else ""
     found["omega"] = found[f"{only}_omega"] if only else 2.0 * math.pi / (HORIZON * cycle)
     found["fastest"] = fastest
     table = np.stack([found[name] for name in kind.number_names], axis=1)
-    return Driven(kind, table, cycle, np.full(runs, np.inf), speed, np.empty(0))
+    return Driven(kind, table, cycle, np.full(runs, np.inf), speed, samples)
 
 
 def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
-    """Greatest angular frequency of the base and of the axial load, rad/s; 0 without them."""
+    """Greatest angular frequency of the base, the axial load and the external force, rad/s; 0 without them."""
     found = np.zeros(runs)
     for section, drive in system.moving:
-        if section in ("base_excitation", "axial_load"):
+        if section in _AROUND:
             numbers = drive.numbers(_own_driven(columns, section, runs), system.scale)
             found = np.maximum(found, numbers["fastest" if "fastest" in numbers else "omega"])
     return found
 
 
 def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, tuple[_Array, _Array]]:
-    """Displacement (m) and velocity (m/s) of the base in space, and change (N) and rate of the load, at instants.
+    """Displacement (m) and velocity (m/s) of the base in space, change (N) and rate of the load, and the external force.
 
     *ensemble* is that of the one run, which may begin in the middle of its drives.
     """
     found = {}
     for section, drive in system.moving:
-        if section not in ("base_excitation", "axial_load"):
+        if section not in _AROUND:
             continue
         pairs = _motion_at(ensemble, system, drive, times)
         sign = (
@@ -267,8 +278,9 @@ def _motion_at(ensemble: Ensemble, system: System, drive: Drive, times: _Array) 
     own = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
     numbers, kind = drive.numbers(own, system.scale), drive.integrated_as or type(drive)
     table = kind.numbers_type()(*(float(numbers[name][0]) for name in kind.number_names))
+    memory = drive.samples()
     arguments = numbers["omega"][0] * times + (begun if alone else float(getattr(drive, "phase", 0.0)))
-    return np.array([tip_motion(table, np.empty(0), at) for at in arguments.tolist()]).reshape(-1, 2)
+    return np.array([tip_motion(table, memory, at) for at in arguments.tolist()]).reshape(-1, 2)
 
 
 def begun_at(driven: Driven, phase: _Array) -> _Array:
@@ -290,6 +302,8 @@ def begun_at(driven: Driven, phase: _Array) -> _Array:
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
 
+_AROUND = ("base_excitation", "axial_load", "external_force")
+"""Sections of what acts on the structure as a whole."""
 _LOWEST = {"standard": 1e-9, "reference": 1e-13}
 """Height of a flight after an impact that lasts no time, over b, below which chatter ends in sticking."""
 _RESOLVED = 24.0
@@ -338,7 +352,9 @@ def make_ensemble(
         runs = state.batch[0]
     columns = {name: np.array(np.broadcast_to(values, (runs,))) for name, values in columns.items()}
     side = _side(system, state, goes_on=periods is not None)
-    structure = structure_of(system.model, side, system.striker, system.base_excitation, system.harvester)
+    structure = structure_of(
+        system.model, side, system.striker, system.base_excitation, system.harvester, system.external_force
+    )
     plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
     if step_factor != 1.0:
         plans = [each._replace(step=step_factor * each.step) for each in plans]
@@ -359,6 +375,7 @@ def make_ensemble(
     if structure.body_mass is not None or driven.kind.parts or system.further_contacts:
         highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown, and a shaken beam too
     time = clocked(table, system, integration, driven.period, plans, periods)
+    _require_record(system, table, driven)
     _decisions(table, system, structure, integration, time, places.location, highest)
     table["lowest"] = system.scale.length * _LOWEST[integration.accuracy]
     law: type[ContactLaw] = HertzContact if system.contact is None else type(system.contact)
@@ -383,6 +400,20 @@ def make_ensemble(
         harvester=system.harvester,
         others=others_of(system, structure, columns, runs, since),
     )
+
+
+def _require_record(system: System, table: NDArray[Any], driven: Driven) -> None:
+    """Refuse runs that last longer than a recorded force."""
+    force = system.external_force
+    if force is None or not isinstance(force.history, RecordedForce):
+        return
+    omega = driven.numbers[:, driven.kind.number_names.index("omega")]
+    ends = float((table["end"] * table["tick"] + table["phase"] / omega).max())
+    if ends > force.history.duration * (1.0 + 1e-9):
+        raise InputError(
+            f"cycles: the run ends after {ends:g} s, but the recorded force lasts {force.history.duration:g} s; ask for "
+            "fewer cycles, or give a longer record"
+        )
 
 
 _LONGEST_CLOCK = 2.0 * math.pi * 2.0**16 / HORIZON
@@ -424,9 +455,9 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
         own |= {f"drive.{name}": value for name, value in system.striker.drive.values().items()}
     if system.harvester is not None:
         own["harvester.resistance"] = float(system.harvester.resistance)
-    for section, around in (("base_excitation", system.base_excitation), ("axial_load", system.axial_load)):
-        if around is not None:
-            own |= {f"{section}.{name}": value for name, value in around.motion.values().items()}
+    for section, motion in system.moving:
+        if section in _AROUND:
+            own |= {f"{section}.{name}": value for name, value in motion.values().items()}
     columns = {name: np.full(size, value) for name, value in own.items()}
     for name, values in points.items():
         section, _, field = name.partition(".")
@@ -450,10 +481,10 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     ]
     if further:
         plans = [_serving(each) for each in zip(plans, *further, strict=True)]
-    if integration.step is None and (system.base_excitation is not None or system.axial_load is not None):
+    if integration.step is None and any(section in _AROUND for section, _ in system.moving):
         fastest = fastest_of(system, columns, len(plans))
         plans = [
-            each._replace(step=min(each.step, 2.0 * math.pi / (_RESOLVED * rate)))
+            each._replace(step=min(each.step, 2.0 * math.pi / (_RESOLVED * rate))) if rate > 0.0 else each
             for each, rate in zip(plans, fastest.tolist(), strict=True)
         ]
     if integration.step is None and system.harvester is not None:
@@ -630,10 +661,10 @@ def _decisions(
     properties = system.contact is None or system.contact.properties.energy_bound
     if not integration.early_termination or not properties or system.further_contacts:
         return
-    if system.striker is not None and structure.unequal_wells is None:
+    if system.striker is not None and structure.wells_are_mirror_images:
         # elsewhere the class also depends on whether the other well is reached
         table["decide_crossings"] = int(time.cycles / 20.0)
     table["decide_reach"] = np.maximum(highest, 0.0)
-    if structure.unequal_wells is not None:
+    if not structure.wells_are_mirror_images:
         table["decide_reach"] = passed_heights(structure.model, location, highest)
     table["decide_energy"] = decidable_energy(structure.model, location, highest)

@@ -89,11 +89,6 @@ class Ensemble:
         return bool((self.runs["offset"] > FAR_AWAY).any())
 
     @property
-    def forced(self) -> bool:
-        """Whether a base moves or the axial load changes."""
-        return any(part in ("base", "load") for part, _ in self.drive.parts)
-
-    @property
     def size(self) -> int:
         """Number of runs."""
         return int(self.runs.size)
@@ -103,9 +98,7 @@ class Ensemble:
         """-1 for a run that starts in the well away from which the striker pushes, +1 for the other one."""
         moved = np.array([float(start[0] @ self.structure.center) for start in self.starts])
         center = self.runs["well_sign"] * self.runs["rest_center"] + moved[self.runs["start_row"]]
-        if self.structure.unequal_wells is not None:
-            center = center - self.structure.unequal_wells.level
-        side: _Integers = np.where(center > 0.0, 1, -1)
+        side: _Integers = np.where(center - self.structure.dividing_height > 0.0, 1, -1)
         return side
 
     @property

@@ -15,14 +15,12 @@ from snapbeam.solver.physics import shaker_motion, sincos
 
 __all__ = [
     "Tip",
-    "base_acceleration",
     "drive_rate",
-    "has_axial_load",
     "joined_motion",
     "kind_acceleration",
     "kind_motion",
-    "load_change",
     "numbers_of",
+    "part_acceleration",
     "part_motion",
     "seen_from",
     "tip_acceleration",
@@ -169,6 +167,11 @@ def part_motion(owner: Any, part: str) -> Any:
     return _of_part(owner, part, "motion")
 
 
+def part_acceleration(owner: Any, part: str) -> Any:
+    """The same of its acceleration, m/s^2."""
+    return _of_part(owner, part, "acceleration")
+
+
 def joined_motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
     """Displacement of the tip from its mid-position, m, and its velocity, m/s, in the frame of the ends."""
     owner = type(drive).owner
@@ -201,45 +204,6 @@ def _joined_motion(drive, memory, argument):
         return moved, speed
 
     return both
-
-
-def base_acceleration(drive: Any, memory: Any, argument: float) -> float:
-    """Acceleration of the base in space, m/s^2, positive upwards."""
-    raise TypeError("base_acceleration runs in compiled code only")
-
-
-@overload(base_acceleration, jit_options=INLINE)
-def _base_acceleration(drive, memory, argument):
-    owner = drive.instance_class.owner
-    if "base_sign" not in drive.fields:
-        return lambda drive, memory, argument: 0.0
-    own = _of_part(owner, "base", "acceleration")
-    return lambda drive, memory, argument: drive.base_sign * own(drive, memory, argument)
-
-
-def load_change(drive: Any, memory: Any, argument: float) -> float:
-    """Axial load beyond the one that the beam was reduced under, N."""
-    raise TypeError("load_change runs in compiled code only")
-
-
-@overload(load_change, jit_options=INLINE)
-def _load_change(drive, memory, argument):
-    owner = drive.instance_class.owner
-    if not any(part == "load" for part, _ in owner.parts):
-        return lambda drive, memory, argument: 0.0
-    own = _of_part(owner, "load", "motion")
-    return lambda drive, memory, argument: own(drive, memory, argument)[0]
-
-
-def has_axial_load(drive: Any) -> bool:
-    """Whether the axial load changes."""
-    return any(part == "load" for part, _ in type(drive).owner.parts)
-
-
-@overload(has_axial_load, jit_options=INLINE)
-def _has_axial_load(drive):
-    found = any(part == "load" for part, _ in drive.instance_class.owner.parts)
-    return lambda drive: found
 
 
 # ----------------------------------------------------------------------------------------------------

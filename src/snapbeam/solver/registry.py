@@ -73,10 +73,10 @@ def resolve(
     modes: int = 1,
     law: type[ContactLaw] | None = None,
     drive: type[Drive] = Sine,
-    body: bool = False,
+    striker_with_mass: bool = False,
     unequal_wells: bool = False,
-    around: bool = False,
-    several: bool = False,
+    environment: bool = False,
+    several_strikers: bool = False,
 ) -> tuple[str, Engine]:
     """The engine that *name* stands for, and its own name.
 
@@ -94,13 +94,13 @@ def resolve(
         Modes of the model.
     law, drive : type
         Of contact, and of the striker.
-    body : bool
+    striker_with_mass : bool
         Whether the striker is a body with a mass.
     unequal_wells : bool
         Whether the wells are unequal.
-    around : bool
+    environment : bool
         Whether a base moves, the axial load changes, or a harvester is attached.
-    several : bool
+    several_strikers : bool
         Whether several strikers strike.
 
     Raises
@@ -114,15 +114,15 @@ def resolve(
         from snapbeam.solver.cuda import driver as cuda
 
         reason = cuda.refusal(modes, law, drive)
-        if body:
+        if striker_with_mass:
             reason = "a striker with a mass is integrated by the CPU engine alone"
         if unequal_wells:
             reason = "a beam with unequal wells is integrated by the CPU engine alone"
-        if around:
+        if environment:
             reason = (
                 "a moving base, a changing axial load and a harvester are integrated by the CPU engine alone"
             )
-        if several:
+        if several_strikers:
             reason = "several strikers are integrated by the CPU engine alone"
         if reason is None and (name == "cuda" or not cuda.simulated()):
             return "cuda", cuda

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from snapbeam.model.drive.combined import MOST_STRIKERS
 from snapbeam.model.early_termination import crossing_energy, decidable_energy, passed_heights
 from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.terms import WORKS
 from snapbeam.util.status_codes import ResponseClass, RunStatus, class_of
 from snapbeam.util.validation import InputError, NamedTable
 
@@ -38,10 +39,10 @@ __all__ = [
     "accumulators_dtype",
     "empty_accumulators",
     "of_one_named",
-    "register",
+    "register_statistic",
     "rows_for",
     "statistics_of",
-    "unregister",
+    "unregister_statistic",
     "updated",
 ]
 
@@ -100,10 +101,9 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
     ("gross_work", np.float64, 0.0),
     ("dissipated", np.float64, 0.0),  # integrated, where an energy balance is computed
     ("lost", np.float64, 0.0),  # in contact
-    ("base_work", np.float64, 0.0),  # of a moving base, on the beam in its frame
+    *((name, np.float64, 0.0) for name in WORKS),
     ("circuit_energy", np.float64, 0.0),  # lost in a harvester's circuit, load included
     ("peak_circuit", np.float64, 0.0),  # maximum voltage or current, as the circuit's coordinate
-    ("load_work", np.float64, 0.0),  # of what an axial load has beyond its mean
     ("first_energy", np.float64, 0.0),
     ("energy", np.float64, 0.0),  # at the end, contact included
     ("displacement", np.float64, 0.0),  # of contact point and centre, at the end
@@ -193,7 +193,7 @@ def _response(reading: Reading) -> Values:
         -reading.first_side * accumulators["side"],
     )
     ensemble = reading.ensemble
-    if ensemble.structure.unequal_wells is not None or not ensemble.struck:
+    if not (ensemble.structure.wells_are_mirror_images and ensemble.struck):
         # the paper's rule is for equal wells and a striker; here the centre may cross far from the other well
         kinds = np.where(reading.other_well_reached, kinds, ResponseClass.INTRAWELL)
     return np.where(reading.good, kinds, ResponseClass.UNKNOWN)
@@ -214,7 +214,7 @@ def _high_share(reading: Reading) -> Values:
 
 
 def _dissipated(reading: Reading) -> Values:
-    given = reading.seen("work") + reading.seen("base_work") + reading.seen("load_work")
+    given = sum(map(reading.seen, WORKS), start=reading.seen("work"))
     return given - (reading.seen("energy") - reading.seen("first_energy")) - _harvested(reading)
 
 
@@ -336,8 +336,7 @@ _ROWS = (
         "high_frequency_energy_fraction", "float64", "1", "share of the modal energy above a multiple of omega_1, over time",
         _high_share, comment=_SHARE,
     ),
-    Statistic("base_work", "float64", "J", "work done by the base, in its frame", _seen("base_work")),
-    Statistic("load_work", "float64", "J", "work done by the change of the axial load", _seen("load_work")),
+    *(Statistic(name, "float64", "J", long_name, _seen(name)) for name, long_name in WORKS.items()),
     Statistic("energy_harvested", "float64", "J", "energy that ended in the harvester's load", _harvested),
     Statistic(
         "harvested_power", "float64", "W", "energy in the harvester's load over the time of the run", _harvested_power
@@ -364,7 +363,7 @@ def updated() -> tuple[Statistic, ...]:
     return tuple(row for row in STATISTICS.values() if row.update is not None)
 
 
-def register(statistic: Statistic) -> None:
+def register_statistic(statistic: Statistic) -> None:
     """Add a statistic to the table; every run and map from now on has it.
 
     Raises
@@ -379,7 +378,7 @@ def register(statistic: Statistic) -> None:
     STATISTICS[statistic.name] = statistic
 
 
-def unregister(name: str) -> None:
+def unregister_statistic(name: str) -> None:
     """Take a registered statistic out of the table again.
 
     Raises
@@ -503,7 +502,7 @@ class Reading:
         accumulators, status = self.accumulators, self.accumulators["status"]
         done = (status == RunStatus.OK) | (status == RunStatus.EARLY_STOP)
         with np.errstate(invalid="ignore"):  # runs that failed have no numbers
-            given = accumulators["work"] + accumulators["base_work"] + accumulators["load_work"]
+            given = sum((accumulators[name] for name in WORKS), start=accumulators["work"])
             made = accumulators["energy"] - accumulators["first_energy"] - given
         allowed = _MADE * accumulators["gross_work"]
         allowed = allowed + _ROUNDED * (np.abs(accumulators["energy"]) + np.abs(accumulators["first_energy"]))
@@ -556,13 +555,12 @@ class Reading:
     @cached_property
     def other_well_reached(self) -> NDArray[np.bool_]:
         """Runs whose centre came more than half of the way from the border of the wells to the other well."""
-        structure, kept, level = self.ensemble.structure, self.accumulators, 0.0
+        structure, kept = self.ensemble.structure, self.accumulators
         if not structure.model.is_bistable:
             return np.zeros(kept.size, dtype=bool)
-        first, second = structure.center_rest, -structure.center_rest
-        if structure.unequal_wells is not None:
-            level = structure.unequal_wells.level
-            second += float(structure.center @ structure.unequal_wells.second)
+        level, first = structure.dividing_height, structure.center_rest
+        _, from_mirror_image, _ = structure.about_second_well()
+        second = float(structure.center @ from_mirror_image) - first
         upper, lower = 0.5 * (max(first, second) - level), 0.5 * (min(first, second) - level)
         over, under = kept["max_center"] - level > upper, kept["min_center"] - level < lower
         return np.asarray(self.good & np.where(self.first_side < 0, over, under))
@@ -582,12 +580,11 @@ class Reading:
         settled = self.good & (accumulators["energy"] < crossing_energy(model) - model.well_energy)
         if not (ensemble.highest > -np.inf).any():
             return np.asarray(settled)
-        reach, level = np.maximum(ensemble.highest, 0.0), 0.0
-        if ensemble.structure.unequal_wells is not None:
-            level = ensemble.structure.unequal_wells.level
+        reach = np.maximum(ensemble.highest, 0.0)
+        if not ensemble.structure.wells_are_mirror_images:
             reach = passed_heights(model, ensemble.location, ensemble.highest)
         away = settled & (accumulators["side"] > 0) & (accumulators["displacement"] > reach)
-        away &= accumulators["center"] > level
+        away &= accumulators["center"] > ensemble.structure.dividing_height
         which = np.flatnonzero(away)
         if which.size:
             bound = decidable_energy(model, ensemble.location[which], ensemble.highest[which])

@@ -30,8 +30,8 @@ A *stage* is a kick and the flow after it; the last stage has no flow.  Every st
 
 The first kick needs no tension: k at the beginning of a step is k at the end of the last one, which every step keeps.
 
-A layout may have further forces.  Those that depend on position and time alone (unequal wells, further contacts, base
-acceleration) add to k, and a change of the axial load adds to both coefficients.  A contact force that depends on velocity
+A layout may have further forces, the *terms* (``solver/terms``).  Those that depend on position and time alone add to k,
+or to its two coefficients.  A contact force that depends on velocity
 changes during a kick; its mean follows from the exact solution of the kick along c.  A harvester circuit is coupled with p
 within the kick, also exactly.
 
@@ -129,7 +129,7 @@ class Increment(NamedTuple):
     dissipated: Any
     """Energy that the damping of the modes dissipated, J; 0 in a layout or a run that does not account for it."""
     surroundings: Any
-    """Work of base and axial load, and the state of the circuit; None in a layout without them."""
+    """Work of the terms, and the state of the circuit; None in a layout without them."""
 
 
 class Primitives(NamedTuple):
@@ -158,13 +158,13 @@ class Primitives(NamedTuple):
     Returns the state after the kick and the flow of a stage, and the energy dissipated in the flow.  After the first stage
     k is *along_g* g + *along_r* r, with the accelerations of further forces that the layout has.
     """
-    enter_forces: Callable[..., Any] | None = None
-    """``enter_forces(data, stage, weight)``: compute further forces at a kick: further contacts, base, axial load.
+    update_terms: Callable[..., Any] | None = None
+    """``update_terms(data, stage, weight)``: compute what the terms and the further contacts need at a kick.
 
     None in a layout without them, as are the following operations.
     """
-    add_axial_load: Callable[..., Any] | None = None
-    """``add_axial_load(data, along_g, along_r)``: both coefficients of k with the change of the axial load."""
+    add_to_tension: Callable[..., Any] | None = None
+    """``add_to_tension(data, along_g, along_r)``: both coefficients of k with what terms add to the tension."""
     rate_dependent_force: Callable[..., Any] | None = None
     """``rate_dependent_force(data, stage, weight, along_g, along_r, penetration, velocity)``.
 
@@ -173,7 +173,7 @@ class Primitives(NamedTuple):
     exchange_energy: Callable[..., Any] | None = None
     """``exchange_energy(data, stage, weight, along_g, along_r, force, surroundings)``.
 
-    Adds the work of base and axial load in a kick, and couples the circuit with p.
+    Adds the work of the terms in a kick, and couples the circuit with p.
     """
 
 
@@ -204,7 +204,7 @@ def build_step(layout: Primitives, compiled_part: Callable[..., Any] = inlined) 
     zero, begin, kick_weight, tip_motion = layout.zero, layout.begin, layout.kick_weight, layout.tip_motion
     form_products, where_closed = layout.form_products, layout.where_closed
     kick_and_flow = layout.kick_and_flow
-    enter_forces, add_axial_load = layout.enter_forces, layout.add_axial_load
+    update_terms, add_to_tension = layout.update_terms, layout.add_to_tension
     rate_dependent_force, exchange_energy = layout.rate_dependent_force, layout.exchange_energy
 
     @compiled_part
@@ -238,10 +238,10 @@ def build_step(layout: Primitives, compiled_part: Callable[..., Any] = inlined) 
         """A kick and the flow after it."""
         weight = kick_weight(data, stage)
         along_g, along_r = tension_factors(data.gamma, products.gq, products.qr)
-        if enter_forces is not None:
-            enter_forces(data, stage, weight)
-        if add_axial_load is not None:
-            along_g, along_r = add_axial_load(data, along_g, along_r)
+        if update_terms is not None:
+            update_terms(data, stage, weight)
+        if add_to_tension is not None:
+            along_g, along_r = add_to_tension(data, along_g, along_r)
         contact = evaluate_contact(data, stage, weight, along_g, along_r, products.cq, before.contact)
         surroundings = before.surroundings
         if exchange_energy is not None:

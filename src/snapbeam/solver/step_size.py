@@ -92,7 +92,7 @@ def flight_step(model: ReducedModel, order: int, limit: float) -> float:
     key = (structure.hash, order, limit, period, model.length_scale, places)
     if key not in _CHOSEN:
         chosen = period / _Bench(structure, order).fewest(limit)
-        if structure.unequal_wells is not None:
+        if not structure.wells_are_mirror_images:
             chosen = min(chosen, period / _Bench(structure, order, far=True).fewest(limit))
         _CHOSEN[key] = chosen
         while len(_CHOSEN) > _MOST_CHOSEN:
@@ -120,14 +120,8 @@ class _Bench:
         self.columns = np.array(structure.coupling[lowest, lowest].T, order="C")
         self.well = structure.well[lowest]
         self.rest = self.force = np.zeros(self.omega.size)
-        if (
-            far and structure.unequal_wells is not None
-        ):  # about the mirror image of the first well, at rest in the second
-            self.well = -self.well
-            self.rest, self.force = (
-                structure.unequal_wells.second[lowest],
-                structure.unequal_wells.force[lowest],
-            )
+        if far:
+            self.well, self.rest, self.force = (each[lowest] for each in structure.about_second_well())
         self.rows = (np.array(shapes) @ model.linear_modes)[:, lowest] / length
         if model.beam is not None:
             struck = model.shape_at(_STRUCK)
@@ -136,7 +130,7 @@ class _Bench:
         blow = (struck @ model.linear_modes)[lowest]
         if not blow.any():
             blow = np.ones(self.omega.size)
-        if structure.unequal_wells is not None and model.landscape is not None:
+        if not structure.wells_are_mirror_images and model.landscape is not None:
             barrier = model.saddle_energy - model.landscape.deepest.energy
         elif model.is_bistable:
             straight, well = np.zeros(model.modes), structure.equilibrium

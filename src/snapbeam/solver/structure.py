@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.base_excitation import BaseExcitation, rigid_mass
+from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.harvester import Harvester
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
@@ -77,7 +78,8 @@ class Structure:
     unequal_wells: UnequalWells | None = None
     """Of unequal wells."""
     base_load: _Array | None = None
-    """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi)."""
+    """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi).  Of an external force
+    F(t) along a row h: V^T h, where F stands for the acceleration."""
     tapped: _Array | None = None
     """Of a harvester: its coupling, scaled so that half the square of the circuit's coordinate is its energy."""
     circuit: bool = False
@@ -103,6 +105,22 @@ class Structure:
         beam = row.copy()
         beam[self.equilibrium.size] = 0.0
         return beam
+
+    @property
+    def wells_are_mirror_images(self) -> bool:
+        """Whether the two wells are; also of a structure with one."""
+        return self.unequal_wells is None
+
+    @property
+    def dividing_height(self) -> float:
+        """Displacement of the centre that divides the wells, m."""
+        return 0.0 if self.unequal_wells is None else self.unequal_wells.level
+
+    def about_second_well(self) -> tuple[_Array, _Array, _Array]:
+        """About the mirror image of the first well: g, the second well as q, and the force that is left over there."""
+        if self.unequal_wells is None:
+            return -self.well, np.zeros(self.omega.size), np.zeros(self.omega.size)
+        return -self.well, self.unequal_wells.second, self.unequal_wells.force
 
     def high_modes(self, omega: float) -> NDArray[np.bool_]:
         """Which modes are vibration modes of the beam above an angular frequency, rad/s; shape (N,)."""
@@ -176,6 +194,7 @@ def structure_of(
     striker: Striker | None = None,
     base: BaseExcitation | None = None,
     harvester: Harvester | None = None,
+    force: ExternalForce | None = None,
 ) -> Structure:
     """The structure of a reduced model, about the well that a striker from *side* pushes away from.
 
@@ -191,20 +210,29 @@ def structure_of(
         damping_ratio=model.damping_ratio,
         coupling=model.tension_matrix,
         nonlinear_stiffness=float(model.nonlinear_stiffness),
-        well=modes.T @ equilibrium,
+        well=modes.T @ model.pulled(equilibrium),
         center=sign * (modes.T @ model.midspan_shape),
         shift=-2.0 * (modes.T @ model.mass @ equilibrium),
-        stretch=float(equilibrium @ equilibrium),
+        stretch=float(equilibrium @ model.pulled(equilibrium)) if model.is_bistable else 0.0,
         center_rest=sign * float(model.midspan_shape @ equilibrium),
         sign=sign,
         equilibrium=equilibrium,
         model=model,
         unequal_wells=_uneven(model, sign),
-        base_load=None if base is None else -(modes.T @ rigid_mass(model)),
+        base_load=_base_load(model, base, force),
     )
     if striker is not None and striker.mass is not None:
         struck = _with_body(struck, striker, carried_by_base=base is not None and base.striker_on_base)
     return struck if harvester is None else _with_circuit(struck, harvester)
+
+
+def _base_load(
+    model: ReducedModel, base: BaseExcitation | None, force: ExternalForce | None
+) -> _Array | None:
+    """What the base's acceleration, or the external force, does to p."""
+    if force is not None:
+        return np.asarray(model.linear_modes.T @ force.row(model))
+    return None if base is None else -(model.linear_modes.T @ rigid_mass(model))
 
 
 def _uneven(model: ReducedModel, sign: float) -> UnequalWells | None:

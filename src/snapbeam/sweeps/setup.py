@@ -190,10 +190,10 @@ class SweepSetup:
                     modes=system.model.modes,
                     law=ensemble.law,
                     drive=ensemble.drive,
-                    body=ensemble.structure.body_mass is not None,
+                    striker_with_mass=ensemble.structure.body_mass is not None,
                     unequal_wells=ensemble.structure.model.transverse_force is not None,
-                    around=system.has_environment,
-                    several=bool(system.further_contacts),
+                    environment=system.has_environment,
+                    several_strikers=bool(system.further_contacts),
                 )[1]
                 books = engine.run_ensemble(ensemble, threads, report)
                 for name, values in statistics_of(ensemble, books).items():
@@ -381,10 +381,10 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         cycles=integration.cycles_or_default,
         modes=system.model.modes,
         law=law,
-        body=system.striker is not None and system.striker.mass is not None,
+        striker_with_mass=system.striker is not None and system.striker.mass is not None,
         unequal_wells=system.model.transverse_force is not None,
-        around=system.has_environment,
-        several=bool(system.further_contacts),
+        environment=system.has_environment,
+        several_strikers=bool(system.further_contacts),
         **({} if system.striker is None else {"drive": type(system.striker.drive)}),
     )[0]
     setup = SweepSetup(system, integration.replace(engine=resolved), points)

@@ -74,7 +74,7 @@ def score_measurements(
     InputError
         If the dataset is not such a map, or a measurement is outside it or none has a class.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not hasattr(measurements, "response_class") or not hasattr(measurements, "frequency_ratio"):
         raise InputTypeError("measurements: must be MeasuredPoints, as read_measured_points reads them")

@@ -93,6 +93,8 @@ class Trials:
     rounds: int = 0
     made: dict[tuple[Any, ...], System] = field(default_factory=dict, repr=False)
     """Systems of the structures that were sampled so far."""
+    progress: Progress | None = field(default=None, repr=False)
+    """Called with the runs of a round, unless the round has a report of its own."""
 
     def columns(
         self, points: Columns, numbers: _Numbers, scores: NDArray[np.float64] | None = None
@@ -144,7 +146,7 @@ class Trials:
         if keeping.path is not None:
             keeping = replace(keeping, path=_folder(Path(keeping.path)) / f"round_{self.rounds:04d}")
         work = PointWork(setup)
-        table, _ = compute_table(work, keeping, cluster=self.cluster, progress=progress)
+        table, _ = compute_table(work, keeping, cluster=self.cluster, progress=progress or self.progress)
         self.rounds += 1
         self.runs += setup.points.size
         return {name: work.values(name, table) for name in (*work.integers, *work.numbers)}

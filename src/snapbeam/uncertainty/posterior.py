@@ -27,7 +27,7 @@ from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions
 from snapbeam.uncertainty.distributions import Distribution, Empirical, ParameterUncertainty
 from snapbeam.uncertainty.measurements import Measurements
 from snapbeam.uncertainty.monte_carlo import reached, trials_of
-from snapbeam.util.diagnostics import DiagnosticWarning
+from snapbeam.util.diagnostics import DiagnosticWarning, counting
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import (
     InputError,
@@ -383,7 +383,7 @@ class Posterior:
 
     def to_dataset(self) -> xr.Dataset:
         """Samples and weights, labelled."""
-        import xarray as xr
+        from snapbeam.util.datasets import xr
 
         dataset = xr.Dataset(
             attrs={
@@ -410,6 +410,7 @@ def estimate_posterior(
     modes: int = 8,
     samples: int = 2000,
     seed: int = 0,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> Posterior:
     """What measured frequencies, decays, collisions and waveforms say of a beam, beside what was known before.
 
@@ -431,6 +432,8 @@ def estimate_posterior(
     samples : int
         Samples, at least 200.
     seed : int
+    progress : callable, optional
+        Called as ``progress(done, total)`` with samples of all stages, after the least squares; True writes a line to standard error.
 
     Returns
     -------
@@ -472,7 +475,9 @@ def estimate_posterior(
         found += [waveform.misfit(dotted) for waveform in tracked]
         return np.concatenate(found)
 
-    logs, weights, reason = _population(terms, begin, samples, seed, _STEP if tracked else None)
+    logs, weights, reason = _population(
+        terms, begin, samples, seed, _STEP if tracked else None, counting(progress, "posterior", "samples")
+    )
     values, listed = np.exp(logs), [_dotted(name) for name in names]
     if measured is not None:
         for column, (name, given, errors) in enumerate(_known_by_themselves(measured)):
@@ -539,7 +544,12 @@ def _checked_prior(
 
 
 def _population(
-    terms: Callable[[_Array], _Array], begin: _Array, draws: int, seed: int, step: float | None = None
+    terms: Callable[[_Array], _Array],
+    begin: _Array,
+    draws: int,
+    seed: int,
+    step: float | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> tuple[_Array, _Array, str]:
     """Samples and weights of exp(-|terms|^2/2), and why the search stopped; *step* is the relative one of differences."""
     found = optimize.least_squares(terms, begin, x_scale="jac", diff_step=step, max_nfev=_EVALUATIONS)
@@ -548,13 +558,22 @@ def _population(
         raise InputError(f"measured: {words}; give a beam nearer to the measured one, or a narrower prior")
     middle, cover = found.x, np.linalg.inv(found.jac.T @ found.jac)
     logs, weights = np.empty((0, begin.size)), np.empty(0)
-    for stage in range(_STAGES):
-        count = draws if stage == _STAGES - 1 else max(200, draws // 4)
+    counts = [max(200, draws // 4)] * (_STAGES - 1) + [draws]
+    done = 0
+
+    def logarithm(each: _Array) -> float:
+        nonlocal done
+        value, done = -0.5 * float(np.sum(terms(each) ** 2)), done + 1
+        if progress is not None:
+            progress(done, sum(counts))
+        return value
+
+    for stage, count in enumerate(counts):
         generator = np.random.Generator(np.random.Philox(key=[seed, stage]))
         proposal = stats.multivariate_t(middle, 1.2 * cover, df=_FREEDOM)
         logs = np.reshape(proposal.rvs(count, random_state=generator), (count, begin.size))
         density = np.atleast_1d(proposal.logpdf(logs))
-        target = np.array([-0.5 * float(np.sum(terms(each) ** 2)) for each in logs])
+        target = np.array([logarithm(each) for each in logs])
         weights = special.softmax(target - density)
         middle = weights @ logs
         cover = (logs - middle).T @ ((logs - middle) * weights[:, None]) + 1e-12 * np.diag(np.diag(cover))
@@ -605,6 +624,7 @@ def class_likelihood(
     runs: int = 16,
     integration: Integration | None = None,
     checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> _Array:
     """Log likelihood of measured classes under every sample of a posterior, for :meth:`Posterior.updated`.
 
@@ -624,7 +644,7 @@ def class_likelihood(
         What differs from test to test, such as ``ParameterUncertainty(displacement=3.5e-6)``: no parameter of the posterior.
     runs : int
         Of each measured point and sample, the same random samples for all.
-    integration, checkpoint
+    integration, checkpoint, progress
         As in :func:`snapbeam.uncertainty.probability_map`.
 
     Returns
@@ -644,6 +664,7 @@ def class_likelihood(
     if not known.any():
         raise InputError("measurements: none has a known class")
     trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint)
+    trials.progress = counting(progress, "class likelihood", "runs")
     samples, count = len(posterior.values), int(known.sum())
     sample, dot, number = (
         each.ravel()

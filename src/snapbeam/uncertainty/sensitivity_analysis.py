@@ -21,6 +21,7 @@ from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions
 from snapbeam.sweeps.points import PointList
 from snapbeam.uncertainty.distributions import ParameterUncertainty
 from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, require_held, trials_of
+from snapbeam.util.diagnostics import counting
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.validation import InputError, axis, checked, choice, finite_array, integer, shown, within
 
@@ -505,6 +506,7 @@ def sensitivity(
     confidence: float = 0.95,
     integration: Integration | None = None,
     checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
     """Compute which uncertain parameter changes a quantity of interest most, with intervals.
 
@@ -527,6 +529,8 @@ def sensitivity(
     integration : Integration, optional
     checkpoint : path or CheckpointOptions, optional
         Folder that keeps the runs of all quantities except lifetimes; one that exists is resumed.
+    progress : callable, optional
+        Called as ``progress(done, total)`` with runs of each round; lifetimes report nothing; True writes a line to standard error.
 
     Returns
     -------
@@ -547,6 +551,7 @@ def sensitivity(
     trials = trials_of(
         system, uncertainty, integration, checkpoint=checkpoint, early=not isinstance(quantity, str)
     )
+    trials.progress = counting(progress, "sensitivity", "runs")
     names = trials.uncertainty.parameters
     if not names:
         raise InputError("uncertainty: has no uncertain parameter, so there is nothing to compare")
@@ -660,7 +665,7 @@ def _dataset(
     table: dict[str, _Array],
     values: _Array,
 ) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     names = list(trials.uncertainty.of)
     attrs: dict[str, Any] = {

@@ -13,6 +13,7 @@ from enum import StrEnum
 from typing import Any
 
 from snapbeam.util.validation import InputError, InputTypeError, choice, shown
+from snapbeam.util.work_rate import WorkRate
 
 __all__ = [
     "Diagnostic",
@@ -184,19 +185,19 @@ class _Line:
 
     def __init__(self, what: str) -> None:
         self.what = what
-        self.start = self.last = time.monotonic()
-        self.begun: float | None = None
+        self.last = time.monotonic()
+        self.rate = WorkRate()
         self.ended = False
 
     def say(self, share: float, words: str) -> None:
         now = time.monotonic()
-        self.begun = now if self.begun is None else self.begun  # what was compiled before is not counted
-        if self.ended or (now - self.last < _INTERVAL and share < 1.0):
+        self.rate.report(share)
+        if (self.ended and share >= 1.0) or (now - self.last < _INTERVAL and share < 1.0):
             return
         self.ended = share >= 1.0
         self.last = now
-        spent = now - self.begun
-        left = f", {spent * (1.0 - share) / share:.0f} s left" if 0.0 < share < 1.0 and spent > 1.0 else ""
+        rate = self.rate.per_second
+        left = f", {(1.0 - share) / rate:.0f} s left" if rate is not None and share < 1.0 else ""
         end = "\n" if share >= 1.0 else ""
         sys.stderr.write(f"\r{self.what}: {words}{left}      {end}")
         sys.stderr.flush()

@@ -140,6 +140,7 @@ def test_the_engine_says_why_not(monkeypatch):
 
 def test_auto_takes_a_device_only_where_it_pays(monkeypatch):
     monkeypatch.setattr(cuda_engine, "_unusable", lambda: None)
+    monkeypatch.setattr(cuda_engine, "simulated", lambda: False)
     big = {"runs": 52_000, "cycles": 1000, "modes": 32}
     assert engines.resolve("auto", **big)[0] == "cuda"
     assert engines.resolve("cuda")[0] == "cuda"

@@ -137,7 +137,7 @@ def calibrate(
     report: lab.JsonFile = None,
     strict: lab.Strict = False,
 ) -> None:
-    """Fit thickness and buckling level to measured natural frequencies, and say what the data leave open.
+    """Fit thickness and buckling level to natural frequencies, and report what the data leave open.
 
     Parameters that are not fitted come from --config, or from the measurements' own section beam, or are the
     paper's.

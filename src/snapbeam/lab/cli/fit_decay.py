@@ -100,7 +100,7 @@ def fit_decay(
     report: lab.JsonFile = None,
     strict: lab.Strict = False,
 ) -> None:
-    """Identify natural frequency, damping ratio and softening from a free decay, with standard errors.
+    """Fit frequency, damping ratio and softening to a free decay, with standard errors.
 
     The frequency is that of vanishing amplitude: about a well a buckled beam softens.
 

@@ -223,7 +223,7 @@ def track(
     video_every: VideoEvery = 1,
     strict: lab.Strict = False,
 ) -> None:
-    """Measure the displacement of beam and shaker in every frame of a high-speed recording.
+    """Track beam and shaker in every frame of a high-speed recording.
 
     Finds the beam, the shaker and a sticker on it, fits their edges to a fraction of a pixel, and writes the
     displacements with standard errors and flags to a NetCDF file.  What could not be measured is flagged and

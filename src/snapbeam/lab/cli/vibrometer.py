@@ -95,7 +95,7 @@ def vibrometer(
     report: lab.JsonFile = None,
     strict: lab.Strict = False,
 ) -> None:
-    """Measure the shaker's motion in a vibrometer record and say whether the test is acceptable.
+    """Measure the motion of the shaker from a vibrometer signal, and check whether the test is acceptable.
 
     Fits the steady sine with standard errors, tells noise from distortion, finds and describes the start-up
     transient, and on request aligns the record with a tracked recording and writes the measured drive for use

@@ -62,7 +62,7 @@ def plot_test_series(results: list[TestResult], folder: Path) -> Figure:
 def _thumbnail(ax: Axes, result: TestResult, path: Path) -> None:
     color = CLASS_COLORS[_LABELS.get(result.response_class, ResponseClass.UNKNOWN)]
     if path.exists():
-        import xarray as xr
+        from snapbeam.util.datasets import xr
 
         with xr.open_dataset(path, engine="h5netcdf") as run:
             time = run["time"].values

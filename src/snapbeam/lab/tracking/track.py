@@ -372,7 +372,7 @@ class _FixedMarks:
 
 def check_tracked(dataset: xr.Dataset) -> xr.Dataset:
     """Return *dataset* if it came from :func:`snapbeam.lab.track`; refuse it if not."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not isinstance(dataset, xr.Dataset):
         raise InputTypeError(f"dataset: must be an xarray.Dataset, not {type(dataset).__name__}")
@@ -500,7 +500,7 @@ def contact_onsets(
     InputError
         If the dataset holds no penetration.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not isinstance(dataset, xr.Dataset):
         raise InputTypeError(f"dataset: must be an xarray.Dataset, not {type(dataset).__name__}")

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.optimize import brentq
 
 from snapbeam.model.quantity import check_fields, numbers_type
 
@@ -131,6 +130,8 @@ class ContactLaw:
 
     def _greatest_penetration(self, mass: float, velocity: float) -> float:
         """Penetration, m, at which a free mass stops; 0 if the force does not stop it within a metre."""
+        from scipy.optimize import brentq
+
         law: Any = type(self)
         numbers, energy, arrives = self._numbers(), law.energy, 0.5 * mass * velocity**2
         high = 1e-12

@@ -35,18 +35,25 @@ class Joined(Drive):
 
 def joined(kinds: Mapping[str, type[Drive]]) -> type[Joined]:
     """The class of a mixture: the kinds of what moves, by part."""
-    from snapbeam.model.axial_load import LOADS
-
     named = [(part, kinds[part]) for part in PARTS if part in kinds]
     for part, kind in named:
-        known = LOADS if part == "load" else DRIVES
-        if known.get(kind.name) is not kind:
+        if _known(part, kind.name) is not kind:
             raise TypeError(f"{kind.__name__}: is registered under no name")
     name = _SEPARATOR.join(["Joined", *(f"{part}{_SEPARATOR}{kind.name}" for part, kind in named)])
     if name not in globals():
         globals()[name] = _made(name, named)
     found: type[Joined] = globals()[name]
     return found
+
+
+def _known(part: str, name: str) -> type[Drive] | None:
+    """The kind of drive that a part may have, by its name, or None; an external force takes the part of the base."""
+    from snapbeam.model.axial_load import LOADS
+    from snapbeam.model.external_force import FORCES
+
+    if part == "load":
+        return LOADS.get(name)
+    return FORCES[name] if part == "base" and name in FORCES else DRIVES.get(name)
 
 
 def _made(name: str, named: list[tuple[str, type[Drive]]]) -> type[Joined]:
@@ -75,10 +82,8 @@ def __getattr__(name: str) -> type[Joined]:
     first, *words = name.split(_SEPARATOR)
     if first != "Joined" or not words or len(words) % 2:
         raise AttributeError(name)
-    from snapbeam.model.axial_load import LOADS
-
     pairs = dict(zip(words[::2], words[1::2], strict=True))
-    try:
-        return joined({part: (LOADS if part == "load" else DRIVES)[kind] for part, kind in pairs.items()})
-    except KeyError:
-        raise AttributeError(name) from None
+    kinds = {part: _known(part, kind) for part, kind in pairs.items()}
+    if any(kind is None for kind in kinds.values()):
+        raise AttributeError(name)
+    return joined({part: kind for part, kind in kinds.items() if kind is not None})

@@ -63,7 +63,7 @@ def usable_cores() -> int:
 
 def _packed(ensemble: Ensemble) -> Packed:
     others = None if ensemble.others is None else several(ensemble.others.laws)
-    return pack(ensemble.structure, ensemble.high_omega, forced=ensemble.forced, several=others)
+    return pack(ensemble.structure, ensemble.high_omega, drive=ensemble.drive, several=others)
 
 
 def _asked(ensemble: Ensemble, packed: Packed, memory: Memory | None) -> KernelInput:

@@ -21,13 +21,11 @@ from snapbeam.solver.cpu.recording import record_aside, record_contact, record_i
 from snapbeam.solver.cpu.state import IntegratorState, Rows, StepControl, cut_slot, look_slot, sample_energy
 from snapbeam.solver.cpu.step import (
     Step,
-    accumulate_environment_work,
     observe,
     prepare,
     take_step,
     with_circuit_acceleration,
 )
-from snapbeam.solver.cpu.terms.base_and_load import extra_speed
 from snapbeam.solver.cpu.terms.circuit import (
     accumulate_circuit,
     circuit_speed_bound,
@@ -43,13 +41,6 @@ from snapbeam.solver.cpu.terms.further_contact_events import (
     refine_further_onsets,
     store_further_contacts,
     update_further_contacts,
-)
-from snapbeam.solver.cpu.terms.second_well import (
-    about_level,
-    above_own_well,
-    add_potential_energy,
-    at_center,
-    relative_to_nearest_well,
 )
 from snapbeam.solver.cpu.terms.step_across import mark_at_jump, taken_across
 from snapbeam.solver.excitation import seen_from, turned_motion
@@ -73,6 +64,16 @@ from snapbeam.solver.step_control import (
     is_low_energy,
     refine_onset,
     safe_interval,
+)
+from snapbeam.solver.terms.interface import (
+    above_nearest_well,
+    accumulate_work,
+    add_potential_energy,
+    add_to_speed_bound,
+    center_from_divide,
+    relative_to_nearest_well,
+    seen_from_divide,
+    wells_differ,
 )
 from snapbeam.util.status_codes import RunStatus
 
@@ -294,7 +295,9 @@ def detect_contact_event(memory, layout, run, now, tip, step, seen1, scratch):
         bound = circuit_speed_bound(
             memory, size, layout.omega, layout.circuit, layout.contact, step.q, step.p, bound, TRUST * known
         )
-        bound += extra_speed(layout.forced, memory, size, tip.drive, layout.contact, TRUST * run.step_time)
+        bound = add_to_speed_bound(
+            memory, size, layout.terms, tip.drive, layout.contact, TRUST * run.step_time, bound
+        )
         push = dot(memory, size, layout.contact, step.k)
         safe_gap = now.t + int(safe_interval(-seen.d, bound, run.tip_speed, push, known) / tick)
     if after > safe_center:
@@ -302,10 +305,12 @@ def detect_contact_event(memory, layout, run, now, tip, step, seen1, scratch):
         bound = circuit_speed_bound(
             memory, size, layout.omega, layout.circuit, layout.center, step.q, step.p, bound, TRUST * known
         )
-        bound += extra_speed(layout.forced, memory, size, tip.drive, layout.center, TRUST * run.step_time)
+        bound = add_to_speed_bound(
+            memory, size, layout.terms, tip.drive, layout.center, TRUST * run.step_time, bound
+        )
         push = dot(memory, size, layout.center, step.k)
         safe_center = now.t + int(
-            safe_interval(abs(at_center(layout.unequal_wells, seen.c)), bound, 0.0, push, known) / tick
+            safe_interval(abs(center_from_divide(layout.terms, seen.c)), bound, 0.0, push, known) / tick
         )
     safe_gap = limit_safe_interval(memory, layout.others, now.t, safe_gap)
     safe_center = limit_safe_interval(memory, layout.others, now.t, safe_center)
@@ -363,18 +368,16 @@ def monitor_energy(
             memory, layout, run, now.well_sign, (q, p, k), seen1, pressed, accumulators, span
         )
     elif looked_at:
-        near = relative_to_nearest_well(
-            memory, layout.size, layout.unequal_wells, now.well_sign, q, run.spare
-        )
+        near = relative_to_nearest_well(memory, layout.size, layout.terms, now.well_sign, run.spare, q)
         linear = modal_energy(memory, layout, near, p)
     if looked_at:
         if not control.touching:
             energy = linear + tension_energy(layout.gamma, gq, qr)
-            if layout.unequal_wells is not None:
+            if wells_differ(layout.terms):
                 energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
-            energy = add_potential_energy(memory, layout.size, layout.unequal_wells, q, energy)
+            energy = add_potential_energy(memory, layout.size, layout.terms, q, energy)
             low_energy = is_low_energy(
-                above_own_well(layout.unequal_wells, now.well_sign, energy), layout.gamma, layout.stretch
+                above_nearest_well(layout.terms, now.well_sign, energy), layout.gamma, layout.stretch
             )
             low_energy = disable_long_steps(layout.circuit, low_energy)
             if (
@@ -383,7 +386,7 @@ def monitor_energy(
                 and (steps_since_start & 15) == 0
                 and seen1.w > clock.decide_reach
             ):
-                if at_center(layout.unequal_wells, seen1.c) > 0.0 and energy < clock.decide_energy:
+                if center_from_divide(layout.terms, seen1.c) > 0.0 and energy < clock.decide_energy:
                     status = _EARLY_STOP
     if clock.decide_crossings >= 0 and accumulators.zero_crossings_last_quarter > clock.decide_crossings:
         status = _EARLY_STOP
@@ -487,15 +490,15 @@ def accept_step(
         accumulators.gross_work += done.gross
         accumulators.lost += done.lost
     accumulate_further_contacts(memory, layout.others, touching, done, accumulators)
-    accumulate_environment_work(layout.forced, accumulators, done.external)
+    accumulate_work(layout.terms, accumulators, done.external)
     accumulate_circuit(memory, layout, layout.circuit, step.p1, accumulators, done.circuit)
     if outputs is not None:
         accumulators.dissipated += done.dissipated + done.lost
     accumulate_displacement(accumulators, seen, seen1, step.length)
     if touching or t + step.ticks > contact_event.safe_center:
         count_zero_crossings_in_step(
-            accumulators, clock, t, step.length, about_level(layout.unequal_wells, seen), about_level(layout.unequal_wells, seen1),
-            scratch.inner_samples, at_center(layout.unequal_wells, rest_center), contact_event.pieces, contact_event.piece,
+            accumulators, clock, t, step.length, seen_from_divide(layout.terms, seen), seen_from_divide(layout.terms, seen1),
+            scratch.inner_samples, center_from_divide(layout.terms, rest_center), contact_event.pieces, contact_event.piece,
         )  # fmt: skip
     observe_extras(kernel_input.extras, accumulators, t * tick, step.length, seen, seen1, touching)
 

@@ -34,9 +34,7 @@ from snapbeam.solver.cpu.state import (
     restart_from_state,
     run_of,
 )
-from snapbeam.solver.cpu.step import Step, StepIncrement, prepare, take_step, take_two_steps
-from snapbeam.solver.cpu.terms.base_and_load import ExternalWork, enter_forces
-from snapbeam.solver.cpu.terms.circuit import CircuitIncrement
+from snapbeam.solver.cpu.step import Step, nothing_done, prepare, take_step, take_two_steps
 from snapbeam.solver.cpu.terms.discontinuities import up_to_discontinuity
 from snapbeam.solver.cpu.terms.further_contact_events import (
     close_further_contacts,
@@ -44,9 +42,9 @@ from snapbeam.solver.cpu.terms.further_contact_events import (
     store_contact_states,
 )
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, mirror_further_contacts
-from snapbeam.solver.cpu.terms.second_well import has_crossed_to_other_well
 from snapbeam.solver.excitation import seen_from
 from snapbeam.solver.step_control import contact_level, flight_level, ticks_of, time_beyond
+from snapbeam.solver.terms.interface import has_crossed, update_time_dependent
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["KernelOutput", "integrate_ensemble", "integrate_recorded", "propose_step"]
@@ -54,9 +52,6 @@ __all__ = ["KernelOutput", "integrate_ensemble", "integrate_recorded", "propose_
 
 _RUNNING = int(RunStatus.INTERRUPTED)
 _NO_STEP = Step(0, 0, 0.0, 0.0, False, 0, 0, 0, 0, 0, 0, 0)
-_NOTHING_DONE = StepIncrement(
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ExternalWork(0.0, 0.0, 0.0), CircuitIncrement(0.0, 0.0, 0.0, 0.0)
-)
 
 
 class KernelOutput(NamedTuple):
@@ -78,11 +73,10 @@ def propose_step(memory, blocks, workspace, run, now, accumulators):
     layout, clock, well_sign, stretch, t = workspace.layout, run.clock, now.well_sign, now.stretch, now.t
     rows, seen, control, energy_tick = now.rows, now.seen, now.control, now.control.energy_tick
     r = layout.work + 9 * layout.size
-    if layout.stretch > 0.0 and has_crossed_to_other_well(
-        layout.unequal_wells, seen.c, well_sign, run.rest_center
-    ):
+    crossed = seen.c * (well_sign * run.rest_center) < 0.0
+    if layout.stretch > 0.0 and has_crossed(layout.terms, seen.c, well_sign, crossed):
         there = phase_at(run, t)
-        enter_forces(layout.forced, memory, run.struck.drive, there)
+        update_time_dependent(memory, layout.terms, run.struck.drive, there)
         evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, there, rows.q, 0.0, False)
         mirror_further_contacts(memory, layout.others, -well_sign)
         if run.high:
@@ -173,7 +167,8 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
     accumulators_b = accumulators_a
     run_a, now_a = begin(memory, blocks, place_a, kernel_input, i_a, accumulators_a)
     run_b, now_b = run_a, now_a
-    step_a, step_b, done_a, done_b = _NO_STEP, _NO_STEP, _NOTHING_DONE, _NOTHING_DONE
+    step_a, step_b = _NO_STEP, _NO_STEP
+    done_a, done_b = nothing_done(layouts[0]), nothing_done(layouts[1])
     while live_a or live_b or following < which.size:
         if kernel_output.stop_flag[0] != 0:
             break

@@ -7,16 +7,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.solver.cpu.mode_lanes import Layout
-from snapbeam.solver.cpu.terms.base_and_load import TimeDependentForces
+from snapbeam.model.drive.base import Drive
+from snapbeam.model.drive.sine import Sine
+from snapbeam.solver.cpu.mode_lanes import WORK_ROWS, Layout
 from snapbeam.solver.cpu.terms.circuit import Circuit
 from snapbeam.solver.cpu.terms.further_contacts import FurtherContacts
-from snapbeam.solver.cpu.terms.second_well import UnequalWells
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.further_contacts import NUMBERS, Several
 from snapbeam.solver.simd import WIDTH
 from snapbeam.solver.splitting import Stages, in_memory, slot_length
 from snapbeam.solver.structure import Structure
+from snapbeam.solver.terms import TERMS_AFTER_CONTACTS, TERMS_BEFORE_CONTACTS
+from snapbeam.solver.terms.interface import TermMemory
 
 __all__ = ["Memory", "Packed", "lay_out", "pack"]
 
@@ -28,8 +30,6 @@ _LONGEST_DECAY = 4.0
 _SLOWEST = 1e-12
 """Stands for no damping, 1/s."""
 _ALIGNMENT = 64
-WORK_ROWS = 10
-"""Working rows of a run: q, p, k at both ends of a step and of a look ahead, and G q."""
 
 
 class Packed(NamedTuple):
@@ -43,6 +43,8 @@ class Packed(NamedTuple):
     """Row of each linear mode, shape (N,)."""
     members: tuple[int, ...]
     """Modes of each block."""
+    own: tuple[dict[str, int], ...]
+    """Of each term in the layout, the lengths of what every run has for itself."""
 
     def spread(self, values: _Array) -> _Array:
         """Numbers of modes, shape (..., N), as padded rows, shape (..., rows)."""
@@ -69,14 +71,13 @@ def _blocks_of(coupled: NDArray[np.bool_]) -> NDArray[np.int64]:
 def pack(
     structure: Structure,
     high_omega: float = np.inf,
-    forced: bool = False,
+    drive: type[Drive] = Sine,
     several: type[Several] | None = None,
 ) -> Packed:
     """Arrange a structure in rows.
 
     Linear modes that the tension does not couple (the symmetric and the antisymmetric ones) become
-    separate blocks, each padded to a multiple of eight rows.  *forced*: with room for a moving base or a changing load.
-    *several*: with room for strikers beside the first.
+    separate blocks, each padded to a multiple of eight rows.  *several*: with room for strikers beside the first.
     """
     label = _blocks_of(structure.coupling != 0.0)
     omega, zeta = structure.omega, structure.damping_ratio
@@ -119,35 +120,39 @@ def pack(
         "high": padded(structure.high_modes(high_omega).astype(np.float64)),
         "tension": np.concatenate(strips),
     }
-    away = structure.unequal_wells
-    if away is not None:
-        pieces |= {"far": padded(away.force), "second": padded(away.second), "here": np.zeros(size + WIDTH)}
-    if forced:
-        pieces["shaken"] = padded(
-            np.zeros(omega.size) if structure.base_load is None else structure.base_load
-        )
-        pieces["now"] = np.zeros(WIDTH)
+    kinds = (*TERMS_BEFORE_CONTACTS, FurtherContacts, *TERMS_AFTER_CONTACTS)
+    built: dict[type, TermMemory] = {}
+    for kind in kinds:
+        found = None if kind is FurtherContacts else kind.build(structure, drive, size, padded)
+        if found is not None:
+            built[kind] = found
+            pieces |= {
+                f"{kind.__name__}.{name}": values for name, values in (found.shared | found.own).items()
+            }
     if structure.tapped is not None:
         pieces |= {"tapped": padded(structure.tapped), "rate": np.zeros(WIDTH)}
-    if forced or structure.tapped is not None:
-        pieces["kick"] = np.zeros(size)
     if several is not None:
         pieces["striker_rows"] = np.zeros(len(several.laws) * size)
         pieces["strikers"] = np.zeros(len(several.laws) * NUMBERS)
     starts = np.concatenate(([0], np.cumsum([piece.size for piece in pieces.values()])))
     placed = dict(zip(pieces, map(int, starts), strict=False))
-    unequal_wells, forces, circuit, others = None, None, None, None
-    kick = placed.pop("kick", 0)
-    if forced:
-        forces = TimeDependentForces(placed.pop("shaken"), placed.pop("now"), kick)
+    circuit, others = None, None
     if structure.tapped is not None:
         element = int(rows[-1]) if structure.circuit else None
-        circuit = Circuit(placed.pop("tapped"), placed.pop("rate"), kick, element)
+        circuit = Circuit(placed.pop("tapped"), placed.pop("rate"), element)
     if several is not None:
         others = FurtherContacts(placed.pop("striker_rows"), placed.pop("strikers"), several.numbers_type()())
-    if away is not None:
-        own = placed.pop("far"), placed.pop("second"), placed.pop("here")
-        unequal_wells = UnequalWells(*own, away.lift, away.depth, away.level)
+    terms: list[Any] = []
+    own: list[dict[str, int]] = []
+    for kind in kinds:
+        if kind is FurtherContacts and others is not None:
+            terms.append(others)
+            own.append({})
+        elif kind in built:
+            shared, single, numbers = built[kind]
+            places = {name: placed.pop(f"{kind.__name__}.{name}") for name in (*shared, *single)}
+            terms.append(kind(**places, **numbers))
+            own.append({name: values.size for name, values in single.items()})
     moving = bool(np.all(omega * np.sqrt(1.0 - zeta * zeta) > 0.0))
     gentle = _LONGEST_DECAY / max(float((zeta * omega).max()), _SLOWEST) if moving else 0.0
     layout = Layout(
@@ -157,14 +162,18 @@ def pack(
         gamma=structure.nonlinear_stiffness,
         stretch=structure.stretch,
         gentle=gentle,
-        unequal_wells=unequal_wells,
-        forced=forces,
+        terms=tuple(terms),
         circuit=circuit,
         others=others,
         body=None if structure.body_mass is None else int(rows[structure.equilibrium.size]),
     )
     return Packed(
-        np.concatenate(list(pieces.values())), np.array(blocks, dtype=np.int64), layout, rows, tuple(held)
+        np.concatenate(list(pieces.values())),
+        np.array(blocks, dtype=np.int64),
+        layout,
+        rows,
+        tuple(held),
+        tuple(own),
     )
 
 
@@ -191,18 +200,8 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
     second = first._replace(
         g=first.work + work, contact=first.work + work + size, work=first.work + work + 2 * size
     )
-    if first.unequal_wells is not None:
-        second = second._replace(
-            work=second.work + size + WIDTH, unequal_wells=first.unequal_wells._replace(here=second.work)
-        )
-    if first.forced is not None or first.circuit is not None:
-        now = second.work
-        rate, kick = now + WIDTH, now + 2 * WIDTH
-        second = second._replace(
-            work=kick + size,
-            forced=None if first.forced is None else first.forced._replace(now=now, kick=kick),
-            circuit=None if first.circuit is None else first.circuit._replace(rate=rate, kick=kick),
-        )
+    if first.circuit is not None:
+        second = second._replace(work=second.work + WIDTH, circuit=first.circuit._replace(rate=second.work))
     if first.others is not None:
         count = len(type(first.others.kinds).owner.laws)
         rows = second.work
@@ -210,6 +209,14 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
             work=rows + count * (size + NUMBERS),
             others=first.others._replace(rows=rows, numbers=rows + count * size),
         )
+    terms: list[Any] = []
+    for term, own in zip(first.terms, packed.own, strict=True):
+        places = {}
+        for name, length in own.items():
+            places[name] = second.work
+            second = second._replace(work=second.work + length)
+        terms.append(second.others if term is first.others else term._replace(**places))
+    second = second._replace(terms=tuple(terms))
     at = second.work + WORK_ROWS * size + slots
     stages, weights = in_memory(
         ensemble.order, at, general=ensemble.law.rate_dependent, coupled=first.circuit is not None
@@ -224,7 +231,8 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
     memory[stages.flow : table] = weights
     memory[table:] = ensemble.samples
     numbers: Any = ensemble.drive_numbers
-    if "table" in ensemble.drive.number_names:
+    sampled = [i for i, name in enumerate(ensemble.drive.number_names) if name in ("table", "base_table")]
+    if sampled:
         numbers = numbers.copy()
-        numbers[:, ensemble.drive.number_names.index("table")] += table
+        numbers[:, sampled] += table
     return Memory(memory, packed.blocks, (first, second), stages, numbers)

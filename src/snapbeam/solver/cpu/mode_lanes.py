@@ -13,10 +13,7 @@ from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import called, inlined
 from snapbeam.solver.cpu.dot import dot
-from snapbeam.solver.cpu.terms.base_and_load import add_base_acceleration
 from snapbeam.solver.cpu.terms.circuit import without_circuit
-from snapbeam.solver.cpu.terms.further_contacts import struck
-from snapbeam.solver.cpu.terms.second_well import add_static_load, towards_well
 from snapbeam.solver.physics import (
     decay_less_one,
     mode_energy,
@@ -28,6 +25,7 @@ from snapbeam.solver.physics import (
 )
 from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat, store, vabs
 from snapbeam.solver.step import flow_mode, kick_mode
+from snapbeam.solver.terms.interface import acceleration_about_nearest_well, add_acceleration
 
 __all__ = [
     "Layout",
@@ -39,6 +37,7 @@ __all__ = [
     "flow_coefficients",
     "flow_rows",
     "kick_and_flow_rows",
+    "kick_row",
     "kick_rows",
     "modal_energies",
     "modal_energy",
@@ -48,6 +47,10 @@ __all__ = [
     "tension_rows",
     "tension_rows_twice",
 ]
+
+
+WORK_ROWS = 11
+"""Working rows of a run: q, p, k at both ends of a step and of a look ahead, G q, and the acceleration of a kick."""
 
 
 class Layout(NamedTuple):
@@ -80,10 +83,8 @@ class Layout(NamedTuple):
     """Squared slopes of the beam in a well, alpha_eq . alpha_eq; 0 if there is one well only."""
     gentle: float
     """Longest flow, s, that polynomials serve; 0 if there is an overdamped or a still mode."""
-    unequal_wells: Any
-    """Of unequal wells, an :class:`~snapbeam.solver.cpu.terms.second_well.UnequalWells`; else None."""
-    forced: Any
-    """Of a moving base or a changing load, a :class:`~snapbeam.solver.cpu.terms.base_and_load.TimeDependentForces`; else None."""
+    terms: Any
+    """The terms of the structure, a tuple (:mod:`snapbeam.solver.terms`)."""
     circuit: Any
     """Of a harvester, a :class:`~snapbeam.solver.cpu.terms.circuit.Circuit`; else None."""
     others: Any
@@ -220,9 +221,7 @@ def tension_rows_twice(memory, blocks, layout_a, q_a, r_a, layout_b, q_b, r_b):
 @inlined
 def _acceleration_row(memory, layout, along_g, along_r, r, row):
     k = tension_acceleration(along_g, along_r, load(memory, layout.g + row), load(memory, r + row))
-    k = add_static_load(memory, layout.unequal_wells, row, k)
-    k = struck(memory, layout.size, layout.others, row, k)
-    return add_base_acceleration(memory, layout.forced, row, k)
+    return add_acceleration(memory, layout.size, layout.terms, row, k)
 
 
 @inlined
@@ -230,6 +229,12 @@ def acceleration_rows(memory, layout, along_g, along_r, r, k):
     """k = the modal acceleration by the change of tension, and by the further forces at a kick."""
     for row in range(0, layout.size, WIDTH):
         store(memory, k + row, _acceleration_row(memory, layout, along_g, along_r, r, row))
+
+
+@inlined
+def kick_row(layout):
+    """The working row that holds the whole acceleration of a kick, contact included."""
+    return layout.work + 10 * layout.size
 
 
 @inlined
@@ -291,8 +296,8 @@ def modal_energies(memory, layout, q, near, p, k, force):
             load(memory, layout.high + row),
         )
         energy = mode_energy(omega, load(memory, near + row), p_row)
-        k_row = towards_well(
-            memory, layout.unequal_wells, layout.omega_squared, q, near, row, load(memory, k + row)
+        k_row = acceleration_about_nearest_well(
+            memory, layout.terms, layout.omega_squared, q, near, row, load(memory, k + row)
         )
         change = mode_power(
             load(memory, layout.damping + row), k_row, load(memory, layout.contact + row), force, p_row

@@ -12,10 +12,11 @@ from snapbeam.solver.cpu.state import IntegratorState, Rows, StepControl, cut_sl
 from snapbeam.solver.cpu.step import Step, observe, prepare, take_step
 from snapbeam.solver.cpu.sticking import held_for, hold
 from snapbeam.solver.cpu.terms.further_contact_events import any_touches
-from snapbeam.solver.cpu.terms.second_well import add_potential_energy
 from snapbeam.solver.cpu.terms.step_across import taken_across
 from snapbeam.solver.physics import tension_energy
 from snapbeam.solver.step_control import ContactKinematics
+from snapbeam.solver.terms import WORKS
+from snapbeam.solver.terms.interface import add_potential_energy, no_external_work, works_so_far
 
 __all__ = [
     "MARKS",
@@ -32,14 +33,15 @@ __all__ = [
 ]
 
 
-VALUES = 10
-"""Penetration, contact force, beam energy, contact energy, work, dissipation, loss in contact, work of the base and of
-the axial load, and energy lost in the circuit, of a sample."""
+VALUES = 8 + len(WORKS)
+"""Penetration, contact force, beam energy, contact energy, work, dissipation, loss in contact, works of the terms, and
+energy lost in the circuit, of a sample."""
 MARKS, REALS = 24, 10
 """Integers and floats of a run that was laid aside."""
 _TOGETHER = ContactKinematics(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _MOST_IN_CONTACT = 96
 """Steps of one contact whose ends are recorded."""
+_works_so_far = works_so_far(tuple(WORKS))
 
 
 class Outputs(NamedTuple):
@@ -90,30 +92,29 @@ class _Sums(NamedTuple):
     work: float
     dissipated: float
     lost: float
-    base: float
-    load: float
+    works: Any
+    """Of the terms, a tuple."""
     circuit: float
 
 
 @inlined
-def _sums(accumulators):
+def _sums(terms, accumulators):
     """As a run's record of accumulators has them."""
     return _Sums(
         accumulators.work,
         accumulators.dissipated,
         accumulators.lost,
-        accumulators.base_work,
-        accumulators.load_work,
+        _works_so_far(terms, accumulators, no_external_work(terms)),
         accumulators.circuit_energy,
     )
 
 
 @inlined
-def _sums_with(accumulators, done):
+def _sums_with(terms, accumulators, done):
     """The same with what a part of a step gave."""
     return _Sums(
         accumulators.work + done.work, accumulators.dissipated + done.dissipated + done.lost, accumulators.lost + done.lost,
-        accumulators.base_work + done.external.base, accumulators.load_work + done.external.load, accumulators.circuit_energy + done.circuit.energy,
+        _works_so_far(terms, accumulators, done.external), accumulators.circuit_energy + done.circuit.energy,
     )  # fmt: skip
 
 
@@ -134,9 +135,9 @@ def _write(memory, layout, well_sign, law, outputs, sample, instant, sums):
     outputs.values[sample, 4] = sums.work
     outputs.values[sample, 5] = sums.dissipated
     outputs.values[sample, 6] = sums.lost
-    outputs.values[sample, 7] = sums.base
-    outputs.values[sample, 8] = sums.load
-    outputs.values[sample, 9] = sums.circuit
+    for i in range(len(sums.works)):
+        outputs.values[sample, 7 + i] = sums.works[i]
+    outputs.values[sample, VALUES - 1] = sums.circuit
 
 
 @compiled
@@ -158,10 +159,17 @@ def record_instants(memory, blocks, layout, stages, run, tip, now, step, accumul
         here = taken_across(memory, blocks, layout, stages, run, tip, now.t, short, here, True)
         about = observe(memory, layout, tip, step.phase + tip.drive.omega * part, q2, p2)
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, here.gq, here.qr)
-        energy = add_potential_energy(memory, size, layout.unequal_wells, q2, energy)
+        energy = add_potential_energy(memory, size, layout.terms, q2, energy)
         instant = _Instant(times[done], q2, p2, about, energy)
         _write(
-            memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums_with(accumulators, here)
+            memory,
+            layout,
+            now.well_sign,
+            tip.law,
+            outputs,
+            sample,
+            instant,
+            _sums_with(layout.terms, accumulators, here),
         )
         sample, done = sample + 1, done + 1
     outputs.marks[0] = done
@@ -184,14 +192,13 @@ def record_held(memory, blocks, layout, run, tip, now, step, accumulators, outpu
         _, work, _, dissipated, _ = held_for(memory, blocks, layout, run, tip, step.phase, part)
         force, gq, qr = hold(memory, blocks, layout, tip, phase, q2, p2, run.spare + 2 * size)
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, gq, qr)
-        energy = add_potential_energy(memory, size, layout.unequal_wells, q2, energy)
-        so_far = _sums(accumulators)
+        energy = add_potential_energy(memory, size, layout.terms, q2, energy)
+        so_far = _sums(layout.terms, accumulators)
         sums = _Sums(
             so_far.work + work,
             so_far.dissipated + dissipated,
             so_far.lost,
-            so_far.base,
-            so_far.load,
+            so_far.works,
             so_far.circuit,
         )
         instant = _Instant(times[done], q2, p2, _TOGETHER, energy)
@@ -208,9 +215,18 @@ def record_aside(memory, layout, tip, now, short, here, when, about, sample, acc
     if not outputs.in_contact:
         return sample
     energy = modal_energy(memory, layout, short.q1, short.p1) + tension_energy(layout.gamma, here.gq, here.qr)
-    energy = add_potential_energy(memory, layout.size, layout.unequal_wells, short.q1, energy)
+    energy = add_potential_energy(memory, layout.size, layout.terms, short.q1, energy)
     instant = _Instant(when, short.q1, short.p1, about, energy)
-    _write(memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums_with(accumulators, here))
+    _write(
+        memory,
+        layout,
+        now.well_sign,
+        tip.law,
+        outputs,
+        sample,
+        instant,
+        _sums_with(layout.terms, accumulators, here),
+    )
     return sample + 1
 
 
@@ -227,9 +243,11 @@ def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, acc
         return sample
     outputs.marks[2] += 1
     energy = modal_energy(memory, layout, step.q1, step.p1) + tension_energy(layout.gamma, done.gq, done.qr)
-    energy = add_potential_energy(memory, layout.size, layout.unequal_wells, step.q1, energy)
+    energy = add_potential_energy(memory, layout.size, layout.terms, step.q1, energy)
     instant = _Instant(when, step.q1, step.p1, seen1, energy)
-    _write(memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums(accumulators))
+    _write(
+        memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums(layout.terms, accumulators)
+    )
     return sample + 1
 
 

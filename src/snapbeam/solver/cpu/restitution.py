@@ -19,7 +19,6 @@ from snapbeam.solver.cpu.recording import record_held, record_instants
 from snapbeam.solver.cpu.state import IntegratorState, StepControl, cut_slot, phase_at
 from snapbeam.solver.cpu.step import Step, observe, prepare, take_step
 from snapbeam.solver.cpu.sticking import PANELS, constraint_force, held_for, hold
-from snapbeam.solver.cpu.terms.second_well import about_level, at_center
 from snapbeam.solver.excitation import seen_from
 from snapbeam.solver.interpolation import cubic, first_upcrossing, root
 from snapbeam.solver.registered_statistics import observe as observe_extras
@@ -31,6 +30,7 @@ from snapbeam.solver.step_control import (
     count_zero_crossings_in_step,
     ticks_of,
 )
+from snapbeam.solver.terms.interface import center_from_divide, seen_from_divide
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["accept_step_restitution", "carry"]
@@ -122,8 +122,8 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
     accumulate_displacement(accumulators, seen, seen1, length)
     # a carried centre moves as the tip does, slowly enough for one cubic
     count_zero_crossings_in_step(
-        accumulators, clock, t, length, about_level(layout.unequal_wells, seen), about_level(layout.unequal_wells, seen1), scratch.inner_samples,
-        at_center(layout.unequal_wells, rest_center), 0, 0.0,
+        accumulators, clock, t, length, seen_from_divide(layout.terms, seen), seen_from_divide(layout.terms, seen1), scratch.inner_samples,
+        center_from_divide(layout.terms, rest_center), 0, 0.0,
     )  # fmt: skip
     observe_extras(kernel_input.extras, accumulators, t * tick, length, seen, seen1, True)
     t += ticks
@@ -470,8 +470,8 @@ def accept_step_restitution(
     accumulate_displacement(accumulators, seen, seen1, step.length)
     if hit or t + step.ticks > contact_event.safe_center:
         count_zero_crossings_in_step(
-            accumulators, clock, t, step.length, about_level(layout.unequal_wells, seen), about_level(layout.unequal_wells, seen1),
-            scratch.inner_samples, at_center(layout.unequal_wells, rest_center), contact_event.pieces, contact_event.piece,
+            accumulators, clock, t, step.length, seen_from_divide(layout.terms, seen), seen_from_divide(layout.terms, seen1),
+            scratch.inner_samples, center_from_divide(layout.terms, rest_center), contact_event.pieces, contact_event.piece,
         )  # fmt: skip
     observe_extras(kernel_input.extras, accumulators, t * tick, step.length, seen, seen1, False)
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from snapbeam.solver.compilation import called, compiled, inlined
 from snapbeam.solver.contact_force import contact_energy, felt_force, is_impulsive
 from snapbeam.solver.cpu.mode_lanes import (
+    WORK_ROWS,
     Layout,
     acceleration_rows,
     beam_energy,
@@ -18,7 +19,6 @@ from snapbeam.solver.cpu.mode_lanes import (
     tension_rows,
 )
 from snapbeam.solver.cpu.step import observe, prepare
-from snapbeam.solver.cpu.terms.base_and_load import changed_load, enter_forces
 from snapbeam.solver.cpu.terms.circuit import disable_long_steps, put_rate
 from snapbeam.solver.cpu.terms.further_contact_events import (
     accumulate_open_further_contacts,
@@ -26,13 +26,6 @@ from snapbeam.solver.cpu.terms.further_contact_events import (
     restart_further_contacts,
 )
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, with_further_contact_energy
-from snapbeam.solver.cpu.terms.second_well import (
-    about_level,
-    above_own_well,
-    add_potential_energy,
-    put,
-    relative_to_nearest_well,
-)
 from snapbeam.solver.excitation import Tip, drive_rate, numbers_of, seen_from
 from snapbeam.solver.physics import tension_energy, tension_factors
 from snapbeam.solver.splitting import TURNS, Stages
@@ -47,6 +40,15 @@ from snapbeam.solver.step_control import (
     clock_of,
     close_impact,
     is_low_energy,
+)
+from snapbeam.solver.terms.interface import (
+    above_nearest_well,
+    add_potential_energy,
+    add_to_tension,
+    enter_well,
+    relative_to_nearest_well,
+    seen_from_divide,
+    update_time_dependent,
 )
 from snapbeam.util.status_codes import RunStatus
 
@@ -213,7 +215,7 @@ def run_of(memory, layout, stages, kernel_input, i):
         numbers_of(kernel_input.drive, kernel_input.drive_numbers, i),
     )
     clock = clock_of(record, kernel_input.max_steps)
-    coefficients, slot = work + 10 * size, (stages.flows + 1) // 2 * 4 * size + 2 * TURNS
+    coefficients, slot = work + WORK_ROWS * size, (stages.flows + 1) // 2 * 4 * size + 2 * TURNS
     step_time = clock.step * clock.tick
     for level in range(clock.finest + 2):
         length, at = 2.0 * step_time / (1 << level), coefficients + level * slot
@@ -250,7 +252,7 @@ def _energies_at(memory, layout, run, well_sign, rows, seen, touching):
     *rows* are the locations of q, p and k.  Modes are those about the well that the beam is near.
     """
     q, p, k = rows
-    near = relative_to_nearest_well(memory, layout.size, layout.unequal_wells, well_sign, q, run.spare)
+    near = relative_to_nearest_well(memory, layout.size, layout.terms, well_sign, run.spare, q)
     force = felt_force(run.struck.law, seen.d, seen.dv) if touching else 0.0
     linear, high, power, high_power = modal_energies(memory, layout, q, near, p, k, force)
     whole = beam_energy(memory, layout, near, p, linear)
@@ -291,12 +293,12 @@ def change_energy_origin(memory, layout, run, now, accumulators, span):
 def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching, landed, sample):
     """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from a landing."""
     q, p, k, r = rows.q, rows.p, rows.k, layout.work + 9 * layout.size
-    enter_forces(layout.forced, memory, run.struck.drive, phase_at(run, t))
+    update_time_dependent(memory, layout.terms, run.struck.drive, phase_at(run, t))
     evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, phase_at(run, t), q, 0.0, False)
     restart_further_contacts(memory, layout.size, layout.others, run.struck.drive, phase_at(run, t), t, q)
     gq, qr = tension_rows(memory, blocks, layout, q, r)
     along_g, along_r = tension_factors(layout.gamma, gq, qr)
-    along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
+    along_g, along_r = add_to_tension(memory, layout.terms, along_g, along_r)
     acceleration_rows(memory, layout, along_g, along_r, r, k)
     tip = seen_from(run.struck, well_sign, run.rest_contact)
     about = observe(memory, layout, tip, phase_at(run, t), q, p)
@@ -305,9 +307,9 @@ def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching
         about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv
     )
     energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
-    energy = add_potential_energy(memory, layout.size, layout.unequal_wells, q, energy)
+    energy = add_potential_energy(memory, layout.size, layout.terms, q, energy)
     low_energy = is_low_energy(
-        above_own_well(layout.unequal_wells, well_sign, energy), layout.gamma, layout.stretch
+        above_nearest_well(layout.terms, well_sign, energy), layout.gamma, layout.stretch
     )
     status = _RUNNING if t < run.clock.end else _OK
     control = StepControl(touching, disable_long_steps(layout.circuit, low_energy), t, t, t, 0)
@@ -328,7 +330,7 @@ def begin(memory, blocks, workspace, kernel_input, i, accumulators):
     if record.well_sign < 0.0:
         for row in range(size):
             memory[layout.g + row] = -memory[layout.g + row]
-    put(memory, size, layout.unequal_wells, record.well_sign)
+    enter_well(memory, size, layout.terms, record.well_sign)
     put_rate(memory, layout.circuit, record.circuit_rate)
     begin_further_contacts(
         memory,
@@ -354,7 +356,7 @@ def begin(memory, blocks, workspace, kernel_input, i, accumulators):
         accumulators.onset = -int(since / run.clock.tick + 0.5)
     begin_statistics(
         accumulators,
-        about_level(layout.unequal_wells, seen).c,
+        seen_from_divide(layout.terms, seen).c,
         seen,
         run.struck.law,
         with_further_contact_energy(memory, layout.others, energy + contact_energy(run.struck.law, seen.d)),
@@ -379,10 +381,10 @@ def change_origin(memory, blocks, layout, well_sign, q, k, r):
     for row in range(layout.size):
         memory[q + row] -= well_sign * memory[layout.shift + row]
         memory[layout.g + row] = -memory[layout.g + row]
-    put(memory, layout.size, layout.unequal_wells, -well_sign)
+    enter_well(memory, layout.size, layout.terms, -well_sign)
     gq, qr = tension_rows(memory, blocks, layout, q, r)
     along_g, along_r = tension_factors(layout.gamma, gq, qr)
-    along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
+    along_g, along_r = add_to_tension(memory, layout.terms, along_g, along_r)
     acceleration_rows(memory, layout, along_g, along_r, r, k)
     return 2.0 * gq + qr
 
@@ -404,7 +406,7 @@ def finish(memory, blocks, layout, run, now, accumulators, impacts, before, goes
         close_energy(memory, layout, run, now, accumulators)
     gq, qr = tension_rows(memory, blocks, layout, q, layout.work + 9 * layout.size)
     stored = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
-    stored = add_potential_energy(memory, layout.size, layout.unequal_wells, q, stored)
+    stored = add_potential_energy(memory, layout.size, layout.terms, q, stored)
     stored = stored + contact_energy(run.struck.law, now.seen.d)
     accumulators.energy = with_further_contact_energy(memory, layout.others, stored)
     accumulators.displacement, accumulators.center = now.seen.w, now.seen.c

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from numba import types
 from numba.extending import overload
 
 from snapbeam.solver.compilation import INLINE_HERE, called, compiled, inlined
@@ -18,19 +19,12 @@ from snapbeam.solver.cpu.mode_lanes import (
     flow_coefficients,
     flow_rows,
     kick_and_flow_rows,
+    kick_row,
     kick_rows,
     modal_energy,
     signals,
     tension_rows,
     tension_rows_twice,
-)
-from snapbeam.solver.cpu.terms.base_and_load import (
-    ExternalWork,
-    changed_load,
-    enter_forces,
-    no_external_work,
-    shaken_along,
-    worked,
 )
 from snapbeam.solver.cpu.terms.circuit import (
     CircuitIncrement,
@@ -43,22 +37,30 @@ from snapbeam.solver.cpu.terms.circuit import (
 )
 from snapbeam.solver.cpu.terms.further_contacts import (
     evaluate_contacts,
-    struck_along,
     with_further_contact_gross_work,
     with_further_contact_work,
 )
-from snapbeam.solver.cpu.terms.second_well import pushed_along
-from snapbeam.solver.excitation import has_axial_load, tip_motion, turned_motion
+from snapbeam.solver.excitation import tip_motion, turned_motion
 from snapbeam.solver.physics import sincos
 from snapbeam.solver.simd import WIDTH, fma, load, store
 from snapbeam.solver.splitting import TURNS
 from snapbeam.solver.step import InnerProducts, Primitives, build_step, rotate_phase
 from snapbeam.solver.step_control import ContactKinematics
+from snapbeam.solver.terms.interface import (
+    ExternalWork,
+    add_acceleration_along,
+    add_to_tension,
+    add_work,
+    does_work,
+    needs_tension_product,
+    no_external_work,
+    update_time_dependent,
+)
 
 __all__ = [
     "Step",
     "StepIncrement",
-    "accumulate_environment_work",
+    "nothing_done",
     "observe",
     "prepare",
     "take_step",
@@ -103,18 +105,16 @@ class StepIncrement(NamedTuple):
     """In the contact."""
     dissipated: float
     external: ExternalWork
-    """Of a moving base and a changing axial load."""
+    """Of the terms."""
     circuit: CircuitIncrement
 
 
 @inlined
-def accumulate_environment_work(forced, accumulators, external):
-    """Enter the work of base and axial load in a step in the statistics."""
-    if forced is None:
-        return
-    accumulators.base_work += external.base
-    accumulators.load_work += external.load
-    accumulators.gross_work += external.gross
+def nothing_done(layout):
+    """The results of no step."""
+    return StepIncrement(
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, no_external_work(layout.terms), no_circuit_increment()
+    )
 
 
 @called
@@ -188,7 +188,7 @@ def _zero(data):
 
 @inlined
 def _begin(data):
-    return data.step.q, (no_external_work(), no_circuit_increment())
+    return data.step.q, (no_external_work(data.layout.terms), no_circuit_increment())
 
 
 @inlined
@@ -281,17 +281,17 @@ def _kick_and_flow(data, stage, q, weight, along_g, along_r, r, force):
 
 
 @inlined
-def _enter_forces(data, stage, weight):
+def _update_terms(data, stage, weight):
     memory, layout, drive, step = data.memory, data.layout, data.tip.drive, data.step
     argument = _argument(data, stage)
-    enter_forces(layout.forced, memory, drive, argument)
+    update_time_dependent(memory, layout.terms, drive, argument)
     q = step.q1 if stage > 0 else step.q
     evaluate_contacts(memory, layout.size, layout.others, drive, argument, q, weight, stage == 0)
 
 
 @inlined
-def _add_axial_load(data, along_g, along_r):
-    return changed_load(data.memory, data.layout.forced, along_g, along_r)
+def _add_to_tension(data, along_g, along_r):
+    return add_to_tension(data.memory, data.layout.terms, along_g, along_r)
 
 
 def _rate_dependent_force(
@@ -310,9 +310,7 @@ def _lossy_force(data, stage, weight, along_g, along_r, penetration, velocity):
     else:
         rate = dot(memory, size, contact, step.p1)
         along = along_g * dot(memory, size, contact, layout.g) + along_r * dot(memory, size, contact, step.r)
-        along = pushed_along(memory, size, layout.unequal_wells, contact, along)
-        along = struck_along(memory, size, layout.others, contact, along)
-        along = shaken_along(memory, size, layout.forced, contact, along)
+        along = add_acceleration_along(memory, size, layout.terms, contact, along)
     mobility = dot(memory, size, contact, contact)
     loss = kick_force(data.tip.law, penetration, velocity - rate, mobility, along, weight)
     return loss.impulse, loss.lost
@@ -342,50 +340,43 @@ def _whole_acceleration(memory, layout, step, stage, along_g, along_r, force, ki
         store(memory, kick + row, fma(force, load(memory, layout.contact + row), k))
 
 
+def _exchange_energy(
+    data: Any, stage: int, weight: float, along_g: float, along_r: float, force: float, surroundings: Any
+) -> Any:
+    """Work of the terms, and the impulse of the circuit, which p1 then includes."""
+    raise TypeError("_exchange_energy runs in compiled code only")
+
+
+@overload(_exchange_energy, jit_options=INLINE_HERE)
+def _exchange_by_layout(data, stage, weight, along_g, along_r, force, surroundings):
+    layout = data.types[data.fields.index("layout")]
+    terms = layout.types[layout.fields.index("terms")]
+    without = layout.types[layout.fields.index("circuit")] == types.none
+    if without and not any(hasattr(each.instance_class, "kick_work") for each in terms):
+        return lambda data, stage, weight, along_g, along_r, force, surroundings: surroundings
+    return lambda data, stage, weight, along_g, along_r, force, surroundings: _exchange(
+        data, data.layout.circuit, stage, weight, along_g, along_r, force, surroundings
+    )
+
+
 @inlined
-def _exchange(data, forced, circuit, stage, weight, along_g, along_r, force, surroundings):
-    """Work of base and load, and the impulse of the circuit, which p1 then includes."""
-    if forced is None:
-        if circuit is None:
-            return surroundings
+def _exchange(data, circuit, stage, weight, along_g, along_r, force, surroundings):
     memory, layout, step = data.memory, data.layout, data.step
     size, p = layout.size, step.p if stage == 0 else step.p1
     work, tap = surroundings
-    kick = _row_of_kick(forced, circuit)
+    kick = kick_row(layout)
     _whole_acceleration(memory, layout, step, stage, along_g, along_r, force, kick)
     if circuit is not None:
-        tap = tap_of(memory, size, circuit, circuit.own, p, weight, tap)
-        if forced is not None:
-            lean_kick(memory, size, circuit, weight, tap)
-    if forced is not None:
-        if stage == 0 and has_axial_load(data.tip.drive):
+        tap = tap_of(memory, size, circuit, circuit.own, p, kick, weight, tap)
+        if does_work(layout.terms):
+            lean_kick(memory, size, circuit, kick, weight, tap)
+    if does_work(layout.terms):
+        if stage == 0 and needs_tension_product(layout.terms):
             tension_rows(memory, data.blocks, layout, step.q, step.r)
-        work = worked(memory, size, forced, weight, layout.g, step.r, kick, p, work)
+        work = add_work(memory, size, layout.terms, weight, layout.g, step.r, kick, p, work)
     if circuit is not None:
         apply_tap(memory, size, circuit, circuit.own, p, step.p1, tap)
     return work, tap
-
-
-@inlined
-def _row_of_kick(forced, circuit):
-    if circuit is None:
-        return _row_of_forces(forced)
-    return circuit.kick
-
-
-@inlined
-def _row_of_forces(forced):
-    if forced is None:
-        return 0
-    return forced.kick
-
-
-@inlined
-def _exchange_energy(data, stage, weight, along_g, along_r, force, surroundings):
-    layout = data.layout
-    return _exchange(
-        data, layout.forced, layout.circuit, stage, weight, along_g, along_r, force, surroundings
-    )
 
 
 _STEP = build_step(
@@ -397,8 +388,8 @@ _STEP = build_step(
         form_products=_form_products,
         where_closed=_where_closed,
         kick_and_flow=_kick_and_flow,
-        enter_forces=_enter_forces,
-        add_axial_load=_add_axial_load,
+        update_terms=_update_terms,
+        add_to_tension=_add_to_tension,
         rate_dependent_force=_rate_dependent_force,
         exchange_energy=_exchange_energy,
     )

@@ -20,7 +20,6 @@ from snapbeam.solver.cpu.integrate import propose_step, store_state
 from snapbeam.solver.cpu.mode_lanes import acceleration_rows, flow_rows, kick_rows, tension_rows
 from snapbeam.solver.cpu.state import Workspace, begin, cut_slot, finish
 from snapbeam.solver.cpu.step import prepare, take_step
-from snapbeam.solver.cpu.terms.base_and_load import changed_load, enter_forces
 from snapbeam.solver.cpu.terms.further_contacts import (
     kick_tangent_by_further_contacts,
     linearise_further_contacts,
@@ -29,6 +28,7 @@ from snapbeam.solver.cpu.terms.further_contacts import (
 from snapbeam.solver.excitation import seen_from, tip_motion
 from snapbeam.solver.physics import tension_factors
 from snapbeam.solver.simd import WIDTH, fma, load, store
+from snapbeam.solver.terms.interface import add_to_tension, update_time_dependent
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["TANGENT_ROWS", "integrate_tangent"]
@@ -68,8 +68,8 @@ def carry_tangents(memory, blocks, workspace, run, tip, step, first, count):
         gq, qr = tension_rows(memory, blocks, layout, q, r)
         along_g, along_r = tension_factors(layout.gamma, gq, qr)
         at = step.phase + memory[stages.elapsed + stage] * step.length * tip.drive.omega
-        enter_forces(layout.forced, memory, tip.drive, at)
-        along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
+        update_time_dependent(memory, layout.terms, tip.drive, at)
+        along_g, along_r = add_to_tension(memory, layout.terms, along_g, along_r)
         force, slope = 0.0, 0.0
         if step.touching:
             now = step.phase + memory[stages.elapsed + stage] * step.length * tip.drive.omega

@@ -38,21 +38,21 @@ _TWO_PI = 2.0 * math.pi
 # What a pass through a step is for.
 _WHOLE, _CUT, _DEEPEST = 0, 1, 2
 
-_first_entry, _count_in_step, _entry_again = (
+_first_contact_onset, _count_zero_crossings_in_step, _refine_onset = (
     shared(first_contact_onset),
     shared(count_zero_crossings_in_step),
     shared(refine_onset),
 )
-_finish_impact, _track, _track_energy, _track_other_well = (
+_close_impact, _accumulate_displacement, _accumulate_energy, _begin_other_well = (
     shared(close_impact),
     shared(accumulate_displacement),
     shared(accumulate_energy),
     shared(begin_other_well),
 )
 _time_beyond = shared(time_beyond)
-_safe_for, _is_quiet, _ticks_of = shared(safe_interval), shared(is_low_energy), shared(ticks_of)
+_safe_interval, _is_low_energy, _ticks_of = shared(safe_interval), shared(is_low_energy), shared(ticks_of)
 _flight_level, _contact_level, _seen_from = shared(flight_level), shared(contact_level), shared(seen_from)
-_first_fall, _turning_point, _widened = (
+_first_downcrossing, _turning_point, _update_extrema = (
     shared(first_downcrossing),
     shared(turning_point),
     shared(update_extrema),
@@ -60,7 +60,7 @@ _first_fall, _turning_point, _widened = (
 
 
 class Taken(NamedTuple):
-    """A step that was taken: what it gave, where it was cut and how it was looked into."""
+    """A step: its results, where it was cut, and the samples inside it."""
 
     own: Standing
     seen: ContactKinematics
@@ -79,14 +79,14 @@ class Taken(NamedTuple):
     gross: float
 
 
-def _watching(functions: Functions) -> tuple[Any, Any, Any]:
+def _look_ahead_functions(functions: Functions) -> tuple[Any, Any, Any]:
     """Device functions of what is watched for: a change of well, how long nothing can happen, what is in a step."""
     sum_four, tension = functions.sum_four, functions.tension
     sample_inside_step, flow_into = functions.sample_inside_step, functions.flow_into
     energies = energies_function(functions)
 
     @device
-    def home_again(block, fixed, held, accumulators):
+    def change_well(block, fixed, held, accumulators):
         """The other well becomes the origin, if the centre has crossed over; see change_well.
 
         Returns the state, the well, and the tick at which the energy was last looked at.
@@ -96,19 +96,19 @@ def _watching(functions: Functions) -> tuple[Any, Any, Any]:
             return own, well_sign, held.energy_tick
         pressed, seen = held.touching, held.seen
         linear, high, power, high_power = energies(block, fixed, own, seen, pressed)
-        if block.lane == 0:
+        if block.lane == 0 and fixed.high:
             span = (held.t - held.energy_tick) * fixed.clock.tick
-            _track_energy(accumulators, linear, high, power, high_power, span)
+            _accumulate_energy(accumulators, linear, high, power, high_power, span)
         q, well_sign = own.q - well_sign * fixed.shift, -well_sign
         g, r = well_sign * fixed.g, tension(block, q)
         gq, qr, _, _ = sum_four(block, g * q, r * q, 0.0, 0.0)
         along_g, along_r = tension_factors(fixed.gamma, gq, qr)
         own = Standing(q, own.p, tension_acceleration(along_g, along_r, g, r), gq, qr)
         linear, high, power, high_power = energies(block, fixed, own, seen, pressed)
-        if block.lane == 0:
+        if block.lane == 0 and fixed.high:
             crossing = accumulators.last_zero_crossing
             span = _time_beyond(held.t * fixed.clock.tick, crossing, fixed.step_time)
-            _track_other_well(accumulators, linear, high, power, high_power, span)
+            _begin_other_well(accumulators, linear, high, power, high_power, span)
         return own, well_sign, held.t
 
     @device
@@ -126,10 +126,10 @@ def _watching(functions: Functions) -> tuple[Any, Any, Any]:
                 mode.center * own.k,
             )
             if after > safe_gap:
-                safe = _safe_for(-held.seen.d, gap_bound, fixed.tip_speed, gap_push, fixed.step_time)
+                safe = _safe_interval(-held.seen.d, gap_bound, fixed.tip_speed, gap_push, fixed.step_time)
                 safe_gap = held.t + int(safe / clock.tick)
             if after > safe_center:
-                safe = _safe_for(abs(held.seen.c), center_bound, 0.0, center_push, fixed.step_time)
+                safe = _safe_interval(abs(held.seen.c), center_bound, 0.0, center_push, fixed.step_time)
                 safe_center = held.t + int(safe / clock.tick)
         return safe_gap, safe_center
 
@@ -147,15 +147,15 @@ def _watching(functions: Functions) -> tuple[Any, Any, Any]:
         sample_inside_step(block, fixed.mode, tip, look, pieces, piece, phase, own.q, own.p, own.k, k1)
         return pieces, piece
 
-    return home_again, safe_until, inner_samples
+    return change_well, safe_until, inner_samples
 
 
-def _taking(functions: Functions, safe_until: Any, inner_samples: Any) -> Any:
+def _step_and_cut_function(functions: Functions, safe_until: Any, inner_samples: Any) -> Any:
     """The device function that takes a step and cuts it short."""
     observe, take_step, prepare = functions.observe, functions.take_step, functions.prepare
 
     @device
-    def taken(block, fixed, held, own, well_sign, span, slot, phase):
+    def take_and_cut_step(block, fixed, held, own, well_sign, span, slot, phase):
         """Take a step, cut it short at an event, and look for the deepest point: one text for all three."""
         clock, seen, touching = fixed.clock, held.seen, held.touching
         tip = _seen_from(fixed.struck, well_sign, fixed.rest_contact)
@@ -192,14 +192,16 @@ def _taking(functions: Functions, safe_until: Any, inner_samples: Any) -> Any:
                     if seen1.d <= 0.0:
                         event = True
                         if seen.d > 0.0:
-                            cut = max(1, int(_first_fall(seen.d, seen.dv, seen1.d, seen1.dv, length) * span))
+                            cut = max(
+                                1, int(_first_downcrossing(seen.d, seen.dv, seen1.d, seen1.dv, length) * span)
+                            )
                 else:
                     after = held.t + span
                     safe_gap, safe_center = safe_until(block, fixed, held, own, after)
                     if after > min(safe_gap, safe_center):
                         pieces, piece = inner_samples(block, fixed, tip, own, k2, phase, span, length)
                         if after > safe_gap:
-                            entry = _first_entry(block.seen, pieces, piece)
+                            entry = _first_contact_onset(block.seen, pieces, piece)
                             if entry >= 0.0:
                                 event, cut = True, min(span, int(entry / tick))
                                 entered = cut < 1
@@ -211,7 +213,7 @@ def _taking(functions: Functions, safe_until: Any, inner_samples: Any) -> Any:
                     continue
             if event and not found:
                 cut, found = (
-                    _entry_again(clock, span, whole, seen1, (clock.step >> clock.finest) * tick),
+                    _refine_onset(clock, span, whole, seen1, (clock.step >> clock.finest) * tick),
                     True,
                 )
                 if cut != span:
@@ -222,7 +224,7 @@ def _taking(functions: Functions, safe_until: Any, inner_samples: Any) -> Any:
                 deepest = max(deepest, seen1.d)
                 turn = _turning_point(seen.d, seen.dv, seen1.d, seen1.dv, length) if seen.dv > 0.0 else -1.0
                 if turn > 0.0 and (
-                    _widened(seen.d, deepest, seen.d, seen.dv, seen1.d, seen1.dv, length)[1] > deepest
+                    _update_extrema(seen.d, deepest, seen.d, seen.dv, seen1.d, seen1.dv, length)[1] > deepest
                 ):
                     here, slot, purpose = turn * length, fixed.cut_slot, _DEEPEST
                     continue
@@ -232,15 +234,15 @@ def _taking(functions: Functions, safe_until: Any, inner_samples: Any) -> Any:
             impulse, work, gross,
         )  # fmt: skip
 
-    return taken
+    return take_and_cut_step
 
 
-def _keeping(functions: Functions) -> tuple[Any, Any]:
+def _acceptance_functions(functions: Functions) -> tuple[Any, Any]:
     """Device functions of what is kept of a step."""
     energies = energies_function(functions)
 
     @device
-    def keep(block, fixed, held, well_sign, step, counted, accumulators):
+    def accumulate_step(block, fixed, held, well_sign, step, counted, accumulators):
         """Enter a step in the statistics; the first thread keeps the record of accumulators."""
         if block.lane == 0:
             if held.touching:
@@ -248,45 +250,45 @@ def _keeping(functions: Functions) -> tuple[Any, Any]:
                 accumulators.work += step.work
                 accumulators.gross_work += step.gross
                 accumulators.deepest = step.deepest
-            _track(accumulators, held.seen, step.seen, step.length)
+            _accumulate_displacement(accumulators, held.seen, step.seen, step.length)
             if counted:
-                _count_in_step(
+                _count_zero_crossings_in_step(
                     accumulators, fixed.clock, held.t, step.length, held.seen, step.seen, block.seen,
                     well_sign * fixed.rest_center, step.pieces, step.piece,
                 )  # fmt: skip
 
     @device
-    def weigh(block, fixed, held, step, t, well_sign, touching, released, status, accumulators):
+    def monitor_energy(block, fixed, held, step, t, well_sign, touching, released, status, accumulators):
         """Add up the energy of the modes; after some steps, or a release, it decides about the next ones."""
         low_energy, own = held.low_energy, step.own
         pressed = touching and not step.event
         linear, high, power, high_power = energies(block, fixed, own, step.seen, pressed)
-        if block.lane == 0:
+        if block.lane == 0 and fixed.high:
             span = (t - held.energy_tick) * fixed.clock.tick
-            _track_energy(accumulators, linear, high, power, high_power, span)
+            _accumulate_energy(accumulators, linear, high, power, high_power, span)
         if not touching and (released or (held.steps & 7) == 0):
             energy = linear + tension_energy(fixed.gamma, own.gq, own.qr)
-            low_energy = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
+            low_energy = _is_low_energy(energy, fixed.gamma, fixed.rest_stretch)
             far = well_sign < 0.0 and step.seen.w > fixed.clock.decide_reach and step.seen.c > 0.0
             if not step.event and far and (held.steps & 15) == 0 and energy < fixed.clock.decide_energy:
                 status = _EARLY_STOP
         return low_energy, t, status
 
-    return keep, weigh
+    return accumulate_step, monitor_energy
 
 
 def step_function(functions: Functions) -> Any:
     """The device function that takes a run one step further."""
-    home_again, safe_until, inner_samples = _watching(functions)
-    taken = _taking(functions, safe_until, inner_samples)
-    keep, weigh = _keeping(functions)
+    change_well, safe_until, inner_samples = _look_ahead_functions(functions)
+    take_and_cut_step = _step_and_cut_function(functions, safe_until, inner_samples)
+    accumulate_step, monitor_energy = _acceptance_functions(functions)
     synchronise = functions.synchronise
 
     @device
-    def further(block, fixed, held, accumulators):
+    def advance_one_step(block, fixed, held, accumulators):
         """The run after one more step."""
         clock = fixed.clock
-        own, well_sign, energy_tick = home_again(block, fixed, held, accumulators)
+        own, well_sign, energy_tick = change_well(block, fixed, held, accumulators)
         steps = held.steps + 1
         level = _flight_level(clock, held.low_energy, 2.0 * own.gq + own.qr, fixed.rest_stretch)
         if held.touching:
@@ -296,7 +298,7 @@ def step_function(functions: Functions) -> Any:
         if held.t + span > clock.end:
             span, slot = clock.end - held.t, fixed.cut_slot
         phase = fixed.phase + _TWO_PI * ((held.t % clock.period) / clock.period)
-        step = taken(block, fixed, held, own, well_sign, span, slot, phase)
+        step = take_and_cut_step(block, fixed, held, own, well_sign, span, slot, phase)
         if step.failed or step.entered:
             status = _DIVERGED if step.failed else _STEP_LIMIT if steps >= clock.max_steps else _RUNNING
             onset = held.t if step.entered else held.onset
@@ -307,7 +309,7 @@ def step_function(functions: Functions) -> Any:
                 step.safe_center, onset, held.deepest, energy_tick, steps, status,
             )  # fmt: skip
         counted = held.touching or held.t + step.span > step.safe_center
-        keep(block, fixed, held, well_sign, step, counted, accumulators)
+        accumulate_step(block, fixed, held, well_sign, step, counted, accumulators)
         t, seen = held.t + step.span, step.seen
         status = _RUNNING if t < clock.end else _OK
         touching, onset, deepest = held.touching != step.event, held.onset, step.deepest
@@ -317,7 +319,7 @@ def step_function(functions: Functions) -> Any:
             safe_gap, safe_center = t, t
             if held.touching:
                 if block.lane == 0:
-                    _finish_impact(accumulators, None, 0, fixed.struck.law, t, clock.tick)
+                    _close_impact(accumulators, None, 0, fixed.struck.law, t, clock.tick)
                 deepest = 0.0
                 seen = ContactKinematics(seen.w, seen.wv, min(seen.d, 0.0), seen.dv, seen.c, seen.cv)
             else:
@@ -328,7 +330,7 @@ def step_function(functions: Functions) -> Any:
             held.t, held.well_sign, held.own, held.seen, held.touching, held.low_energy, held.safe_gap, held.safe_center,
             held.onset, held.deepest, energy_tick, steps, held.status,
         )  # fmt: skip
-        low_energy, energy_tick, status = weigh(
+        low_energy, energy_tick, status = monitor_energy(
             block, fixed, counting, step, t, well_sign, touching, released, status, accumulators
         )
         if counted and clock.decide_crossings >= 0:
@@ -353,4 +355,4 @@ def step_function(functions: Functions) -> Any:
             status,
         )
 
-    return further
+    return advance_one_step

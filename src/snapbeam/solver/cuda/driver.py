@@ -150,18 +150,18 @@ class _Launch:
         """What blocks keep of their own: marks and state of the run laid down, and work arrays."""
         from numba import cuda
 
-        from snapbeam.solver.cuda.integrate import DeviceKept, DeviceRoom
+        from snapbeam.solver.cuda.integrate import DeviceState, DeviceWorkspace
 
         threads, blocks = self.structure.threads, self.blocks
         distinct = (COMPOSITIONS[self.ensemble.order].flow.size + 1) // 2
         flows = (self.finest + 3) * distinct + 2
-        kernel_output = DeviceKept(
+        kernel_output = DeviceState(
             cuda.to_device(np.full(blocks, -1, dtype=np.int64)),
             cuda.to_device(np.zeros((blocks, MARKS), dtype=np.int64)),
             cuda.to_device(np.zeros((blocks, KEPT))),
             cuda.device_array((blocks, 3, threads), dtype=np.float64),
         )
-        work = DeviceRoom(
+        work = DeviceWorkspace(
             cuda.device_array((blocks, flows, 4, threads), dtype=np.float64),
             cuda.device_array((blocks, self.finest + 3, 2, TURNS), dtype=np.float64),
             cuda.device_array((blocks, self.pieces + 1, 4), dtype=np.float64),
@@ -172,11 +172,11 @@ class _Launch:
         """The columns of the runs *which*, their queue, and where their results go."""
         from numba import cuda
 
-        from snapbeam.solver.cuda.integrate import DeviceAsked
+        from snapbeam.solver.cuda.integrate import DeviceInput
 
         ensemble = self.ensemble
         law, drive = ensemble.law.numbers_type(), ensemble.drive.numbers_type()
-        kernel_input = DeviceAsked(
+        kernel_input = DeviceInput(
             runs=cuda.to_device(np.ascontiguousarray(ensemble.runs[which]).view(np.recarray)),
             law_numbers=cuda.to_device(np.ascontiguousarray(ensemble.law_numbers[which])),
             drive_numbers=cuda.to_device(np.ascontiguousarray(ensemble.drive_numbers[which])),
@@ -187,6 +187,7 @@ class _Launch:
             gamma=float(ensemble.structure.nonlinear_stiffness),
             stretch=float(ensemble.structure.stretch),
             max_steps=ensemble.max_steps,
+            high=bool(ensemble.structure.high_modes(ensemble.high_omega).any()),
         )
         return (
             kernel_input,

@@ -26,13 +26,13 @@ from snapbeam.solver.ensemble import RUN
 from snapbeam.solver.statistics import empty_accumulators
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = ["DeviceAsked", "DeviceKept", "DeviceRoom", "integrate_kernel", "signature"]
+__all__ = ["DeviceInput", "DeviceState", "DeviceWorkspace", "integrate_kernel", "signature"]
 
 
 _RUNNING = int(RunStatus.INTERRUPTED)
 
 
-class DeviceAsked(NamedTuple):
+class DeviceInput(NamedTuple):
     """What is asked of the runs of an ensemble, on the device."""
 
     runs: Any
@@ -45,10 +45,12 @@ class DeviceAsked(NamedTuple):
     gamma: float
     stretch: float
     max_steps: int
+    high: bool
+    """Whether some modes count as high."""
 
 
-class DeviceKept(NamedTuple):
-    """What blocks keep of the runs they laid down."""
+class DeviceState(NamedTuple):
+    """What blocks keep of the runs that they interrupted."""
 
     slots: Any
     """Run of each block, or -1."""
@@ -57,7 +59,7 @@ class DeviceKept(NamedTuple):
     modes: Any
 
 
-class DeviceRoom(NamedTuple):
+class DeviceWorkspace(NamedTuple):
     """What blocks work in."""
 
     flows: Any
@@ -69,8 +71,10 @@ class DeviceRoom(NamedTuple):
 def integrate_kernel(order: int, threads: int, columns: int, finest: int, warps: int = RESIDENT_WARPS) -> Any:
     """The kernel for a composition, a number of threads, of coupled modes (at most) and of halvings."""
     step_functions = functions(order, threads, columns)
-    fixed_of, begin, restore_state, lay_down, finish = run_functions(step_functions, threads, finest)
-    further, synchronise = step_function(step_functions), step_functions.synchronise
+    run_constants_of, begin, restore_state, save_state, finish = run_functions(
+        step_functions, threads, finest
+    )
+    advance_one_step, synchronise = step_function(step_functions), step_functions.synchronise
     stride, partial, scratch = stride_of(threads), 4 * PARTS, 2 * threads + columns
     sums = 4 * stride
 
@@ -121,7 +125,7 @@ def integrate_kernel(order: int, threads: int, columns: int, finest: int, warps:
                     break
                 run = queue_order[place]
             accumulators = accumulators_of_runs[run]
-            fixed = fixed_of(block, structure, kernel_input, run, fresh)
+            fixed = run_constants_of(block, structure, kernel_input, run, fresh)
             if fresh:
                 held = begin(block, fixed, kernel_input, run, accumulators)
             else:
@@ -129,9 +133,9 @@ def integrate_kernel(order: int, threads: int, columns: int, finest: int, warps:
             synchronise()
             while held.status == _RUNNING and left > 0:
                 left -= 1
-                held = further(block, fixed, held, accumulators)
+                held = advance_one_step(block, fixed, held, accumulators)
             if held.status == _RUNNING:
-                lay_down(block, index, kernel_output, accumulators, held)
+                save_state(block, index, kernel_output, accumulators, held)
             else:
                 finish(block, fixed, held, accumulators)
                 if lane == 0:
@@ -151,12 +155,12 @@ def signature(law: type[ContactLaw], drive: type[Drive]) -> tuple[Any, ...]:
     def table(dimensions: int, kind: Any = np.float64) -> Any:
         return np.zeros((1,) * dimensions, dtype=kind)
 
-    kernel_input = DeviceAsked(
+    kernel_input = DeviceInput(
         np.zeros(1, dtype=RUN), table(2), table(2), table(2), table(3), laws(*[0.0] * len(laws._fields)),
-        drives(*[0.0] * len(drives._fields)), 0.0, 0.0, 0,
+        drives(*[0.0] * len(drives._fields)), 0.0, 0.0, 0, False,
     )  # fmt: skip
-    kernel_output = DeviceKept(table(1, np.int64), table(2, np.int64), table(2), table(3))
-    work = DeviceRoom(table(4), table(4), table(3))
+    kernel_output = DeviceState(table(1, np.int64), table(2, np.int64), table(2), table(3))
+    work = DeviceWorkspace(table(4), table(4), table(3))
     whole = table(1, np.int64)
     arguments = (
         table(2),

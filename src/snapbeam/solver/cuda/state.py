@@ -34,9 +34,9 @@ __all__ = ["Fixed", "Held", "Standing", "energies_function", "run_functions"]
 _OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
 _TWO_PI = 2.0 * math.pi
 
-_finish_impact, _open_book = shared(close_impact), shared(begin_statistics)
-_track_energy = shared(accumulate_energy)
-_clock_of, _seen_from, _is_quiet = shared(clock_of), shared(seen_from), shared(is_low_energy)
+_close_impact, _begin_statistics = shared(close_impact), shared(begin_statistics)
+_accumulate_energy = shared(accumulate_energy)
+_clock_of, _seen_from, _is_low_energy = shared(clock_of), shared(seen_from), shared(is_low_energy)
 
 
 class Fixed(NamedTuple):
@@ -59,6 +59,8 @@ class Fixed(NamedTuple):
     rest_stretch: float
     cut_slot: int
     whole_look: int
+    high: bool
+    """Whether some modes count as high, so that the energy of the modes is added up."""
 
 
 class Standing(NamedTuple):
@@ -104,19 +106,19 @@ def energies_function(functions: Functions) -> Any:
 
 
 def run_functions(functions: Functions, threads: int, finest: int) -> tuple[Any, Any, Any, Any, Any]:
-    """Device functions: fixed_of, begin, take_up, lay_down, finish."""
-    begin, finish = _ends(functions)
-    restore_state, lay_down = _pauses()
+    """Device functions: run_constants_of, begin, restore_state, save_state, finish."""
+    begin, finish = _begin_and_finish_functions(functions)
+    restore_state, save_state = _save_and_restore_functions()
 
-    return _fixing(functions, threads, finest), begin, restore_state, lay_down, finish
+    return _run_constants_function(functions, threads, finest), begin, restore_state, save_state, finish
 
 
-def _fixing(functions: Functions, threads: int, finest: int) -> Any:
+def _run_constants_function(functions: Functions, threads: int, finest: int) -> Any:
     """The device function of what stays the same in a run."""
     prepare, flow_into, distinct = functions.prepare, functions.flow_into, functions.distinct
 
     @device
-    def fixed_of(block, structure, kernel_input, i, fresh):
+    def run_constants_of(block, structure, kernel_input, i, fresh):
         """What stays the same in run *i*; its prepared steps, if it is *fresh*."""
         lane, record = block.lane, kernel_input.runs[i]
         mode = Mode(
@@ -143,19 +145,19 @@ def _fixing(functions: Functions, threads: int, finest: int) -> Any:
         return Fixed(
             struck, clock, record.phase, record.rest_contact, record.rest_center, record.tip_speed,
             finest_look, step_pieces, step_time, mode, structure[4, lane], structure[6, lane],
-            kernel_input.gamma, kernel_input.stretch, finest + 2, whole_look,
+            kernel_input.gamma, kernel_input.stretch, finest + 2, whole_look, kernel_input.high,
         )  # fmt: skip
 
-    return fixed_of
+    return run_constants_of
 
 
-def _ends(functions: Functions) -> tuple[Any, Any]:
+def _begin_and_finish_functions(functions: Functions) -> tuple[Any, Any]:
     """Device functions: how a run begins, and how it ends."""
     sum_one, sum_four, tension = functions.sum_one, functions.sum_four, functions.tension
     observe, energies = functions.observe, energies_function(functions)
 
     @device
-    def tensioned(block, fixed, well_sign, q, p):
+    def with_tension(block, fixed, well_sign, q, p):
         """Return the part of a state that belongs to this thread, with the sums of the tension."""
         g = well_sign * fixed.g
         r = tension(block, q)
@@ -168,7 +170,7 @@ def _ends(functions: Functions) -> tuple[Any, Any]:
         lane, record = block.lane, kernel_input.runs[i]
         q, p = kernel_input.starts[record.start_row, 0, lane], kernel_input.starts[record.start_row, 1, lane]
         well_sign = record.well_sign
-        own = tensioned(block, fixed, well_sign, q, p)
+        own = with_tension(block, fixed, well_sign, q, p)
         tip = _seen_from(fixed.struck, well_sign, fixed.rest_contact)
         about = observe(block, fixed.mode, tip, fixed.phase, q, p)
         seen = ContactKinematics(
@@ -178,13 +180,14 @@ def _ends(functions: Functions) -> tuple[Any, Any]:
         energy = sum_one(block, mode_energy(fixed.mode.omega, q, p)) + tension_energy(
             fixed.gamma, own.gq, own.qr
         )
-        low_energy = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
+        low_energy = _is_low_energy(energy, fixed.gamma, fixed.rest_stretch)
         touching = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
         linear, high, power, high_power = energies(block, fixed, own, seen, touching)
         if lane == 0:
-            _track_energy(accumulators, linear, high, power, high_power, 0.0)
+            if fixed.high:
+                _accumulate_energy(accumulators, linear, high, power, high_power, 0.0)
             accumulators.status, accumulators.touching, accumulators.onset = _RUNNING, int(touching), 0
-            _open_book(
+            _begin_statistics(
                 accumulators,
                 seen.c,
                 seen,
@@ -199,9 +202,10 @@ def _ends(functions: Functions) -> tuple[Any, Any]:
         if block.lane == 0:
             clock, law = fixed.clock, fixed.struck.law
             span = (held.t - held.energy_tick) * clock.tick
-            _track_energy(accumulators, linear, high, power, high_power, span)
+            if fixed.high:
+                _accumulate_energy(accumulators, linear, high, power, high_power, span)
             if held.touching:
-                _finish_impact(accumulators, None, 0, law, held.t, clock.tick)
+                _close_impact(accumulators, None, 0, law, held.t, clock.tick)
             if held.status == _EARLY_STOP:
                 accumulators.early_stop_time = held.t * clock.tick
             accumulators.energy = (
@@ -215,8 +219,8 @@ def _ends(functions: Functions) -> tuple[Any, Any]:
     return begin, finish
 
 
-def _pauses() -> tuple[Any, Any]:
-    """Device functions: a run is taken up where it stood, and laid down."""
+def _save_and_restore_functions() -> tuple[Any, Any]:
+    """Device functions: save a run that is interrupted, and restore it."""
 
     @device
     def restore_state(block, index, kernel_output, accumulators):
@@ -243,7 +247,7 @@ def _pauses() -> tuple[Any, Any]:
         )  # fmt: skip
 
     @device
-    def lay_down(block, index, kernel_output, accumulators, held):
+    def save_state(block, index, kernel_output, accumulators, held):
         lane = block.lane
         own, seen = held.own, held.seen
         (
@@ -269,4 +273,4 @@ def _pauses() -> tuple[Any, Any]:
             accumulators.time, accumulators.status, accumulators.steps = held.t, held.status, held.steps
             accumulators.touching, accumulators.onset = int(held.touching), held.onset
 
-    return restore_state, lay_down
+    return restore_state, save_state

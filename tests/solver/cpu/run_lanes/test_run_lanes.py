@@ -13,7 +13,7 @@ from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.cpu import driver
 from snapbeam.solver.cpu.memory import pack
 from snapbeam.solver.cpu.run_lanes.memory import suits
-from snapbeam.solver.statistics import Statistic, register, statistics_of, unregister
+from snapbeam.solver.statistics import Statistic, register_statistic, statistics_of, unregister_statistic
 from snapbeam.util.status_codes import RunStatus
 
 
@@ -151,13 +151,13 @@ def test_what_it_does_not_serve_goes_to_the_other_layout():
     assert not serves(ensemble(1, cycles=2, contact=sb.PowerLaw(force_at_1um=1.0, exponent=1.4)))
     drive = sb.HalfSine(displacement_amplitude=0.5, duration=0.5)
     assert not serves(ensemble(1, cycles=2, drive=drive))
-    register(
+    register_statistic(
         Statistic("twice", "float64", "1", "a number", lambda reading, held: held, lambda held, step: held)
     )
     try:
         assert not serves(ensemble(1, cycles=2))
     finally:
-        unregister("twice")
+        unregister_statistic("twice")
 
 
 def test_small_work_is_not_worth_another_kernel(monkeypatch):

@@ -16,8 +16,8 @@ from snapbeam.solver.cpu.run_lanes.state import (
     slot_of,
 )
 from snapbeam.solver.cpu.run_lanes.step import (
-    at_hand,
     bounds,
+    load_prepared_step,
     modal_energy,
     modes_of,
     propagate_free,
@@ -67,7 +67,17 @@ from snapbeam.solver.step_control import (
     time_beyond,
 )
 
-__all__ = ["About", "accept", "cut_again", "end_contact", "fetch", "look_at", "meet", "probe", "propose_step"]
+__all__ = [
+    "About",
+    "accept_steps",
+    "detect_contact_events",
+    "detect_deepest_points",
+    "end_contact",
+    "inner_samples_of",
+    "load_flows",
+    "propose_step",
+    "refine_onsets",
+]
 
 
 _CUSTOM = -99.0
@@ -77,7 +87,7 @@ _CUSTOM = -99.0
 @compiled
 def _change_wells(m, n, shape, lane_settings, kernel_input, which):
     """Take the other well as the origin, in some lanes."""
-    well_sign, mask = load(m, at.HOME), mask_of(which)
+    well_sign, mask = load(m, at.WELL_SIGN), mask_of(which)
     if kernel_input.high:
         close_energy(m, shape, kernel_input, n[at.TOUCHING], which)
     for i in range(modes_of(shape)):
@@ -85,7 +95,7 @@ def _change_wells(m, n, shape, lane_settings, kernel_input, which):
         q, well = load(m, mode + at.Q), load(m, mode + at.SEEN_WELL)
         store(m, mode + at.Q, pick(mask, q - well_sign * broadcast_load(m, mode + at.SHIFT), q))
         store(m, mode + at.SEEN_WELL, pick(mask, 0.0 - well, well))
-    store(m, at.HOME, pick(mask, 0.0 - well_sign, well_sign))
+    store(m, at.WELL_SIGN, pick(mask, 0.0 - well_sign, well_sign))
     gq, qr = tension(m, shape, lane_settings.gamma, mask, at.Q)
     store(m, at.STRETCH, pick(mask, 2.0 * gq + qr, load(m, at.STRETCH)))
     if kernel_input.high:
@@ -95,17 +105,17 @@ def _change_wells(m, n, shape, lane_settings, kernel_input, which):
 
 
 @inlined
-def _flight(m, n, lane_settings):
+def _flight_level(m, n, lane_settings):
     """Halvings of the flight step in free flight, or -1."""
     level = splat(0.0)
     if lane_settings.stretch > 0.0:
         far = halvings(vabs(load(m, at.STRETCH)), splat(STRETCHED * lane_settings.stretch))
         level = vmin(vmax(far, level), load(m, at.FINEST))
-    return pick(mask_of(n[at.QUIET]), splat(-1.0), level)
+    return pick(mask_of(n[at.LOW_ENERGY]), splat(-1.0), level)
 
 
 @inlined
-def _in_contact(m, level, touching):
+def _contact_level(m, level, touching):
     """The same of the lanes in contact: graded from the onset and towards the release."""
     dv = load(m, at.DV)
     want = GRADING * ((load(m, at.T) - load(m, at.ONSET)) * load(m, at.TICK))
@@ -120,17 +130,17 @@ def propose_step(m, n, shape, lane_settings, kernel_input):
     """The length of the next step of every lane that begins one; returns those."""
     fresh = n[at.LIVE] & ~(n[at.CUTTING] | n[at.ASIDE] | n[at.PROBED])
     if lane_settings.stretch > 0.0:
-        across = load(m, at.C) * (load(m, at.HOME) * load(m, at.REST_CENTER))
+        across = load(m, at.C) * (load(m, at.WELL_SIGN) * load(m, at.REST_CENTER))
         crossed = bits(less(across, 0.0)) & fresh
         if crossed:
             _change_wells(m, n, shape, lane_settings, kernel_input, crossed)
     which = mask_of(fresh)
     one = pick(which, splat(1.0), splat(0.0))
     store(m, at.STEPS, load(m, at.STEPS) + one)
-    store(m, at.BEAT, load(m, at.BEAT) + one)
-    level = _flight(m, n, lane_settings)
+    store(m, at.STEPS_SINCE_START, load(m, at.STEPS_SINCE_START) + one)
+    level = _flight_level(m, n, lane_settings)
     if n[at.TOUCHING] & fresh:
-        level = _in_contact(m, level, n[at.TOUCHING] & fresh)
+        level = _contact_level(m, level, n[at.TOUCHING] & fresh)
     ticks = load(m, at.STEP) * power_of_two(0.0 - level)
     t, limit = load(m, at.T), load(m, at.LIMIT)
     over = bits(less(limit, t + ticks)) & fresh
@@ -149,19 +159,19 @@ def propose_step(m, n, shape, lane_settings, kernel_input):
 
 
 @compiled
-def _make(m, shape, lane_settings, odd):
+def _prepare_any_length(m, shape, lane_settings, odd):
     """Prepare steps of any length, and have them at hand."""
     while odd:
         lane = lowest(odd)
         odd &= odd - 1
         place = slot_of(lane_settings, lane, at.LEVELS - 1)
         prepare(m, shape, lane_settings, place, m[at.LENGTH + lane], m[at.OMEGA + lane])
-        at_hand(m, shape, place, lane)
+        load_prepared_step(m, shape, place, lane)
         m[at.KEY + lane] = _CUSTOM
 
 
 @inlined
-def fetch(m, n, shape, lane_settings):
+def load_flows(m, n, shape, lane_settings):
     """Have the flows of every lane's step at hand."""
     odd = (n[at.ODD] | n[at.ASIDE]) & n[at.LIVE]
     level, key = load(m, at.LEVEL), load(m, at.KEY)
@@ -169,10 +179,10 @@ def fetch(m, n, shape, lane_settings):
     while other:
         lane = lowest(other)
         other &= other - 1
-        at_hand(m, shape, slot_of(lane_settings, lane, int(m[at.LEVEL + lane])), lane)
+        load_prepared_step(m, shape, slot_of(lane_settings, lane, int(m[at.LEVEL + lane])), lane)
         m[at.KEY + lane] = m[at.LEVEL + lane]
     if odd:
-        _make(m, shape, lane_settings, odd)
+        _prepare_any_length(m, shape, lane_settings, odd)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -191,7 +201,7 @@ class About(NamedTuple):
 
 
 @compiled
-def look_at(m, look, lane, inner_samples):
+def inner_samples_of(m, look, lane, inner_samples):
     """What was seen inside the step of a lane, as the scalar functions have it; returns how many pieces."""
     pieces = int(m[at.LOOK_PIECES + lane])
     for i in range(pieces + 1):
@@ -201,7 +211,7 @@ def look_at(m, look, lane, inner_samples):
 
 
 @inlined
-def _safe(m, shape, late, early_center):
+def _update_safe_intervals(m, shape, late, early_center):
     """Until when the gap cannot close, and the centre cannot cross, in lanes where that has passed."""
     bound, push, center_bound, center_push = bounds(m, shape)
     t, tick, step_time = load(m, at.T), load(m, at.TICK), load(m, at.STEP_TIME)
@@ -213,7 +223,7 @@ def _safe(m, shape, late, early_center):
 
 
 @inlined
-def _look(m, shape, lane_settings, lookers, with_center):
+def _sample_inside_steps(m, shape, lane_settings, lookers, with_center):
     """Look into the free steps of some lanes; returns where the penetration may have been positive."""
     which, ticks, step = mask_of(lookers), load(m, at.TICKS), load(m, at.STEP)
     length, pieces = load(m, at.LENGTH), load(m, at.PIECES)
@@ -248,7 +258,7 @@ def _cut(m, n, lane, cut):
 
 
 @compiled
-def _leave(m, n, about_d, about_dv, leaving):
+def _cut_at_release(m, n, about_d, about_dv, leaving):
     """Cut the steps in which the penetration falls below zero; returns the lanes whose steps end there as they are."""
     store(m, at.TEMP, about_d)
     store(m, at.TEMP1, about_dv)
@@ -272,14 +282,14 @@ def _leave(m, n, about_d, about_dv, leaving):
 
 
 @compiled
-def _enter(m, n, look, rising, inner_samples):
+def _cut_at_onset(m, n, look, rising, inner_samples):
     """Cut the steps in which the gap closes; returns those that end as they are, and those that touch at once."""
     on, at_once = 0, 0
     while rising:
         lane = lowest(rising)
         rising &= rising - 1
         bit = 1 << lane
-        pieces = look_at(m, look, lane, inner_samples)
+        pieces = inner_samples_of(m, look, lane, inner_samples)
         entry = first_contact_onset(inner_samples, pieces, m[at.LOOK_PIECE + lane])
         if entry < 0.0:
             on |= bit
@@ -299,8 +309,8 @@ def _enter(m, n, look, rising, inner_samples):
 
 
 @inlined
-def meet(m, n, shape, lane_settings, about, whole, inner_samples):
-    """What the steps of the lanes *whole* meet; returns those that end as they are, and those that touch at once."""
+def detect_contact_events(m, n, shape, lane_settings, about, whole, inner_samples):
+    """Contact events in the steps of the lanes *whole*; returns the lanes whose steps end as they are, and those in contact at once."""
     if whole == 0:
         return 0, 0
     touching = whole & n[at.TOUCHING]
@@ -309,25 +319,25 @@ def meet(m, n, shape, lane_settings, about, whole, inner_samples):
     if touching:
         leaving = touching & ~bits(less(0.0, about.d))
         if leaving:
-            ends = (ends & ~leaving) | _leave(m, n, about.d, about.dv, leaving)
+            ends = (ends & ~leaving) | _cut_at_release(m, n, about.d, about.dv, leaving)
     if free:
         after = load(m, at.T) + load(m, at.TICKS)
         late, early = bits(less(load(m, at.SAFE_GAP), after)), bits(less(load(m, at.SAFE_CENTER), after))
         if (late | early) & free:
-            _safe(m, shape, late & free, early & free)
+            _update_safe_intervals(m, shape, late & free, early & free)
             late = bits(less(load(m, at.SAFE_GAP), after)) & free
             early = bits(less(load(m, at.SAFE_CENTER), after)) & free
             if late | early:
-                rising = _look(m, shape, lane_settings, late | early, early != 0) & late
+                rising = _sample_inside_steps(m, shape, lane_settings, late | early, early != 0) & late
                 if rising:
-                    on, at_once = _enter(m, n, lane_settings.look, rising, inner_samples)
+                    on, at_once = _cut_at_onset(m, n, lane_settings.look, rising, inner_samples)
                     ends = (ends & ~rising) | on
     return ends, at_once
 
 
 @compiled
-def cut_again(m, n, kernel_input, d, dv, which):
-    """Cut the steps of lanes once more that enter the contact, where they did not meet it; returns those that do."""
+def refine_onsets(m, n, kernel_input, d, dv, which):
+    """Cut the steps of lanes once more that enter the contact, where their ends missed the onset; returns those lanes."""
     store(m, at.TEMP, d)
     store(m, at.TEMP1, dv)
     again = 0
@@ -347,7 +357,7 @@ def cut_again(m, n, kernel_input, d, dv, which):
 
 
 @compiled
-def probe(m, n, d, dv, turning):
+def detect_deepest_points(m, n, d, dv, turning):
     """Lanes whose contact is deepest inside the step at hand: a pass of theirs goes there first; returns those."""
     store(m, at.TEMP, d)
     store(m, at.TEMP1, dv)
@@ -371,7 +381,7 @@ def probe(m, n, d, dv, turning):
 
 
 @compiled
-def _widen(m, low, high, u0, v0, which):
+def _extend_by_turning_points(m, low, high, u0, v0, which):
     """Widen the extremes of some lanes by cubics that pass their ends; those are at the end of the step in TEMP."""
     while which:
         lane = lowest(which)
@@ -383,7 +393,7 @@ def _widen(m, low, high, u0, v0, which):
 
 
 @inlined
-def _extremes(m, low, high, u0, v0, u1, v1, length, which):
+def _accumulate_extremes(m, low, high, u0, v0, u1, v1, length, which):
     before, rate = load(m, u0), load(m, v0)
     lesser, greater = vmin(before, u1), vmax(before, u1)
     swell = hermite_overshoot_bound(rate, v1, length)
@@ -396,7 +406,7 @@ def _extremes(m, low, high, u0, v0, u1, v1, length, which):
     if turning:
         store(m, at.TEMP, u1)
         store(m, at.TEMP1, v1)
-        _widen(m, low, high, u0, v0, turning)
+        _extend_by_turning_points(m, low, high, u0, v0, turning)
 
 
 @inlined
@@ -405,10 +415,10 @@ def _add(m, row, which, more):
 
 
 @inlined
-def _track(m, seen1, length, which):
+def _accumulate_displacement(m, seen1, length, which):
     """Extremes and mean squares, as :func:`~snapbeam.solver.step_control.accumulate_displacement` keeps them."""
-    _extremes(m, at.MIN_W, at.MAX_W, at.W, at.WV, seen1.w, seen1.wv, length, which)
-    _extremes(m, at.MIN_C, at.MAX_C, at.C, at.CV, seen1.c, seen1.cv, length, which)
+    _accumulate_extremes(m, at.MIN_W, at.MAX_W, at.W, at.WV, seen1.w, seen1.wv, length, which)
+    _accumulate_extremes(m, at.MIN_C, at.MAX_C, at.C, at.CV, seen1.c, seen1.cv, length, which)
     mask = mask_of(which)
     peak, center_peak = load(m, at.PEAK_WV), load(m, at.PEAK_CV)
     store(m, at.PEAK_WV, pick(mask, vmax(peak, vabs(seen1.wv)), peak))
@@ -422,7 +432,9 @@ def _track(m, seen1, length, which):
 
 
 @compiled
-def _count(m, n, lane_settings, kernel_input, accumulators_of_runs, c1, cv1, which, inner_samples):
+def _count_zero_crossings(
+    m, n, lane_settings, kernel_input, accumulators_of_runs, c1, cv1, which, inner_samples
+):
     """Count the crossings of the centre in the steps of some lanes."""
     store(m, at.TEMP, c1)
     store(m, at.TEMP1, cv1)
@@ -433,20 +445,23 @@ def _count(m, n, lane_settings, kernel_input, accumulators_of_runs, c1, cv1, whi
         accumulators, clock = accumulators_of_runs[i], clock_of(kernel_input.runs[i], kernel_input.max_steps)
         pieces = 0
         if not n[at.TOUCHING] & (1 << lane):
-            pieces = look_at(m, lane_settings.look, lane, inner_samples)
+            pieces = inner_samples_of(m, lane_settings.look, lane, inner_samples)
         seen = ContactKinematics(0.0, 0.0, 0.0, 0.0, m[at.C + lane], m[at.CV + lane])
         seen1 = ContactKinematics(0.0, 0.0, 0.0, 0.0, m[at.TEMP + lane], m[at.TEMP1 + lane])
-        rest = m[at.HOME + lane] * m[at.REST_CENTER + lane]
+        rest = m[at.WELL_SIGN + lane] * m[at.REST_CENTER + lane]
         start, length, piece = int(m[at.T + lane]), m[at.LENGTH + lane], m[at.LOOK_PIECE + lane]
         count_zero_crossings_in_step(
             accumulators, clock, start, length, seen, seen1, inner_samples, rest, pieces, piece
         )
-        m[at.SIDE + lane], m[at.LATE + lane] = accumulators.side, accumulators.zero_crossings_last_quarter
+        m[at.SIDE + lane], m[at.CROSSINGS_LAST_QUARTER + lane] = (
+            accumulators.side,
+            accumulators.zero_crossings_last_quarter,
+        )
         m[at.CROSSING + lane] = accumulators.last_zero_crossing
 
 
 @inlined
-def _crossings(
+def _accumulate_zero_crossings(
     m, n, lane_settings, kernel_input, accumulators_of_runs, seen1, length, after, which, inner_samples
 ):
     """Where the centre may have crossed, have it counted."""
@@ -457,7 +472,7 @@ def _crossings(
         clear = vmin(side * load(m, at.C), side * seen1.c)
         near |= touching & ~bits(less(hermite_overshoot_bound(load(m, at.CV), seen1.cv, length), clear))
     if near:
-        _count(
+        _count_zero_crossings(
             m, n, lane_settings, kernel_input, accumulators_of_runs, seen1.c, seen1.cv, near, inner_samples
         )
 
@@ -472,8 +487,8 @@ def end_contact(m, kernel_input, i, lane, accumulators, end):
 
 
 @compiled
-def _events(m, n, kernel_input, accumulators_of_runs, which):
-    """Contacts that begin and end where their lanes stand now."""
+def _begin_and_end_contacts(m, n, kernel_input, accumulators_of_runs, which):
+    """Contacts that begin and end where their lanes are now."""
     n[at.TOUCHING] ^= which
     while which:
         lane = lowest(which)
@@ -495,9 +510,9 @@ def _every(steps, share, many):
 
 
 @inlined
-def _weigh(m, n, shape, lane_settings, kernel_input, law, seen1, released, events, which):
+def _monitor_energy(m, n, shape, lane_settings, kernel_input, law, seen1, released, events, which):
     """After some steps, or a release, look at the energy; returns the lanes whose future is certain."""
-    steps_since_start = load(m, at.BEAT)
+    steps_since_start = load(m, at.STEPS_SINCE_START)
     due = (released | _every(steps_since_start, 0.125, 8.0)) & which
     linear = splat(0.0)
     if kernel_input.high:
@@ -510,9 +525,9 @@ def _weigh(m, n, shape, lane_settings, kernel_input, law, seen1, released, event
     apart = due & ~n[at.TOUCHING]
     energy = linear + tension_energy(lane_settings.gamma, load(m, at.GQ), load(m, at.QR))
     low_energy = bits(less(energy, low_energy_limit(lane_settings.gamma, lane_settings.stretch)))
-    n[at.QUIET] = (n[at.QUIET] & ~apart) | (low_energy & apart)
+    n[at.LOW_ENERGY] = (n[at.LOW_ENERGY] & ~apart) | (low_energy & apart)
     sixteenth = _every(steps_since_start, 0.0625, 16.0)
-    sure = apart & ~events & sixteenth & bits(less(load(m, at.HOME), 0.0))
+    sure = apart & ~events & sixteenth & bits(less(load(m, at.WELL_SIGN), 0.0))
     if sure:
         sure &= bits(less(load(m, at.DECIDE_REACH), seen1.w)) & bits(less(0.0, seen1.c))
         sure &= bits(less(energy, load(m, at.DECIDE_ENERGY)))
@@ -520,12 +535,12 @@ def _weigh(m, n, shape, lane_settings, kernel_input, law, seen1, released, event
 
 
 @inlined
-def accept(
+def accept_steps(
     m, n, shape, lane_settings, kernel_input, accumulators_of_runs, law, about, contact, which, inner_samples
 ):
     """Accept the steps of the lanes *which*; returns those that are decided."""
     mask, length = mask_of(which), load(m, at.LENGTH)
-    well_sign = load(m, at.HOME)
+    well_sign = load(m, at.WELL_SIGN)
     seen1 = ContactKinematics(
         about.w + well_sign * load(m, at.REST_CONTACT), about.wv, about.d, about.dv,
         about.c + well_sign * load(m, at.REST_CENTER), about.cv,
@@ -538,10 +553,10 @@ def accept(
         _add(m, at.IMPULSE, pressed, contact.impulse)
         _add(m, at.WORK, pressed, contact.work)
         _add(m, at.GROSS, pressed, contact.gross)
-    _track(m, seen1, length, which)
+    _accumulate_displacement(m, seen1, length, which)
     ticks, period = load(m, at.TICKS), load(m, at.PERIOD)
     after = load(m, at.T) + ticks
-    _crossings(
+    _accumulate_zero_crossings(
         m, n, lane_settings, kernel_input, accumulators_of_runs, seen1, length, after, which, inner_samples
     )
     store(m, at.T, pick(mask, after, load(m, at.T)))
@@ -552,12 +567,12 @@ def accept(
     events = n[at.EVENT] & which
     released = events & touching
     if events:
-        _events(m, n, kernel_input, accumulators_of_runs, events)
+        _begin_and_end_contacts(m, n, kernel_input, accumulators_of_runs, events)
     for bit in (at.CUTTING, at.EVENT, at.LOOKS, at.PROBED):
         n[bit] &= ~which
-    sure = _weigh(m, n, shape, lane_settings, kernel_input, law, seen1, released, events, which)
+    sure = _monitor_energy(m, n, shape, lane_settings, kernel_input, law, seen1, released, events, which)
     many = load(m, at.DECIDE_CROSSINGS)
-    sure |= bits(less(-0.5, many)) & bits(less(many, load(m, at.LATE))) & which
+    sure |= bits(less(-0.5, many)) & bits(less(many, load(m, at.CROSSINGS_LAST_QUARTER))) & which
     for i in range(modes_of(shape)):
         mode = at.MODE + i * at.MODE_ROWS
         for field in range(at.Q, at.K + WIDTH, WIDTH):

@@ -15,15 +15,15 @@ from snapbeam.solver.contact_force import contact_energy
 from snapbeam.solver.cpu.run_lanes import layout as at
 from snapbeam.solver.cpu.run_lanes.control import (
     About,
-    accept,
-    cut_again,
+    accept_steps,
+    detect_contact_events,
+    detect_deepest_points,
     end_contact,
-    fetch,
-    meet,
-    probe,
+    load_flows,
     propose_step,
+    refine_onsets,
 )
-from snapbeam.solver.cpu.run_lanes.state import close_energy, seat
+from snapbeam.solver.cpu.run_lanes.state import begin_run, close_energy
 from snapbeam.solver.cpu.run_lanes.step import beam_signals, modal_energy, signals, take_step, tension
 from snapbeam.solver.excitation import numbers_of
 from snapbeam.solver.physics import shaker_motion, sincos, tension_energy
@@ -53,7 +53,7 @@ _DIVERGED, _STEP_LIMIT = int(RunStatus.DIVERGED), int(RunStatus.STEP_LIMIT)
 @inlined
 def _observe(m, shape):
     """What is seen at the ends of the steps."""
-    well_sign = load(m, at.HOME)
+    well_sign = load(m, at.WELL_SIGN)
     offset = load(m, at.OFFSET) + (1.0 - well_sign) * load(m, at.REST_CONTACT)
     omega = load(m, at.OMEGA)
     sine, cosine = sincos(load(m, at.PHASE) + omega * load(m, at.LENGTH))
@@ -122,7 +122,7 @@ def _begin_at_once(m, n, accumulators_of_runs, which):
 def _pass(m, n, shape, lane_settings, kernel_input, accumulators_of_runs, inner_samples):
     """A step of every lane; returns the lanes that are not finite, decided, over, and at their limit of steps."""
     fresh = propose_step(m, n, shape, lane_settings, kernel_input)
-    fetch(m, n, shape, lane_settings)
+    load_flows(m, n, shape, lane_settings)
     live = n[at.LIVE]
     touching = n[at.TOUCHING] & live
     law = lanes_tuple(kernel_input.law, m, at.LAW)
@@ -141,20 +141,20 @@ def _pass(m, n, shape, lane_settings, kernel_input, accumulators_of_runs, inner_
     failed = going & ~bits(less(vabs(about.d + about.dv), math.inf))
     going &= ~failed
     looks = n[at.LOOKS] & n[at.CUTTING] & going
-    ends, at_once = meet(m, n, shape, lane_settings, about, fresh & going, inner_samples)
+    ends, at_once = detect_contact_events(m, n, shape, lane_settings, about, fresh & going, inner_samples)
     going = (going & ~fresh) | ends
     if looks:
-        going &= ~cut_again(m, n, kernel_input, about.d, about.dv, looks)
+        going &= ~refine_onsets(m, n, kernel_input, about.d, about.dv, looks)
     if at_once:
         _begin_at_once(m, n, accumulators_of_runs, at_once)
     pressed = going & n[at.TOUCHING] & ~n[at.PROBED]
     if pressed:
         turning = bits(less(load(m, at.DV) * about.dv, 0.0)) & bits(less(0.0, load(m, at.DV))) & pressed
         if turning:
-            going &= ~probe(m, n, about.d, about.dv, turning)
+            going &= ~detect_deepest_points(m, n, about.d, about.dv, turning)
     sure, over = 0, 0
     if going:
-        sure = accept(
+        sure = accept_steps(
             m,
             n,
             shape,
@@ -186,10 +186,10 @@ def integrate_run_lanes(m, n, shape, lane_settings, kernel_input, which, scratch
         # lanes that stay empty integrate what the first run begins with, unseen
         i = which[min(lane, which.size - 1)]
         if lane < which.size:
-            seat(m, n, shape, lane_settings, kernel_input, lane, i, accumulators_of_runs[i])
+            begin_run(m, n, shape, lane_settings, kernel_input, lane, i, accumulators_of_runs[i])
             following += 1
         else:
-            seat(m, n, shape, lane_settings, kernel_input, lane, i, spare[0])
+            begin_run(m, n, shape, lane_settings, kernel_input, lane, i, spare[0])
             n[at.LIVE] &= ~(1 << lane)
     while n[at.LIVE]:
         if kernel_output.stop_flag[0] != 0:
@@ -214,7 +214,7 @@ def integrate_run_lanes(m, n, shape, lane_settings, kernel_input, which, scratch
             if following < which.size:
                 i = which[following]
                 following += 1
-                seat(m, n, shape, lane_settings, kernel_input, lane, i, accumulators_of_runs[i])
+                begin_run(m, n, shape, lane_settings, kernel_input, lane, i, accumulators_of_runs[i])
     live = n[at.LIVE]
     while live:
         lane = lowest(live)

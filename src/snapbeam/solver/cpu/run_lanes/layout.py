@@ -1,4 +1,4 @@
-"""Where in memory things stand: a row is eight numbers, one of each of the eight runs that are integrated side by side.
+"""Places in memory: a row is eight numbers, one of each of the eight runs that are integrated side by side.
 
 Addresses are the same for every number of modes, so that compiled code has them as constants.
 """
@@ -24,10 +24,10 @@ FLOWS = 6
 
 # Of each run:
 (
-    T, WITHIN, PERIOD, TICK, LANDING, LIMIT, END, TICKS, LENGTH, KEY, WHOLE, LEVEL, PHASE0, PHASE, SINE, COSINE, HOME,
+    T, WITHIN, PERIOD, TICK, LANDING, LIMIT, END, TICKS, LENGTH, KEY, WHOLE, LEVEL, PHASE0, PHASE, SINE, COSINE, WELL_SIGN,
     STRETCH, OFFSET, OMEGA, AMPLITUDE, REST_CONTACT, REST_CENTER, TIP_SPEED, STEP_TIME, STEP, COARSEST,
     COARSE_TICKS, FINEST, PIECES, LOOK_KEY, FINEST_LOOK, LOOK_PIECES, LOOK_PIECE, SAFE_GAP, SAFE_CENTER,
-    WEIGHED, BEAT, ONSET, SIDE, DECIDE_REACH, DECIDE_ENERGY, DECIDE_CROSSINGS, LATE, STEPS, MAX_STEPS, W, WV, D,
+    ENERGY_TICK, STEPS_SINCE_START, ONSET, SIDE, DECIDE_REACH, DECIDE_ENERGY, DECIDE_CROSSINGS, CROSSINGS_LAST_QUARTER, STEPS, MAX_STEPS, W, WV, D,
     DV, C, CV, MIN_W, MAX_W, MIN_C, MAX_C, PEAK_WV, PEAK_CV, SQUARE_W, SQUARE_C, SQUARE_WV, SQUARE_CV,
     ENERGY_TIME, HIGH_TIME, ENERGY, HIGH_ENERGY, POWER, HIGH_POWER, CROSSING, IMPULSE, WORK, GROSS, DEEPEST, TEMP, TEMP1, TEMP2,
     TEMP3, GQ, QR,
@@ -76,7 +76,7 @@ def sizes(modes: int, distinct: int, pieces: int) -> tuple[int, int]:
 (
     LIVE,  # hold a run
     TOUCHING,
-    QUIET,
+    LOW_ENERGY,
     CUTTING,  # take a step that was cut where the contact begins or ends
     EVENT,  # and do so at the end of the step at hand
     LOOKS,  # look once more where they enter

@@ -38,16 +38,15 @@ class FewMemory(NamedTuple):
 def suits(ensemble: Ensemble, packed: Packed, most: int = at.MOST) -> bool:
     """Whether the layout for few modes serves an ensemble, of *most* modes at most.
 
-    It knows equal wells, sinusoidal drives, laws that store energy and are plain arithmetic, modes whose flows
+    It knows a structure without terms and circuit, sinusoidal drives, laws that store energy and are plain arithmetic, modes whose flows
     polynomials serve, and the package's own statistics.
     """
     law, longest = ensemble.law, float(ensemble.step_times.max())
     flow = float(np.abs(COMPOSITIONS[ensemble.order].flow).max())
     return (
         packed.rows.size <= most
-        and ensemble.structure.unequal_wells is None
+        and not packed.layout.terms
         and ensemble.structure.tapped is None
-        and ensemble.others is None
         and ensemble.size > 1
         and ensemble.drive.harmonic
         and law.vectorizable
@@ -105,7 +104,7 @@ def lay_out_few(ensemble: Ensemble, packed: Packed, pieces: int) -> FewMemory:
 
 
 def _enter_pairs(m: _Array, of_modes: list[_Array], flow: int, distinct: int) -> None:
-    """What the flows follow from, for each pair of a mode and a distinct flow; those that fill a group stand still."""
+    """What the flows follow from, for each pair of a mode and a distinct flow; those that fill a group do not move."""
     modes = of_modes[0].size
     pairs = np.zeros((at.groups(modes, distinct) * WIDTH, 4))
     pairs[:, 0] = 1.0

@@ -35,14 +35,14 @@ from snapbeam.util.status_codes import RunStatus
 __all__ = [
     "TWO_PI",
     "LaneSettings",
+    "begin_run",
     "change_energy_origin",
     "close_energy",
     "flows_over",
+    "observe_run",
     "prepare",
     "sample_energy",
-    "seat",
     "slot_of",
-    "stand",
 ]
 
 
@@ -131,7 +131,7 @@ def _prepare_all(m, shape, lane_settings, lane, levels):
 
 
 @compiled
-def stand(m, shape, lane_settings, lane):
+def observe_run(m, shape, lane_settings, lane):
     """What is seen of a lane that stands where Q and P say, and its tension; returns its energy without the contact."""
     which = mask_of(1 << lane)
     gq, qr = tension(m, shape, lane_settings.gamma, which, at.Q)
@@ -140,7 +140,7 @@ def stand(m, shape, lane_settings, lane):
     phase = load(m, at.PHASE0) + TWO_PI * (load(m, at.WITHIN) / load(m, at.PERIOD))
     sine, cosine = sincos(phase)
     motion, velocity = shaker_motion(load(m, at.AMPLITUDE), load(m, at.OMEGA), sine, cosine)
-    well_sign, rest = load(m, at.HOME), load(m, at.REST_CONTACT)
+    well_sign, rest = load(m, at.WELL_SIGN), load(m, at.REST_CONTACT)
     offset = load(m, at.OFFSET) + (1.0 - well_sign) * rest
     beam, beam_rate = beam_signals(m, shape, at.Q, at.P, w, wv)
     store(m, at.W, pick(which, beam + well_sign * rest, load(m, at.W)))
@@ -183,20 +183,20 @@ def sample_energy(m, shape, law, q, p, k, d, pressed, t, which):
     """
     linear, whole, high, power, high_power = _energies_at(m, shape, law, q, p, k, d, pressed)
     mask, zero = mask_of(which), splat(0.0)
-    span = (t - load(m, at.WEIGHED)) * load(m, at.TICK)
+    span = (t - load(m, at.ENERGY_TICK)) * load(m, at.TICK)
     half, twelfth = 0.5 * span, TWELFTH * (span * span)
     more = half * (load(m, at.ENERGY) + whole) + twelfth * (load(m, at.POWER) - power)
     store(m, at.ENERGY_TIME, load(m, at.ENERGY_TIME) + pick(mask, more, zero))
     more = half * (load(m, at.HIGH_ENERGY) + high) + twelfth * (load(m, at.HIGH_POWER) - high_power)
     store(m, at.HIGH_TIME, load(m, at.HIGH_TIME) + pick(mask, more, zero))
-    store(m, at.WEIGHED, pick(mask, t, load(m, at.WEIGHED)))
+    store(m, at.ENERGY_TICK, pick(mask, t, load(m, at.ENERGY_TICK)))
     _keep_energies(m, whole, high, power, high_power, mask)
     return linear
 
 
 @called
 def close_energy(m, shape, kernel_input, touching, which):
-    """The same where the lanes *which* stand now, between two steps."""
+    """The same where the lanes *which* are now, between two steps."""
     law = lanes_tuple(kernel_input.law, m, at.LAW)
     sample_energy(m, shape, law, at.Q, at.P, at.K, load(m, at.D), touching & which, load(m, at.T), which)
 
@@ -231,7 +231,7 @@ def _constants(m, shape, kernel_input, lane, i):
     m[at.LIMIT + lane] = min(record.landing, record.end)
     m[at.COARSEST + lane], m[at.FINEST + lane] = record.coarsest, record.finest
     m[at.COARSE_TICKS + lane] = record.step >> record.coarsest
-    m[at.PHASE0 + lane], m[at.OFFSET + lane], m[at.HOME + lane] = (
+    m[at.PHASE0 + lane], m[at.OFFSET + lane], m[at.WELL_SIGN + lane] = (
         record.phase,
         record.offset,
         record.well_sign,
@@ -253,7 +253,7 @@ def _constants(m, shape, kernel_input, lane, i):
 
 
 @compiled
-def seat(m, n, shape, lane_settings, kernel_input, lane, i, accumulators):
+def begin_run(m, n, shape, lane_settings, kernel_input, lane, i, accumulators):
     """Put run *i* into a lane; its status."""
     record, bit = kernel_input.runs[i], 1 << lane
     n[at.RUNS + lane] = i
@@ -261,7 +261,7 @@ def seat(m, n, shape, lane_settings, kernel_input, lane, i, accumulators):
     _prepare_all(m, shape, lane_settings, lane, record.finest + 2)
     m[at.KEY + lane], m[at.LOOK_KEY + lane], m[at.LOOK_PIECES + lane] = -99.0, -1.0, 0.0
     m[at.T + lane] = m[at.WITHIN + lane] = 0.0
-    energy = stand(m, shape, lane_settings, lane)
+    energy = observe_run(m, shape, lane_settings, lane)
     seen = ContactKinematics(
         m[at.W + lane], m[at.WV + lane], m[at.D + lane], m[at.DV + lane], m[at.C + lane], m[at.CV + lane]
     )
@@ -287,7 +287,14 @@ def seat(m, n, shape, lane_settings, kernel_input, lane, i, accumulators):
         m[row + lane] = 0.0
     for row in range(at.IMPULSE, at.DEEPEST, WIDTH):
         m[row + lane] = 0.0
-    for row in (at.SAFE_GAP, at.SAFE_CENTER, at.WEIGHED, at.BEAT, at.STEPS, at.LATE):
+    for row in (
+        at.SAFE_GAP,
+        at.SAFE_CENTER,
+        at.ENERGY_TICK,
+        at.STEPS_SINCE_START,
+        at.STEPS,
+        at.CROSSINGS_LAST_QUARTER,
+    ):
         m[row + lane] = 0.0
     for j in range(at.TOUCHING, at.ODD + 1):
         n[j] &= ~bit
@@ -297,5 +304,5 @@ def seat(m, n, shape, lane_settings, kernel_input, lane, i, accumulators):
     if kernel_input.high:
         close_energy(m, shape, kernel_input, n[at.TOUCHING], bit)
     if is_low_energy(energy, lane_settings.gamma, lane_settings.stretch):
-        n[at.QUIET] |= bit
+        n[at.LOW_ENERGY] |= bit
     return _RUNNING if record.end > 0 else _OK

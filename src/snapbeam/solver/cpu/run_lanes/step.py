@@ -46,11 +46,11 @@ from snapbeam.solver.step import InnerProducts, Primitives, build_step, flow_mod
 __all__ = [
     "TEXTS",
     "Modes",
-    "at_hand",
     "beam_energies",
     "beam_signals",
     "bounds",
     "groups_of",
+    "load_prepared_step",
     "made",
     "modal_energies",
     "modal_energy",
@@ -299,7 +299,7 @@ def _step_of(shape: Any) -> Any:
 
     @inlined
     def take_step(m, stages, gamma, in_contact, closed, law):
-        offset = load(m, at.OFFSET) + (1.0 - load(m, at.HOME)) * load(m, at.REST_CONTACT)
+        offset = load(m, at.OFFSET) + (1.0 - load(m, at.WELL_SIGN)) * load(m, at.REST_CONTACT)
         tip = Tip(offset, law, SineDrive(load(m, at.AMPLITUDE), load(m, at.OMEGA)))
         length, sine, cosine = load(m, at.LENGTH), load(m, at.SINE), load(m, at.COSINE)
         state, increment = take(
@@ -385,7 +385,7 @@ def _energies_and_powers(modes: Modes) -> list[str]:
     return [*lines, f"    return {total}, {high}, {power}, {high_power}"]
 
 
-def _glide(modes: Modes) -> list[str]:
+def _free_propagation(modes: Modes) -> list[str]:
     """A free step in short pieces, as the other layout's :func:`~snapbeam.solver.cpu.events.sample_inside_step`.
 
     Row i of a look is the penetration, its rate, the displacement of the centre and its rate; only lanes of *which*
@@ -395,7 +395,7 @@ def _glide(modes: Modes) -> list[str]:
     head = ["def glide(m, shape, look, which, with_center, most):"]
     body = [f"pieces, piece = load(m, {at.LOOK_PIECES}), load(m, {at.LOOK_PIECE})"]
     body += [f"amplitude, omega = load(m, {at.AMPLITUDE}), load(m, {at.OMEGA})"]
-    body += [f"offset = load(m, {at.OFFSET}) + (1.0 - load(m, {at.HOME})) * load(m, {at.REST_CONTACT})"]
+    body += [f"offset = load(m, {at.OFFSET}) + (1.0 - load(m, {at.WELL_SIGN})) * load(m, {at.REST_CONTACT})"]
     for i in modes.each():
         body += [f"q{i}, p{i} = {modes.row(i, at.Q)}, {modes.row(i, at.P)}"]
         body += [f"k{i}, l{i} = {modes.row(i, at.K)}, {modes.row(i, at.K1)}"]
@@ -454,9 +454,9 @@ def _glide(modes: Modes) -> list[str]:
     return head + [f"    {line}" for line in [*body, "return greatest"]]
 
 
-def _at_hand(modes: Modes) -> list[str]:
-    """The flows and turns of a prepared step, from where they stand into one lane."""
-    lines = ["def at_hand(m, shape, place, lane):"]
+def _load_prepared_step(modes: Modes) -> list[str]:
+    """The flows and turns of a prepared step, copied into one lane."""
+    lines = ["def load_prepared_step(m, shape, place, lane):"]
     for i in modes.each():
         for flow in range(modes.distinct):
             group, j = divmod(i * modes.distinct + flow, WIDTH)
@@ -472,9 +472,9 @@ def _at_hand(modes: Modes) -> list[str]:
 
 
 TEXTS = {
-    "at_hand": _at_hand, "begin": _begin, "form_products": _form_products, "kick_and_flow": _kick_and_flow,
+    "load_prepared_step": _load_prepared_step, "begin": _begin, "form_products": _form_products, "kick_and_flow": _kick_and_flow,
     "store_end": _store_end, "signals": _signals, "tension": _tension_at, "bounds": _bounds,
-    "modal_energy": _energies, "modal_energies": _energies_and_powers, "glide": _glide,
+    "modal_energy": _energies, "modal_energies": _energies_and_powers, "glide": _free_propagation,
 }  # fmt: skip
 
 
@@ -619,14 +619,14 @@ def _modes_of(shape):
     return lambda shape: count
 
 
-def at_hand(m: Any, shape: Any, place: int, lane: int) -> None:
+def load_prepared_step(m: Any, shape: Any, place: int, lane: int) -> None:
     """Have the flows and turns of the prepared step at *place* at hand in a lane."""
-    raise TypeError("at_hand runs in compiled code only")
+    raise TypeError("load_prepared_step runs in compiled code only")
 
 
-@overload(at_hand, jit_options=INLINE_HERE)
-def _at_hand_of(m, shape, place, lane):
-    written = _function("at_hand", shape.instance_class)
+@overload(load_prepared_step, jit_options=INLINE_HERE)
+def _load_prepared_step_of(m, shape, place, lane):
+    written = _function("load_prepared_step", shape.instance_class)
     return lambda m, shape, place, lane: written(m, shape, place, lane)
 
 

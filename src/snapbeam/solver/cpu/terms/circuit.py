@@ -52,8 +52,6 @@ class Circuit(NamedTuple):
     """t, a row."""
     rate: int
     """Where the rate of loss stands, 1/s; of a circuit without inertia what y is of -s."""
-    kick: int
-    """Room for the acceleration of a kick."""
     own: Any
     """Which element of a row is y; None of a circuit without inertia."""
 
@@ -154,13 +152,13 @@ def _resistive_flow(s, push, size, rate, weight, energy):
 
 
 @inlined
-def tap_of(memory, size, circuit, own, p, weight, tap):
-    """What a kick of *weight* does, p before it; its acceleration stands in the circuit's row for that."""
+def tap_of(memory, size, circuit, own, p, kick, weight, tap):
+    """What a kick of *weight* does, p before it and *kick* the row of its acceleration."""
     along, push, square = splat(0.0), splat(0.0), splat(0.0)
     for row in range(0, size, WIDTH):
         t = load(memory, circuit.coupling + row)
         along = fma(t, load(memory, p + row), along)
-        push = fma(t, load(memory, circuit.kick + row), push)
+        push = fma(t, load(memory, kick + row), push)
         square = fma(t, t, square)
     s, k, n, rate = lanes_sum(along), lanes_sum(push), lanes_sum(square), memory[circuit.rate]
     if own is None:
@@ -169,14 +167,14 @@ def tap_of(memory, size, circuit, own, p, weight, tap):
 
 
 @inlined
-def lean_kick(memory, size, circuit, weight, tap):
+def lean_kick(memory, size, circuit, kick, weight, tap):
     """Add to the row of the kick what makes half of it times its weight the mean of what the circuit does to p."""
     if weight == 0.0:
         return
     mean = 2.0 * tap.twice / (weight * weight)
     for row in range(0, size, WIDTH):
-        kick = load(memory, circuit.kick + row)
-        store(memory, circuit.kick + row, fma(mean, load(memory, circuit.coupling + row), kick))
+        k = load(memory, kick + row)
+        store(memory, kick + row, fma(mean, load(memory, circuit.coupling + row), k))
 
 
 @inlined

@@ -12,7 +12,6 @@ from snapbeam.solver.compilation import called, inlined
 from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.mode_lanes import flow_coefficients, propagate_free, speed_bound
 from snapbeam.solver.cpu.step import with_circuit_acceleration
-from snapbeam.solver.cpu.terms.base_and_load import extra_speed
 from snapbeam.solver.cpu.terms.circuit import circuit_speed_bound, validity_horizon
 from snapbeam.solver.cpu.terms.further_contacts import block, mirror_further_contacts, penetration_of
 from snapbeam.solver.further_contacts import (
@@ -44,6 +43,7 @@ from snapbeam.solver.interpolation import first_downcrossing, first_upcrossing, 
 from snapbeam.solver.simd import WIDTH, lanes_sum, load
 from snapbeam.solver.statistics import OTHER_IMPACTS, OTHER_IMPULSE, OTHER_PEAK, OTHER_WORK
 from snapbeam.solver.step_control import TRUST, ContactKinematics, contact_level, refine_onset, safe_interval
+from snapbeam.solver.terms.interface import add_to_speed_bound
 
 __all__ = [
     "accumulate_further_contacts",
@@ -238,7 +238,9 @@ def _edge(memory, layout, others, slot, run, t, drive, step, scratch):
                 bound = circuit_speed_bound(
                     memory, size, layout.omega, layout.circuit, row, step.q, step.p, bound, TRUST * known
                 )
-                bound += extra_speed(layout.forced, memory, size, drive, row, TRUST * run.step_time)
+                bound = add_to_speed_bound(
+                    memory, size, layout.terms, drive, row, TRUST * run.step_time, bound
+                )
                 push = dot(memory, size, row, step.k)
                 safe = safe_interval(-depth, bound, memory[at + SPEED], push, known)
                 memory[at + SAFE] = t + int(safe / tick)

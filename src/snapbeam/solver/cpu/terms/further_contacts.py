@@ -48,8 +48,6 @@ __all__ = [
     "mirror_further_contacts",
     "note_touching",
     "penetration_of",
-    "struck",
-    "struck_along",
     "with_further_contact_energy",
     "with_further_contact_gross_work",
     "with_further_contact_work",
@@ -65,6 +63,26 @@ class FurtherContacts(NamedTuple):
     """Their blocks of numbers."""
     kinds: Any
     """A value whose type says which laws they touch by."""
+
+    @staticmethod
+    @inlined
+    def add_acceleration(memory, size, term, row, k):
+        """An acceleration with what the other strikers add."""
+        for j in range(count_of(term.kinds)):
+            force = broadcast_load(memory, block(term, j) + FORCE)
+            k = fma(force, load(memory, term.rows + j * size + row), k)
+        return k
+
+    @staticmethod
+    @inlined
+    def add_acceleration_along(memory, size, term, contact, along):
+        """The same along the first contact's row."""
+        for j in range(count_of(term.kinds)):
+            total = splat(0.0)
+            for row in range(0, size, WIDTH):
+                total = fma(load(memory, term.rows + j * size + row), load(memory, contact + row), total)
+            along += memory[block(term, j) + FORCE] * lanes_sum(total)
+        return along
 
 
 @inlined
@@ -105,30 +123,6 @@ def evaluate_contacts(memory, size, others, drive, argument, q, weight, begins):
     if others is None:
         return
     _press(memory, size, others, drive, argument, q, weight, begins)
-
-
-@inlined
-def struck(memory, size, others, row, k):
-    """An acceleration with what the other strikers add."""
-    if others is None:
-        return k
-    for j in range(count_of(others.kinds)):
-        force = broadcast_load(memory, block(others, j) + FORCE)
-        k = fma(force, load(memory, others.rows + j * size + row), k)
-    return k
-
-
-@inlined
-def struck_along(memory, size, others, contact, along):
-    """The same along the first contact's row."""
-    if others is None:
-        return along
-    for j in range(count_of(others.kinds)):
-        total = splat(0.0)
-        for row in range(0, size, WIDTH):
-            total = fma(load(memory, others.rows + j * size + row), load(memory, contact + row), total)
-        along += memory[block(others, j) + FORCE] * lanes_sum(total)
-    return along
 
 
 @inlined

@@ -14,11 +14,16 @@ from snapbeam.solver.contact_force import mark_of
 from snapbeam.solver.cpu.mode_lanes import acceleration_rows
 from snapbeam.solver.cpu.state import cut_slot
 from snapbeam.solver.cpu.step import Step, StepIncrement, observe, prepare, take_step
-from snapbeam.solver.cpu.terms.base_and_load import ExternalWork, changed_load, enter_forces
 from snapbeam.solver.cpu.terms.circuit import CircuitIncrement
 from snapbeam.solver.cpu.terms.discontinuities import APART, discontinuity_within, jumps_of
 from snapbeam.solver.cpu.terms.further_contact_events import add_stored_contacts, store_further_contacts
 from snapbeam.solver.physics import tension_factors
+from snapbeam.solver.terms.interface import (
+    add_to_tension,
+    does_work,
+    total_work,
+    update_time_dependent,
+)
 
 __all__ = ["mark_at_jump", "taken_across"]
 
@@ -38,10 +43,10 @@ def _in_two_parts(memory, blocks, layout, stages, run, tip, step, length, with_e
     one = take_step(memory, blocks, layout, stages, tip, to_jump, with_energy)
     store_further_contacts(memory, layout.others)
     phase = step.phase + drive.omega * length + APART
-    if layout.forced is not None:
-        enter_forces(layout.forced, memory, drive, phase)
+    if does_work(layout.terms):
+        update_time_dependent(memory, layout.terms, drive, phase)
         along_g, along_r = tension_factors(layout.gamma, one.gq, one.qr)
-        along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
+        along_g, along_r = add_to_tension(memory, layout.terms, along_g, along_r)
         acceleration_rows(memory, layout, along_g, along_r, step.r, step.k1)
     rest = Step(
         0, at, step.length - length, phase, step.touching, step.q1, step.p1, step.k1, step.q1, step.p1, step.k1, step.r
@@ -52,9 +57,7 @@ def _in_two_parts(memory, blocks, layout, stages, run, tip, step, length, with_e
     return StepIncrement(
         two.gq, two.qr, one.impulse + two.impulse, one.work + two.work, one.gross + two.gross, one.lost + two.lost,
         one.dissipated + two.dissipated,
-        ExternalWork(
-            one.external.base + two.external.base, one.external.load + two.external.load, one.external.gross + two.external.gross
-        ),
+        total_work(layout.terms, one.external, two.external),
         CircuitIncrement(two.circuit.impulse, two.circuit.y, one.circuit.energy + two.circuit.energy, two.circuit.twice),
     )  # fmt: skip
 

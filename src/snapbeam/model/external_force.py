@@ -1,0 +1,314 @@
+"""An external force on the structure: a history in newtons that acts on one row of its coordinates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.drive.base import Drive, Scale, Timed
+from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.util.validation import InputError, InputTypeError, finite_array, shown
+
+__all__ = ["FORCES", "ConstantForce", "ExternalForce", "ForceHistory", "HarmonicForce", "RecordedForce"]
+
+
+_Array = NDArray[np.float64]
+
+FORCES: dict[str, type[Drive]] = {}
+"""Every history of a force, by the name it has in parameter files."""
+_KNOTS = 8.0
+"""Samples in the shortest period that the steps of a recorded force resolve."""
+
+
+class ForceHistory(Drive):
+    """A force as a function of time, N: a drive whose *motion* is the force and its rate."""
+
+    registry: ClassVar[dict[str, type[Drive]]] = FORCES
+
+    @classmethod
+    def can_excite_base(cls) -> bool:
+        """A force moves no base."""
+        return False
+
+
+@dataclass(frozen=True, kw_only=True)
+class HarmonicForce(ForceHistory):
+    """A harmonic force about a mean, F(t) = F_0 + F_1 sin(omega t + phase).
+
+    Parameters
+    ----------
+    frequency_ratio : float
+        omega over omega_1.
+    amplitude : float
+        F_1, N.
+    mean : float
+        F_0, N.
+    phase : float
+        At the start, rad; pi/2 gives a cosine.
+    """
+
+    frequency_ratio: float = quantity(
+        "1", "frequency of the force over the first natural frequency", low=0.0, scope=RUN,
+        short="force_frequency_ratio", symbol=r"\Omega",
+    )  # fmt: skip
+    amplitude: float = quantity(
+        "N",
+        "amplitude of the force",
+        low=0.0,
+        closed="left",
+        scope=RUN,
+        short="force_amplitude",
+        symbol="F_1",
+    )
+    mean: float = quantity("N", "mean of the force", default=0.0, scope=RUN, short="force_mean", symbol="F_0")
+    phase: float = quantity(
+        "rad", "phase of the force at the start", default=0.0, low=-1e6, high=1e6, closed="both", scope=RUN,
+        short="force_phase",
+    )  # fmt: skip
+    name = "harmonic_force"
+    number_names = ("omega", "amplitude", "mean")
+    amplitudes = ("amplitude", "mean")
+
+    def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """Angular frequency (rad/s), amplitude and mean (N)."""
+        omega = columns["frequency_ratio"] * scale.omega
+        return {"omega": omega, "amplitude": columns["amplitude"], "mean": columns["mean"]}
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """One period of the sine."""
+        return np.asarray(2.0 * math.pi / (columns["frequency_ratio"] * scale.omega))
+
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """Greatest force, N."""
+        return np.asarray(columns["amplitude"] + np.abs(columns["mean"]))
+
+    @staticmethod
+    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+        """Force and its rate."""
+        varying = drive.amplitude * math.sin(argument)
+        return drive.mean + varying, drive.amplitude * drive.omega * math.cos(argument)
+
+    @staticmethod
+    def acceleration(drive: Any, memory: Any, argument: float) -> float:
+        """The force."""
+        return drive.mean + drive.amplitude * math.sin(argument)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConstantForce(ForceHistory, Timed):
+    """A constant force, such as the weight of a free mass.
+
+    A constant force on a structure that can rest under it is better given as the *transverse_force* of its model: runs
+    then begin at rest under that force.  A cycle is a period of the first mode.
+
+    Parameters
+    ----------
+    force : float
+        N.
+    """
+
+    force: float = quantity("N", "constant force", scope=RUN, short="constant_force")
+    name = "constant_force"
+    number_names = ("omega", "fastest", "force")
+    amplitudes = ("force",)
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """A period of the first mode."""
+        return np.full(columns["force"].size, 2.0 * math.pi / scale.omega)
+
+    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """The force, which never changes."""
+        return {"fastest": np.zeros(columns["force"].size), "force": columns["force"]}
+
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """Its size, N."""
+        return np.abs(columns["force"])
+
+    @staticmethod
+    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+        """Force and its rate."""
+        return drive.force, 0.0
+
+    @staticmethod
+    def acceleration(drive: Any, memory: Any, argument: float) -> float:
+        """The force."""
+        return drive.force
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedForce(ForceHistory, Timed):
+    """A sampled force: any history.  Between samples it is the cubic spline through all of them.
+
+    A cycle is a period of the first mode.  A run must end before the record does.
+
+    Parameters
+    ----------
+    record : array_like of shape (samples,)
+        N, the first sample at the start of the run.
+    sampling_frequency : float
+        Samples per second, Hz.
+    """
+
+    record: NDArray[np.float64] = quantity("N", "force, sampled", kind=object)
+    sampling_frequency: float = quantity("Hz", "samples per second of the force", low=0.0)
+    name = "recorded_force"
+    number_names = ("omega", "fastest", "table", "samples", "interval")
+    amplitudes = ()
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        record = finite_array("record", self.record, 1).copy()
+        if record.size < 4:
+            raise InputError(f"record of {record.size} samples: must hold at least 4; give a longer one")
+        record.setflags(write=False)
+        object.__setattr__(self, "record", record)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, RecordedForce):
+            return NotImplemented
+        return self.sampling_frequency == other.sampling_frequency and np.array_equal(
+            self.record, other.record
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.sampling_frequency, self.record.tobytes()))
+
+    @property
+    def duration(self) -> float:
+        """Length of the record, s."""
+        return (self.record.size - 1) / self.sampling_frequency
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """A period of the first mode."""
+        return np.full(next(iter(columns.values())).size, 2.0 * math.pi / scale.omega)
+
+    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """Location and number of the samples, and their interval, s."""
+        runs = next(iter(columns.values())).size
+        fixed = {
+            "fastest": 2.0 * math.pi * self.sampling_frequency / _KNOTS,
+            "table": 0.0,
+            "samples": float(self.record.size),
+            "interval": 1.0 / self.sampling_frequency,
+        }
+        return {name: np.full(runs, value) for name, value in fixed.items()}
+
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """A bound on the spline: between two samples it is at most both, and 4/27 of an interval times each slope."""
+        pairs = self.samples().reshape(-1, 2)
+        most = np.abs(pairs[:, 0]).max() + 8.0 / 27.0 * np.abs(pairs[:, 1]).max() / self.sampling_frequency
+        return np.full(next(iter(columns.values())).size, float(most))
+
+    def samples(self) -> _Array:
+        """Force and slope of the spline, sample after sample."""
+        from scipy.interpolate import CubicSpline
+
+        times = np.arange(self.record.size) / self.sampling_frequency
+        return np.column_stack((self.record, CubicSpline(times, self.record)(times, 1))).ravel()
+
+    @staticmethod
+    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+        """Force and its rate; the last sample after the end."""
+        at = min(argument / (drive.omega * drive.interval), drive.samples - 1.0)
+        i = min(int(at), int(drive.samples) - 2)
+        row = int(drive.table) + 2 * i
+        s, interval = at - i, drive.interval
+        f0, rise = memory[row], memory[row + 2] - memory[row]
+        a, b = memory[row + 1] * interval, memory[row + 3] * interval
+        c2, c3 = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
+        return f0 + s * (a + s * (c2 + s * c3)), (a + s * (2.0 * c2 + s * 3.0 * c3)) / interval
+
+    @staticmethod
+    def acceleration(drive: Any, memory: Any, argument: float) -> float:
+        """The force."""
+        at = min(argument / (drive.omega * drive.interval), drive.samples - 1.0)
+        i = min(int(at), int(drive.samples) - 2)
+        row = int(drive.table) + 2 * i
+        s, interval = at - i, drive.interval
+        f0, rise = memory[row], memory[row + 2] - memory[row]
+        a, b = memory[row + 1] * interval, memory[row + 3] * interval
+        return f0 + s * (a + s * (3.0 * rise - 2.0 * a - b + s * (a + b - 2.0 * rise)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ExternalForce:
+    """A force on the structure: m alpha'' + ... = h F(t), where h is one row.
+
+    Parameters
+    ----------
+    history : ForceHistory
+        F(t): a :class:`~snapbeam.HarmonicForce`, a :class:`~snapbeam.ConstantForce` or, for any other history, a
+        :class:`~snapbeam.RecordedForce`.
+    location : float, optional
+        Of a beam: where the force acts, over the length.
+    shape : array_like of shape (N,), optional
+        Of a structure given by matrices: h, the force on each coordinate per unit of F; its contact point by default.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> oscillator = sb.ReducedModel.from_matrices(
+    ...     [[1.0]], [1.0], contact_shape=[1.0], damping_ratio=0.05, reference_frequency=0.5 / 3.141592653589793
+    ... )
+    >>> system = sb.System(
+    ...     oscillator,
+    ...     external_force=sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=1.0, amplitude=0.2)),
+    ... )
+    """
+
+    history: Drive
+    location: float | None = quantity(
+        "1", "location of the external force over the length", default=None, optional=True, low=0.0, high=1.0,
+        scope=STRUCTURE,
+    )  # fmt: skip
+    shape: Any = quantity(
+        "1", "external force on each coordinate", default=None, optional=True, kind=object, scope=STRUCTURE
+    )
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.history, ForceHistory):
+            raise InputTypeError(
+                f"history = {shown(self.history)}: must be a force in newtons; use a HarmonicForce, a ConstantForce or a "
+                "RecordedForce"
+            )
+        check_fields(self)
+        if self.shape is not None:
+            shape = finite_array("shape", self.shape, 1).copy()
+            shape.setflags(write=False)
+            object.__setattr__(self, "shape", shape)
+
+    def row(self, model: ReducedModel) -> _Array:
+        """Return h of a model, shape (N,).
+
+        Raises
+        ------
+        InputError
+            For a shape that does not fit the model, and for a beam without a location.
+        """
+        if model.beam is not None:
+            if self.shape is not None or self.location is None:
+                raise InputError(
+                    f"external_force.location = {self.location}: a force on a beam acts at a location; give location "
+                    "in (0, 1) and leave shape out"
+                )
+            return np.asarray(model.shape_at(self.location))
+        if self.location is not None:
+            raise InputError(
+                f"external_force.location = {self.location:g}: a structure given by matrices has no length; give shape"
+            )
+        if self.shape is None:
+            assert model.contact_shape is not None
+            return model.contact_shape
+        if self.shape.shape != (model.modes,):
+            raise InputError(
+                f"external_force.shape of shape {self.shape.shape}: must be ({model.modes},); give one number for each "
+                "coordinate"
+            )
+        found: _Array = self.shape
+        return found

@@ -1,0 +1,339 @@
+"""What a term can add to the equation of motion, and where the solver asks for it.
+
+A *term* is a force or a coupling beside linear modes and tension: one class in one file of this folder.  The class is a
+named tuple.  Its fields are numbers and places in memory; its static methods are the operations below, each under the
+name that it has here.  A method has the parameters of the operation, with the term itself in place of *terms*.
+
+Numba compiles a kernel for the tuple of the terms that a structure has.  An operation calls the method of every term
+that has it, in the order of the tuple; the value of the last parameter goes in and comes out.  A term without the
+method, and a structure without terms, leave no code.
+
+Beside operations, a class has
+
+``build(structure, drive, size, padded)``
+    Python: a :class:`TermMemory`, or None if the structure and the drive have no such term.
+``kick_work(memory, size, term, weight, g, r, kick, p)``, ``accumulator`` and ``work_description``
+    Its work in a kick of *weight* seconds, J, exact: the row *kick* is the whole acceleration of the kick, contact
+    included, and p the row of the velocities before it.  With it, the name and long name of the statistic of the work.
+``needs_tension_product``
+    True if ``kick_work`` reads r = G q at the first kick of a step too.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from snapbeam.solver.compilation import INLINE_HERE, inlined
+from snapbeam.solver.step_control import ContactKinematics
+
+__all__ = [
+    "ExternalWork",
+    "TermMemory",
+    "above_nearest_well",
+    "acceleration_about_nearest_well",
+    "accumulate_work",
+    "add_acceleration",
+    "add_acceleration_along",
+    "add_potential_energy",
+    "add_to_speed_bound",
+    "add_to_tension",
+    "add_work",
+    "center_from_divide",
+    "does_work",
+    "enter_well",
+    "has_crossed",
+    "needs_tension_product",
+    "no_external_work",
+    "relative_to_nearest_well",
+    "seen_from_divide",
+    "total_work",
+    "update_time_dependent",
+    "wells_differ",
+    "works_so_far",
+]
+
+
+class TermMemory(NamedTuple):
+    """Numbers of a term, by the names of its fields."""
+
+    shared: dict[str, NDArray[np.float64]]
+    """Rows of the structure; the field is their place in memory."""
+    own: dict[str, NDArray[np.float64]]
+    """The same, of which every run that is integrated has its own."""
+    numbers: dict[str, float]
+
+
+class ExternalWork(NamedTuple):
+    """Work of the terms on the beam within a step, J."""
+
+    works: Any
+    """Of each term, a tuple; 0 of those that do none."""
+    gross: float
+    """Sum of the absolute values of the works in the kicks."""
+
+
+# ----------------------------------------------------------------------------------------------------
+# How operations are made: text for the terms at hand, compiled into the kernel.
+
+
+def _classes(terms: Any) -> list[Any]:
+    """The classes of the terms of a Numba type."""
+    return [each.instance_class for each in terms]
+
+
+def _compiled_for_terms(stub: Any, write: Callable[[list[Any]], tuple[list[str], dict[str, Any]]]) -> Any:
+    """Have Numba compile a call of *stub* as what *write* returns for the terms: lines of a body, and names in them."""
+    parameters = ", ".join(inspect.signature(stub).parameters)
+
+    def implementation(terms: Any) -> Any:
+        lines, names = write(_classes(terms))
+        return _defined(stub.__name__, parameters, lines, names)
+
+    names = {"implementation": implementation}
+    chosen = _defined(stub.__name__, parameters, ["return implementation(terms)"], names)
+    overload(stub, jit_options=INLINE_HERE)(chosen)
+    return stub
+
+
+def _defined(name: str, parameters: str, lines: list[str], names: dict[str, Any]) -> Any:
+    text = "\n    ".join([f"def {name}({parameters}):", *lines])
+    known = {"__name__": __name__, "ExternalWork": ExternalWork, **names}
+    exec(compile(text, f"<{name}>", "exec"), known)
+    return known[name]
+
+
+def _operation(threaded: int = 1) -> Callable[[Any], Any]:
+    """Declare an operation, whose last *threaded* parameters are its results."""
+
+    def declared(stub: Any) -> Any:
+        name, parameters = stub.__name__, list(inspect.signature(stub).parameters)
+        results = ", ".join(parameters[len(parameters) - threaded :])
+
+        def write(classes: list[Any]) -> tuple[list[str], dict[str, Any]]:
+            lines, names = [], {}
+            for i, each in enumerate(classes):
+                if hasattr(each, name):
+                    names[f"term{i}"] = getattr(each, name)
+                    given = ", ".join(f"terms[{i}]" if p == "terms" else p for p in parameters)
+                    lines.append(f"{results} = term{i}({given})" if threaded else f"term{i}({given})")
+            return [*lines, f"return {results}"], names
+
+        return _compiled_for_terms(stub, write)
+
+    return declared
+
+
+def _of_kernels() -> TypeError:
+    return TypeError("operations of terms run in compiled code only")
+
+
+# ----------------------------------------------------------------------------------------------------
+# Forces.
+
+
+@_operation(threaded=0)
+def update_time_dependent(memory: Any, terms: Any, drive: Any, argument: float) -> Any:
+    """Write what follows from time alone into memory, for an argument of the drive."""
+    raise _of_kernels()
+
+
+@_operation()
+def add_acceleration(memory: Any, size: int, terms: Any, row: int, k: Any) -> Any:
+    """Add to *k*, eight elements of the modal acceleration from *row* on."""
+    raise _of_kernels()
+
+
+@_operation()
+def add_acceleration_along(memory: Any, size: int, terms: Any, contact: int, along: Any) -> Any:
+    """Add to *along*, the product of the modal acceleration with the row *contact*."""
+    raise _of_kernels()
+
+
+@_operation(threaded=2)
+def add_to_tension(memory: Any, terms: Any, along_g: Any, along_r: Any) -> Any:
+    """Change the two coefficients of the tension's acceleration, along g and along r = G q."""
+    raise _of_kernels()
+
+
+@_operation()
+def add_to_speed_bound(
+    memory: Any, size: int, terms: Any, drive: Any, along: int, horizon: float, bound: Any
+) -> Any:
+    """Add to a *bound* of the speed along a row what the term can change within a time, for the look-ahead."""
+    raise _of_kernels()
+
+
+# ----------------------------------------------------------------------------------------------------
+# Energy and wells.
+
+
+@_operation()
+def add_potential_energy(memory: Any, size: int, terms: Any, q: int, energy: Any) -> Any:
+    """Add to the *energy* of linear modes and tension about the present origin."""
+    raise _of_kernels()
+
+
+@_operation(threaded=0)
+def enter_well(memory: Any, size: int, terms: Any, well_sign: float) -> Any:
+    """Write what depends on the well whose mirror image is the origin of q."""
+    raise _of_kernels()
+
+
+@_operation()
+def above_nearest_well(terms: Any, well_sign: float, energy: Any) -> Any:
+    """Take the *energy* above the first well relative to the well that the beam is near."""
+    raise _of_kernels()
+
+
+@_operation()
+def relative_to_nearest_well(memory: Any, size: int, terms: Any, well_sign: float, spare: int, q: Any) -> Any:
+    """The row of the displacements from the well that the beam is near: *q* itself, or *spare*, written here."""
+    raise _of_kernels()
+
+
+@_operation()
+def acceleration_about_nearest_well(
+    memory: Any, terms: Any, omega_squared: int, q: int, near: int, row: int, k: Any
+) -> Any:
+    """Take *k*, which belongs to *q*, with the linear force of the difference between *q* and *near*."""
+    raise _of_kernels()
+
+
+@_operation()
+def center_from_divide(terms: Any, center: Any) -> Any:
+    """The displacement of the centre from the height that divides the wells, m."""
+    raise _of_kernels()
+
+
+@_operation()
+def has_crossed(terms: Any, center: float, well_sign: float, crossed: Any) -> Any:
+    """Whether the centre has come to the side of the other well."""
+    raise _of_kernels()
+
+
+@inlined
+def seen_from_divide(terms, seen):
+    """What is seen, the centre from the height that divides the wells."""
+    return ContactKinematics(seen.w, seen.wv, seen.d, seen.dv, center_from_divide(terms, seen.c), seen.cv)
+
+
+# ----------------------------------------------------------------------------------------------------
+# Work.
+
+
+def _working(classes: list[Any]) -> list[int]:
+    """Which terms do work."""
+    return [i for i, each in enumerate(classes) if hasattr(each, "kick_work")]
+
+
+def _tuple(items: list[str]) -> str:
+    return f"({', '.join(items)},)" if items else "()"
+
+
+def _write_flag(attribute: str) -> Callable[[list[Any]], tuple[list[str], dict[str, Any]]]:
+    return lambda classes: ([f"return {any(hasattr(each, attribute) for each in classes)}"], {})
+
+
+def does_work(terms: Any) -> bool:
+    """Whether a term does work on the beam; known when the kernel is compiled, as are the next two."""
+    raise _of_kernels()
+
+
+def needs_tension_product(terms: Any) -> bool:
+    """Whether the work of a term needs r = G q at every kick."""
+    raise _of_kernels()
+
+
+def wells_differ(terms: Any) -> bool:
+    """Whether the two wells are not mirror images."""
+    raise _of_kernels()
+
+
+_compiled_for_terms(does_work, _write_flag("kick_work"))
+_compiled_for_terms(needs_tension_product, _write_flag("needs_tension_product"))
+_compiled_for_terms(wells_differ, _write_flag("relative_to_nearest_well"))
+
+
+def no_external_work(terms: Any) -> ExternalWork:
+    """Of a step that has not begun."""
+    raise _of_kernels()
+
+
+_compiled_for_terms(
+    no_external_work,
+    lambda classes: ([f"return ExternalWork({_tuple(['0.0'] * len(classes))}, 0.0)"], {}),
+)
+
+
+def total_work(terms: Any, one: ExternalWork, two: ExternalWork) -> ExternalWork:
+    """Of two parts of a step."""
+    raise _of_kernels()
+
+
+def _write_total(classes: list[Any]) -> tuple[list[str], dict[str, Any]]:
+    works = _tuple([f"one.works[{i}] + two.works[{i}]" for i in range(len(classes))])
+    return [f"return ExternalWork({works}, one.gross + two.gross)"], {}
+
+
+_compiled_for_terms(total_work, _write_total)
+
+
+def add_work(
+    memory: Any,
+    size: int,
+    terms: Any,
+    weight: float,
+    g: int,
+    r: int,
+    kick: int,
+    p: int,
+    external: ExternalWork,
+) -> ExternalWork:
+    """Add the work of a kick to that of the step so far."""
+    raise _of_kernels()
+
+
+def _write_added(classes: list[Any]) -> tuple[list[str], dict[str, Any]]:
+    working = _working(classes)
+    lines = [f"work{i} = term{i}(memory, size, terms[{i}], weight, g, r, kick, p)" for i in working]
+    works = [f"external.works[{i}]" + (f" + work{i}" if i in working else "") for i in range(len(classes))]
+    gross = " + ".join(["external.gross", *(f"abs(work{i})" for i in working)])
+    lines.append(f"return ExternalWork({_tuple(works)}, {gross})")
+    return lines, {f"term{i}": classes[i].kick_work for i in working}
+
+
+_compiled_for_terms(add_work, _write_added)
+
+
+def accumulate_work(terms: Any, accumulators: Any, external: ExternalWork) -> None:
+    """Enter the work in a step in the statistics."""
+    raise _of_kernels()
+
+
+def _write_accumulated(classes: list[Any]) -> tuple[list[str], dict[str, Any]]:
+    working = _working(classes)
+    lines = [f"accumulators.{classes[i].accumulator} += external.works[{i}]" for i in working]
+    return [*lines, *(["accumulators.gross_work += external.gross"] if working else []), "return"], {}
+
+
+_compiled_for_terms(accumulate_work, _write_accumulated)
+
+
+def works_so_far(accumulators: tuple[str, ...]) -> Any:
+    """Make a function f(terms, sums, external): *accumulators* of the run, with the work in a part of a step."""
+
+    def works(terms: Any, sums: Any, external: ExternalWork) -> tuple[float, ...]:
+        raise _of_kernels()
+
+    def write(classes: list[Any]) -> tuple[list[str], dict[str, Any]]:
+        place = {classes[i].accumulator: f" + external.works[{i}]" for i in _working(classes)}
+        found = [f"sums.{name}{place.get(name, '')}" for name in accumulators]
+        return [f"return {_tuple(found)}"], {}
+
+    return _compiled_for_terms(works, write)
