@@ -14,7 +14,14 @@ from scipy.spatial import cKDTree
 from scipy.stats import beta
 
 from snapbeam.dynamics.bifurcation import minimal_period
-from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, flow_of, settling_periods
+from snapbeam.dynamics.flow import (
+    AdvancedStates,
+    Flow,
+    Stroboscope,
+    fixed_parameters,
+    flow_of,
+    settling_periods,
+)
 from snapbeam.dynamics.lyapunov import lyapunov_spectrum
 from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, orbit_tolerance, shoot
 from snapbeam.model.integration import Integration
@@ -261,7 +268,7 @@ class Attractors:
             },
             {"coordinate": list(names)},
             {
-                "title": "attractors", "undecided": self.undecided, "check_periods": self.check_periods,
+                **fixed_parameters(self.flow), "title": "attractors", "undecided": self.undecided, "check_periods": self.check_periods,
                 "unseen_share_95": self.unseen_share(), "termination_reason": self.termination_reason,
             },
         )  # fmt: skip

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.dynamics.flow import Flow, Stroboscope
+from snapbeam.dynamics.flow import Flow, Stroboscope, fixed_parameters
 from snapbeam.dynamics.periodic_orbits import (
     Corrector,
     Family,
@@ -178,6 +178,7 @@ class Branch:
                 short: ("orbit", self.values, {"units": unit, "long_name": words, "parameter": self.name}),
             },
             {
+                **fixed_parameters(first.flow, short),
                 "title": "branch of periodic orbits",
                 "parameter": short,
                 "period": first.period,

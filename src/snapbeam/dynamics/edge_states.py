@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.dynamics.bifurcation import minimal_period
-from snapbeam.dynamics.flow import Flow, Stroboscope, flow_of
+from snapbeam.dynamics.flow import Flow, Stroboscope, fixed_parameters, flow_of
 from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, shoot
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
@@ -84,6 +84,7 @@ class EdgeState:
             },
             {"coordinate": list(names)},
             {
+                **fixed_parameters(self.flow),
                 "title": "edge state",
                 "period": 0 if self.orbit is None else self.orbit.period,
                 "termination_reason": self.termination_reason,

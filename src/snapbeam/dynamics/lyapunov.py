@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, flow_of, settling_periods
+from snapbeam.dynamics.flow import (
+    AdvancedStates,
+    Flow,
+    Stroboscope,
+    fixed_parameters,
+    flow_of,
+    settling_periods,
+)
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State
@@ -198,7 +205,9 @@ def _dataset(
     coords: dict[str, Any] = {"exponent_number": np.arange(1, count + 1)}
     coords |= {} if points is None else points.coordinates()
     dataset = xr.Dataset(
-        coords=coords, attrs={"title": "Lyapunov exponents", "periods": total, "transient": before}
+        coords=coords,
+        attrs={name: value for name, value in fixed_parameters(flow).items() if name not in coords}
+        | {"title": "Lyapunov exponents", "periods": total, "transient": before},
     )
     for name, (values, words) in table.items():
         dataset[name] = ((*dims, "exponent_number"), arranged(values), {"units": unit, "long_name": words})
@@ -301,7 +310,7 @@ def largest_lyapunov(
             "exponent": ("run", _sums(rate) / total, {"units": unit, "long_name": "largest Lyapunov exponent"}),
             "exponent_error": ("run", _error(means), {"units": unit, "long_name": "standard error"}),
         },
-        attrs={
+        attrs=fixed_parameters(flow) | {
             "title": "largest Lyapunov exponent from two trajectories", "periods": total, "period": flow.period,
             "transient": before, "termination_reason": _stopped(total, before, rule), "merged": merged,
             "diagnostics": to_json(told),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, flow_of
+from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, fixed_parameters, flow_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State
@@ -494,6 +494,7 @@ class PeriodicOrbit:
             },
             {"coordinate": list(names)},
             {
+                **fixed_parameters(self.flow),
                 "period": self.period,
                 "residual": self.residual,
                 "stable": int(self.is_stable),

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from snapbeam.plot.axes import dress, edges_of, positions
-from snapbeam.plot.style import axes_or_new, figure_style, fix_ticks
+from snapbeam.plot.style import axes_or_new, figure_style, fix_ticks, set_title
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, checked, choice
 
@@ -76,7 +76,7 @@ def plot_diagram(
         if each is not None and not needed <= set(getattr(each, "dims", ())):
             raise InputError(f"{name}: must have the dimensions {', '.join(sorted(needed))}")
     with figure_style():
-        ax = axes_or_new(ax, "double", 84.0)
+        ax = axes_or_new(ax, first, "double", 84.0)
         handles: list[Line2D] = []
         if dataset is not None:
             if variable not in dataset:
@@ -189,7 +189,7 @@ def plot_lifetimes(
     if not 1 <= len(dims) <= 2 or "point" in dims:
         raise InputError(f"lifetime over {dims}: is drawn over one or two parameters")
     with figure_style():
-        ax = axes_or_new(ax)
+        ax = axes_or_new(ax, dataset)
         if len(dims) == 1:
             x, _ = positions(dataset, dims[0])
             low, high = dataset["lifetime_low"].values, dataset["lifetime_high"].values
@@ -251,7 +251,7 @@ def plot_survival(
         raise InputError(f"dataset: has {len(rows)} points; choose at most 5 of them")
     tau, delay = (np.atleast_1d(runs[name].values).ravel() for name in ("lifetime", "delay"))
     with figure_style():
-        ax = axes_or_new(ax)
+        ax = axes_or_new(ax, dataset)
         seen = float(dataset.attrs["cycles"]) - float(dataset.attrs["settling_cycles"])
         settled = runs["final_well_proven"].values.astype(bool) | (
             runs["status"].values == int(RunStatus.EARLY_STOP)
@@ -287,6 +287,8 @@ def plot_survival(
             ylim=(0.6 / rows.shape[1], 1.3),
         )
         ax.set_xlim(left=0.0)
+        if not np.isfinite(rows).any():
+            ax.text(0.5, 0.5, "no run snaps through", transform=ax.transAxes, ha="center")
         handles, _ = ax.get_legend_handles_labels()
         handles.append(Line2D([], [], color="0.3", dashes=(4, 2), linewidth=0.7, label="fitted"))
         if open_ends:
@@ -348,7 +350,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     dims = [str(name) for name in dataset["exponent"].dims if name != "exponent_number"]
     value, error = (each.transpose(*dims) for each in (value, error))
     with figure_style():
-        ax = axes_or_new(ax)
+        ax = axes_or_new(ax, dataset)
         if "running" in dataset:
             _running(factor * dataset["running"], ax)
             ax.set(
@@ -448,7 +450,7 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         raise InputError(f"no multipliers among {list(map(str, dataset.variables))}")
     values = dataset["multiplier_real"].values + 1j * dataset["multiplier_imag"].values
     with figure_style():
-        ax = axes_or_new(ax, height=84.0)
+        ax = axes_or_new(ax, dataset, height=84.0)
         if "orbit" in dataset.dims:
             _multipliers_along(dataset, ax, np.abs(values))
         else:
@@ -522,7 +524,7 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     points = dataset["points"].transpose("attractor", "point", "coordinate").values
     count = dataset.sizes["attractor"]
     with figure_style():
-        ax = axes_or_new(ax, height=88.0)
+        ax = axes_or_new(ax, dataset, height=88.0)
         for number in range(count):
             color = cm.batlow(0.08 + 0.84 * number / max(count - 1, 1))
             period = int(dataset["period"][number])
@@ -533,7 +535,8 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             )  # fmt: skip
         ax.set(xlabel=_coordinate(names[pair[0]]), ylabel=_coordinate(names[pair[1]]))
         unseen = 100 * float(dataset.attrs["unseen_share_95"])
-        ax.set_title(f"Attractors not found: below {unseen:.2g} % of the states (95 %)", loc="left")
+        words = f"Attractors not found: below {unseen:.2g} % of the states (95 %)"
+        set_title(ax, f"{ax.get_title('left')}\n{words}".lstrip())
         figure = ax.get_figure(root=True)
         assert figure is not None
         figure.legend(loc="outside lower center", ncols=1)
@@ -548,7 +551,7 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
     if x not in dataset or y not in dataset:
         raise InputError(f"no {x} and {y} among {list(map(str, dataset.variables))}")
     with figure_style():
-        ax = axes_or_new(ax)
+        ax = axes_or_new(ax, dataset)
         ax.plot(
             dataset[x].values,
             dataset[y].values,
@@ -558,6 +561,14 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
             markeredgewidth=0.0,
             rasterized=True,
         )
+        for limits, name in (
+            ("xlim", x),
+            ("ylim", y),
+        ):  # a point that repeats is not magnified to its rounding errors
+            values = dataset[name].values
+            middle, least = 0.5 * (values.min() + values.max()), 1e-3 * np.abs(values).max()
+            if 0.0 < least > np.ptp(values):
+                ax.set(**{limits: (middle - 10.0 * least, middle + 10.0 * least)})
         where = "Centre" if x.startswith("midspan") else "Contact point's"
         ax.set(xlabel=f"{where} displacement, over $b$", ylabel=rf"{where} velocity, over $b\,\omega_1$")
         fix_ticks(ax)
@@ -575,7 +586,7 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     colors = [_UNDECIDED, *(cm.batlow(0.08 + 0.84 * i / max(count - 1, 1)) for i in range(count))]
     meanings = str(dataset["basin"].attrs["flag_meanings"]).split()
     with figure_style():
-        ax = axes_or_new(ax, height=84.0)
+        ax = axes_or_new(ax, dataset, height=84.0)
         edges = [edges_of(dataset, name) for name in names]
         norm = BoundaryNorm(np.arange(-1.5, count), count + 1)
         ax.pcolormesh(*edges, labels.T, cmap=ListedColormap(colors), norm=norm, rasterized=True)
@@ -613,7 +624,7 @@ def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     name = str(dataset["coordinate"].values[0])
     values = dataset["state"].values[:, 0]
     with figure_style():
-        ax = axes_or_new(ax)
+        ax = axes_or_new(ax, dataset)
         for at, words in ((-1.0, "well"), (0.0, "straight")):
             if name == "amplitude[1]" and values.min() - 0.3 < at < values.max() + 0.3:
                 ax.axhline(at, color="0.75", linewidth=0.5, zorder=0)

@@ -25,6 +25,7 @@ from snapbeam.plot.style import (
     figure_style,
     fix_ticks,
     new_figure,
+    set_title,
 )
 from snapbeam.solver.statistics import STATISTICS
 from snapbeam.sweeps.measured_points import MeasuredPoints
@@ -128,7 +129,7 @@ def plot_response_map(
         fix_ticks(ax)
         dress(ax.xaxis, dataset, across)
         dress(ax.yaxis, dataset, upward)
-        ax.set_title(subtitle(dataset, (across, upward)), loc="left")
+        set_title(ax, subtitle(dataset, (across, upward)))
         handles = class_handles(kinds)
         if "class_fraction" in dataset:
             handles.append(draw_agreement(ax, dataset, (across, upward), edges))
@@ -160,7 +161,7 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
         assert ax is not None
         fix_ticks(ax)
         _draw_line(ax, dataset, name)
-        ax.set_title(subtitle(dataset, (name,)), loc="left")
+        set_title(ax, subtitle(dataset, (name,)))
         handles = class_handles(dataset["response_class"].values)
         if legend and own is not None:
             own.legend(handles=handles, loc="outside lower center", ncols=2)
@@ -246,7 +247,7 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     handles: list[Patch | Line2D] = []
     for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
         count = 0 if kinds is None else int((kinds == kind).sum())
-        if count or kind is not ResponseClass.UNKNOWN:
+        if count or (kinds is None and kind is not ResponseClass.UNKNOWN):
             label = kind.label if kinds is None else f"{kind.label}, {_percent(count, kinds.size)}"
             handles.append(Patch(facecolor=CLASS_COLORS[kind], edgecolor="black", linewidth=0.4, label=label))
     return handles
@@ -399,7 +400,7 @@ def plot_statistic(
             ax.figure.colorbar(mesh, ax=ax, label=label, pad=0.02).ax.tick_params(labelsize=7)
             dress(ax.xaxis, dataset, across)
             dress(ax.yaxis, dataset, upward)
-        ax.set_title(subtitle(dataset, (*dims,)), loc="left")
+        set_title(ax, subtitle(dataset, (*dims,)))
     return ax
 
 
@@ -516,7 +517,7 @@ def plot_points(
             own.legend(handles=handles, loc="outside lower center", ncols=2)
         elif legend and handles:
             ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2)
-        ax.set_title(subtitle(dataset, along), loc="left")
+        set_title(ax, subtitle(dataset, along))
     return ax
 
 

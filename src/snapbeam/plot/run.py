@@ -18,6 +18,7 @@ from snapbeam.plot.style import (
     figure_style,
     fix_ticks,
     new_figure,
+    set_title,
 )
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.simulation.run import Run
@@ -65,7 +66,7 @@ def across(dataset: xr.Dataset) -> tuple[str, str]:
 def _axes(ax: Axes | None, dataset: xr.Dataset) -> Axes:
     if ax is None:
         ax = new_figure("single", 66.0).add_subplot()
-        ax.set_title(caption(dataset, 2), loc="left", fontsize=7)
+        set_title(ax, caption(dataset, 2))
     fix_ticks(ax)
     return ax
 
@@ -307,9 +308,9 @@ def plot_run(
         left[0].set_ylabel("Displacement $w/b$")
         handles, labels = left[0].get_legend_handles_labels()
         figure.legend(
-            handles, labels, loc="outside upper left", ncols=3, title=caption(dataset), alignment="left",
-            title_fontsize=7,
+            handles, labels, loc="outside lower left", ncols=3,
         )  # fmt: skip
+        set_title(left[0], caption(dataset, 2))
         figure.align_ylabels(left)
         if has_force:
             near, seconds, peak = _hardest_impact(part)
@@ -317,7 +318,7 @@ def plot_run(
             around = seconds / scale
             right = _column(figure, grid, 1, near, around, force)
             right[-1].set_xlabel(
-                f"Time after $\\tau$ = {peak:.4g} ({unit})" if axis_name == "cycle" else f"Time ({unit})"
+                f"Time after\n$\\tau$ = {peak:.4g} ({unit})" if axis_name == "cycle" else f"Time ({unit})"
             )
             right[0].set_xlim(min(around[0], -0.12 * around[-1]), around[-1])
     return left[0]

@@ -16,7 +16,7 @@ from matplotlib.ticker import EngFormatter
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quasi_static import quasi_static_threshold
 from snapbeam.plot.axes import dress, edges_of, is_geometric, positions, symbol_of
-from snapbeam.plot.style import CLASS_COLORS, figure_style, fix_ticks, new_figure
+from snapbeam.plot.style import CLASS_COLORS, figure_style, fix_ticks, new_figure, set_title
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, instance, shown
 
@@ -323,7 +323,7 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
         reach = np.nanmax(np.where(np.isfinite(data["threshold_high"]), data["threshold_high"], np.nan))
         ax.set_ylim(min(0.0, bottom), min(top, 1.08 * float(reach)) if np.isfinite(reach) else top)
         share = 100.0 * float(data.attrs.get("confidence", 0.95))
-        ax.set_title(f"{int(data['runs'].max())} runs a point, {share:g} % bands", loc="left")
+        set_title(ax, f"{int(data['runs'].max())} runs a point, {share:g} % bands")
         ax.legend(loc="best")
     return ax
 
