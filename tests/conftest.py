@@ -33,6 +33,8 @@ FIRST = (
     "conformance/",
 )
 """The files and folders to begin with.  The first file compiles the kernels that most tests use."""
+LATER = "lab/test_test_series.py"
+"""A file of the laboratory that needs one of these kernels."""
 
 
 def pytest_collection_modifyitems(items):
@@ -44,6 +46,8 @@ def pytest_collection_modifyitems(items):
 
     def place(item):
         path = item.path.as_posix()
+        if path.endswith(LATER):
+            return len(FIRST)
         return next((k for k, part in enumerate(FIRST) if f"/tests/{part}" in path), len(FIRST))
 
     items.sort(key=place)

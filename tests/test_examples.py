@@ -15,6 +15,7 @@ DEAR = {
     "ex17_si5_added_modes",
     "ex19_figB10_resonance",
     "ex21_sensitivity",
+    "ex41_steel_beam",
     "ex22_claims",
     "ex23_extended_models",
     "ex24_dynamics",

@@ -74,6 +74,7 @@ ASKED = sb.Integration(cycles=2)
 
 
 OF_OTHERS = {
+    "local_force_work",
     "valid", "energy_striker", "energy_lost_contact", "base_displacement", "base_velocity", "base_work", "external_force",
     "force_work", "load_change",
     "load_work", "voltage", "power_load", "energy_harvested", "energy_circuit", "striker", "striker_displacements",

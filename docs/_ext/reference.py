@@ -38,6 +38,9 @@ _SECTIONS = {
     "base_excitation": "The motion of the base, selected by `type` as in `[drive]`; without this section the base is at rest.",
     "axial_load": "The change of the axial load in time, selected by `type`: {loads}; without this section the load is "
     "constant.",
+    "external_force": "A force on the structure as a function of time, selected by `type`: {forces}.",
+    "local_force": "A force that depends on the displacement or velocity of one point, selected by `type`: {local_forces}. "
+    "A law of your own has its own type; see [Your own parts](extending.md#local-force).",
     "harvester": "The circuit of an energy harvester, selected by `type`: {harvesters}.",
     "integration": "Solver settings.",
 }
@@ -58,7 +61,9 @@ def parameter_tables() -> str:
     from snapbeam.model.axial_load import LOADS
     from snapbeam.model.contact.base import LAWS
     from snapbeam.model.drive.base import DRIVES
+    from snapbeam.model.external_force import FORCES
     from snapbeam.model.harvester import HARVESTERS
+    from snapbeam.model.local_force import LOCAL_FORCES
     from snapbeam.model.parameter_file import Config
     from snapbeam.model.parameters import parameters
 
@@ -70,11 +75,13 @@ def parameter_tables() -> str:
             name: kind for name, kind in DRIVES.items() if name != "sum" and kind.can_excite_base()
         },
         "axial_load": LOADS,
+        "external_force": FORCES,
+        "local_force": LOCAL_FORCES,
         "harvester": HARVESTERS,
     }
     listed = {
         "laws": _listed(LAWS), "drives": _listed(types["drive"]), "loads": _listed(LOADS),
-        "harvesters": _listed(HARVESTERS),
+        "harvesters": _listed(HARVESTERS), "forces": _listed(FORCES), "local_forces": _listed(LOCAL_FORCES),
     }  # fmt: skip
     parts = []
     for section, words in _SECTIONS.items():
@@ -343,6 +350,10 @@ def _parts() -> dict[str, Any]:
     piezo = sb.PiezoelectricHarvester(
         moment_per_volt=4e-3, capacitance=60e-9, resistance=2e4, patch_start=0.05, patch_end=0.4
     )
+    spring, drag = (
+        sb.LocalSpring(stiffness=10.0, location=0.4),
+        sb.QuadraticDamping(coefficient=0.1, location=0.4),
+    )
     return {
         "the paper's": struck(),
         "a gap": struck(gap=5e-5),
@@ -374,6 +385,11 @@ def _parts() -> dict[str, Any]:
             axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.4, amplitude=3.0))
         ),
         "a load with a ramp": struck(axial_load=sb.AxialLoadModulation(motion=sb.LoadRamp(change=1.0, duration=3.0))),
+        "an external force": struck(
+            external_force=sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=0.9, amplitude=0.1), location=0.4)
+        ),
+        "a local force": struck(local_force=spring),
+        "a local force with damping": struck(local_force=drag),
         "a harvester": struck(harvester=piezo),
     }  # fmt: skip
 
@@ -389,6 +405,7 @@ def _refused_systems() -> dict[str, Any]:
     record = parts["drive `recorded_motion`"].striker
     load, harvester = parts["a load with a sine"].axial_load, parts["a harvester"].harvester
     base = parts["a base with a sine"].base_excitation
+    drag = parts["a local force with damping"].local_force
     first = parts["the paper's"].striker
     stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5)
     heavy = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5, mass=2e-3)
@@ -406,6 +423,13 @@ def _refused_systems() -> dict[str, Any]:
         "contact `restitution` with a changing load": lambda: sb.System(one, newton, first, axial_load=load),
         "contact `restitution` with a harvester": lambda: sb.System(one, newton, first, harvester=harvester),
         "contact `restitution` with a striker with a mass": lambda: sb.System(one, newton, heavy),
+        "contact `restitution` with a local force": lambda: sb.System(one, newton, first, local_force=drag),
+        "a local force with damping, with a harvester": lambda: sb.System(
+            model, hertz, first, local_force=drag, harvester=harvester
+        ),
+        "a local force with damping, with a contact that loses energy": lambda: sb.System(
+            model, lossy, first, local_force=drag
+        ),
         "a contact that loses energy with a harvester": lambda: sb.System(
             model, lossy, first, harvester=harvester
         ),

@@ -39,6 +39,9 @@ from .model.harvester import ElectromagneticHarvester as ElectromagneticHarveste
 from .model.harvester import PiezoelectricHarvester as PiezoelectricHarvester
 from .model.imperfection import Imperfection as Imperfection
 from .model.integration import Integration as Integration
+from .model.local_force import LocalForce as LocalForce
+from .model.local_force import LocalSpring as LocalSpring
+from .model.local_force import QuadraticDamping as QuadraticDamping
 from .model.quantity import quantity as quantity
 from .model.reduced_model import ReducedModel as ReducedModel
 from .model.state import State as State

@@ -56,6 +56,7 @@ def test_probability(tmp_path) -> None:
     assert picture.stat().st_size > 5_000 and "runs at 3 points" in result.output
 
 
+@pytest.mark.slow
 def test_design(tmp_path) -> None:
     target, picture, told = tmp_path / "d.nc", tmp_path / "d.png", tmp_path / "d.json"
     result = run(

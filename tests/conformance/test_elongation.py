@@ -29,7 +29,7 @@ def model(stiffness, elongation, **more) -> sb.ReducedModel:
 
 
 @pytest.mark.parametrize("elongation", [np.outer(SPRING, SPRING), FULL], ids=["one spring", "full"])
-@pytest.mark.parametrize("buckled", [False, True])
+@pytest.mark.parametrize("buckled", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_against_an_independent_solution(elongation, buckled) -> None:
     stiffness = STIFF - 6.0 * np.outer(SPRING, SPRING) if buckled else STIFF
     load = np.array([0.1, -0.05, 0.02])

@@ -54,6 +54,7 @@ def test_harmonic_force_with_a_mean():
     held_against(system, ROW, lambda t: 0.5 + 2.0 * math.sin(1.3 * w * t + 0.7), 1e-5)
 
 
+@pytest.mark.slow
 def test_recorded_and_constant_force():
     first = model().reference_frequency
     rate = 60.0 * first
@@ -74,6 +75,7 @@ def test_recorded_and_constant_force():
     held_against(sb.System(model(), external_force=constant), np.array([1.0, 0.5]), lambda t: -3.0, 1e-5)
 
 
+@pytest.mark.slow
 def test_moving_base():
     reduced = model(base_shape=BASE)
     w = 2.0 * math.pi * reduced.reference_frequency
@@ -103,6 +105,7 @@ def test_force_on_a_beam_beside_a_stop():
     )
 
 
+@pytest.mark.slow
 def test_weight_of_a_free_mass_on_a_moving_stop():
     """Between impacts a free mass falls; it meets a stop that moves as a sine."""
     ball = sb.ReducedModel.from_matrices([[0.5]], [0.0], contact_shape=[1.0], reference_frequency=10.0)

@@ -107,6 +107,7 @@ def test_against_an_independent_solution(names) -> None:
     np.testing.assert_allclose(found, truth[40::40], rtol=0.0, atol=2e-6)
 
 
+@pytest.mark.slow
 def test_sections_orbits_and_diagrams_begin_at_the_phase() -> None:
     """Of a base alone: a section, the states on an orbit, and phases that differ between the runs."""
     system = system_of(("base",)).replace(**{"base_excitation.acceleration_amplitude": 0.02})

@@ -38,7 +38,7 @@ def still(t: float) -> tuple[float, float]:
 
 CASES = [
     pytest.param("stop", 1, 3, marks=pytest.mark.slow),
-    pytest.param("stop", 3, 2),
+    pytest.param("stop", 3, 2, marks=pytest.mark.slow),
     pytest.param("stop", 8, 2, marks=pytest.mark.slow),
     pytest.param("both move", 1, 3, marks=pytest.mark.slow),
     pytest.param("both move", 3, 2, marks=pytest.mark.slow),

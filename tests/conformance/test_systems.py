@@ -45,7 +45,7 @@ def swept(name: str, count: int, seed: int, *, mirrored: bool = False, modes: in
 def test_none_is_missing() -> None:
     """Every kind of law, drive, motion of a base, load and harvester, and every parameter but those of runs.
 
-    ``test_external_force.py`` compares external forces with independent solutions.
+    ``test_external_force.py`` and ``test_local_force.py`` compare forces with independent solutions.
     """
     systems = [extended.system() for extended in SYSTEMS.values()]
     there = {(section, type(drive).name) for each in systems for section, drive in each.moving}
@@ -67,7 +67,7 @@ def test_none_is_missing() -> None:
     missing = {
         name
         for name, row in parameters().items()
-        if row.section not in ("integration", "initial_state", "external_force")
+        if row.section not in ("integration", "initial_state", "external_force", "local_force")
     } - own
     assert not missing
 

@@ -46,6 +46,7 @@ EXACT = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ratio", "restitution", "periods"), EXACT)
 def test_orbits_with_one_impact_in_n_periods(ratio: float, restitution: float, periods: int) -> None:
     """State and impulse to 1e-8, and det = r^2."""

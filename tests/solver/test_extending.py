@@ -26,7 +26,7 @@ from snapbeam.util.validation import InputError
 
 PAGE = Path(__file__).parents[2] / "docs" / "extending.md"
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-"""The code of the page: a contact law, the function of a statistic, its row, a drive, a script that uses all."""
+"""The code of the page: a contact law, the function of a statistic, its row, a drive, a local force, scripts that use them."""
 MASS, SPEED = 2e-3, 0.05
 
 
@@ -46,7 +46,7 @@ def own(tmp_path_factory):
     for path, text in zip(
         (
             law / "own_law.py", statistic / "deepest.py", statistic / "my_statistics.py", drive / "own_drive.py",
-            drive / "run_own.py",
+            drive / "own_force.py", drive / "run_friction.py", drive / "run_own.py",
         ),
         BLOCKS, strict=True,
     ):  # fmt: skip

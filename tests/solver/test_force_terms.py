@@ -19,6 +19,7 @@ SOLVER = Path(snapbeam.solver.__file__).parent
 TERMS = {
     "second_well": (r"SecondWell|terms\.second_well|UnequalWells|unequal_wells", 2),
     "base_excitation": ("BaseExcitation|base_(excitation|load|acceleration|work|sign|follow|hardest)", 4),
+    "local_force": ("LocalForce|local_force", 3),
     "axial_load": ("AxialLoad|axial_load|load_(change|work)", 1),
 }
 """Of each term, the names that belong to it, and in how many other files of the solver they are; the aim is 0."""

@@ -8,8 +8,13 @@ import pytest
 from cases import CASES, Row
 from write_table import TABLE, rows_of
 
+SLOW = ("basin_shares", "mass_on_a_stop", "bouncing_ball", "lyapunov")
+"""Cases whose kernels no other test of the quick run needs, or that take long."""
 
-@pytest.mark.parametrize("name", CASES)
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in CASES]
+)
 def test_case(name: str) -> None:
     for row in CASES[name]():
         assert math.isfinite(row.ours), row

@@ -380,8 +380,10 @@ class Stroboscope:
 
     @property
     def smooth(self) -> bool:
-        """Whether tangents exist: every contact law has a force without a jump that depends on the penetration only."""
+        """Whether tangents exist: no local force, and contact forces without a jump that depend on the penetration only."""
         contact = self.system.contact
+        if self.system.local_force is not None:
+            return False
         if contact is None or self.system.striker is None:
             return True
         laws = [contact, *(each.contact for each in self.system.further_contacts)]

@@ -104,8 +104,8 @@ def lyapunov_spectrum(
     before, rule = _transient(flow, transient, 0)
     if not flow.smooth:
         raise InputError(
-            "contact: has no tangent flow, since its force jumps or depends on the velocity; use largest_lyapunov for "
-            "the largest exponent"
+            "system: has no tangent flow, since its contact force jumps or depends on the velocity, or since it has a local "
+            "force; use largest_lyapunov for the largest exponent"
         )
     begun, points, columns = _runs(flow, states, axes)
     advanced = (

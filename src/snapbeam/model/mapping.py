@@ -17,6 +17,7 @@ from snapbeam.model.drive.base import DRIVES, Drive
 from snapbeam.model.external_force import FORCES, ExternalForce
 from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.imperfection import Imperfection
+from snapbeam.model.local_force import LOCAL_FORCES
 from snapbeam.model.quantity import quantities
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State, started
@@ -37,6 +38,7 @@ SECTIONS = (
     "base_excitation",
     "axial_load",
     "external_force",
+    "local_force",
     "harvester",
     "initial_state",
 )
@@ -116,6 +118,8 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
         own = {name: value for name, value in own.items() if value is not None}
         history = system.external_force.history
         sections["external_force"] = {"type": history.name} | own | _fields(history)
+    if system.local_force is not None:
+        sections["local_force"] = {"type": system.local_force.name} | _fields(system.local_force)
     if system.harvester is not None:
         sections["harvester"] = {"type": system.harvester.name} | _fields(system.harvester)
     if start is not None:
@@ -168,6 +172,8 @@ def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, A
         parts["external_force"] = ExternalForce(
             history=_chosen(own, "external_force", "type", FORCES), **of_force
         )
+    if "local_force" in sections:
+        parts["local_force"] = _chosen(sections["local_force"], "local_force", "type", LOCAL_FORCES)
     if "harvester" in sections:
         parts["harvester"] = _chosen(sections["harvester"], "harvester", "type", HARVESTERS)
     if "initial_state" in sections:
@@ -282,6 +288,7 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         "base_excitation",
         "axial_load",
         "external_force",
+        "local_force",
         "harvester",
         "initial_state",
     ):
@@ -308,8 +315,9 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
     for name in ("base_excitation", "axial_load", "external_force"):
         if name in inside:
             found[name] = _around(found.get(name), name, inside[name])
-    if "harvester" in inside:
-        found["harvester"] = _changed(found.get("harvester"), "harvester", inside["harvester"])
+    for name in ("local_force", "harvester"):
+        if name in inside:
+            found[name] = _changed(found.get(name), name, inside[name])
     start, model = found["initial_state"], found["model"]
     if isinstance(start, State) and "initial_state" not in whole and start.modes != model.modes:
         found["initial_state"] = start.with_modes(model.modes)

@@ -23,6 +23,7 @@ from snapbeam.model.drive.base import DRIVES
 from snapbeam.model.external_force import FORCES
 from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.integration import CYCLES, Integration
+from snapbeam.model.local_force import LOCAL_FORCES
 from snapbeam.model.mapping import parts_from_mapping
 from snapbeam.model.parameter_axes import PHYSICAL, checked_physical, parse_axis, physical_name, unit_of
 from snapbeam.model.parameters import Parameter, lookup, parameters, row_of
@@ -134,7 +135,7 @@ def contact_rivals() -> list[tuple[set[str], set[str]]]:
 
 
 SECTIONS = (
-    "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "external_force", "harvester", "initial_state",
+    "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "external_force", "local_force", "harvester", "initial_state",
     "sweep", "integration",
 )  # fmt: skip
 _OF_OTHER_COMMANDS = ("uncertainty", "probability", "design")
@@ -144,6 +145,7 @@ _KINDS: dict[str, Mapping[str, type]] = {
     "base_excitation": {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()},
     "axial_load": LOADS,
     "external_force": FORCES,
+    "local_force": LOCAL_FORCES,
     "harvester": HARVESTERS,
 }
 """What a section may be of, where its ``type`` says so."""
@@ -372,7 +374,7 @@ DEFAULT_DRIVE = {"frequency_ratio": 1.21, "velocity_amplitude": 0.18}
 DEFAULT_AXES = {"drive.frequency_ratio": "0.1:4:64", "drive.velocity_amplitude": "0.01:0.65:40"}
 """Of a map for which no axis is named."""
 _AROUND, _STRIKING = (
-    ("base_excitation", "axial_load", "external_force", "harvester"),
+    ("base_excitation", "axial_load", "external_force", "local_force", "harvester"),
     ("contact", "striker", "drive"),
 )
 # What stands for the same thing in a section: giving one set takes the other away.

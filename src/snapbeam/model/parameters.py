@@ -25,6 +25,7 @@ from snapbeam.model.external_force import FORCES, ExternalForce
 from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.integration import Integration
+from snapbeam.model.local_force import LOCAL_FORCES
 from snapbeam.model.quantity import RUN, ParameterField, quantities
 from snapbeam.model.reduced_model import MODEL_QUANTITIES
 from snapbeam.model.state import START_NAME
@@ -123,6 +124,7 @@ def _rows() -> Iterable[Parameter]:
         ("base_excitation", shaking),
         ("axial_load", LOADS),
         ("external_force", FORCES),
+        ("local_force", LOCAL_FORCES),
         ("harvester", HARVESTERS),
     )
     for section, known in several:
@@ -132,7 +134,13 @@ def _rows() -> Iterable[Parameter]:
                 yield dataclasses.replace(row, kinds=(kind_name,))
 
 
-_AROUND = {"base_excitation": "the base", "axial_load": "", "external_force": "", "harvester": ""}
+_AROUND = {
+    "base_excitation": "the base",
+    "axial_load": "",
+    "external_force": "",
+    "local_force": "",
+    "harvester": "",
+}
 """Sections of what surrounds a beam, whose names in datasets say so, and what words of a drive are said of."""
 
 
@@ -157,7 +165,11 @@ def _of_class(section: str, kind: type) -> Iterable[Parameter]:
 
 def parameters() -> dict[str, Parameter]:
     """Every parameter by its dotted name, those of registered laws and drives included."""
-    return dict(_table(tuple(tuple(known.items()) for known in (LAWS, DRIVES, LOADS, FORCES, HARVESTERS))))
+    return dict(
+        _table(
+            tuple(tuple(known.items()) for known in (LAWS, DRIVES, LOADS, FORCES, LOCAL_FORCES, HARVESTERS))
+        )
+    )
 
 
 @lru_cache(maxsize=4)
@@ -169,7 +181,7 @@ def _table(registered: tuple[tuple[tuple[str, type], ...], ...]) -> dict[str, Pa
             row = dataclasses.replace(row, kinds=(*table[row.name].kinds, *row.kinds))
         table[row.name] = row
     order = (
-        "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "external_force", "harvester", "initial_state",
+        "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "external_force", "local_force", "harvester", "initial_state",
         "integration",
     )  # fmt: skip
     return dict(sorted(table.items(), key=lambda item: order.index(item[1].section)))

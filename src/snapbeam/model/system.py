@@ -22,6 +22,7 @@ from snapbeam.model.drive.fixed_stop import FixedStop
 from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.harvester import Harvester
+from snapbeam.model.local_force import LocalForce
 from snapbeam.model.mapping import parts_from_mapping, parts_to_mapping, replaced
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
@@ -43,6 +44,7 @@ _A = {
     "base_excitation": "a BaseExcitation(motion=AccelerationSine(...))",
     "axial_load": "an AxialLoadModulation(motion=HarmonicLoad(...))",
     "external_force": "an ExternalForce(history=HarmonicForce(...))",
+    "local_force": "a LocalSpring(...), or a law that is derived from LocalForce",
     "harvester": "a PiezoelectricHarvester(...) or an ElectromagneticHarvester(...)",
 }
 
@@ -55,6 +57,7 @@ def check_environment(system: Any) -> None:
         ("base_excitation", base, BaseExcitation),
         ("axial_load", load, AxialLoadModulation),
         ("external_force", force, ExternalForce),
+        ("local_force", system.local_force, LocalForce),
         ("harvester", harvester, Harvester),
     ):
         if part is not None and not isinstance(part, kind):
@@ -70,6 +73,7 @@ def check_environment(system: Any) -> None:
             )
     if harvester is not None:
         harvester.row(system.model)
+    _check_local_force(system)
     if base is None and load is None and harvester is None and force is None:
         return
     words = "a harvester" if harvester is not None else "a changing axial load"
@@ -101,6 +105,26 @@ def check_environment(system: Any) -> None:
         )
 
 
+def _check_local_force(system: Any) -> None:
+    """Refuse a local force beside what is not integrated with it."""
+    local, contact = system.local_force, system.contact
+    if local is None:
+        return
+    local.row(system.model)
+    if contact is not None and contact.impulsive:
+        raise InputError(
+            f"contact = {contact!r} with a local force: sticking under Newton's law includes the tip's force only; use a "
+            "HertzContact, or a HuntCrossley with the same restitution"
+        )
+    if local.dissipative and (
+        system.harvester is not None or (contact is not None and contact.rate_dependent)
+    ):
+        raise InputError(
+            f"local_force = {shown(local)} with a harvester or a contact law that depends on the velocity: the solver "
+            "has one velocity-dependent force; leave one of them out"
+        )
+
+
 # ----------------------------------------------------------------------------------------------------
 
 
@@ -122,6 +146,9 @@ class System:
         How the axial load changes in time.
     external_force : ExternalForce, optional
         A force on the structure; not beside a base excitation.
+    local_force : LocalForce, optional
+        A force that depends on the displacement and velocity of one point, such as a :class:`~snapbeam.LocalSpring` or a law of
+        one's own.
     harvester : PiezoelectricHarvester or ElectromagneticHarvester, optional
         A circuit that turns motion into power in a resistor.
     initial_state : State, optional
@@ -158,6 +185,7 @@ class System:
     harvester: Harvester | None = None
     further_contacts: tuple[ContactPair, ...] = ()
     external_force: ExternalForce | None = None
+    local_force: LocalForce | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.striker, (list, tuple)) or isinstance(self.contact, (list, tuple)):
@@ -216,7 +244,7 @@ class System:
         ``beam.thickness``, ``model.modes``, ``contact.stiffness``, ``striker.location`` and
         ``drive.frequency_ratio`` (of the second striker ``striker_2.location``, ``drive_2.frequency_ratio``,
         ``contact_2.stiffness``), or whole parts: ``beam``, ``model``, ``contact``, ``striker``, ``drive``, ``initial_state``,
-        ``base_excitation``, ``axial_load``, ``external_force``, ``harvester``.
+        ``base_excitation``, ``axial_load``, ``external_force``, ``local_force``, ``harvester``.
 
         Raises
         ------
@@ -281,8 +309,8 @@ class System:
 
     @property
     def has_environment(self) -> bool:
-        """Whether a base moves, the axial load changes, an external force acts or a harvester taps the beam."""
-        around = self.base_excitation, self.axial_load, self.external_force, self.harvester
+        """Whether a base moves, the axial load changes, an external or local force acts, or there is a harvester."""
+        around = self.base_excitation, self.axial_load, self.external_force, self.local_force, self.harvester
         return any(each is not None for each in around)
 
     @property

@@ -144,6 +144,10 @@ def require_tangent(system: System) -> None:
             f"tangent with striker mass = {system.striker.mass:g} kg: the tangent flow does not contain the body "
             "of the striker; give no tangent, or no mass"
         )
+    if system.local_force is not None:
+        raise InputError(
+            "tangent with a local force: the tangent flow does not contain it; give no tangent, or no local force"
+        )
     if system.harvester is not None:
         raise InputError(
             "tangent with a harvester: the tangent flow does not contain its circuit; give no tangent, or no harvester"

@@ -75,6 +75,7 @@ SCHEMA: dict[str, Variable] = {
     "force_work": Variable(("time",), "J", "work done by the external force"),
     "load_change": Variable(("time",), "N", "change of the axial load"),
     "load_work": Variable(("time",), "J", "work done by the change of the axial load"),
+    "local_force_work": Variable(("time",), "J", "work done by the damping part of a local force"),
     "voltage": Variable(("time",), "V", "voltage across the harvester's load"),
     "power_load": Variable(("time",), "W", "power in the harvester's load"),
     "energy_harvested": Variable(("time",), "J", "energy dissipated in the harvester's load"),
@@ -380,7 +381,7 @@ def _harvested(
     found = {
         "voltage": tapped.volts[0] * y,
         "power_load": tapped.share[0] * lost,
-        "energy_harvested": tapped.share[0] * values[:, 9],
+        "energy_harvested": tapped.share[0] * values[:, -1],
     }
     if structure.circuit:
         found["energy_circuit"] = 0.5 * y * y
@@ -390,6 +391,8 @@ def _harvested(
 def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Array) -> dict[str, _Array]:
     """Return the variables of a base excitation, of a changing axial load and of an external force."""
     found: dict[str, _Array] = {}
+    if system.local_force is not None and system.local_force.dissipative:
+        found["local_force_work"] = values[:, 9]
     if system.base_excitation is None and system.axial_load is None and system.external_force is None:
         return found
     motions = motions_of(ensemble, system, recorded.times)

@@ -30,6 +30,7 @@ from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.registry import resolve
 from snapbeam.solver.statistics import Recorded, statistics_of
 from snapbeam.solver.step_size import Plan
+from snapbeam.solver.terms import WORKS
 from snapbeam.util.diagnostics import Diagnostic, counting, sharing, tell
 from snapbeam.util.provenance import array_hash, made_by
 from snapbeam.util.status_codes import RunStatus
@@ -82,7 +83,7 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
     if model.imperfection is not None:
         attrs |= _short(model.imperfection)
     sections = system.to_mapping() if system.has_environment else {}
-    for section in ("base_excitation", "axial_load", "external_force", "harvester"):
+    for section in ("base_excitation", "axial_load", "external_force", "local_force", "harvester"):
         for name, value in sections.get(section, {}).items():
             short = f"{section}_type" if name == "type" else lookup(f"{section}.{name}").short
             attrs[short] = int(value) if isinstance(value, bool) else value
@@ -252,7 +253,7 @@ def _energy_error(accumulators_of_runs: Any) -> float:
     """
     accumulators = accumulators_of_runs[0]
     with np.errstate(invalid="ignore"):  # a run that failed has no numbers
-        given = accumulators["work"] + accumulators["base_work"] + accumulators["load_work"]
+        given = sum((accumulators[name] for name in WORKS), start=accumulators["work"])
         missed = (
             given
             - (accumulators["energy"] - accumulators["first_energy"])

@@ -18,6 +18,7 @@ from snapbeam.model.drive.sine import Sine
 from snapbeam.model.early_termination import decidable_energy, passed_heights
 from snapbeam.model.external_force import RecordedForce
 from snapbeam.model.integration import Integration
+from snapbeam.model.local_force import LocalForce
 from snapbeam.model.quantity import RUN as RUN_SCOPE
 from snapbeam.model.quantity import quantities
 from snapbeam.model.reduced_model import ReducedModel
@@ -353,8 +354,9 @@ def make_ensemble(
     columns = {name: np.array(np.broadcast_to(values, (runs,))) for name, values in columns.items()}
     side = _side(system, state, goes_on=periods is not None)
     structure = structure_of(
-        system.model, side, system.striker, system.base_excitation, system.harvester, system.external_force
-    )
+        system.model, side, system.striker, system.base_excitation, system.harvester, system.external_force,
+        system.local_force,
+    )  # fmt: skip
     plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
     if step_factor != 1.0:
         plans = [each._replace(step=step_factor * each.step) for each in plans]
@@ -372,7 +374,7 @@ def make_ensemble(
     if tapped is not None:
         table["circuit_rate"] = tapped.rate
     highest = table["rest_contact"] + table["offset"] + driven.highest
-    if structure.body_mass is not None or driven.kind.parts or system.further_contacts:
+    if structure.body_mass is not None or driven.kind.parts or system.further_contacts or system.local_force:
         highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown, and a shaken beam too
     time = clocked(table, system, integration, driven.period, plans, periods)
     _require_record(system, table, driven)
@@ -497,11 +499,31 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
             each._replace(step=min(each.step, longest, 1.0 / rate if rate > 0.0 else math.inf))
             for each, rate in zip(plans, rates.tolist(), strict=True)
         ]
+    if integration.step is None and system.local_force is not None:
+        longest = _longest_with_local_force(system, system.local_force, integration.accuracy)
+        plans = [each._replace(step=min(each.step, longest)) for each in plans]
     if striker is None or striker.mass is None:
         return plans
     mass = _struck(system).lightest_contact_mass
     more = max(0, math.ceil(0.5 * math.log2(1.0 + mass / striker.mass) - 1e-9))
     return [each._replace(coarsest=each.coarsest + more, finest=each.finest + more) for each in plans]
+
+
+def _longest_with_local_force(system: System, force: LocalForce, accuracy: str) -> float:
+    """Longest step with a local force, s: its stiffness and damping are in the kicks."""
+    model, scale = _struck(system), system.scale
+    shape = force.row(model)
+    mobility = float(np.sum((model.linear_modes.T @ shape) ** 2))
+    well = abs(float(shape @ model.well_amplitude))
+    # u and v of an interwell motion
+    at_center = abs(float(model.midspan_shape @ model.well_amplitude)) or scale.length
+    largest = 2.0 * max(
+        well, scale.length * float(np.abs(shape).max() / max(np.abs(model.midspan_shape).max(), 1e-300))
+    )
+    fastest = largest * scale.omega * max(1.0, scale.length / at_center)
+    stiff = math.sqrt(mobility * force.greatest_stiffness(largest))
+    decay = mobility * force.greatest_damping(largest, fastest) if force.dissipative else 0.0
+    return _TAPPED[accuracy] / max(stiff, decay, 1e-300)
 
 
 def _fastest_open(system: System) -> float:
@@ -659,7 +681,7 @@ def _decisions(
     """When a run may end early."""
     table["decide_crossings"], table["decide_energy"] = -1, -math.inf
     properties = system.contact is None or system.contact.properties.energy_bound
-    if not integration.early_termination or not properties or system.further_contacts:
+    if not integration.early_termination or not properties or system.further_contacts or system.local_force:
         return
     if system.striker is not None and structure.wells_are_mirror_images:
         # elsewhere the class also depends on whether the other well is reached

@@ -99,7 +99,7 @@ def resolve(
     unequal_wells : bool
         Whether the wells are unequal.
     environment : bool
-        Whether a base moves, the axial load changes, or a harvester is attached.
+        Whether a base moves, the axial load changes, an external or local force acts, or there is a harvester.
     several_strikers : bool
         Whether several strikers strike.
 
@@ -119,9 +119,7 @@ def resolve(
         if unequal_wells:
             reason = "a beam with unequal wells is integrated by the CPU engine alone"
         if environment:
-            reason = (
-                "a moving base, a changing axial load and a harvester are integrated by the CPU engine alone"
-            )
+            reason = "a moving base, a changing axial load, an external or local force and a harvester are integrated by the CPU engine alone"
         if several_strikers:
             reason = "several strikers are integrated by the CPU engine alone"
         if reason is None and (name == "cuda" or not cuda.simulated()):

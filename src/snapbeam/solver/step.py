@@ -33,7 +33,7 @@ The first kick needs no tension: k at the beginning of a step is k at the end of
 A layout may have further forces, the *terms* (``solver/terms``).  Those that depend on position and time alone add to k,
 or to its two coefficients.  A contact force that depends on velocity
 changes during a kick; its mean follows from the exact solution of the kick along c.  A harvester circuit is coupled with p
-within the kick, also exactly.
+within the kick, also exactly; the damping of a local force by a Runge-Kutta method with steps much shorter than the kick.
 
 The step itself decides nothing.  Whether a contact is closed is fixed for a whole step.  The caller observes the beam at
 the end, and inside the step where needed.  If a contact began or ended there, the caller takes a shorter step from the same

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from snapbeam.model.base_excitation import BaseExcitation, rigid_mass
 from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.harvester import Harvester
+from snapbeam.model.local_force import LocalForce
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
 
-__all__ = ["Structure", "UnequalWells", "structure_of"]
+__all__ = ["LocalForceRow", "Structure", "UnequalWells", "structure_of"]
 
 
 _Array = NDArray[np.float64]
@@ -43,6 +44,18 @@ class UnequalWells:
     """Potential energy of the second well above the first, J."""
     level: float
     """Displacement of the centre that divides the wells, m."""
+
+
+@dataclass(frozen=True, eq=False)
+class LocalForceRow:
+    """A local force as the solver sees it."""
+
+    row: _Array
+    """r = V^T shape, shape (N,)."""
+    rest: float
+    """u in the well."""
+    law: Any
+    """Constants of the law."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +93,7 @@ class Structure:
     base_load: _Array | None = None
     """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi).  Of an external force
     F(t) along a row h: V^T h, where F stands for the acceleration."""
+    local_force: LocalForceRow | None = None
     tapped: _Array | None = None
     """Of a harvester: its coupling, scaled so that half the square of the circuit's coordinate is its energy."""
     circuit: bool = False
@@ -185,6 +199,11 @@ class Structure:
             digest.update(np.ascontiguousarray(self.base_load).tobytes())
         if self.body_mass is not None:
             digest.update(np.array([self.body_mass]).tobytes())
+        if self.local_force is not None:
+            kind = type(self.local_force.law).owner
+            digest.update(f"{kind.__module__}.{kind.__qualname__}".encode())
+            digest.update(np.ascontiguousarray(self.local_force.row).tobytes())
+            digest.update(np.array([*self.local_force.law]).tobytes())
         return digest.hexdigest()
 
 
@@ -195,6 +214,7 @@ def structure_of(
     base: BaseExcitation | None = None,
     harvester: Harvester | None = None,
     force: ExternalForce | None = None,
+    local_force: LocalForce | None = None,
 ) -> Structure:
     """The structure of a reduced model, about the well that a striker from *side* pushes away from.
 
@@ -220,6 +240,7 @@ def structure_of(
         model=model,
         unequal_wells=_uneven(model, sign),
         base_load=_base_load(model, base, force),
+        local_force=None if local_force is None else _local_force(model, equilibrium, local_force),
     )
     if striker is not None and striker.mass is not None:
         struck = _with_body(struck, striker, carried_by_base=base is not None and base.striker_on_base)
@@ -233,6 +254,11 @@ def _base_load(
     if force is not None:
         return np.asarray(model.linear_modes.T @ force.row(model))
     return None if base is None else -(model.linear_modes.T @ rigid_mass(model))
+
+
+def _local_force(model: ReducedModel, equilibrium: _Array, local_force: LocalForce) -> LocalForceRow:
+    shape = local_force.row(model)
+    return LocalForceRow(model.linear_modes.T @ shape, float(shape @ equilibrium), local_force.numbers)
 
 
 def _uneven(model: ReducedModel, sign: float) -> UnequalWells | None:
@@ -267,6 +293,7 @@ def _with_body(structure: Structure, striker: Striker, carried_by_base: bool = F
         shift=np.append(structure.shift, 0.0),
         unequal_wells=None if structure.unequal_wells is None else _with_rest(structure.unequal_wells),
         base_load=None if structure.base_load is None else np.append(structure.base_load, own),
+        local_force=_longer(structure.local_force),
         body_mass=striker.mass,
     )
 
@@ -292,12 +319,17 @@ def _with_circuit(structure: Structure, harvester: Harvester) -> Structure:
         coupling=tension,
         unequal_wells=None if structure.unequal_wells is None else _with_rest(structure.unequal_wells),
         base_load=None if structure.base_load is None else np.append(structure.base_load, 0.0),
+        local_force=_longer(structure.local_force),
         tapped=np.append(coupling, 0.0),
         circuit=True,
     )
 
 
 _ROWS = ("omega", "damping_ratio", "well", "center", "shift")
+
+
+def _longer(force: LocalForceRow | None) -> LocalForceRow | None:
+    return None if force is None else dataclasses.replace(force, row=np.append(force.row, 0.0))
 
 
 def _with_rest(unequal_wells: UnequalWells) -> UnequalWells:

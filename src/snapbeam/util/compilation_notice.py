@@ -12,12 +12,12 @@ _LOG = logging.getLogger("snapbeam")
 
 
 class _Notice(logging.Handler):
-    """Write the message of a compilation to standard error if nothing else handles the log."""
+    """Write warnings and the message of a compilation to standard error if nothing else handles the log."""
 
     def emit(self, record: logging.LogRecord) -> None:
         others = [each for each in (*_LOG.handlers, *logging.getLogger().handlers) if each is not self]
         text = record.getMessage()
-        if not others and text.startswith("compiling "):
+        if not others and (record.levelno >= logging.WARNING or text.startswith("compiling ")):
             sys.stderr.write(f"snapbeam: {text}\n")
             sys.stderr.flush()
 

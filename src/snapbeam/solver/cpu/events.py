@@ -24,7 +24,7 @@ from snapbeam.solver.cpu.step import (
     observe,
     prepare,
     take_step,
-    with_circuit_acceleration,
+    with_velocity_dependent,
 )
 from snapbeam.solver.cpu.terms.circuit import (
     accumulate_circuit,
@@ -323,13 +323,13 @@ def detect_contact_event(memory, layout, run, now, tip, step, seen1, scratch):
             pieces = max(2, math.ceil(step.length / run.finest_look))
             flow_coefficients(memory, layout, step.length / pieces, look)
         piece = step.length / pieces
-        free = with_circuit_acceleration(memory, layout, run.spare, step)
+        free = with_velocity_dependent(memory, layout, run.spare, step)
         sample_inside_step(memory, layout, tip, look, pieces, piece, free, after > safe_center, scratch)
         if after > safe_gap:
             entry = first_contact_onset(scratch.inner_samples, pieces, piece)
             if entry >= 0.0:
                 event, cut = True, min(step.ticks, int(entry / tick))
-    if missed_onset(layout.circuit, event, seen.d, seen1.d):
+    if missed_onset(layout.circuit, layout.terms, event, seen.d, seen1.d):
         entry = first_upcrossing(seen.d, seen.dv, seen1.d, seen1.dv, step.length) * step.length
         event, cut = True, min(step.ticks, int(entry / tick))
     return ContactEvent(event, cut, entry, safe_gap, safe_center, pieces, piece)
@@ -379,7 +379,7 @@ def monitor_energy(
             low_energy = is_low_energy(
                 above_nearest_well(layout.terms, now.well_sign, energy), layout.gamma, layout.stretch
             )
-            low_energy = disable_long_steps(layout.circuit, low_energy)
+            low_energy = disable_long_steps(layout.circuit, layout.terms, low_energy)
             if (
                 not event
                 and now.well_sign < 0.0

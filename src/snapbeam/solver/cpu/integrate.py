@@ -44,7 +44,7 @@ from snapbeam.solver.cpu.terms.further_contact_events import (
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, mirror_further_contacts
 from snapbeam.solver.excitation import seen_from
 from snapbeam.solver.step_control import contact_level, flight_level, ticks_of, time_beyond
-from snapbeam.solver.terms.interface import has_crossed, update_time_dependent
+from snapbeam.solver.terms.interface import has_crossed, update_forces
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["KernelOutput", "integrate_ensemble", "integrate_recorded", "propose_step"]
@@ -76,7 +76,7 @@ def propose_step(memory, blocks, workspace, run, now, accumulators):
     crossed = seen.c * (well_sign * run.rest_center) < 0.0
     if layout.stretch > 0.0 and has_crossed(layout.terms, seen.c, well_sign, crossed):
         there = phase_at(run, t)
-        update_time_dependent(memory, layout.terms, run.struck.drive, there)
+        update_forces(memory, layout.size, layout.terms, run.struck.drive, there, rows.q)
         evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, there, rows.q, 0.0, False)
         mirror_further_contacts(memory, layout.others, -well_sign)
         if run.high:

@@ -48,7 +48,7 @@ from snapbeam.solver.terms.interface import (
     enter_well,
     relative_to_nearest_well,
     seen_from_divide,
-    update_time_dependent,
+    update_forces,
 )
 from snapbeam.util.status_codes import RunStatus
 
@@ -293,7 +293,7 @@ def change_energy_origin(memory, layout, run, now, accumulators, span):
 def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching, landed, sample):
     """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from a landing."""
     q, p, k, r = rows.q, rows.p, rows.k, layout.work + 9 * layout.size
-    update_time_dependent(memory, layout.terms, run.struck.drive, phase_at(run, t))
+    update_forces(memory, layout.size, layout.terms, run.struck.drive, phase_at(run, t), q)
     evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, phase_at(run, t), q, 0.0, False)
     restart_further_contacts(memory, layout.size, layout.others, run.struck.drive, phase_at(run, t), t, q)
     gq, qr = tension_rows(memory, blocks, layout, q, r)
@@ -312,7 +312,7 @@ def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching
         above_nearest_well(layout.terms, well_sign, energy), layout.gamma, layout.stretch
     )
     status = _RUNNING if t < run.clock.end else _OK
-    control = StepControl(touching, disable_long_steps(layout.circuit, low_energy), t, t, t, 0)
+    control = StepControl(touching, disable_long_steps(layout.circuit, layout.terms, low_energy), t, t, t, 0)
     return IntegratorState(t, well_sign, 2.0 * gq + qr, rows, seen, control, sample, landed, status), energy
 
 

@@ -50,11 +50,15 @@ from snapbeam.solver.terms.interface import (
     ExternalWork,
     add_acceleration_along,
     add_to_tension,
+    add_velocity_dependent,
     add_work,
+    begin_exchange,
+    depends_on_velocity,
     does_work,
+    end_exchange,
     needs_tension_product,
     no_external_work,
-    update_time_dependent,
+    update_forces,
 )
 
 __all__ = [
@@ -65,7 +69,7 @@ __all__ = [
     "prepare",
     "take_step",
     "take_two_steps",
-    "with_circuit_acceleration",
+    "with_velocity_dependent",
 ]
 
 
@@ -140,9 +144,17 @@ def observe(memory, layout, tip, phase, q, p):
 
 
 @inlined
-def with_circuit_acceleration(memory, layout, spare, step):
-    """A free step as it is looked into: with the circuit's part in the accelerations of its ends, if there is one."""
-    k, k1 = circuit_acceleration_rows(memory, layout.size, layout.circuit, spare, step)
+def with_velocity_dependent(memory, layout, spare, step):
+    """A free step as it is looked into: with the velocity-dependent forces in the accelerations of its ends."""
+    size, terms = layout.size, layout.terms
+    k, k1 = circuit_acceleration_rows(memory, size, layout.circuit, spare, step)
+    if depends_on_velocity(terms):
+        for row in range(0, size, WIDTH):
+            store(memory, spare + row, load(memory, step.k + row))
+            store(memory, spare + size + row, load(memory, step.k1 + row))
+        add_velocity_dependent(memory, size, terms, step.q, step.p, spare)
+        add_velocity_dependent(memory, size, terms, step.q1, step.p1, spare + size)
+        k, k1 = spare, spare + size
     return Step(
         step.ticks, step.at, step.length, step.phase, step.touching, step.q, step.p, k, step.q1, step.p1, k1, step.r
     )  # fmt: skip
@@ -273,7 +285,8 @@ def _later_kick(memory, layout, step, flow, last, weight, along_g, along_r, r, f
 def _kick_and_flow(data, stage, q, weight, along_g, along_r, r, force):
     memory, layout, step, energy = data.memory, data.layout, data.step, data.with_energy
     if stage == 0:
-        kick_rows(memory, layout, weight, step.k, force, kick_source(layout.circuit, step), step.p1)
+        p = step.p1 if depends_on_velocity(layout.terms) else kick_source(layout.circuit, step)
+        kick_rows(memory, layout, weight, step.k, force, p, step.p1)
         return step.q1, _flow(memory, layout, step.at, step.q, step.p1, step.q1, step.p1, energy)
     flow = step.at + min(stage, data.flows - 1 - stage) * 4 * layout.size
     last = stage == data.flows
@@ -284,8 +297,8 @@ def _kick_and_flow(data, stage, q, weight, along_g, along_r, r, force):
 def _update_terms(data, stage, weight):
     memory, layout, drive, step = data.memory, data.layout, data.tip.drive, data.step
     argument = _argument(data, stage)
-    update_time_dependent(memory, layout.terms, drive, argument)
     q = step.q1 if stage > 0 else step.q
+    update_forces(memory, layout.size, layout.terms, drive, argument, q)
     evaluate_contacts(memory, layout.size, layout.others, drive, argument, q, weight, stage == 0)
 
 
@@ -370,12 +383,14 @@ def _exchange(data, circuit, stage, weight, along_g, along_r, force, surrounding
         tap = tap_of(memory, size, circuit, circuit.own, p, kick, weight, tap)
         if does_work(layout.terms):
             lean_kick(memory, size, circuit, kick, weight, tap)
+    begin_exchange(memory, size, layout.terms, weight, kick, p)
     if does_work(layout.terms):
         if stage == 0 and needs_tension_product(layout.terms):
             tension_rows(memory, data.blocks, layout, step.q, step.r)
         work = add_work(memory, size, layout.terms, weight, layout.g, step.r, kick, p, work)
     if circuit is not None:
         apply_tap(memory, size, circuit, circuit.own, p, step.p1, tap)
+    end_exchange(memory, size, layout.terms, p, step.p1)
     return work, tap
 
 

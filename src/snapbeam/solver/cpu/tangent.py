@@ -28,7 +28,7 @@ from snapbeam.solver.cpu.terms.further_contacts import (
 from snapbeam.solver.excitation import seen_from, tip_motion
 from snapbeam.solver.physics import tension_factors
 from snapbeam.solver.simd import WIDTH, fma, load, store
-from snapbeam.solver.terms.interface import add_to_tension, update_time_dependent
+from snapbeam.solver.terms.interface import add_to_tension, update_forces
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["TANGENT_ROWS", "integrate_tangent"]
@@ -68,7 +68,7 @@ def carry_tangents(memory, blocks, workspace, run, tip, step, first, count):
         gq, qr = tension_rows(memory, blocks, layout, q, r)
         along_g, along_r = tension_factors(layout.gamma, gq, qr)
         at = step.phase + memory[stages.elapsed + stage] * step.length * tip.drive.omega
-        update_time_dependent(memory, layout.terms, tip.drive, at)
+        update_forces(memory, size, layout.terms, tip.drive, at, q)
         along_g, along_r = add_to_tension(memory, layout.terms, along_g, along_r)
         force, slope = 0.0, 0.0
         if step.touching:

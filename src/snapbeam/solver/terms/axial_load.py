@@ -45,7 +45,7 @@ class AxialLoad(NamedTuple):
 
     @staticmethod
     @inlined
-    def update_time_dependent(memory, term, drive, argument):
+    def update_forces(memory, size, term, drive, argument, q):
         """Write P(t) into memory."""
         memory[term.change] = _change(drive, memory, argument)
 

@@ -48,7 +48,7 @@ class BaseExcitation(NamedTuple):
 
     @staticmethod
     @inlined
-    def update_time_dependent(memory, term, drive, argument):
+    def update_forces(memory, size, term, drive, argument, q):
         """Write a(t) into memory."""
         memory[term.acceleration] = _acceleration(drive, memory, argument)
 

@@ -15,6 +15,8 @@ Beside operations, a class has
 ``kick_work(memory, size, term, weight, g, r, kick, p)``, ``accumulator`` and ``work_description``
     Its work in a kick of *weight* seconds, J, exact: the row *kick* is the whole acceleration of the kick, contact
     included, and p the row of the velocities before it.  With it, the name and long name of the statistic of the work.
+``keeps_steps_short``, ``may_hide_onset``
+    True if the term changes the motion at low energy, or within a step, more than the step control and the look-ahead expect.
 ``needs_tension_product``
     True if ``kick_work`` reads r = G q at the first kick of a step too.
 """
@@ -43,17 +45,23 @@ __all__ = [
     "add_potential_energy",
     "add_to_speed_bound",
     "add_to_tension",
+    "add_velocity_dependent",
     "add_work",
+    "begin_exchange",
     "center_from_divide",
+    "depends_on_velocity",
     "does_work",
+    "end_exchange",
     "enter_well",
     "has_crossed",
+    "keeps_steps_short",
+    "may_hide_onset",
     "needs_tension_product",
     "no_external_work",
     "relative_to_nearest_well",
     "seen_from_divide",
     "total_work",
-    "update_time_dependent",
+    "update_forces",
     "wells_differ",
     "works_so_far",
 ]
@@ -138,8 +146,8 @@ def _of_kernels() -> TypeError:
 
 
 @_operation(threaded=0)
-def update_time_dependent(memory: Any, terms: Any, drive: Any, argument: float) -> Any:
-    """Write what follows from time alone into memory, for an argument of the drive."""
+def update_forces(memory: Any, size: int, terms: Any, drive: Any, argument: float, q: int) -> Any:
+    """Write what follows from time and displacements into memory, for an argument of the drive and the row *q*."""
     raise _of_kernels()
 
 
@@ -166,6 +174,32 @@ def add_to_speed_bound(
     memory: Any, size: int, terms: Any, drive: Any, along: int, horizon: float, bound: Any
 ) -> Any:
     """Add to a *bound* of the speed along a row what the term can change within a time, for the look-ahead."""
+    raise _of_kernels()
+
+
+# ----------------------------------------------------------------------------------------------------
+# Forces that depend on the velocities, and so change within a kick.
+
+
+@_operation(threaded=0)
+def begin_exchange(memory: Any, size: int, terms: Any, weight: float, kick: int, p: int) -> Any:
+    """Compute the impulse of a kick of *weight* seconds, exact at fixed displacements.
+
+    The row *kick* is the acceleration by all other forces.  The term adds to it what makes half of it times the weight the mean
+    of its own effect on p.
+    """
+    raise _of_kernels()
+
+
+@_operation(threaded=0)
+def end_exchange(memory: Any, size: int, terms: Any, p: int, p_to: int) -> Any:
+    """Write p with the impulse into *p_to*."""
+    raise _of_kernels()
+
+
+@_operation(threaded=0)
+def add_velocity_dependent(memory: Any, size: int, terms: Any, q: int, p: int, k: int) -> Any:
+    """Add the velocity-dependent part to the row of accelerations *k*."""
     raise _of_kernels()
 
 
@@ -241,7 +275,7 @@ def _write_flag(attribute: str) -> Callable[[list[Any]], tuple[list[str], dict[s
 
 
 def does_work(terms: Any) -> bool:
-    """Whether a term does work on the beam; known when the kernel is compiled, as are the next two."""
+    """Whether a term does work on the beam; known when the kernel is compiled, as are the next ones."""
     raise _of_kernels()
 
 
@@ -255,9 +289,27 @@ def wells_differ(terms: Any) -> bool:
     raise _of_kernels()
 
 
+def depends_on_velocity(terms: Any) -> bool:
+    """Whether a term has an impulse of its own in each kick."""
+    raise _of_kernels()
+
+
+def keeps_steps_short(terms: Any) -> bool:
+    """Whether a term forbids the longer steps at low energy."""
+    raise _of_kernels()
+
+
+def may_hide_onset(terms: Any) -> bool:
+    """Whether a term may change the motion so much within a step that the look-ahead misses a contact."""
+    raise _of_kernels()
+
+
 _compiled_for_terms(does_work, _write_flag("kick_work"))
 _compiled_for_terms(needs_tension_product, _write_flag("needs_tension_product"))
 _compiled_for_terms(wells_differ, _write_flag("relative_to_nearest_well"))
+_compiled_for_terms(depends_on_velocity, _write_flag("end_exchange"))
+_compiled_for_terms(keeps_steps_short, _write_flag("keeps_steps_short"))
+_compiled_for_terms(may_hide_onset, _write_flag("may_hide_onset"))
 
 
 def no_external_work(terms: Any) -> ExternalWork:

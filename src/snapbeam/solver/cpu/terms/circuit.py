@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import inlined
 from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, splat, store, vabs
+from snapbeam.solver.terms.interface import keeps_steps_short, may_hide_onset
 
 __all__ = [
     "Circuit",
@@ -78,9 +79,9 @@ def put_rate(memory, circuit, rate):
 
 
 @inlined
-def disable_long_steps(circuit, low_energy):
-    """Whether steps may be longer: never with a circuit, which couples all modes at any energy."""
-    if circuit is None:
+def disable_long_steps(circuit, terms, low_energy):
+    """Whether steps may be longer: never with a circuit or a local force, which couple all modes at any energy."""
+    if circuit is None and not keeps_steps_short(terms):
         return low_energy
     return False
 
@@ -255,9 +256,9 @@ def validity_horizon(circuit, horizon):
 
 
 @inlined
-def missed_onset(circuit, event, depth, depth1):
+def missed_onset(circuit, terms, event, depth, depth1):
     """Whether a free step ended in the contact unseen: the tension changed more than was foreseen."""
-    if circuit is None:
+    if circuit is None and not may_hide_onset(terms):
         return False
     return not event and depth1 > 0.0 and depth <= 0.0
 

@@ -11,7 +11,7 @@ import math
 from snapbeam.solver.compilation import called, inlined
 from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.mode_lanes import flow_coefficients, propagate_free, speed_bound
-from snapbeam.solver.cpu.step import with_circuit_acceleration
+from snapbeam.solver.cpu.step import with_velocity_dependent
 from snapbeam.solver.cpu.terms.circuit import circuit_speed_bound, validity_horizon
 from snapbeam.solver.cpu.terms.further_contacts import block, mirror_further_contacts, penetration_of
 from snapbeam.solver.further_contacts import (
@@ -204,7 +204,7 @@ def _looked_for(memory, layout, others, slot, run, drive, step, j, scratch):
         look += 4 * layout.size
         pieces = max(2, math.ceil(step.length / run.finest_look))
         flow_coefficients(memory, layout, step.length / pieces, look)
-    free = with_circuit_acceleration(memory, layout, run.spare, step)
+    free = with_velocity_dependent(memory, layout, run.spare, step)
     return _entry(memory, layout, others, drive, look, pieces, step.length / pieces, free, j, scratch)
 
 

@@ -22,7 +22,7 @@ from snapbeam.solver.terms.interface import (
     add_to_tension,
     does_work,
     total_work,
-    update_time_dependent,
+    update_forces,
 )
 
 __all__ = ["mark_at_jump", "taken_across"]
@@ -44,7 +44,7 @@ def _in_two_parts(memory, blocks, layout, stages, run, tip, step, length, with_e
     store_further_contacts(memory, layout.others)
     phase = step.phase + drive.omega * length + APART
     if does_work(layout.terms):
-        update_time_dependent(memory, layout.terms, drive, phase)
+        update_forces(memory, layout.size, layout.terms, drive, phase, step.q1)
         along_g, along_r = tension_factors(layout.gamma, one.gq, one.qr)
         along_g, along_r = add_to_tension(memory, layout.terms, along_g, along_r)
         acceleration_rows(memory, layout, along_g, along_r, step.r, step.k1)

@@ -1,0 +1,233 @@
+"""A local force: any law of a force on one point of the structure, by its displacement or rotation and their rate."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.quantity import STRUCTURE, check_fields, numbers_type, quantity
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.util.validation import InputError, finite_array
+
+__all__ = ["LOCAL_FORCES", "LocalForce", "LocalSpring", "QuadraticDamping"]
+
+
+_Array = NDArray[np.float64]
+
+LOCAL_FORCES: dict[str, type[LocalForce]] = {}
+"""Every law of a local force, by the name it has in parameter files."""
+_PLACES = ("location", "coordinate", "shape")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LocalForce:
+    """A law of a force that acts on one point: derive a frozen dataclass from it, with the law's constants as fields.
+
+    The law depends on the displacement u of the point from the straight beam, or on its rotation, and on the rate v of
+    that.  Its physics are scalar functions, which the solver compiles into the time step.  ``law`` stands for the
+    constants, by the names of the fields:
+
+    - ``force(law, displacement)``: conservative force on the beam, N, or moment, N m; positive in the direction of u;
+    - ``energy(law, displacement)``: its potential energy, J; the force is minus its derivative.
+
+    A law with *dissipative* = True has two more:
+
+    - ``damping_force(law, displacement, velocity)``: the part that depends on v;
+    - ``damping_coefficient(law, displacement, velocity)``: minus its derivative by v, N s/m or N m s/rad.
+
+    They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone.
+
+    Parameters
+    ----------
+    location : float, optional
+        Of a beam: where the force acts, over the length.
+    coordinate : {"displacement", "rotation"}
+        Of a beam: what u is, in m or rad.
+    shape : array_like of shape (N,), optional
+        Of a structure given by matrices: u = shape . alpha; its contact point by default.
+
+    Notes
+    -----
+    In modal coordinates about a well, p' = ... + r F(u, v) with r = V^T shape, u = u_well + r . q and v = r . p.  The wells of
+    the model are those without the force: where F is not 0 in a well, a run that begins there begins out of equilibrium.
+    """
+
+    location: float | None = quantity(
+        "1", "location of the local force over the length", default=None, optional=True, low=0.0, high=1.0,
+        closed="both", scope=STRUCTURE,
+    )  # fmt: skip
+    coordinate: str = quantity(
+        "1",
+        "coordinate that the local force acts on",
+        default="displacement",
+        kind=str,
+        choices=("displacement", "rotation"),
+        scope=STRUCTURE,
+    )
+    shape: Any = quantity(
+        "1", "coordinate of the local force, per modal amplitude", default=None, optional=True, kind=object,
+        scope=STRUCTURE,
+    )  # fmt: skip
+
+    name: ClassVar[str] = ""
+    """In parameter files and attributes."""
+    dissipative: ClassVar[bool] = False
+    """Whether the force depends on the velocity too."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if cls.name:
+            LOCAL_FORCES[cls.name] = cls
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.shape is not None:
+            shape = finite_array("shape", self.shape, 1).copy()
+            shape.setflags(write=False)
+            object.__setattr__(self, "shape", shape)
+
+    @staticmethod
+    def force(law: Any, displacement: float) -> float:
+        """Conservative force, N; none by default."""
+        return 0.0
+
+    @staticmethod
+    def energy(law: Any, displacement: float) -> float:
+        """Potential energy of the force, J."""
+        return 0.0
+
+    @staticmethod
+    def damping_force(law: Any, displacement: float, velocity: float) -> float:
+        """Part of the force that depends on the velocity, N."""
+        return 0.0
+
+    @staticmethod
+    def damping_coefficient(law: Any, displacement: float, velocity: float) -> float:
+        """Minus the derivative of the damping force by the velocity, N s/m."""
+        return 0.0
+
+    @classmethod
+    def numbers_type(cls) -> Any:
+        """The named tuple of the law's constants, as kernels see them; an attribute of the class, ``Numbers``."""
+        return numbers_type(cls, (item.name for item in dataclasses.fields(cls) if item.name not in _PLACES))
+
+    @property
+    def numbers(self) -> Any:
+        """The law's constants."""
+        kind = self.numbers_type()
+        return kind(*(float(getattr(self, name)) for name in kind._fields))
+
+    def row(self, model: ReducedModel) -> _Array:
+        """Return the shape that gives u of the modal amplitudes, u = shape . alpha; shape (N,).
+
+        Raises
+        ------
+        InputError
+            For a beam without a location, and for a shape that does not fit the model.
+        """
+        if model.beam is not None:
+            if self.shape is not None or self.location is None:
+                raise InputError(
+                    f"local_force.location = {self.location}: a force on a beam acts at a location; give location in "
+                    "[0, 1] and leave shape out"
+                )
+            at = self.location * model.beam.length
+            modes = model.beam.buckling_modes(model.modes)
+            return np.asarray(modes.slope(at) if self.coordinate == "rotation" else modes.shape(at))
+        if self.location is not None or self.coordinate != "displacement":
+            raise InputError(
+                f"local_force.location = {self.location}, coordinate = {self.coordinate!r}: a structure given by matrices has "
+                "no length; give shape"
+            )
+        if self.shape is None:
+            assert model.contact_shape is not None
+            return model.contact_shape
+        if self.shape.shape != (model.modes,):
+            raise InputError(
+                f"local_force.shape of shape {self.shape.shape}: must be ({model.modes},); give one number for each coordinate"
+            )
+        found: _Array = self.shape
+        return found
+
+    def greatest_stiffness(self, largest: float) -> float:
+        """Greatest slope of the conservative force over displacements up to *largest*, by differences; N/m."""
+        numbers, at = self.numbers, np.linspace(-largest, largest, 401)
+        forces = np.array([type(self).force(numbers, float(u)) for u in at])
+        return float(np.abs(np.diff(forces) / np.diff(at)).max())
+
+    def greatest_damping(self, largest: float, fastest: float) -> float:
+        """Greatest damping coefficient over displacements and velocities up to *largest* and *fastest*; N s/m."""
+        numbers, damping = self.numbers, type(self).damping_coefficient
+        # dense near 0, where friction changes
+        speeds = [0.0, *(fastest * 10.0 ** (-k / 4.0) for k in range(24))]
+        places = [largest * k / 8.0 for k in range(-8, 9)]
+        return max(abs(damping(numbers, u, s * v)) for u in places for v in speeds for s in (1.0, -1.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LocalSpring(LocalForce):
+    """A linear and cubic spring to the ground, F = -k u - k_3 u^3, such as a torsional spring at mid-span.
+
+    Parameters
+    ----------
+    stiffness : float
+        k, N/m, or N m/rad for a rotation.
+    cubic_stiffness : float
+        k_3, N/m^3, or N m/rad^3.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> spring = sb.LocalSpring(stiffness=0.02, location=0.5, coordinate="rotation")
+    """
+
+    stiffness: float = quantity("N/m", "stiffness of the local spring", low=0.0, closed="left", symbol="k")
+    cubic_stiffness: float = quantity(
+        "N/m^3", "cubic stiffness of the local spring", default=0.0, symbol="k_3"
+    )
+    name = "local_spring"
+
+    @staticmethod
+    def force(law: Any, displacement: float) -> float:
+        """-k u - k_3 u^3."""
+        return -displacement * (law.stiffness + law.cubic_stiffness * displacement * displacement)
+
+    @staticmethod
+    def energy(law: Any, displacement: float) -> float:
+        """k u^2/2 + k_3 u^4/4."""
+        square = displacement * displacement
+        return square * (0.5 * law.stiffness + 0.25 * law.cubic_stiffness * square)
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuadraticDamping(LocalForce):
+    """Quadratic damping of a point, F = -c |v| v, such as the drag of a tip mass in air.
+
+    Parameters
+    ----------
+    coefficient : float
+        c, N s^2/m^2.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> drag = sb.QuadraticDamping(coefficient=0.5, location=0.5)
+    """
+
+    coefficient: float = quantity("N s^2/m^2", "coefficient of quadratic damping", low=0.0, closed="left")
+    name = "quadratic_damping"
+    dissipative = True
+
+    @staticmethod
+    def damping_force(law: Any, displacement: float, velocity: float) -> float:
+        """-c |v| v."""
+        return -law.coefficient * abs(velocity) * velocity
+
+    @staticmethod
+    def damping_coefficient(law: Any, displacement: float, velocity: float) -> float:
+        """2 c |v|."""
+        return 2.0 * law.coefficient * abs(velocity)

@@ -1,0 +1,214 @@
+"""Local forces: springs and damping of one point, against an independent solution, and a law of one's own."""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from importlib import import_module, invalidate_caches
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import snapbeam as sb
+from snapbeam.model import default_values
+from snapbeam.model.base_excitation import rigid_mass
+from snapbeam.model.local_force import LOCAL_FORCES
+from snapbeam.util.validation import InputError
+
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=3, damping_ratio=0.01)
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "extending.md"
+"""The law of friction is that of the page."""
+
+
+@pytest.fixture(scope="module")
+def friction(tmp_path_factory):
+    """The law in a file of its own, as the page has it."""
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    folder = tmp_path_factory.mktemp("force")
+    text = next(block for block in blocks if block.startswith("# own_force.py"))
+    (folder / "own_force.py").write_text(text, encoding="utf-8")
+    sys.path.insert(0, str(folder))
+    invalidate_caches()
+    try:
+        yield import_module("own_force").CoulombFriction(
+            friction_force=2e-3, smoothing_velocity=0.02, location=0.45
+        )
+    finally:
+        sys.path.remove(str(folder))
+        del sys.modules["own_force"], LOCAL_FORCES["coulomb_friction"]
+
+
+def independent(system, force, start, times):
+    """Integrate the amplitudes themselves, alpha'' from mass, damping and stiffness, by DOP853."""
+    model, striker = system.model, system.striker
+    mass, gamma = model.mass, model.nonlinear_stiffness
+    inverse = np.linalg.inv(mass)
+    shape, law, kind = force.row(model), force.numbers, type(force)
+    drive = None if system.base_excitation is None else system.base_excitation.motion
+    rigid = None if drive is None else rigid_mass(model)
+
+    if striker is not None:
+        tip, side = model.shape_at(striker.location), 1.0 if striker.side == "below" else -1.0
+        omega = striker.drive.frequency_ratio * system.scale.omega
+        reach = striker.drive.velocity_amplitude * system.scale.length * system.scale.omega / omega
+
+    def rate(t, y):
+        alpha, velocity = np.split(y, 2)
+        u, v = shape @ alpha, shape @ velocity
+        total = kind.force(law, u) + (kind.damping_force(law, u, v) if kind.dissipative else 0.0)
+        load = -model.stiffness * alpha - gamma * (alpha @ alpha) * alpha - model.damping_matrix @ velocity
+        if drive is not None:
+            shaken = drive.frequency_ratio * system.scale.omega
+            # the displacement of the base is a sine, its acceleration minus a sine
+            peak = drive.acceleration_amplitude * system.scale.length * system.scale.omega**2
+            load = load + rigid * peak * math.sin(shaken * t)
+        if striker is not None:
+            motion = reach * math.sin(omega * t)
+            depth = motion - side * tip @ (alpha - start.amplitude)
+            load = load + side * tip * system.contact.stiffness * max(depth, 0.0) ** 1.5
+        return np.concatenate((velocity, inverse @ (load + total * shape)))
+
+    y0 = np.concatenate((start.amplitude, start.velocity))
+    found = solve_ivp(rate, (0.0, times[-1]), y0, "DOP853", times, rtol=1e-12, atol=1e-15)
+    return found.y.T[:, : model.modes]
+
+
+def struck_start(model, share):
+    """At rest in the well, with a velocity of the first shape that reaches *share* of the barrier."""
+    well = model.well_amplitude
+    shape = np.zeros(model.modes)
+    shape[0] = 1.0
+    barrier = float(model.potential_energy(np.zeros(model.modes)) - model.potential_energy(well))
+    speed = math.sqrt(2.0 * share * barrier / float(shape @ model.mass @ shape))
+    return sb.State(amplitude=well, velocity=-speed * shape)
+
+
+FORCES = {
+    "spring": sb.LocalSpring(stiffness=40.0, cubic_stiffness=1e8, location=0.3),
+    "rotation": sb.LocalSpring(stiffness=3e-3, location=0.5, coordinate="rotation"),
+    "drag": sb.QuadraticDamping(coefficient=0.3, location=0.4),
+}
+
+
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("name", "share"),
+    [
+        ("spring", 1.7),
+        *(pytest.param(name, 0.3, marks=SLOW) for name in (*FORCES, "friction")),
+        *(pytest.param(name, 1.7, marks=SLOW) for name in ("rotation", "drag", "friction")),
+    ],
+)
+def test_against_an_independent_solution(name, share, friction):
+    """Free motion within a well and across both: displacements agree, and the energy balance closes."""
+    force = FORCES.get(name, friction)
+    start = struck_start(MODEL, share)
+    system = sb.System(MODEL, local_force=force, initial_state=start)
+    check_against_independent(system, force, start, 4, 1e-6)
+
+
+def check_against_independent(system, force, start, cycles, tolerance):
+    length = 1.0 / system.model.reference_frequency if system.striker is None else cycle_of(system)
+    times = length * np.linspace(0.0, cycles, 16 * cycles + 1)
+    run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy="reference"), sample_times=times)
+    expected = independent(system, force, start, times)
+    error = np.abs(run.dataset["modal_amplitude"].values - expected).max() / np.abs(expected).max()
+    assert error < tolerance
+    balance = run.dataset["energy_beam"] + run.dataset["energy_dissipated"]
+    if system.striker is not None:
+        balance = balance + run.dataset["energy_contact"] - run.dataset["striker_work"]
+        assert run.summary.impacts > 0
+    if system.base_excitation is not None:
+        balance = balance - run.dataset["base_work"]
+    if force.dissipative:
+        balance = balance - run.dataset["local_force_work"]
+        assert float(run.dataset["local_force_work"][-1]) < 0.0
+    scale = max(float(run.dataset["energy_beam"].max()), run.dataset.attrs.get("gross_work", 0.0))
+    assert float(abs(balance - balance[0]).max()) < 1e-7 * scale
+
+
+def cycle_of(system):
+    return 1.0 / (system.striker.drive.frequency_ratio * system.model.reference_frequency)
+
+
+@SLOW
+@pytest.mark.parametrize("side", ["below", "above"])
+@pytest.mark.parametrize("name", ["drag", "spring", "friction"])
+def test_with_impacts(name, side, friction):
+    """A shaker strikes; onset and release of each contact are located although the force changes the motion."""
+    force = FORCES.get(name, friction)
+    striker = sb.Striker(
+        drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.18), side=side, location=1 / 2.1
+    )
+    system = sb.System(MODEL, default_values.CONTACT, striker, local_force=force)
+    run = sb.simulate(system, sb.Integration(cycles=1, accuracy="reference"))
+    start = sb.State(amplitude=run.dataset["modal_amplitude"].values[0], velocity=np.zeros(MODEL.modes))
+    check_against_independent(system, force, start, 2, 1e-5)
+
+
+@SLOW
+@pytest.mark.parametrize("name", ["drag", "rotation"])
+def test_on_a_moving_base(name):
+    """The works of the base and of the force, each to the last digits."""
+    force, start = FORCES[name], struck_start(MODEL, 0.3)
+    motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.3)
+    system = sb.System(
+        MODEL, local_force=force, initial_state=start, base_excitation=sb.BaseExcitation(motion=motion)
+    )
+    check_against_independent(system, force, start, 4, 1e-6)
+
+
+def test_energy_of_quadratic_damping():
+    """A free mass: v = v_0/(1 + c v_0 t/m) and the energy lost, both exact."""
+    mass, coefficient, speed = 0.01, 2.0, 0.4
+    model = sb.ReducedModel.from_matrices(
+        [[mass]], [0.0], contact_shape=[1.0], length_scale=1e-3, reference_frequency=10.0
+    )
+    drag = sb.QuadraticDamping(coefficient=coefficient)
+    system = sb.System(model, local_force=drag, initial_state=sb.State(amplitude=[0.0], velocity=[speed]))
+    run = sb.simulate(system, sb.Integration(cycles=2))
+    exact = speed / (1.0 + coefficient * speed * run.dataset["time"].values / mass)
+    np.testing.assert_allclose(run.dataset["modal_velocity"].values[:, 0], exact, rtol=1e-8)
+    lost = 0.5 * mass * (speed**2 - exact[-1] ** 2)
+    assert run.summary["local_force_work"] == pytest.approx(-lost, rel=1e-8)
+
+
+def test_file_and_dotted_names(tmp_path):
+    system = sb.System(MODEL, local_force=FORCES["spring"])
+    system.save(tmp_path / "system.toml")
+    assert sb.System.load(tmp_path / "system.toml") == system
+    stiffer = system.replace(**{"local_force.stiffness": 50.0})
+    assert stiffer.local_force.stiffness == 50.0 and stiffer.hash != system.hash
+    assert system.get("local_force.location") == 0.3
+
+
+@pytest.mark.parametrize(
+    ("force", "more", "words"),
+    [
+        (sb.LocalSpring(stiffness=1.0), {}, "local_force.location = None"),
+        (sb.LocalSpring(stiffness=1.0, shape=[1.0, 0.0, 0.0]), {}, "leave shape out"),
+        (3.0, {}, "local_force = 3.0: must be a LocalSpring"),
+        (
+            FORCES["drag"],
+            {"harvester": sb.PiezoelectricHarvester(moment_per_volt=1e-5, capacitance=1e-8, resistance=1e5)},
+            "one velocity-dependent force",
+        ),
+    ],
+)
+def test_refusals(force, more, words):
+    with pytest.raises(InputError, match=words):
+        sb.System(MODEL, local_force=force, **more)
+
+
+def test_tangents_are_refused():
+    system = sb.System(MODEL, local_force=FORCES["spring"])
+    start = sb.State(amplitude=MODEL.well_amplitude, velocity=np.zeros(MODEL.modes))
+    with pytest.raises(InputError, match="tangent with a local force"):
+        sb.advance(system, start, tangent=np.zeros((1, 2, MODEL.modes)))
