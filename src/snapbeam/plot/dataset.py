@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from snapbeam.plot.dynamics import (
+    MAX_CURVES,
     plot_attractors,
     plot_basins,
     plot_diagram,
@@ -78,8 +79,8 @@ def _map(dataset: xr.Dataset) -> dict[str, _Draws]:
 
 
 def _lifetimes(dataset: xr.Dataset) -> dict[str, _Draws]:
-    figures: dict[str, _Draws] = {"lifetime": plot_lifetimes, "survival": plot_survival}
-    return figures if dataset["lifetime"].ndim else {"survival": plot_survival}
+    figures: dict[str, _Draws] = {"lifetime": plot_lifetimes} if dataset["lifetime"].ndim else {}
+    return figures | ({"survival": plot_survival} if dataset["lifetime"].size <= MAX_CURVES else {})
 
 
 def _section(dataset: xr.Dataset) -> dict[str, _Draws]:

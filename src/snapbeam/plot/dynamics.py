@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
+    "MAX_CURVES",
     "plot_attractors",
     "plot_basins",
     "plot_diagram",
@@ -35,6 +36,8 @@ __all__ = [
 
 _UP, _DOWN, _LINE = "#16245E", "#B03A27", "#000000"
 _STARTS = "#8A8A8A"
+MAX_CURVES = 5
+"""The most points of a map that :func:`plot_survival` draws."""
 _SPECIAL_POINTS = {"fold": "s", "flip": "D", "Neimark-Sacker": "o", "branch point": "^", "grazing": "x"}
 
 
@@ -247,8 +250,8 @@ def plot_survival(
         raise InputError("dataset: holds no lifetimes of starts")
     runs = dataset.transpose(..., "start")
     rows = np.atleast_2d(runs["last_snap"].values).reshape(-1, runs.sizes["start"])
-    if len(rows) > 5:
-        raise InputError(f"dataset: has {len(rows)} points; choose at most 5 of them")
+    if len(rows) > MAX_CURVES:
+        raise InputError(f"dataset: has {len(rows)} points; choose at most {MAX_CURVES} of them")
     tau, delay = (np.atleast_1d(runs[name].values).ravel() for name in ("lifetime", "delay"))
     with figure_style():
         ax = axes_or_new(ax, dataset)

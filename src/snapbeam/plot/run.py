@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
+from matplotlib.ticker import MaxNLocator
 
 from snapbeam.plot.style import (
     BEAM_COLOR,
@@ -317,9 +318,9 @@ def plot_run(
             scale, unit = scale_of(seconds, "s")
             around = seconds / scale
             right = _column(figure, grid, 1, near, around, force)
-            right[-1].set_xlabel(
-                f"Time after\n$\\tau$ = {peak:.4g} ({unit})" if axis_name == "cycle" else f"Time ({unit})"
-            )
+            after = f"\nafter $\\tau$ = {peak:.4g}" if axis_name == "cycle" else ""
+            right[-1].set_xlabel(f"Time ({unit}){after}", loc="right")
+            right[-1].xaxis.set_major_locator(MaxNLocator(3))
             right[0].set_xlim(min(around[0], -0.12 * around[-1]), around[-1])
     return left[0]
 

@@ -1,6 +1,6 @@
-"""How results show themselves: pictures and tables, looked up by name when somebody asks for one.
+"""Figures and tables of results.
 
-Nothing of a drawing library is loaded before, and no room below the figures knows one.
+The functions of :mod:`snapbeam.plot` are found by name when a figure is requested, because Matplotlib loads slowly.
 """
 
 from __future__ import annotations
