@@ -21,12 +21,12 @@ WORKERS ?= 2
 # Where the benchmarks write; the docs show what is in docs/images
 BENCH ?= out/bench
 
-.PHONY: help map tables prose explorer-deps test quick-tests test-slow test-oldest lint docs bench audit dist clean
+.PHONY: help map tables prose explorer-deps test quick-tests test-slow test-oldest coverage lint lock docs bench audit release dist clean
 
 help:
 	@echo "make map        compute the response map ($(MAP), $(PLOT)); variables: MODES CYCLES FREQUENCY_RATIO"
 	@echo "                VELOCITY_AMPLITUDE LOCATION MAP PLOT"
-	@echo "make test       lint, types, import contracts and the tests"
+	@echo "make test       lint, types, import contracts, metadata and the tests"
 	@echo "make test-slow  the tests that take longer"
 	@echo "make explorer-deps   what the explorer and its tests in a browser need"
 	@echo "make test-oldest  the tests with the oldest packages that are allowed, on Python 3.11"
@@ -34,7 +34,10 @@ help:
 	@echo "make tables     the tables of the reference pages, from the program"
 	@echo "make prose      a report on the sentences of the pages"
 	@echo "make bench      the benchmarks, in out/bench; variable: BENCH"
+	@echo "make coverage   the lines that the quick tests run"
+	@echo "make lock       requirements-dev.txt from constraints.txt, with hashes"
 	@echo "make audit      known vulnerabilities of the pinned packages"
+	@echo "make release    version and repository in every file; variables: VERSION, REPOSITORY"
 	@echo "make dist       wheel and source archive, each installed alone and run"
 	@echo "make clean      remove what was built (not the environment, not results)"
 
@@ -43,20 +46,19 @@ $(BIN)/python:
 
 # One stamp per set of packages: a second make installs nothing again.
 $(VENV)/.installed-run: pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP) install --constraint constraints.txt pip
 	$(PIP) install --constraint constraints.txt --editable .
 	@touch $@
 
-$(VENV)/.installed-test: pyproject.toml constraints.txt $(VENV)/.installed-run
-	$(PIP) install --constraint constraints.txt --editable ".[dev,lab,cluster,video]"
+# Every package is compared with its hash.
+$(VENV)/.installed-dev: pyproject.toml requirements-dev.txt | $(BIN)/python
+	$(PIP) install --require-hashes --requirement requirements-dev.txt
+	$(PIP) install --no-deps --no-build-isolation --editable .
 	@touch $@
 
-$(VENV)/.installed-docs: pyproject.toml constraints.txt $(VENV)/.installed-run
-	$(PIP) install --constraint constraints.txt --editable ".[docs,lab,cluster,video]"
-	@touch $@
-
-$(VENV)/.installed-bench: pyproject.toml constraints.txt $(VENV)/.installed-test
-	$(PIP) install --constraint constraints.txt --editable ".[bench]"
-	$(PIP) install --constraint constraints.txt --editable ".[bench-fortran]" \
+$(VENV)/.installed-bench: pyproject.toml constraints.txt $(VENV)/.installed-dev
+	$(PIP) install --constraint constraints.txt --group bench
+	$(PIP) install --constraint constraints.txt --group bench-fortran \
 		|| echo "numbalsoda left out: building it needs a Fortran compiler"
 	@touch $@
 
@@ -65,25 +67,32 @@ map: $(VENV)/.installed-run
 		--velocity-amplitude $(VELOCITY_AMPLITUDE) --location $(LOCATION) -o $(MAP) --plot $(PLOT)
 
 # The browser is the system's: its tests are skipped, with a line, where there is none.
-explorer-deps: $(VENV)/.installed-test
-	$(PIP) install --constraint constraints.txt --editable ".[explorer,explorer-test]"
+explorer-deps: $(VENV)/.installed-dev
+	$(PIP) install --constraint constraints.txt --group browser --editable ".[explorer]"
 	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null \
 		|| echo "no Chromium: install it with the system's packages (Debian: apt-get install chromium), or set CHROMIUM"
 
-lint: $(VENV)/.installed-test
+lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/validate-pyproject pyproject.toml
+	$(BIN)/sp-repo-review .
+	$(BIN)/zizmor --offline --quiet .github
 
 # The linters take one minute beside the tests.
 test:
 	$(MAKE) --no-print-directory --jobs 2 lint quick-tests
 
-quick-tests: $(VENV)/.installed-test
+quick-tests: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -m "not slow" --durations=15 -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
-test-slow: $(VENV)/.installed-test
+# Lines of the core and its parts that the quick tests run; compiled code counts as not run.
+coverage: $(VENV)/.installed-dev
+	$(BIN)/python -m pytest -m "not slow" -n $(WORKERS) --dist loadfile --cov=snapbeam --cov-report=term --cov-report=xml
+
+test-slow: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -m slow --durations=15 -n $(WORKERS) --dist loadfile
 
 # The lower bounds that pyproject.toml states, installed and tested.  Python 3.11 is the oldest.
@@ -92,7 +101,7 @@ OLDEST_PYTHON ?= python3.11
 
 $(OLDEST)/.installed: pyproject.toml tests/reliability/oldest.py
 	$(OLDEST_PYTHON) -m venv $(OLDEST)
-	$(OLDEST)/bin/python tests/reliability/oldest.py lab cluster video dev > $(OLDEST)/oldest.txt
+	$(OLDEST)/bin/python tests/reliability/oldest.py lab cluster video test > $(OLDEST)/oldest.txt
 	$(OLDEST)/bin/python -m pip install --quiet --requirement $(OLDEST)/oldest.txt
 	$(OLDEST)/bin/python -m pip install --quiet --no-deps --editable .
 	@touch $@
@@ -100,10 +109,10 @@ $(OLDEST)/.installed: pyproject.toml tests/reliability/oldest.py
 test-oldest: $(OLDEST)/.installed
 	$(OLDEST)/bin/python -m pytest -m "not slow" --durations=15
 
-docs: $(VENV)/.installed-docs
+docs: $(VENV)/.installed-dev
 	$(BIN)/python -m sphinx -W --keep-going -b html docs docs/_build/html
 
-tables: $(VENV)/.installed-test
+tables: $(VENV)/.installed-dev
 	$(BIN)/python docs/_ext/reference.py
 
 prose: $(VENV)/.installed-run
@@ -112,14 +121,25 @@ prose: $(VENV)/.installed-run
 bench: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks -o $(BENCH)
 
-audit: $(VENV)/.installed-test
-	$(PIP) install --constraint constraints.txt pip-audit
+# The exact versions of constraints.txt with the hashes of their files, for every platform.
+lock: constraints.txt
+	$(PIP) install uv
+	$(BIN)/uv pip compile --quiet --universal --generate-hashes --no-header --no-annotate --constraint constraints.txt \
+		--python-version 3.11.5 --extra lab --extra cluster --extra video --group dev pyproject.toml \
+		--output-file requirements-dev.txt
+
+audit: $(VENV)/.installed-dev
+	$(PIP) install --constraint constraints.txt --group archives
 	$(BIN)/python -m pip_audit --requirement constraints.txt --no-deps --disable-pip
 
-dist: $(VENV)/.installed-test
-	$(PIP) install --constraint constraints.txt build
+release: $(VENV)/.installed-dev
+	$(BIN)/python tests/release/prepare.py "$(VERSION)" "$(REPOSITORY)"
+
+dist: $(VENV)/.installed-dev
+	$(PIP) install --constraint constraints.txt --group archives
 	rm -rf dist
 	$(BIN)/python -m build --outdir dist .
+	$(BIN)/python -m twine check --strict dist/*
 	$(BIN)/python tests/release/alone.py dist
 
 clean:

@@ -100,15 +100,17 @@ plot_system(
 # %%
 # A harvester on a moving base
 # ----------------------------
-# The only striker is a stop that moves with the base. Piezoelectric layers next to the clamp supply a resistor.
+# The only striker is a stop that moves with the base. Two layers of PZT-5H next to the clamp supply a resistor.
 
 motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25)
 stop = sb.Striker(drive=sb.FixedStop(), gap=0.2 * level)
-piezo = sb.PiezoelectricHarvester(
-    moment_per_volt=4e-3,
-    capacitance=60e-9,
-    resistance=2e4,
-    patch_start=0.0,
+piezo = sb.PiezoelectricHarvester.from_material(
+    stress_constant=-16.6,
+    permittivity=25.55e-9,
+    layer_thickness=0.1e-3,
+    layer_width=paper.BEAM.width,
+    beam=paper.BEAM,
+    resistance=1e4,
     patch_end=0.25,
 )
 shaken = sb.System(

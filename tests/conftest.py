@@ -22,9 +22,14 @@ def pytest_addoption(parser):
 
 
 def pytest_configure():
-    """Restore the handler of Ctrl-C, which a background job may ignore, since child processes inherit it."""
+    """Restore the signals that the caller ignores or blocks, such as a background job, since child processes inherit this."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    for name in ("SIGTERM", "SIGHUP"):
+        if (number := getattr(signal, name, None)) and signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_SETMASK, ())
 
 
 FIRST = (

@@ -381,6 +381,7 @@ def _parts() -> dict[str, Any]:
         "a base with a sine": based(sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25)),
         "a base with a chirp": based(chirp),
         "a base with noise": based(noise),
+        "a base with a shock": based(sb.Shock(acceleration_g=20.0, duration_ms=11.0)),
         "a load with a sine": struck(
             axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.4, amplitude=3.0))
         ),

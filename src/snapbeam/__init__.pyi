@@ -28,6 +28,7 @@ from .model.drive.fixed_stop import FixedStop as FixedStop
 from .model.drive.half_sine import HalfSine as HalfSine
 from .model.drive.noise import BandLimitedNoise as BandLimitedNoise
 from .model.drive.recorded_motion import RecordedMotion as RecordedMotion
+from .model.drive.shock import Shock as Shock
 from .model.drive.sine import Sine as Sine
 from .model.drive.sum import SumDrive as SumDrive
 from .model.drive.two_tone import TwoTone as TwoTone
@@ -35,6 +36,7 @@ from .model.external_force import ConstantForce as ConstantForce
 from .model.external_force import ExternalForce as ExternalForce
 from .model.external_force import HarmonicForce as HarmonicForce
 from .model.external_force import RecordedForce as RecordedForce
+from .model.force_displacement import force_displacement as force_displacement
 from .model.harvester import ElectromagneticHarvester as ElectromagneticHarvester
 from .model.harvester import PiezoelectricHarvester as PiezoelectricHarvester
 from .model.imperfection import Imperfection as Imperfection
@@ -65,6 +67,8 @@ from .sweeps.checkpoint.read import read_checkpoint as read_checkpoint
 from .sweeps.checkpoint.records import CheckpointError as CheckpointError
 from .sweeps.checkpointed_sweep import CheckpointOptions as CheckpointOptions
 from .sweeps.checkpointed_sweep import SweepReport as SweepReport
+from .sweeps.measured_points import MeasuredPoints as MeasuredPoints
+from .sweeps.measured_points import read_measured_points as read_measured_points
 from .sweeps.replicates import Replicates as Replicates
 from .sweeps.sweep import sweep as sweep
 from .sweeps.threshold import threshold as threshold
@@ -74,5 +78,6 @@ from .util.netcdf import write_netcdf as write_netcdf
 from .util.status_codes import ResponseClass as ResponseClass
 from .util.status_codes import RunStatus as RunStatus
 from .util.status_codes import classify as classify
+from .util.tables import write_table as write_table
 from .util.validation import InputError as InputError
 from .util.validation import InputTypeError as InputTypeError

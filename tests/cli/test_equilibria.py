@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from snapbeam.cli.app import app
+from snapbeam.util.netcdf import read_netcdf
 
 
 def run(*arguments: object):
@@ -32,3 +33,42 @@ def test_what_explains_measured_wells() -> None:
     refused = run("equilibria", "--lower-frequency", 81.3)
     assert refused.exit_code != 0
     assert "give both" in refused.output
+
+
+def test_the_well_that_normalises_is_named() -> None:
+    """An arch with two wells: the deepest one, and the one in which a run without a striker begins."""
+    silicon = (
+        "--length", 5e-4, "--width", 2e-5, "--thickness", 2e-6, "--density", 2330, "--young-modulus", 160e9,
+        "--axial-load", 0, "--modes", 3,
+    )  # fmt: skip
+    bistable = (*silicon, "--midspan-amplitude", 13e-6)
+    for command in ("equilibria", "frequencies"):
+        text = " ".join(run(command, *bistable).output.split())
+        assert "Omega = 1 is 190541.304 Hz, the first frequency about the upper well" in text
+        assert "a run without a striker begins in the upper well, as fabricated" in text
+        assert json.loads(run(command, *bistable, "--json", "-").stdout)["reference_well"] == "upper"
+    assert "centre (µm)" in run("equilibria", *bistable).output
+    shallow = run("equilibria", *silicon, "--midspan-amplitude", 6e-6).output
+    assert "the first frequency about the equilibrium" in " ".join(shallow.split())
+    given = run("equilibria", *bistable, "--reference-frequency", 1e5).output
+    assert "Omega = 1 is 100000.000 Hz, as given" in given
+
+
+def test_force_displacement_curve(tmp_path) -> None:
+    arch = ("--axial-load", 0, "--midspan-amplitude", 1e-3, "--modes", 3)
+    curve, figure = tmp_path / "curve.nc", tmp_path / "curve.png"
+    answer = run("equilibria", *arch, "--force-displacement", "-o", curve, "--plot", figure, "--json", "-")
+    assert answer.exit_code == 0, answer.output
+    found = json.loads(answer.stdout)
+    assert found["well"] == "upper"
+    assert found["snap_through_force"] == pytest.approx(-1.33, rel=0.01)
+    assert set(found["critical_kinds"]) == {"limit", "bifurcation"}
+    assert figure.stat().st_size > 10_000
+    dataset = read_netcdf(curve, "file")
+    assert float(dataset.snap_back_force) == found["snap_back_force"]
+    text = run("equilibria", *arch, "--force-displacement").output
+    assert "from the upper well (the only equilibrium)" in text
+    assert "snap-back: " in text
+    refused = run("equilibria", *arch, "--plot", figure)
+    assert refused.exit_code != 0
+    assert "--force-displacement" in refused.output

@@ -1,4 +1,4 @@
-"""Ctrl-C and termination of the program while it starts, compiles and computes: a sentence and the status of the signal."""
+"""Ctrl-C, termination and a closed terminal while the program starts, compiles and computes: a sentence and a status."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="interrupts are 
 
 SENTENCE = "interrupted; no file was left half written"
 LATER = ("snapbeam.cli.map", "numpy", "xarray")
-BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+HANGUP = getattr(signal, "SIGHUP", signal.SIGTERM)
+ALL = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, HANGUP])
 AT_IMPORT = """
 import os, signal, sys
 from snapbeam.__main__ import main
@@ -29,7 +30,7 @@ main()
 """
 
 
-@BOTH
+@ALL
 @pytest.mark.parametrize(
     "name", ["typer", *(pytest.param(name, marks=pytest.mark.slow) for name in LATER), "numba"]
 )
@@ -45,7 +46,7 @@ def test_while_modules_are_imported(tmp_path, number, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@ALL
 def test_while_a_kernel_is_compiled(tmp_path, number):
     """The main thread is in the compiler for seconds; the program does not wait for it."""
     command = ["map", "--modes", "3", "--cycles", "2", "-o", "map.nc"]
@@ -66,7 +67,7 @@ def test_while_a_kernel_is_compiled(tmp_path, number):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
+@ALL
 def test_while_points_are_computed(tmp_path, number):
     command = ["map", "--modes", "1", "--cycles", "30000", "--frequency-ratio", "0.5:4:20"]
     process = subprocess.Popen(
@@ -79,6 +80,39 @@ def test_while_points_are_computed(tmp_path, number):
     assert process.returncode == 128 + number
     assert messages.splitlines()[-1] == SENTENCE and "Traceback" not in messages
     assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.slow
+def test_a_terminal_that_is_closed(tmp_path):
+    """Messages cannot be written any more; the program ends, and no incomplete file is left."""
+    import fcntl
+    import pty
+    import termios
+
+    command = [
+        "map",
+        "--modes",
+        "1",
+        "--cycles",
+        "30000",
+        "--frequency-ratio",
+        "0.5:4:20",
+        "--checkpoint",
+        "store",
+    ]
+    here, there = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "snapbeam", *command, "--points-per-task", "1"], cwd=tmp_path, stdin=there, stdout=there,
+        stderr=there, start_new_session=True, preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+    )  # fmt: skip
+    os.close(there)
+    shown = b""
+    while b"points" not in shown:
+        shown += os.read(here, 1024)
+    os.close(here)
+    assert process.wait(timeout=600) != 0
+    assert not [file for file in tmp_path.rglob("*.partial")]
+    assert sorted(os.listdir(tmp_path)) in ([], ["store"])
 
 
 def test_a_background_job_ignores_what_its_shell_says(tmp_path):

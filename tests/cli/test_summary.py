@@ -101,6 +101,17 @@ def test_what_was_there_before_is_no_part_of_the_rate(monkeypatch) -> None:
         "1000 runs to compute",
         "900 of 1000 runs",
         "1000 of 1000 runs, 10 runs/s",
-        "2000 runs in all now",
+        "2000 runs to compute",
         "1400 of 2000 runs, 10 runs/s, 1 min 0 s left",
     ]
+
+
+@pytest.mark.parametrize(
+    ("name", "following"), [("map", "closer"), ("closer", "closer_2"), ("closer_2", "closer_3")]
+)
+def test_a_suggested_map_does_not_replace_the_map_it_starts_from(synthetic_map, tmp_path, name, following):
+    file = tmp_path / f"{name}.nc"
+    synthetic_map.to_netcdf(file, engine="h5netcdf")
+    said = text(map_summary(synthetic_map, [file], 1.0))
+    assert f"--from {shlex.quote(str(file))}" in said
+    assert f"-o {following}.nc --plot {following}.png" in said

@@ -178,7 +178,7 @@ def test_sweep_of_the_load() -> None:
         voltage.append(abs(circuit * q))
     expected = np.array(voltage) ** 2 / (2.0 * loads)
     np.testing.assert_allclose(found.harvested_power.values, expected, rtol=0.15)
-    assert int(found.harvested_power.argmax()) == int(expected.argmax())
+    assert int(found.harvested_power.values.argmax()) == int(expected.argmax())
 
 
 def test_refusals() -> None:

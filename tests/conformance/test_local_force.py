@@ -101,7 +101,7 @@ SLOW = pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "share"),
     [
-        ("spring", 1.7),
+        pytest.param("spring", 1.7, marks=SLOW),
         *(pytest.param(name, 0.3, marks=SLOW) for name in (*FORCES, "friction")),
         *(pytest.param(name, 1.7, marks=SLOW) for name in ("rotation", "drag", "friction")),
     ],

@@ -74,7 +74,12 @@ def test_the_map_is_advance(names) -> None:
 
 
 @pytest.mark.parametrize(
-    "names", [("base",), pytest.param(("load",), marks=SLOW), pytest.param(tuple(PHASES), marks=SLOW)]
+    "names",
+    [
+        pytest.param(("base",), marks=SLOW),
+        pytest.param(("load",), marks=SLOW),
+        pytest.param(tuple(PHASES), marks=SLOW),
+    ],
 )
 def test_against_an_independent_solution(names) -> None:
     first = float(PaperBeam(2).omega[0])

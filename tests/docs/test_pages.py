@@ -22,6 +22,7 @@ CODE = [
     "README.md",
     "accuracy.md",
     "contacts.md",
+    "export.md",
     "finite_elements.md",
     "getting-started.md",
     "long_maps.md",
@@ -42,7 +43,15 @@ CODE = [
     pytest.param("orbits.md", marks=pytest.mark.slow),
 ]
 """Pages whose Python blocks run in order in one namespace; those that take more than a few seconds are slow."""
-ELSEWHERE = {"extending.md", "tutorial_beam.md", "tutorial_sweep.md", "tutorial_waveform.md"}
+ELSEWHERE = {
+    "extending.md",
+    "howto_harvester.md",
+    "mems_arch.md",
+    "mems_switch.md",
+    "tutorial_beam.md",
+    "tutorial_sweep.md",
+    "tutorial_waveform.md",
+}
 """Pages that other tests run: ``tests/solver/test_extending.py`` and ``test_tutorials.py``."""
 NEEDS_FILES = ('open_dataset("map.nc")', 'open_recording("test.cihx"')
 """Beginnings of blocks that read a file which a command or a camera made."""

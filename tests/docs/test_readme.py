@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
-from snapbeam import ResponseClass, __version__
+from snapbeam import ResponseClass
 from snapbeam.cli.app import app
 
 ROOT = Path(__file__).parents[2]
@@ -96,7 +96,3 @@ def test_numbers_of_the_claims():
     total, hold, part, fail, close = re.findall(r"\d+", words)[:5]
     assert f"Of {total} statements of the paper that can be tested, {hold} hold, {part} hold in part" in PLAIN
     assert f"{fail} fail; {close} of these verdicts" in PLAIN
-
-
-def test_version():
-    assert f"(version {__version__}," in TEXT

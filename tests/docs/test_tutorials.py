@@ -57,7 +57,18 @@ def follow(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     plt.close("all")
 
 
-@pytest.mark.parametrize("name", ["tutorial_beam", "tutorial_waveform"])
+@pytest.mark.filterwarnings("ignore:the lowest mode about the equilibrium")
+@pytest.mark.filterwarnings("ignore:this imperfection leaves one well")
+@pytest.mark.parametrize(
+    "name",
+    [
+        "tutorial_beam",
+        *(
+            pytest.param(each, marks=pytest.mark.slow)
+            for each in ("tutorial_waveform", "howto_harvester", "mems_arch", "mems_switch")
+        ),
+    ],
+)
 def test_tutorial(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     follow(name, capsys)

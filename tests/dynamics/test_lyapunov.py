@@ -106,3 +106,15 @@ def test_refusals() -> None:
         sb.dynamics.lyapunov_spectrum(system_of(1, 1.6, 0.03), axes={"model.damping_ratio": [0.01, 0.02]})
     with pytest.raises(sb.InputError, match="states"):
         sb.dynamics.lyapunov_spectrum(henon())
+
+
+def test_one_run_is_what_it_is_among_many() -> None:
+    """Few runs: derivatives of the map over each period. Many: tangents that are carried along."""
+    system = system_of(2, 1.3, 0.4)
+    begun = np.linspace(0.9, 1.0, 40)[:, None] * np.array([1.0, 0.0, 0.0, 0.0])
+    options = {"periods": 20, "transient": 0}
+    many = sb.dynamics.lyapunov_spectrum(system, 3, states=begun, **options)
+    for run in (0, 39):
+        alone = sb.dynamics.lyapunov_spectrum(system, 3, states=begun[run : run + 1], **options)
+        np.testing.assert_allclose(alone.running[:, 0], many.running[:, run], rtol=1e-7)
+        assert alone.periods_snapping[0] == many.periods_snapping[run]

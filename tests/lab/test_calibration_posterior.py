@@ -8,6 +8,7 @@ from snapbeam.model.default_values import BEAM
 from snapbeam.uncertainty.measurements import ContactTest, Measurements
 
 
+@pytest.mark.slow
 def test_the_posterior_is_that_of_the_linear_fit() -> None:
     """Small errors: medians and widths agree with those of least squares."""
     straight = sb.ReducedModel.from_beam(BEAM.replace(axial_load=0.0), 2).natural_frequencies

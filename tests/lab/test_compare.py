@@ -20,7 +20,7 @@ from snapbeam.lab.signal_files import write_signal
 from snapbeam.lab.signals import make_signal
 from snapbeam.lab.waveform_comparison import compare_waveforms
 from snapbeam.simulation.dataset import trajectory_dataset
-from snapbeam.sweeps.measured_points import MeasuredPoints
+from snapbeam.sweeps.measured_points import MeasuredPoints, read_measured_points
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError
 
@@ -62,6 +62,60 @@ def test_the_confusion_table_counts_every_swap(synthetic_map):
     assert found.agreement == pytest.approx(1.0 - 7.0 / found.used)
     assert found.snap_agreement == pytest.approx(1.0 - 7.0 / found.used)
     assert (found.table["distance"].values[at] >= 1.0).all()
+
+
+FIRST, LEVEL = 80.0, 0.33e-3
+UNITS = {
+    "rad/s": ("frequency_hz,velocity_m_s", lambda f, v: (2.0 * np.pi * f, v), "rad/s"),
+    "mm/s": ("frequency_hz,velocity_m_s", lambda f, v: (f, 1e3 * v), "mm/s"),
+    "exchanged": ("frequency_hz,velocity_m_s", lambda f, v: (v, f), "exchanged"),
+    "ratios exchanged": (
+        "frequency_ratio,velocity_amplitude",
+        lambda f, v: (v / (2.0 * np.pi * LEVEL * FIRST), f / FIRST),
+        "exchanged",
+    ),
+    "Hz as ratio": ("frequency_ratio,velocity_m_s", lambda f, v: (f, v), "in Hz"),
+}
+
+
+def written(path, heads, points, change):
+    frequency = points.frequency_ratio * FIRST
+    velocity = points.velocity_amplitude * 2.0 * np.pi * LEVEL * FIRST
+    columns = zip(*change(frequency, velocity), points.response_class, strict=True)
+    rows = "".join(f"{one:.9g},{other:.9g},{kind}\n" for one, other, kind in columns)
+    path.write_text(f"{heads},response_class\n{rows}", encoding="utf-8")
+    return read_measured_points(path, reference_frequency=FIRST, buckling_level=LEVEL)
+
+
+@pytest.mark.parametrize("kind", UNITS)
+def test_a_table_in_other_units_is_told(synthetic_map, tmp_path, kind):
+    known = synthetic_map.assign_attrs(reference_frequency=FIRST, beam_buckling_level=LEVEL)
+    points = points_of(known, 30, seed=4)
+    good = compare_measured_points(
+        written(tmp_path / "good.csv", "frequency_hz,velocity_m_s", points, lambda f, v: (f, v)), known
+    )
+    assert good.agreement == 1.0 and not good.diagnostics
+    heads, change, words = UNITS[kind]
+    found = compare_measured_points(written(tmp_path / "bad.csv", heads, points, change), known)
+    (told,) = found.diagnostics
+    assert told.code == "comparison.units" and told.severity == "error"
+    assert words in told.message and found.summary()["diagnostics"]
+
+
+def test_points_that_stand_twice_count_once_and_not_if_they_contradict(synthetic_map):
+    points = points_of(synthetic_map, 30, seed=5)
+    kinds = points.response_class
+    at = np.flatnonzero(kinds >= 0)[:3]
+    again = np.concatenate([np.arange(30), at])
+    changed = kinds[again].copy()
+    changed[-1] = 0 if kinds[at[2]] else 1
+    columns = (points.frequency_ratio, points.velocity_amplitude, points.location)
+    found = compare_measured_points(MeasuredPoints(*(one[again] for one in columns), changed), synthetic_map)
+    assert found.used == compare_measured_points(points, synthetic_map).used - 1
+    assert any("2 of 33 measured points do not count: repeated" in note for note in found.notes)
+    (told,) = found.diagnostics
+    assert (told.code, told.numbers["points"]) == ("comparison.contradicting", 2.0)
+    assert len(plot_map_comparison(synthetic_map, points, found).texts) > 0
 
 
 def test_points_that_do_not_belong_are_left_out_and_said(synthetic_map):
@@ -133,8 +187,42 @@ def test_dropouts_stay_dropouts(synthetic_run):
 def test_runs_that_cannot_be_compared(synthetic_run, change, word):
     with pytest.raises(InputError, match=word):
         compare_waveforms(measured_of(synthetic_run), synthetic_run, **{"frequency": 100.0, **change})
-    with pytest.raises(InputError, match="measured: run without striker_displacement"):
-        compare_waveforms(synthetic_run.drop_vars("striker_displacement"), synthetic_run)
+    alone = synthetic_run.drop_vars(["striker_displacement", "cycle"])
+    with pytest.raises(InputError, match=r"start \(--start\): must be given"):
+        compare_waveforms(alone, synthetic_run, 100.0)
+
+
+def test_a_displacement_sensor_without_the_shaker(synthetic_run, program, tmp_path):
+    """A record of 2 kHz at midspan, zero midway between the wells: aligned by the start of the excitation alone."""
+    length, start = 0.335e-3, 0.05
+    run = synthetic_run.assign_attrs(length_scale=length)
+    time = np.arange(0.0, 0.12, 1.0 / 2000.0)
+    exact = np.interp(time, run["time"].values + start, run["midspan_displacement"].values)
+    noise = 0.01 * np.random.default_rng(1).standard_normal(time.size)
+    signal = make_signal(length * (exact + noise), "m", time=time, name="laser")
+    found = compare_waveforms(signal, run, 100.0, at="midspan_displacement", start=start)
+    assert found.rms_difference == pytest.approx(0.01, rel=0.2) and found.correlation > 0.98
+    assert [one.code for one in found.diagnostics] == ["comparison.no_shaker"] and np.isnan(
+        found.amplitude_ratio
+    )
+    with pytest.raises(InputError, match="must be in m"):
+        compare_waveforms(make_signal(exact, "m/s", time=time), run, 100.0, start=start)
+    write_signal(tmp_path / "laser.csv", signal)
+    run.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
+    told = program(
+        "compare", tmp_path / "laser.csv", tmp_path / "run.nc", "--at", "midspan", "--frequency", "100",
+        "--start", str(start), "--cycles", "7", "--plot", tmp_path / "waves.png", "--overlay", "--json", "-",
+    )  # fmt: skip
+    assert told.exit_code == 0, told.output
+    assert json.loads(told.stdout)["rms_difference_b"] == pytest.approx(found.rms_difference, rel=1e-6)
+
+
+def test_a_coarse_record_of_the_shaker_has_its_amplitude(synthetic_run):
+    """Eight samples a cycle: the amplitude is that of the samples, not of straight lines between them."""
+    seen = measured_of(synthetic_run, noise=0.0)
+    every = seen.sizes["time"] // 85
+    found = compare_waveforms(seen.isel(time=slice(None, None, every)), synthetic_run, 100.0, start=0.0123)
+    assert found.amplitude_ratio == pytest.approx(1.0, abs=0.002)
 
 
 def test_pictures(synthetic_map, synthetic_run):

@@ -74,7 +74,7 @@ def hold(what, folder, *, good, spoiled, seed=20):
     ("what", "good", "spoiled"),
     [
         pytest.param("scene", 1, 3, marks=pytest.mark.slow),
-        ("drive", 4, 6),
+        pytest.param("drive", 4, 6, marks=pytest.mark.slow),
         pytest.param("decay", 10, 12, marks=pytest.mark.slow),
     ],
 )

@@ -11,6 +11,7 @@ import pytest
 
 from snapbeam.lab.signal_files import read_channels, read_signal
 from snapbeam.lab.signals import check_signal, parse_sensitivity, si_unit
+from snapbeam.util.diagnostics import DiagnosticWarning, diagnostics_of
 from snapbeam.util.validation import InputError
 
 COUNT = 40
@@ -143,8 +144,9 @@ def test_labview_text(tmp_path, decimal):
     same(read_signal(path, "Velocity"))
     assert read_signal(path, "Drive").attrs["units"] == "V"
     path.write_text("\n".join(lvm(decimal).splitlines()[:-3]), encoding="utf-8")
-    with pytest.raises(InputError, match="promises 40 samples"):
-        read_signal(path, "Velocity")
+    with pytest.warns(DiagnosticWarning, match="promises 40 samples"):
+        short = read_signal(path, "Velocity")
+    assert short.size == COUNT - 3 and [one.code for one in diagnostics_of(short)] == ["signal.cut"]
 
 
 def test_matlab_of_both_kinds(tmp_path):
@@ -177,13 +179,17 @@ def test_sound_files_of_24_bits_and_of_floats(tmp_path):
     from scipy.io import wavfile
 
     deep = tmp_path / "deep.wav"
-    levels = np.round(VALUES / 0.5 * 2**23).astype(np.int32)
+    values = np.tile(VALUES, 50)  # a long record, so that its header is small beside it
+    levels = np.round(values / 0.5 * 2**23).astype(np.int32)
     with wave.open(str(deep), "wb") as file:
         file.setnchannels(1)
         file.setsampwidth(3)
         file.setframerate(2000)
         file.writeframes(b"".join(int(level).to_bytes(3, "little", signed=True) for level in levels))
-    np.testing.assert_allclose(read_signal(deep, sensitivity="0.5 m/s/FS").values, VALUES, atol=1e-7)
+    np.testing.assert_allclose(read_signal(deep, sensitivity="0.5 m/s/FS").values, values, atol=1e-7)
+    deep.write_bytes(deep.read_bytes()[:-9])
+    with pytest.raises(InputError):
+        read_signal(deep, sensitivity="0.5 m/s/FS")
     floats = tmp_path / "float.wav"
     wavfile.write(floats, 2000, VALUES.astype(np.float32))
     np.testing.assert_allclose(read_signal(floats, units="m/s").values, VALUES, atol=1e-7)
@@ -213,3 +219,55 @@ def test_a_table_that_was_cut_in_its_last_number_says_so(tmp_path, end, cut):
         warnings.simplefilter("always")
         read_signal(file)
     assert any("ends inside its last number" in str(each.message) for each in told) == cut
+
+
+@pytest.mark.parametrize("shape", [(1, COUNT), (COUNT, 1), (2, COUNT), (COUNT, 2)])
+def test_rows_and_columns_of_hdf5(tmp_path, shape):
+    import h5py
+
+    path = tmp_path / "matrix.h5"
+    many = 2 in shape
+    both = np.stack([VALUES, 2.0 * VALUES]) if many else VALUES[None]
+    with h5py.File(path, "w") as file:
+        data = file.create_dataset("velocity", data=both if shape[1] == COUNT else both.T)
+        data.attrs["units"] = "m/s"
+        file.attrs["fs"] = 2000.0
+        file["fs"] = np.array([[2000.0]])
+    same(read_signal(path, "velocity 1" if many else None))
+    if many:
+        np.testing.assert_array_equal(read_signal(path, "velocity 2").values, 2.0 * VALUES)
+
+
+POLYTEC = "Source File Name:\tscan.pvd\nPoint Index:\t1\nSignal:\tVib Velocity\n\n"
+
+
+@pytest.mark.parametrize(
+    "heads", ["Time\tVelocity\n[ s ]\t[ m/s ]\n", "[ s ]\t[ m/s ]\n", "Time [ s ]\tVib Velocity [ m/s ]\n"]
+)
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_tables_of_polytec(tmp_path, heads, decimal):
+    path = tmp_path / "scan.txt"
+    path.write_text(POLYTEC + heads + rows("{t:.6e}\t{v:.9e}", decimal), encoding="latin-1")
+    same(read_signal(path))
+
+
+def test_a_spectrum_is_no_time_signal(tmp_path):
+    path = tmp_path / "scan.txt"
+    path.write_text(
+        POLYTEC + "Frequency\tMagnitude\n[ Hz ]\t[ m/s ]\n" + rows("{i}\t{v:.9e}"), encoding="utf-8"
+    )
+    with pytest.raises(InputError, match="this is a spectrum; export the time signal"):
+        read_signal(path)
+
+
+def test_labview_text_with_appended_records_and_empty_channels(tmp_path):
+    path = tmp_path / "daq.lvm"
+    head = lvm(".").replace("Samples\t40\t40", "Samples\t20\t20").replace("Channels\t2", "Channels\t3")
+    path.write_text(
+        head.replace("Velocity\tDrive\tComment", "Velocity\tDrive\tUntitled\tComment"), encoding="utf-8"
+    )
+    with pytest.warns(DiagnosticWarning, match="appended"):
+        signal = read_signal(path, "Velocity")
+    same(signal)
+    assert [one.code for one in diagnostics_of(signal)] == ["signal.appended"]
+    assert [entry["name"] for entry in read_channels(path)] == ["Velocity", "Drive"]

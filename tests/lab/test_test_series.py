@@ -63,6 +63,7 @@ def test_a_foreign_figure_is_kept_and_nothing_is_measured(tmp_path, name):
     assert [path.name for path in output.iterdir()] == [name]
 
 
+@pytest.mark.slow
 def test_a_good_test_and_a_spoiled_one(tmp_path):
     folder = tmp_path / "tests"
     folder.mkdir()
@@ -142,11 +143,13 @@ def test_two_recordings_of_one_name_are_refused(tmp_path):
         find_tests(tmp_path)
 
 
-def test_a_table_says_which_files_are_which_test(tmp_path):
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "latin-1"])
+def test_a_table_says_which_files_are_which_test(tmp_path, encoding):
     touch(tmp_path, "x1.tif", "v7.csv")
     table = tmp_path / "list.csv"
     table.write_text(
-        "test;recording;vibrometer;frequency_hz;location\nfirst;x1.tif;v7.csv;98,5;0,47\n", encoding="utf-8"
+        "test;recording;vibrometer;frequency_hz;location;comment\n;;;;;\nfirst;x1.tif;v7.csv;98,5;0,47;für\n",
+        encoding=encoding,
     )
     (test,) = find_tests(tmp_path, table)
     assert (test.name, test.recording.name, test.vibrometer.name) == ("first", "x1.tif", "v7.csv")
@@ -156,13 +159,17 @@ def test_a_table_says_which_files_are_which_test(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("test,recording\na,none.tif\n", "row 2: recording 'none.tif' is not in"),
+        ("test,recording\na,none.tif\n", "line 2: recording 'none.tif' is not in"),
         ("test,recording,speed\na,x1.tif,3\n", "unknown column 'speed'"),
         ("test,recording\na,x1.tif\na,x1.tif\n", "'a' stands twice"),
         ("test,recording,frequency_hz\na,x1.tif,fast\n", "frequency_hz = 'fast'"),
         ("test,recording,location\na,x1.tif,1.2\n", "location"),
         ("recording\nx1.tif\n", "must have a column 'test'"),
         ("", "is empty"),
+        ("test,recording,location\na,x1.tif\n", "line 2: has 2 cells, the header names 3"),
+        ("test,recording\n\na,\n", "line 3: recording is empty"),
+        ("test,recording\n,x1.tif\n", "line 2: test is empty"),
+        ("test,recording,recording\na,x1.tif,x1.tif\n", "column 'recording' occurs twice"),
     ],
 )
 def test_a_bad_table_is_refused(tmp_path, text, words):

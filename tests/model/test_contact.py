@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
+from snapbeam.model.contact.base import LAWS, ContactLaw
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.contact.kelvin_voigt import KelvinVoigt
@@ -169,3 +170,18 @@ def test_layer_from_its_material() -> None:
     assert law.layer_stiffness == pytest.approx(math.pi * 5e-3 * 2e6 * 0.6 / (1.4 * 0.2) / 1e-4, rel=1e-12)
     with pytest.raises(InputError, match="poisson_ratio"):
         LayeredHertz.from_layer(4e8, 5e-3, 1e-4, 2e6, 0.5)
+
+
+def test_a_law_without_energy_is_refused_by_name() -> None:
+    with pytest.raises(
+        InputError, match="contact law 'half_done': has no energy and no slope; write them as"
+    ):
+
+        class HalfDone(ContactLaw):
+            name = "half_done"
+
+            @staticmethod
+            def force(law, penetration):
+                return 1e5 * penetration
+
+    assert "half_done" not in LAWS

@@ -118,6 +118,25 @@ def test_rest_is_in_the_well_that_the_striker_pushes_away_from() -> None:
     np.testing.assert_array_equal(rest_state(MODEL).amplitude, MODEL.well_amplitude)
 
 
+@pytest.mark.parametrize(("rise", "well"), [(13e-6, "upper"), (-13e-6, "lower")])
+def test_rest_without_a_striker_is_in_the_fabricated_well(rise: float, well: str) -> None:
+    """The well of an arch that normalises is the deepest one, which is the as-fabricated one."""
+    beam = sb.Beam(length=5e-4, thickness=2e-6, width=2e-5, density=2330, young_modulus=160e9, axial_load=0.0)
+    arch = sb.ReducedModel.from_beam(beam, modes=2, imperfection=sb.Imperfection(midspan_amplitude=rise))
+    start = rest_state(arch).amplitude
+    assert float(arch.midspan_shape @ start) == pytest.approx(rise, rel=1e-9)
+    assert arch.as_fabricated_well == arch.reference_well == arch.side_of(start) == well
+    assert arch.side_of(rest_state(arch, ABOVE).amplitude) == "upper"
+    # a load may make the other well the deeper one; a run still begins where the beam was fabricated
+    bent = beam.replace(axial_load=0.02)
+    pushed = sb.Imperfection(midspan_amplitude=0.01 * rise, uniform_load=math.copysign(0.1, -rise))
+    loaded = sb.ReducedModel.from_beam(bent, modes=2, imperfection=pushed)
+    assert loaded.as_fabricated_well == loaded.side_of(rest_state(loaded).amplitude) == well
+    assert loaded.reference_well == ({"upper", "lower"} - {well}).pop()
+    lowest = loaded.well_frequencies[0 if loaded.reference_well == "lower" else 1, 0]
+    assert loaded.reference_frequency == lowest
+
+
 def test_amplitudes_are_counted_in_that_of_the_well() -> None:
     scale = amplitude_scale(MODEL)
     assert scale == pytest.approx(abs(MODEL.well_amplitude[0]), rel=1e-14)

@@ -223,6 +223,10 @@ OF_OTHERS = {
     "half_sine": (
         sb.HalfSine(displacement_amplitude=0.1, duration=0.5), {"displacement_amplitude": 0.2, "duration": 0.6}
     ),
+    "shock": (
+        sb.Shock(acceleration_g=10.0, duration_ms=11.0),
+        {"acceleration_g": 20.0, "duration_ms": 6.0, "shape": "trapezoid", "rise_fraction": 0.2},
+    ),
     "band_limited_noise": (
         sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
         {"low_ratio": 0.6, "high_ratio": 3.0, "velocity_rms": 0.2, "seed": 5, "ramp_up_cycles": 2.0},

@@ -19,6 +19,8 @@ from snapbeam.paper.claims.prose import read_topic
 from snapbeam.paper.claims.table import Claim, summary
 from snapbeam.util.validation import InputError
 
+pytestmark = pytest.mark.slow  # the studies at sketch size take 20 s
+
 REPRODUCTION = Path(__file__).parents[2] / "docs" / "reproduction.md"
 
 

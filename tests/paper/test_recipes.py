@@ -117,6 +117,7 @@ def test_fig4_names_the_part_that_is_missing(monkeypatch):
         fig4.compute(paper.Results("quick"))
 
 
+@pytest.mark.slow
 @needs_lab
 def test_measured_runs_take_the_left_column(tmp_path, results):
     files = []

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import pytest
+import xarray as xr
 from typer.testing import CliRunner
 
 from snapbeam.cli.app import app
+from snapbeam.paper.cli import _computed
 
 
 @pytest.fixture
@@ -16,7 +18,8 @@ def cli(tmp_path, monkeypatch):
 
 def test_a_figure_with_its_data(cli, tmp_path):
     done = cli("figA9", "-o", "out")
-    assert done.exit_code == 0 and "figA9: error of the natural frequencies" in done.stdout
+    assert done.exit_code == 0 and "error of the natural frequencies" in done.stdout
+    assert "figA9: quick sketch" in done.stdout
     assert sorted(file.name for file in (tmp_path / "out").iterdir()) == [
         "figA9.nc",
         "figA9.pdf",
@@ -38,3 +41,13 @@ def test_refusals(cli, args, words):
     refused = cli(*args)
     assert refused.exit_code == 2
     assert words in " ".join(refused.output.split())
+
+
+def test_a_sketch_states_the_modes_and_cycles_that_were_run():
+    """Not those of the paper's figure."""
+    found = {
+        "a": xr.Dataset(attrs={"modes": 1, "cycles": 40}),
+        "b": xr.Dataset(attrs={"modes": 4, "cycles": 40.0}),
+    }
+    assert _computed({"fig6": found}, "fig6") == "N = 1 and 4, 40 cycles"
+    assert _computed({"fig2": {"a": xr.Dataset()}}, "fig2") == "with a small grid"

@@ -145,3 +145,8 @@ def test_in_axes_of_ones_own(synthetic_map):
     assert [handle.get_label() for handle in class_handles()] == [
         kind.label for kind in ResponseClass if kind >= 0
     ]
+
+
+def test_classes_without_runs_are_not_in_the_legend():
+    labels = [handle.get_label() for handle in class_handles(np.array([0, 0, 3, 0], dtype=np.int8))]
+    assert labels == ["intrawell, 75.0 %", "continuous interwell, 25.0 %"]

@@ -102,3 +102,14 @@ def test_unequal_wells_and_what_makes_them(model) -> None:
     assert solid.get_ydata()[100] == pytest.approx(heights[0], rel=1e-9)
     assert dashed.get_ydata()[100] == pytest.approx(heights[1], rel=1e-9)
     assert "$F$" in words(figure)
+
+
+def test_no_arrows_of_a_load_that_is_zero() -> None:
+    """An arch without an axial load has neither the arrows at its ends nor their symbol."""
+    arch = default_values.BEAM.replace(buckling_level=None, axial_load=0.0)
+    imperfection = sb.Imperfection(midspan_amplitude=2e-3)
+    model = sb.ReducedModel.from_beam(arch, modes=3, imperfection=imperfection)
+    arched = sb.System(model, default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2))
+    assert "$P$" not in words(plot_system(arched))
+    loaded = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
+    assert "$P$" in words(plot_system(arched.replace(model=loaded)))

@@ -16,7 +16,8 @@ import urllib.request
 import venv
 from pathlib import Path
 
-CONSTRAINTS = Path(__file__).parents[2] / "constraints.txt"
+ROOT = Path(__file__).parents[2]
+CONSTRAINTS = ROOT / "constraints.txt"
 EXTRAS = ("lab", "video", "cluster", "explorer", "cuda")
 """What users install; the others are for working on snapbeam."""
 
@@ -29,6 +30,7 @@ _CORE = (
     f"{_SYSTEM}run = sb.simulate(system, sb.Integration(cycles=3)); "
     "run.save('run.nc'); assert sb.load('run.nc').system == run.system; print(run)"
 )
+_README = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
 _SIGNAL = (
     "import numpy as np; t = np.arange(40000) / 20e3; ramp = np.clip(t / 0.3, 0, 1); "
     "np.savetxt('velocity.csv', np.c_[t, 0.02 * ramp * np.sin(2 * np.pi * 100 * t)], delimiter=',', "
@@ -46,6 +48,7 @@ _GRID = "--frequency-ratio 1:1.5:3 --velocity-amplitude 0.1:0.4:3"
 USES = {
     "": (
         ("python", "-c", _CORE),
+        ("python", "-c", _README[0]),
         "snapbeam --version",
         "python -m snapbeam frequencies --count 3",
         f"snapbeam map --modes 1 --cycles 4 {_GRID} --plot map.png",

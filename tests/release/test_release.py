@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
+import json
 import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -12,21 +15,103 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 import snapbeam as sb
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(Path(__file__).parent))
 import alone  # noqa: E402
+from prepare import VERSIONS, prepare, versions  # noqa: E402
 
 
 def test_one_version_everywhere():
-    for name, pattern in (
-        ("CITATION.cff", r"^version: (\S+)$"), ("docs/citing.md", r"version = \{(\S+)\}"),
-        ("src/snapbeam/_version.py", r'^__version__ = "(\S+)"$'),
-    ):  # fmt: skip
-        found = re.search(pattern, (ROOT / name).read_text(encoding="utf-8"), re.MULTILINE)
-        assert found and found[1] == sb.__version__, name
+    assert set(versions().values()) == {sb.__version__}
+
+
+def test_metadata_agree():
+    """Name, license, keywords and title of codemeta.json and CITATION.cff are those of pyproject.toml."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    meta = json.loads((ROOT / "codemeta.json").read_text(encoding="utf-8"))
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert (meta["name"], meta["description"]) == (project["name"], project["description"])
+    assert meta["keywords"] == project["keywords"]
+    assert (
+        meta["license"].endswith("/" + project["license"]) and f"license: {project['license']}\n" in citation
+    )
+    author = project["authors"][0]["name"]
+    assert meta["author"][0]["name"] == author and f'name: "{author}"' in citation
+    bibtex = (ROOT / "docs" / "citing.md").read_text(encoding="utf-8")
+    title = re.search(r'^title: "(.*)"$', citation, re.MULTILINE)
+    assert title and f"title   = {{{title[1]}}}" in bibtex and f"{{{{{author}}}}}" in bibtex
+    assert meta["referencePublication"] == project["urls"]["Paper"]
+
+
+@pytest.fixture
+def copied(tmp_path):
+    """The files that a release changes, in a folder of their own."""
+    for name in (*VERSIONS, "pyproject.toml", "README.md", "hatch_build.py", "LICENSE"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(ROOT / name, tmp_path / name)
+    text = "# Changelog\n\n## Unreleased\n\n### Added\n\n- A file.\n\n## 0.1.0\n"
+    (tmp_path / "CHANGELOG.md").write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+def test_a_release_is_prepared(copied):
+    """One call writes version, date and address; a second one with the next version replaces them."""
+    address = "https://example.org/snapbeam"
+    prepare("0.2.0", address, "2026-12-01", copied)
+    assert set(versions(copied).values()) == {"0.2.0"}
+    changelog = (copied / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert "\n## 0.2.0 (2026-12-01)\n" in changelog and "## Unreleased" not in changelog
+    prepare("0.3.0.dev0", root=copied)
+    assert "\n## Unreleased\n\n## 0.2.0 (" in (copied / "CHANGELOG.md").read_text(encoding="utf-8")
+    prepare("0.3.0", address, "2027-01-15", copied)
+    citation = (copied / "CITATION.cff").read_text(encoding="utf-8")
+    assert (
+        "version: 0.3.0\ndate-released: 2027-01-15\n" in citation and citation.count("repository-code:") == 1
+    )
+    meta = json.loads((copied / "codemeta.json").read_text(encoding="utf-8"))
+    assert (meta["version"], meta["dateModified"], meta["codeRepository"]) == ("0.3.0", "2027-01-15", address)
+    urls = tomllib.loads((copied / "pyproject.toml").read_text(encoding="utf-8"))["project"]["urls"]
+    assert urls["Source"] == address and set(urls) == {"Paper", "Source", "Issues", "Changelog"}
+    with pytest.raises(SystemExit, match="must be like"):
+        prepare("v0.3", root=copied)
+
+
+def test_description_has_links_that_work_elsewhere(copied):
+    """In the archives of a release, links of the README are absolute."""
+    pytest.importorskip("hatchling", reason="make dist builds with it")
+    from hatchling.metadata.core import ProjectMetadata
+    from hatchling.plugin.manager import PluginManager
+
+    prepare("0.2.0", "https://example.org/snapbeam", root=copied)
+    text = ProjectMetadata(str(copied), PluginManager()).core.readme
+    targets = re.findall(r"\]\(([^)]+)\)", text)
+    assert len(targets) > 20 and all(target.startswith("https://") for target in targets)
+    assert (
+        "![Response class over excitation frequency and velocity amplitude](https://example.org/snapbeam/raw/v0.2.0/"
+        in text
+    )
+
+
+def test_locked_versions_are_those_of_the_constraints():
+    """``make lock`` writes requirements-dev.txt; every file in it has a hash."""
+
+    def pins(name):
+        text = (ROOT / name).read_text(encoding="utf-8")
+        found = re.findall(r"^([A-Za-z0-9_.-]+)(?:\[[^\]]*\])?==([^\s;]+)", text, re.MULTILINE)
+        return {re.sub(r"[-_.]+", "-", key).lower(): version for key, version in found}
+
+    locked, stated = pins("requirements-dev.txt"), pins("constraints.txt")
+    assert len(locked) > 100
+    assert locked == {name: stated.get(name) for name in locked}
+    text = (ROOT / "requirements-dev.txt").read_text(encoding="utf-8")
+    assert all("--hash=sha256:" in block for block in re.split(r"\n(?=\S)", text.strip()))
+    groups = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["dependency-groups"]
+    for group in ("test", "lint", "docs"):
+        assert {Requirement(each).name.lower() for each in groups[group]} <= set(locked)
 
 
 def test_no_machine_is_named():
@@ -49,6 +134,15 @@ def archives(tmp_path_factory):
             capture_output=True,
         )  # fmt: skip
     return next(folder.glob("*.tar.gz")), next(folder.glob("*.whl"))
+
+
+@pytest.mark.slow
+def test_wheel_is_reproducible(archives, tmp_path):
+    """A second build has the same bytes."""
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    first, second = (path.read_bytes() for path in (archives[1], next(tmp_path.glob("*.whl"))))
+    assert hashlib.sha256(first).hexdigest() == hashlib.sha256(second).hexdigest()
 
 
 @pytest.mark.slow
@@ -88,8 +182,6 @@ def test_each_runs_alone(which, extra, archives, code):
 
 
 def test_every_extra_is_tried():
-    """Those that are for users in fresh environments; the others are tools for working on snapbeam."""
     stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    tools = {"explorer-test", "docs", "dev", "bench", "bench-fortran"}
-    assert set(stated["optional-dependencies"]) == set(alone.EXTRAS) | tools
+    assert set(stated["optional-dependencies"]) == set(alone.EXTRAS)
     assert set(alone.USES) == {"", *alone.EXTRAS}

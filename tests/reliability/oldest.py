@@ -1,6 +1,6 @@
 """The lower bounds of pyproject.toml as versions to install: what ``make test-oldest`` tests with.
 
-python oldest.py EXTRA... > requirements.txt
+python oldest.py EXTRA_OR_GROUP... > requirements.txt
 """
 
 from __future__ import annotations
@@ -14,18 +14,19 @@ PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
 _BOUND = re.compile(r"(?P<name>[A-Za-z0-9_.-]+(?:\[[a-z0-9,]+\])?)>=(?P<version>[0-9.]+)(?:,<[0-9.]+)?")
 
 
-def oldest(extras: list[str], pyproject: Path = PYPROJECT) -> list[str]:
-    """A requirement for each dependency, of the package and of some of its extras, at its lower bound.
+def oldest(sets: list[str], pyproject: Path = PYPROJECT) -> list[str]:
+    """A requirement for each dependency, of the package and of some of its extras and groups, at its lower bound.
 
     Raises
     ------
     ValueError
         For a dependency without a lower bound, or with more than a lower and an upper bound.
     """
-    project = tomllib.loads(pyproject.read_text(encoding="utf-8"))["project"]
-    asked = list(project["dependencies"])
-    for extra in extras:
-        asked += project["optional-dependencies"][extra]
+    stated = tomllib.loads(pyproject.read_text(encoding="utf-8"))
+    known = stated["project"].get("optional-dependencies", {}) | stated.get("dependency-groups", {})
+    asked = list(stated["project"]["dependencies"])
+    for name in sets:
+        asked += known[name]
     found = []
     for text in asked:
         match = _BOUND.fullmatch(text)

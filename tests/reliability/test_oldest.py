@@ -7,13 +7,14 @@ import tomllib
 import pytest
 from oldest import PYPROJECT, oldest
 
-EXTRAS = ["lab", "cluster", "video", "dev"]
+SETS = ["lab", "cluster", "video", "test"]
 
 
 def test_every_dependency_has_a_lower_bound_that_can_be_installed():
-    project = tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))["project"]
-    count = len(project["dependencies"]) + sum(len(project["optional-dependencies"][each]) for each in EXTRAS)
-    assert len(oldest(EXTRAS)) == count
+    stated = tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))
+    known = stated["project"]["optional-dependencies"] | stated["dependency-groups"]
+    count = len(stated["project"]["dependencies"]) + sum(len(known[each]) for each in SETS)
+    assert len(oldest(SETS)) == count
     assert "typer==0.17.5" in oldest([])
 
 
@@ -29,4 +30,4 @@ def test_the_source_distribution_holds_what_builds_and_tests_it():
     held = tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))["tool"]["hatch"]["build"]["targets"]["sdist"][
         "include"
     ]
-    assert {"/Makefile", "/src", "/tests", "/constraints.txt"} <= set(held)
+    assert {"/Makefile", "/src", "/tests", "/constraints.txt", "/requirements-dev.txt"} <= set(held)

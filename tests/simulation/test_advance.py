@@ -82,7 +82,10 @@ SYSTEMS = {
 }
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[pytest.mark.slow] if n in ("elastic", "plastic") else []) for n in SYSTEMS],
+)
 def test_calls_compose_bit_for_bit(name: str) -> None:
     """Twelve periods in one call, in twelve, in four of three; and all the states on the way."""
     system = SYSTEMS[name]

@@ -129,6 +129,7 @@ def test_early_termination_is_kept_and_reported(one_mode, coefficient):
     assert decided > 0
 
 
+@pytest.mark.slow
 def test_a_map_takes_the_law(one_mode):
     ds = swept(
         one_mode, sb.Restitution(0.6), frequency_ratio=[0.8, 1.2], velocity_amplitude=[0.05, 0.3], cycles=10

@@ -13,7 +13,9 @@ from snapbeam.solver import step_size
 from snapbeam.solver.step_size import choose_base_step, flight_step
 
 
-@pytest.mark.parametrize("modes", [1, 2, 5, 16, 32, 48, 64, 128])
+@pytest.mark.parametrize(
+    "modes", [1, 2, 5, 16, 32, *(pytest.param(n, marks=pytest.mark.slow) for n in (48, 64, 128))]
+)
 @pytest.mark.parametrize("accuracy", ["standard", "reference"])
 def test_steps_in_contact_resolve_the_impact_and_the_fastest_mode(modes: int, accuracy: str) -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes)

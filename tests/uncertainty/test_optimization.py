@@ -107,6 +107,7 @@ def test_the_quasi_static_optimum(tmp_path) -> None:
     assert fresh.constraints[0, 0] >= 0.87
 
 
+@pytest.mark.slow
 def test_a_design_is_brought_to_its_constraint() -> None:
     """P = 0.8 is asked: the design has 0.84 to 0.86, whose lower limit is 0.8, where it had 0.91; the distance is told."""
     system = small_system(frequency_ratio=0.02, location=0.3)

@@ -170,3 +170,10 @@ def test_files() -> None:
     ):
         with pytest.raises(InputError):
             uncertainty_from_mapping(bad)
+
+
+def test_a_width_that_is_meant_as_a_share_names_relative() -> None:
+    """5 % of a thickness, written as 0.05, is 50 mm."""
+    written = uncertainty_from_mapping({"beam.thickness": {"uniform": 0.05}})
+    with pytest.raises(InputError, match=r"0\.05 m is in the unit of the parameter; .* set relative = true"):
+        trials_of(small_system(), written, None).columns({}, NUMBERS[:50])

@@ -189,18 +189,17 @@ def notes() -> Console:
 def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
     """Report errors of a command in one line and exit with the matching status.
 
-    The decorator adds ``--quiet``, ``--force`` and ``--help-all``, and ``--json`` if the command does not define it.  The JSON file
-    contains the values that the command passes to :func:`add_json`.
+    The decorator adds ``--quiet``, ``--force``, ``--help-all`` and ``--json``.  The JSON file contains the values that
+    the command passes to :func:`add_json`.
     """
     signature = inspect.signature(command, eval_str=True)
-    own = next((name for name, each in signature.parameters.items() if "--json" in _flags(each)), None)
 
     @functools.wraps(command)
     def guarded(*args: _P.args, **kwargs: _P.kwargs) -> _R:
         named = _named(kwargs.values())
         kept = nullcontext() if kwargs.pop("force", False) else foreign_files_kept(named)
         kwargs.pop("help_all", None)
-        quiet, path = bool(kwargs.pop("quiet", False)), kwargs.get(own) if own else kwargs.pop("json", None)
+        quiet, path = bool(kwargs.pop("quiet", False)), kwargs.pop("json", None)
         asked = _OutputOptions(quiet, path if isinstance(path, Path) else None)
         token = _OUTPUT_OPTIONS.set(asked)
         try:
@@ -213,7 +212,7 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
                 try:
                     return command(*args, **kwargs)
                 finally:
-                    if asked.json is not None and own is None and asked.found:
+                    if asked.json is not None and asked.found:
                         write_json(asked.json, asked.found)
         except InputError as error:
             errors().print(f"[bold red]error:[/] {escape(str(error))}")
@@ -233,8 +232,7 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
         for name, kind in (("quiet", _QUIET), ("force", _FORCE), ("help_all", _HELP_ALL))
     ]
-    if own is None:
-        more.append(inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_JSON))
+    more.append(inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_JSON))
     mine = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values()]
     guarded.__signature__ = inspect.Signature(mine + more)  # type: ignore[attr-defined]
     guarded.__annotations__ = {}
@@ -245,16 +243,6 @@ def _named(values: Iterable[Any]) -> list[Path]:
     """The paths among the arguments of a command."""
     listed = [each for value in values for each in (value if isinstance(value, (list, tuple)) else [value])]
     return [each for each in listed if isinstance(each, Path)]
-
-
-def _flags(parameter: inspect.Parameter) -> tuple[str, ...]:
-    """Option names of a parameter, where they are explicit."""
-    options = getattr(parameter.annotation, "__metadata__", ())
-    # typer takes the first name for a default until it makes the command
-    named = (
-        (getattr(each, "default", None), *(getattr(each, "param_decls", None) or ())) for each in options
-    )
-    return tuple(flag for names in named for flag in names if isinstance(flag, str) and flag.startswith("-"))
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
@@ -383,7 +371,8 @@ class _Lines:
     def __call__(self, done: int, total: int) -> None:
         if total != self.total:
             begun = self.total is not None
-            self.console.print(f"{count_text(total, self.what)} {'in all now' if begun else 'to compute'}")
+            less = self.total is not None and total < self.total
+            self.console.print(f"{count_text(total, self.what)} {'remain' if less else 'to compute'}")
             self.total, self.tenths = total, 10 * done // total if begun and total else 0
         self.rate.report(done)
         tenths = 10 * done // total if total else 10

@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import add_json, cli_command, duration, file_line, out, progress
+from snapbeam.cli.console import FAILED, add_json, cli_command, duration, file_line, out, progress
 from snapbeam.cli.parameter_options import (
     BEAM,
     CONTACT,
@@ -218,6 +218,54 @@ def bifurcation_diagram(
         kinds = ", ".join(f"{int((found == m).sum())} of period {m}" for m in np.unique(found) if m > 0)
         lines.append(f"{sweep}: {kinds or 'no value repeats'}, {int((found == 0).sum())} that do not repeat")
     _finish(dataset, output, plot, lines)
+
+
+@dynamics.command("hysteresis", cls=ShortHelpCommand)
+@cli_command
+@with_parameters(*_ALL, axes=_AXES[:3])
+def hysteresis(
+    given: Any,
+    parameter: Parameter = "velocity_amplitude",
+    values: Values = "0.01:0.6:200",
+    statistic: Annotated[
+        str,
+        typer.Option(help="Statistic that --plot draws (peak_midspan_displacement).", rich_help_panel=_OWN),
+    ] = "peak_midspan_displacement",
+    output: Output = Path("hysteresis.nc"),
+    plot: opt.Plot = None,
+) -> None:
+    """Sweep a parameter up and down, with every statistic of a run at each value; each run starts from the last state.
+
+    Example: snapbeam dynamics hysteresis --config harvester.toml --parameter base_excitation.frequency_ratio
+    --values 0.2:1.4:25 --statistic harvested_power_last_quarter --plot power.png
+    """
+    from snapbeam.cli.console import check_pictures, draw, write_map
+    from snapbeam.dynamics.swept_statistics import hysteresis as swept
+    from snapbeam.model.parameter_axes import parse_axis
+    from snapbeam.solver.statistics import STATISTICS
+    from snapbeam.util.files import check_writable
+    from snapbeam.util.status_codes import RunStatus
+    from snapbeam.util.validation import choice
+
+    settings = configured(given)
+    check_writable(output, "output", (".nc",))
+    check_pictures(("plot", plot))
+    choice("statistic", statistic, tuple(STATISTICS))
+    points = np.atleast_1d(parse_axis(parameter, values))
+    begun = time.monotonic()
+    with progress(None, "hysteresis", "values") as report:
+        dataset = swept(settings.system, parameter, points, settings.integration, progress=report)
+    failed = int((dataset["status"] != RunStatus.OK).sum())
+    lines = [
+        f"{points.size} values up and down in {duration(time.monotonic() - begun)}, {failed} runs failed or not run"
+    ]
+    files = [write_map(dataset, output)]
+    if plot is not None:
+        files.append(draw(dataset, plot, statistic))
+    add_json(summary=lines, files=files)
+    out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
+    if failed:
+        raise typer.Exit(FAILED)
 
 
 @dynamics.command("lyapunov-spectrum", cls=ShortHelpCommand)

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import add_json, cli_command, out
+from snapbeam.cli.console import (
+    add_json,
+    check_pictures,
+    cli_command,
+    draw,
+    file_line,
+    out,
+    write_map,
+)
 from snapbeam.cli.parameter_options import BEAM, BOUNDARY, IMPERFECTION, MODEL, configured, with_parameters
+
+if TYPE_CHECKING:
+    from snapbeam.model.reduced_model import ReducedModel
 
 __all__ = ["equilibria"]
 
@@ -33,16 +45,65 @@ def equilibria(
             rich_help_panel="Identification",
         ),
     ] = "midspan_amplitude",
+    with_force: Annotated[
+        bool,
+        typer.Option(
+            "--force-displacement",
+            help="Compute the static force-displacement curve of a point force.",
+            rich_help_panel="Force-displacement",
+        ),
+    ] = False,
+    location: Annotated[
+        float | None,
+        opt.number_option("Location of the force over the length (0.5).", "Force-displacement"),
+    ] = None,
+    well: Annotated[
+        str | None,
+        typer.Option(
+            "--well",
+            help="Well from which the force pushes: lower or upper; the as-fabricated one by default.",
+            rich_help_panel="Force-displacement",
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="NetCDF file of the curve to write.",
+            rich_help_panel="Output",
+            metavar="FILE",
+        ),
+    ] = None,
+    plot: opt.Plot = None,
 ) -> None:
     """Print every equilibrium with its stability, the frequencies about the wells, and the barriers.
 
     If you give both measured frequencies, the command first identifies the buckling level and the imperfection.
+
+    Example: snapbeam equilibria --axial-load 0 --midspan-amplitude 1e-3 --force-displacement --plot curve.png
     """
     from rich.table import Table
 
     from snapbeam.model.imperfection_identification import identify_imperfection
+    from snapbeam.util.si_prefixes import prefixed, scale_of
     from snapbeam.util.validation import InputError
 
+    asked = [
+        name
+        for name, value in (
+            ("--location", location),
+            ("--well", well),
+            ("--output", output),
+            ("--plot", plot),
+        )
+        if value is not None
+    ]
+    if asked and not with_force:
+        raise InputError(
+            f"{', '.join(asked)}: belongs to the force-displacement curve; add --force-displacement"
+        )
+    check_pictures(("plot", plot))
     model = configured(given).model
     assert model.beam is not None
     if (lower_frequency is None) != (upper_frequency is None):
@@ -61,35 +122,78 @@ def equilibria(
         )
     beam = model.beam
     assert beam is not None
-    heights = [1e3 * float(model.midspan_shape @ each.amplitude) for each in model.equilibria]
+    heights = [float(model.midspan_shape @ each.amplitude) for each in model.equilibria]
+    metres, length_unit = scale_of(heights, "m")
+    joules, energy_unit = scale_of([each.energy for each in model.equilibria], "J")
     table = Table(box=None, pad_edge=False)
-    for title in ("", "centre (mm)", "energy (µJ)", "unstable directions"):
+    for title in ("", f"centre ({length_unit})", f"energy ({energy_unit})", "unstable directions"):
         table.add_column(title, justify="right")
     kinds = {0: "well", 1: "saddle"}
     for each, height in zip(model.equilibria, heights, strict=True):
-        row = kinds.get(each.unstable_directions, "hilltop"), f"{height:.4f}", f"{1e6 * each.energy:.4f}"
-        table.add_row(*row, str(each.unstable_directions))
+        kind = kinds.get(each.unstable_directions, "hilltop")
+        values = f"{height / metres:.4f}", f"{each.energy / joules:.4f}"
+        table.add_row(kind, *values, str(each.unstable_directions))
     console.print(table)
     freq = model.well_frequencies[:, :3]
     if model.is_bistable:
         barriers = [model.saddle_energy - float(model.potential_energy(well)) for well in model.wells]
         for name, row, barrier in zip(("lower", "upper"), freq, barriers, strict=True):
             own = ", ".join(f"{each:.3f}" for each in row)
-            console.print(f"{name} well: {own} Hz; barrier {1e6 * barrier:.4f} µJ")
+            console.print(f"{name} well: {own} Hz; barrier {prefixed(barrier, 'J', 4)}")
     else:
         barriers = []
         console.print(f"monostable: {', '.join(f'{each:.3f}' for each in freq[0])} Hz")
         if model.imperfection is not None:
             console.print(model.two_well_limits)
+    console.print(model.reference_text)
     add_json(
         bistable=model.is_bistable,
         buckling_level=beam.buckling_level,
         imperfection={} if model.imperfection is None else {
             name: value for name, value in vars(model.imperfection).items() if isinstance(value, (float, str))
         },
-        centers=[1e-3 * each for each in heights],
+        centers=heights,
         energies=[each.energy for each in model.equilibria],
         unstable_directions=[each.unstable_directions for each in model.equilibria],
         frequencies=freq if model.is_bistable else freq[:1],
-        barriers=barriers,
+        barriers=barriers, reference_well=model.reference_well, reference_frequency=model.reference_frequency,
     )  # fmt: skip
+    if with_force:
+        _force_displacement(model, 0.5 if location is None else location, well, output, plot)
+
+
+def _force_displacement(
+    model: ReducedModel, location: float, well: str | None, output: Path | None, plot: Path | None
+) -> None:
+    """Print snap-through and snap-back, and write the curve and its figure."""
+    from snapbeam.model.force_displacement import force_displacement
+    from snapbeam.util.si_prefixes import prefixed
+
+    curve = force_displacement(model, location, well=well)
+    console = out()
+    console.print(
+        f"force at {location:g} of the length, from the {curve.attrs['well']} well ({curve.attrs['well_chosen_as']}); "
+        f"{curve.sizes['branch_number']} branches, {curve.sizes['critical_point']} critical points"
+    )
+    for name, words in (("snap_through", "snap-through"), ("snap_back", "snap-back")):
+        force, place = float(curve[f"{name}_force"]), float(curve[f"{name}_displacement"])
+        if force == force:
+            console.print(
+                f"{words}: {prefixed(force, 'N', 4)} at w = {prefixed(place, 'm', 4)} "
+                f"({curve.attrs[f'{name}_kind']} point)"
+            )
+        else:
+            console.print(f"{words}: none; the stable path does not end")
+    add_json(
+        location=location,
+        well=curve.attrs["well"],
+        snap_through_force=float(curve["snap_through_force"]),
+        snap_back_force=float(curve["snap_back_force"]),
+        critical_forces=curve["critical_force"].values,
+        critical_displacements=curve["critical_displacement"].values,
+        critical_kinds=[str(each) for each in curve["critical_kind"].values],
+    )
+    if output is not None:
+        console.print(f"Written: {file_line(write_map(curve, output))}")
+    if plot is not None:
+        console.print(f"Written: {file_line(draw(curve, plot))}")

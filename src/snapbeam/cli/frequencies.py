@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import add_json, cli_command, out
-from snapbeam.cli.parameter_options import BEAM, BOUNDARY, MODEL, configured, with_parameters
+from snapbeam.cli.parameter_options import BEAM, BOUNDARY, IMPERFECTION, MODEL, configured, with_parameters
 
 if TYPE_CHECKING:
     from snapbeam.model.reduced_model import ReducedModel
@@ -15,7 +15,7 @@ __all__ = ["frequencies"]
 
 
 @cli_command
-@with_parameters(*BEAM, *BOUNDARY, *MODEL)
+@with_parameters(*BEAM, *BOUNDARY, *IMPERFECTION, *MODEL)
 def frequencies(
     given: Any,
     count: Annotated[int, opt.count_option("Number of frequencies to print (10).", "Output")] = 10,
@@ -74,7 +74,7 @@ def _print_wells(model: ReducedModel, count: int) -> None:
     heights = [float(model.midspan_shape @ well) for well in model.wells[: len(names)]]
     add_json(
         modes=model.modes, bistable=model.is_bistable, wells=names, centers=heights, reduced=freq,
-        reference_frequency=model.reference_frequency,
+        reference_well=model.reference_well, reference_frequency=model.reference_frequency,
     )  # fmt: skip
     console = out()
     console.print(
@@ -89,4 +89,4 @@ def _print_wells(model: ReducedModel, count: int) -> None:
     for at in range(freq.shape[1]):
         table.add_row(str(at + 1), *(f"{row[at]:.3f}" for row in freq))
     console.print(table)
-    console.print(f"Omega = 1 is {model.reference_frequency:.3f} Hz")
+    console.print(model.reference_text)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from snapbeam.cli.console import add_json, cli_command, out
+from snapbeam.cli.console import add_json, cli_command, file_line, notes, out
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["info"]
 
@@ -15,12 +18,26 @@ __all__ = ["info"]
 @cli_command
 def info(
     file: Annotated[Path, typer.Argument(help="NetCDF file written by snapbeam.", metavar="FILE")],
+    export: Annotated[
+        Path | None,
+        typer.Option(
+            help="File to write the contents to: a table (.csv) or arrays for MATLAB (.mat).",
+            rich_help_panel="Output",
+            metavar="FILE",
+        ),
+    ] = None,
 ) -> None:
-    """Print the contents and the provenance of a file: parameters, version, command, time."""
+    """Print the contents and the provenance of a file: parameters, version, command, time; or export the contents.
+
+    Example: snapbeam info map.nc --export map.csv
+    """
     from snapbeam.cli.console import open_result
     from snapbeam.cli.summary import class_table, parameter_table, status_lines
 
     dataset = open_result(file)
+    if export is not None:
+        _export(dataset, export)
+        return
     add_json(
         sizes=dict(dataset.sizes), attributes=dict(dataset.attrs),
         variables={str(name): dict(each.attrs) for name, each in dataset.variables.items()},
@@ -39,3 +56,14 @@ def info(
     if "response_class" in dataset:
         console.print(class_table(dataset), *status_lines(dataset), sep="\n")
     console.print(parameter_table(dataset.attrs))
+
+
+def _export(dataset: xr.Dataset, path: Path) -> None:
+    """Write a table or arrays, and print the names of the variables that a table does not contain."""
+    from snapbeam.util.tables import write_table
+
+    left_out = write_table(dataset, path)
+    if left_out:
+        notes().print(f"not in the table, with other dimensions: {', '.join(left_out)}", markup=False)
+    add_json(files=[path], left_out=left_out)
+    out().print(f"Written: {file_line(path)}")

@@ -698,7 +698,7 @@ def report(total: int, log: Path | None, store: Path | None) -> Iterator[LongRep
             said.note(
                 "stopped; no result is stored; use --checkpoint FOLDER to be able to resume"
                 if store is None
-                else "stopped; the checkpoint is complete up to here; run the same command to resume"
+                else "stopped; the checkpoint contains all finished tasks; run the same command to resume"
             )
             raise
 

@@ -57,6 +57,7 @@ def plot(
         open_result,
         read_overlay,
     )
+    from snapbeam.util.validation import InputError
 
     check_pictures(("output", output))
     dataset = open_result(file)
@@ -66,6 +67,11 @@ def plot(
         "location": location,
     }
     dataset = _sliced(dataset, wanted, at or [])
+    if variable not in (None, "response_class") and (measurements is not None or quasi_static_line):
+        raise InputError(
+            f"variable = {variable!r}: measured responses and the quasi-static line are drawn over response classes; "
+            "leave them out"
+        )
     if "time" in dataset.dims:
         options = {} if variable not in (None, "run") else {"window": opt.parse_window(window)}
         draw(dataset, output, variable, **options)

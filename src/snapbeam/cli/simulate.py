@@ -16,6 +16,7 @@ from snapbeam.cli.console import (
     duration,
     errors,
     file_line,
+    notes,
     out,
     show_compilation,
 )
@@ -133,9 +134,10 @@ def simulate(
             run = sb.simulate(system, integration, sample_times=times, progress=progress)
             summary = run.summary
     console = out()
-    console.print(_summary_text(summary, time.monotonic() - start))
+    console.print(_summary_text(summary, time.monotonic() - start, system))
     if output is not None:
         if run is not None:
+            _warn_of_size(run.dataset, output)
             run.save(output)
         console.print(f"Written: {file_line(output)}")
     if run is not None and plot is not None:
@@ -146,6 +148,19 @@ def simulate(
     add_json(summary=summary, seconds=time.monotonic() - start, system=system.hash, files=files)
     if summary.status not in (sb.RunStatus.OK, sb.RunStatus.EARLY_STOP):
         raise typer.Exit(FAILED)
+
+
+_LARGE_FILE = 100e6
+"""Bytes of a run above which the command says so before it writes the file."""
+
+
+def _warn_of_size(dataset: xr.Dataset, path: Path) -> None:
+    if dataset.nbytes > _LARGE_FILE:
+        notes().print(
+            f"{path}: {dataset.sizes['time']} samples, about {dataset.nbytes / 1e6:.0f} MB; for a smaller file use fewer "
+            "samples per cycle, such as --samples 50",
+            markup=False,
+        )
 
 
 def _even(system: Any, integration: Any, samples: int | None) -> Any:
@@ -208,7 +223,27 @@ def _animated(dataset: xr.Dataset, path: Path, window: tuple[float, float] | Non
     return animate_run(dataset, path, window)
 
 
-def _summary_text(summary: Any, elapsed: float) -> str:
+def _harvest_lines(summary: Any) -> list[str]:
+    """Power and voltage of a harvester, over the run and over its last quarter, which leaves out the transient."""
+    from snapbeam.util.si_prefixes import prefixed
+
+    energy, whole, late = (
+        prefixed(summary[name], unit, 4)
+        for name, unit in (
+            ("energy_harvested", "J"), ("harvested_power", "W"), ("harvested_power_last_quarter", "W"),
+        )
+    )  # fmt: skip
+    peak, voltage = (prefixed(summary[name], "V", 4) for name in ("peak_voltage", "rms_voltage_last_quarter"))
+    steady = f"{late}, {voltage} root mean square"
+    if summary.harvested_power_last_quarter != summary.harvested_power_last_quarter:
+        steady = "not known: the run ended before it; set integration.early_termination = false"
+    return [
+        f"  harvested             {energy}; {whole} over the whole run, peak {peak}",
+        f"  last quarter          {steady}",
+    ]
+
+
+def _summary_text(summary: Any, elapsed: float, system: Any) -> str:
     from snapbeam.util.si_prefixes import prefixed
     from snapbeam.util.status_codes import RunStatus
 
@@ -219,7 +254,17 @@ def _summary_text(summary: Any, elapsed: float) -> str:
     final = ", and stays there for certain" if summary.final_well_proven else ""
     crossings = f"{summary.zero_crossings}, {summary.zero_crossings_last_quarter} of them in the last quarter"
     contact = f"{summary.impacts}, in contact {100.0 * summary.contact_time_fraction:.3g} % of the time"
-    center = f"{summary.min_midspan_displacement:.4g} to {summary.max_midspan_displacement:.4g} b"
+    scale = prefixed(system.model.length_scale, "m", 4)
+    center = (
+        f"{summary.min_midspan_displacement:.4g} to {summary.max_midspan_displacement:.4g} b (b = {scale})"
+    )
+    end = f"in the {well} well{final}"
+    other = f"the other well was {'' if summary.other_well_reached else 'not '}reached"
+    if not system.model.is_bistable:
+        end, other = (
+            f"the centre is {'above' if summary.final_well > 0 else 'below'} 0",
+            "the beam has one well",
+        )
     force = (
         "no finite force"
         if summary.peak_force != summary.peak_force
@@ -229,13 +274,21 @@ def _summary_text(summary: Any, elapsed: float) -> str:
     lines = [
         f"[bold]{kind.label}[/] (in {duration(elapsed)}; {status.advice})",
         f"  zero crossings        {crossings}",
-        f"  at the end            in the {well} well{final}",
-        f"  centre displacement   {center}; the other well was {'' if summary.other_well_reached else 'not '}reached",
-        f"  at the striker        {summary.min_displacement:.4g} to {summary.max_displacement:.4g} b",
-        f"  impacts               {contact}",
-        f"  peak contact force    {force}",
-        f"  striker's work        {work}, {lost} dissipated",
+        f"  at the end            {end}",
+        f"  centre displacement   {center}; {other}",
     ]
+    if system.striker is not None:
+        lines += [
+            f"  at the striker        {summary.min_displacement:.4g} to {summary.max_displacement:.4g} b",
+            f"  impacts               {contact}",
+            f"  peak contact force    {force}",
+            f"  striker's work        {work}",
+        ]
+    if system.base_excitation is not None:
+        lines.append(f"  work of the base      {prefixed(summary.base_work, 'J', 4)}")
+    lines.append(f"  dissipated            {lost}")
+    if system.harvester is not None:
+        lines += _harvest_lines(summary)
     if summary.zero_crossings:
         lines.insert(2, f"  last crossing         at {prefixed(summary.last_zero_crossing, 's', 5)}")
     return "\n".join(lines)

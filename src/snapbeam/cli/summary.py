@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -217,6 +218,12 @@ def status_lines(dataset: xr.Dataset) -> list[str]:
     return lines
 
 
+def _closer(stem: str) -> str:
+    """Name of the next file, closer to a point: ``closer``, ``closer_2``, ``closer_3``; never that of the file itself."""
+    found = re.fullmatch(r"closer(?:_(\d+))?", stem)
+    return "closer" if found is None else f"closer_{int(found[1] or 1) + 1}"
+
+
 def _suggestions(dataset: xr.Dataset, files: Sequence[Path], low: dict[str, Any] | None) -> list[str]:
     """Suggested next commands for a map."""
     lines = []
@@ -229,12 +236,13 @@ def _suggestions(dataset: xr.Dataset, files: Sequence[Path], low: dict[str, Any]
         if {"frequency_ratio", "velocity_amplitude"} <= set(axes) and min(
             dataset.sizes[name] for name in axes
         ) > 1:
+            closer = _closer(files[0].stem)
             omega, velocity = low["frequency_ratio"], low["velocity_amplitude"]
             lines.append(
                 f"zoom in           snapbeam map --from {file}{at} "
                 f"--frequency-ratio {0.8 * omega:.3g}:{1.2 * omega:.3g}:40 "
                 f"--velocity-amplitude {0.5 * velocity:.3g}:{2.0 * velocity:.3g}:40 "
-                "-o closer.nc --plot closer.png"
+                f"-o {closer}.nc --plot {closer}.png"
             )
     if file is not None:
         line = " --quasi-static-line" if set(axes) <= set(_PAPER) else ""

@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
 from snapbeam.cli import parameter_options as opt
@@ -317,6 +318,31 @@ def probability(
     )
 
 
+_MOST_PRINTED = 24
+"""Points up to which the command prints the probability of each."""
+
+
+def _probabilities(one: xr.Dataset) -> list[str]:
+    """Probability and interval of each point of one outcome; the range of all, where there are many points."""
+    found = one["probability"]
+    if found.size > _MOST_PRINTED:
+        low, high = float(found.min()), float(found.max())
+        return [f"  probability from {low:.4g} to {high:.4g}; each point is in the file"]
+    lines = []
+    for at in np.ndindex(found.shape):
+        point = one.isel(dict(zip(found.dims, at, strict=True)))
+        values = {dim: point[dim].values.item() for dim in found.dims if dim in point.coords}
+        where = ", ".join(
+            f"{dim} = {value:.6g}" if isinstance(value, float) else f"{dim} = {value}"
+            for dim, value in values.items()
+        )
+        low, high = float(point["probability_low"]), float(point["probability_high"])
+        lines.append(
+            f"  {where or 'probability'}: {float(point['probability']):.4g} ({low:.4g} to {high:.4g})"
+        )
+    return lines
+
+
 def _lines_probability(dataset: xr.Dataset, elapsed: float) -> list[str]:
     runs, points = int(dataset.attrs["runs_made"]), int(dataset["runs"].size)
     lines = [f"{runs} runs at {points} points in {duration(elapsed)}"]
@@ -325,6 +351,7 @@ def _lines_probability(dataset: xr.Dataset, elapsed: float) -> list[str]:
         sure = int((one["probability_low"] > 0.95).sum())
         never = int((one["probability_high"] < 0.05).sum())
         lines.append(f"{name}: lower limit above 0.95 at {sure} points, upper limit below 0.05 at {never}")
+        lines += _probabilities(one)
     if not bool(dataset["reached"].all()):
         lines.append(f"interval wider than requested at {int((~dataset['reached']).sum())} points")
     lines.append(f"stopped: {dataset.attrs['termination_reason']}")

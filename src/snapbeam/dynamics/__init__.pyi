@@ -23,3 +23,4 @@ from .periodic_orbits import OrbitNotFoundError as OrbitNotFoundError
 from .periodic_orbits import PeriodicOrbit as PeriodicOrbit
 from .periodic_orbits import periodic_orbit as periodic_orbit
 from .sections import poincare_section as poincare_section
+from .swept_statistics import hysteresis as hysteresis

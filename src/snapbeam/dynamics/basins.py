@@ -80,6 +80,18 @@ def basins_of_attraction(
     ------
     InputError
         For bad input.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> found = sb.dynamics.find_attractors(system, 12)
+    >>> grid = {"amplitude[1]": [-1.2, 0.0, 1.2], "velocity[1]": [-0.5, 0.5]}
+    >>> sb.dynamics.basins_of_attraction(found, grid).basin.shape
+    (3, 2)
     """
     if not isinstance(attractors, Attractors):
         raise InputTypeError(
@@ -298,6 +310,14 @@ def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
         A grid of any dimension, such as basins or the classes of a map; a negative label is undecided.
     box : int
         Points along a side; what does not fill a box is left out.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> halves = np.repeat([[0, 1]], 10, axis=0).repeat(5, axis=1)  # two basins with a straight border
+    >>> sb.dynamics.basin_entropy(halves, 5).basin
+    0.0
     """
     grid = _labels(labels)
     side = integer("box", box, 2, min(grid.shape))
@@ -414,6 +434,14 @@ def uncertainty_exponent(labels: ArrayLike, sizes: ArrayLike | None = None) -> U
     ------
     InputError
         For a grid that is too small, and one without borders.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> labels = (np.arange(256)[:, None] < np.arange(256)).astype(int)  # two basins with a straight border
+    >>> abs(sb.dynamics.uncertainty_exponent(labels).exponent - 1.0) < 0.1
+    True
     """
     grid = _labels(labels)
     most = min(grid.shape) // 2 if grid.ndim else 0
@@ -495,6 +523,15 @@ def dynamical_integrity(
         Indices of the grid point nearest to its attractor.
     spacing : array_like, optional
         Distance between points along each axis; 1 by default.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> labels = np.ones((21, 21), dtype=int)
+    >>> labels[5:16, 5:16] = 0  # a basin of 11 x 11 states
+    >>> sb.dynamics.dynamical_integrity(labels, 0, attractor=(10, 10)).local_measure
+    6.0
     """
     grid = _labels(labels)
     inside = np.pad(grid == integer("label", label, -(2**31), 2**31), 1)

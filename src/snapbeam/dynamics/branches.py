@@ -52,7 +52,20 @@ SPECIAL_POINTS = ("fold", "flip", "Neimark-Sacker", "branch point", "grazing")
 
 @dataclass(frozen=True, eq=False)
 class SpecialPoint:
-    """A special point of a branch: a bifurcation or a grazing orbit."""
+    """A special point of a branch: a bifurcation or a grazing orbit.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
+    >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12)
+    >>> [(point.kind, round(point.value, 4)) for point in branch.special_points]
+    [('fold', 0.0379)]
+    """
 
     kind: str
     """One of :data:`SPECIAL_POINTS`."""
@@ -71,7 +84,20 @@ class SpecialPoint:
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """Orbits that follow each other along a parameter."""
+    """Orbits that follow each other along a parameter.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
+    >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=5)
+    >>> len(branch.orbits), branch.termination_reason
+    (5, '5 orbits, the maximum (max_points)')
+    """
 
     name: str
     """The parameter."""
@@ -455,6 +481,18 @@ def continuation(
     ------
     InputError
         For bad input.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
+    >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.032))
+    >>> float(branch.values.max())
+    0.032
     """
     low, high = _limits(bounds)
     begun = orbit.flow.value(name)
@@ -587,6 +625,20 @@ def switch_branch(
         For a special point at which no other branch begins.
     OrbitNotFoundError
         If there is none at that distance; try another.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.15)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> orbit = sb.dynamics.periodic_orbit(system, [-0.69, -0.21])
+    >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.145, 0.155))
+    >>> flip = branch.special_points[0]
+    >>> doubled = sb.dynamics.switch_branch(flip, "velocity_amplitude", (0.145, 0.155))
+    >>> doubled.period
+    2
     """
     if not isinstance(special_point, SpecialPoint) or special_point.kind not in ("flip", "branch point"):
         raise InputError(f"special_point = {shown(special_point)}: must be a flip or a branch point")

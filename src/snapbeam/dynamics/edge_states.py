@@ -38,7 +38,19 @@ _FARTHEST = 0.1
 
 @dataclass(frozen=True, eq=False)
 class EdgeState:
-    """A motion on the border between two outcomes."""
+    """A motion on the border between two outcomes.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> edge = sb.dynamics.edge_tracking(system, [-0.9, 0.0], [-1.0, 1.3], periods=25)
+    >>> edge.orbit.period, edge.orbit.is_stable
+    (1, False)
+    """
 
     flow: Flow
     states: _Array
@@ -142,6 +154,17 @@ def edge_tracking(
     ------
     InputError
         For bad input, such as two states of the same outcome.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> edge = sb.dynamics.edge_tracking(system, [-0.9, 0.0], [-1.0, 1.3], periods=25)
+    >>> edge.termination_reason
+    '25 periods; it settled on an orbit of period 1'
     """
     flow = flow_of(system, integration, "reference")
     total, ahead = integer("periods", periods, 2, 10**6), integer("horizon", horizon, 1, 10**6)

@@ -71,6 +71,12 @@ class InitialConditions:
         not press the beam at rest.  For a single striker with a sinusoidal motion.
     seed : int
         Seed of the initial conditions: number s comes from Philox with the key (seed, s).
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> sb.dynamics.InitialConditions(count=64, displacement=1e-4, seed=1).count
+    64
     """
 
     count: int = 32
@@ -195,8 +201,8 @@ def require_map(system: System) -> None:
     """
     if system.harvester is not None:
         raise InputError(
-            "harvester: has a state of its own, which the dynamics tools do not include; integrate such a system by "
-            "sb.advance(system, save_every_period=True), which returns the state after each cycle"
+            "harvester: has a state of its own, which the dynamics tools do not include; sweep a parameter of "
+            "such a system by sb.dynamics.hysteresis, or integrate it by sb.advance(system, save_every_period=True)"
         )
     if system.striker is not None and system.striker.mass is not None:
         raise InputError(
@@ -274,6 +280,18 @@ class AdvancedStates:
     """Of the way, by name, shape (runs,)."""
     hidden: Any = None
     """What it takes to go on without losing a bit."""
+    hidden_every: tuple[Any, ...] | None = None
+    """The same after each period, with *every*."""
+
+    def beginnings(self, later: AdvancedStates) -> AdvancedStates:
+        """Where the periods of *later* began, which went on from here: the runs of each period one after the other."""
+        assert later.every is not None
+        states = np.concatenate([self.states, *later.every.transpose(1, 0, 2)[:-1]])
+        if later.hidden_every is None:
+            return AdvancedStates(states, None, None, hidden=states)
+        return AdvancedStates(
+            states, None, None, hidden=_joined_states([self.hidden, *later.hidden_every[:-1]])
+        )
 
 
 @runtime_checkable
@@ -607,9 +625,6 @@ class Stroboscope:
         for array in (last, whole, moved):
             if array is not None:
                 array[failed] = np.nan
-        q, p = (np.where(failed[:, None], 0.0, values[:, -1]) for values in (landings.q, landings.p))
-        ticks = ensemble.runs["end"]
-        hidden = states_of(ensemble, q, p, landings.well_sign[:, -1], landings.contact_ticks[:, -1], ticks)
         status = np.where(
             failed,
             np.where(
@@ -617,10 +632,23 @@ class Stroboscope:
             ),
             0,
         )
-        # after a period every motion is where it began
-        hidden = replace(hidden, phase=ensemble.runs["phase"].copy(), statistics={"status": status})
+
+        def after(landing: int) -> State:
+            q, p = (np.where(failed[:, None], 0.0, values[:, landing]) for values in (landings.q, landings.p))
+            found = states_of(
+                ensemble, q, p, landings.well_sign[:, landing], landings.contact_ticks[:, landing], ensemble.runs["end"]
+            )  # fmt: skip
+            # after a period every motion is where it began
+            return replace(found, phase=ensemble.runs["phase"].copy(), statistics={"status": status})
+
+        ends = range(landings.q.shape[1])[each]
         return AdvancedStates(
-            last, whole, moved, statistics_of(ensemble, landings.accumulators_of_runs), hidden
+            last,
+            whole,
+            moved,
+            statistics_of(ensemble, landings.accumulators_of_runs),
+            after(-1),
+            tuple(after(landing) for landing in ends) if every else None,
         )
 
     def _require_period(self, own: Mapping[str, _Array]) -> None:
@@ -657,6 +685,12 @@ def _joined(parts: list[AdvancedStates]) -> AdvancedStates:
         stacked([part.tangents for part in parts]),
         statistics,
         _joined_states([part.hidden for part in parts]),
+        None
+        if parts[0].hidden_every is None
+        else tuple(
+            _joined_states(list(each))
+            for each in zip(*(part.hidden_every or () for part in parts), strict=True)
+        ),
     )
 
 

@@ -72,6 +72,12 @@ class LifetimeSettings:
         in its last *settling_cycles* cycles is censored: its lifetime is known only to be longer.
     confidence : float
         Of the intervals, in (0, 1).
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> sb.dynamics.LifetimeSettings(settling_cycles=20, confidence=0.9).settling_cycles
+    20
     """
 
     delay: float | None = None
@@ -406,7 +412,20 @@ def lifetime_map(
 
     Examples
     --------
-    >>> ds = sb.dynamics.lifetime_map(system, {"velocity_amplitude": np.linspace(0.1, 0.6, 20)}, initial_conditions=100)  # doctest: +SKIP
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> ds = sb.dynamics.lifetime_map(
+    ...     system,
+    ...     {"drive.velocity_amplitude": [0.1, 0.2]},
+    ...     sb.Integration(cycles=20),
+    ...     initial_conditions=4,
+    ...     settings=sb.dynamics.LifetimeSettings(settling_cycles=5),
+    ... )
+    >>> ds.lifetime.dims
+    ('velocity_amplitude',)
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")

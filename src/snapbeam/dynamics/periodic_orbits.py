@@ -74,7 +74,21 @@ _SLOW = 0.25
 
 
 class OrbitNotFoundError(RuntimeError):
-    """No orbit was found: the message says why, and what to try."""
+    """No orbit was found: the message says why, and what to try.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> try:
+    ...     sb.dynamics.periodic_orbit(system, [5.0, 3.0], iterations=2)
+    ... except sb.dynamics.OrbitNotFoundError as error:
+    ...     print(type(error).__name__)
+    OrbitNotFoundError
+    """
 
 
 class Shot(NamedTuple):
@@ -364,7 +378,19 @@ _SAME = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class PeriodicOrbit:
-    """A state that comes back after some periods of the drive."""
+    """A state that comes back after some periods of the drive.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
+    >>> orbit.is_stable, bool(abs(orbit.multipliers).max() < 1.0)
+    (True, True)
+    """
 
     flow: Flow
     coordinates: _Array
@@ -557,6 +583,17 @@ def periodic_orbit(
         For bad input.
     OrbitNotFoundError
         If none is found: the message says why, and what to try.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
+    >>> orbit.period, orbit.residual < 1e-10
+    (1, True)
     """
     flow = flow_of(system, integration, "reference")
     if isinstance(flow, Stroboscope):

@@ -80,6 +80,17 @@ def poincare_section(
     ------
     InputError
         For bad input.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> section = sb.dynamics.poincare_section(system, "impact", 20, transient=20)
+    >>> sorted(section.data_vars)[:3]
+    ['displacement_at_striker', 'drive_phase', 'midspan_displacement']
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")

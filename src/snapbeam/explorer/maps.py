@@ -32,6 +32,7 @@ from snapbeam.explorer.jobs import WINDOW_POINTS, Jobs, Token
 from snapbeam.model.parameter_file import config_from_mapping, config_text
 from snapbeam.model.parameters import lookup
 from snapbeam.plot.axes import edges_of, is_geometric, positions
+from snapbeam.util.netcdf import read_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -373,12 +374,7 @@ class FileSource(DatasetSource):
     def _open(self) -> xr.Dataset:
         if not self._path.is_file():
             raise InputError(f"{self._path.name}: there is no such file any more")
-        from snapbeam.util.datasets import xr
-
-        try:
-            return xr.open_dataset(self._path, engine="h5netcdf")
-        except Exception as error:  # of damaged bytes the libraries make errors of every kind
-            raise InputError(f"{self._path.name}: is no NetCDF file of results, or is damaged") from error
+        return read_netcdf(self._path, "map", lazily=True)
 
     def variable(self, name: str) -> xr.DataArray:
         """A variable, read from the file the first time."""

@@ -21,14 +21,14 @@ from snapbeam.lab.camera import open_recording
 from snapbeam.lab.drive_alignment import Alignment, align
 from snapbeam.lab.image_sources import IMAGE_SUFFIXES, RECORDING_SUFFIXES
 from snapbeam.lab.signal_files import read_signal
-from snapbeam.lab.signal_formats import READERS, decoded
+from snapbeam.lab.signal_formats import READERS
 from snapbeam.lab.tracking.settings import TrackingSettings
 from snapbeam.lab.tracking.track import track
 from snapbeam.lab.vibrometer import DriveMeasurement, measure_drive, shaker_signal
-from snapbeam.lab.waveform_comparison import LEAST_CYCLES, measure_response
+from snapbeam.lab.waveform_comparison import LEAST_CYCLES, TOO_SHORT, measure_response
 from snapbeam.util.diagnostics import Diagnostic, Severity, diagnostics_of
 from snapbeam.util.files import atomic_path, check_writable
-from snapbeam.util.input_files import read_toml
+from snapbeam.util.input_files import decoded, read_toml
 from snapbeam.util.netcdf import write_netcdf
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, integer, positive, shown, within
@@ -139,25 +139,38 @@ def _put(known: dict[str, Path], path: Path, stem: str) -> None:
 
 def _from_table(folder: Path, table: Path) -> list[Test]:
     try:
-        text = decoded(table)
+        text = decoded(table.read_bytes(), table.name)
     except OSError as error:
         raise InputError(f"table (--table) = {str(table)!r}: cannot be read, {error.strerror}") from error
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    if not lines:
+    first = next(
+        (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), ""
+    )
+    mark = next((one for one in (";", "\t") if one in first), ",")
+    rows = [
+        (number, [cell.strip() for cell in row])
+        for number, row in enumerate(csv.reader(text.splitlines(), delimiter=mark), start=1)
+        if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
+    ]
+    if not rows:
         raise InputError(f"{table.name}: is empty; its first line must name the columns")
-    mark = next((one for one in (";", "\t") if one in lines[0]), ",")
-    rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=mark)]
-    header = [name.lower() for name in rows[0]]
+    header = [name.lower() for name in rows[0][1]]
     for name in header:
         if name not in _COLUMNS:
             raise InputError(f"{table.name}: unknown column {name!r}; must be among {', '.join(_COLUMNS)}")
+        if header.count(name) > 1:
+            raise InputError(f"{table.name}: column {name!r} occurs twice")
     for name in ("test", "recording"):
         if name not in header:
             raise InputError(f"{table.name}: must have a column {name!r}")
     tests = []
-    for number, cells in enumerate(rows[1:], start=2):
-        row = dict(zip(header, cells, strict=False))
-        where = f"{table.name}, row {number}"
+    for number, cells in rows[1:]:
+        where = f"{table.name}, line {number}"
+        if len(cells) != len(header):
+            raise InputError(f"{where}: has {len(cells)} cells, the header names {len(header)}")
+        row = dict(zip(header, cells, strict=True))
+        for name in ("test", "recording"):
+            if not row[name]:
+                raise InputError(f"{where}: {name} is empty; must name the {name}")
         recording = folder / row["recording"]
         if not recording.exists() and "*" not in recording.name:
             raise InputError(f"{where}: recording {row['recording']!r} is not in {folder}")
@@ -177,7 +190,7 @@ def _from_table(folder: Path, table: Path) -> list[Test]:
         )
     names = [test.name for test in tests]
     twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None or "" in names:
+    if twice is not None:
         raise InputError(f"{table.name}: test {twice!r} stands twice; each must have a name of its own")
     return tests
 
@@ -305,8 +318,8 @@ _NAN = math.nan
 class TestResult:
     """One row of the table of tests.
 
-    ``status`` is "measured", or "spoiled" where the test gives no number to be trusted, and then ``reason``
-    says why; ``diagnostics`` are those of camera, vibrometer and alignment, as codes and words.  Numbers that
+    ``status`` is "measured"; "too short" where only the response class is unknown, since too few cycles were
+    recorded; or "spoiled" where the test gives no number to be trusted.  For the latter two ``reason`` says why; ``diagnostics`` are those of camera, vibrometer and alignment, as codes and words.  Numbers that
     were not measured are NaN.
     """
 
@@ -417,12 +430,15 @@ def _measured(
     )
     speed = 1.0 if drive.units == "m/s" else 2.0 * math.pi * drive.steady.frequency
     reason = _wrong(diagnostics)
+    status = "spoiled" if reason else "measured"
     if not reason and response.response_class is ResponseClass.UNKNOWN:
         reason = "class not told: " + "; ".join(response.reasons)
+        short = all(one.startswith(TOO_SHORT) for one in response.reasons)
+        status = TOO_SHORT if short else "spoiled"
     valid = tracked["valid"].values.astype(bool)
     return _row(
         test,
-        status="spoiled" if reason else "measured",
+        status=status,
         reason=reason,
         frequency_hz=drive.steady.frequency,
         frequency_se_hz=drive.steady.frequency_se,
@@ -530,7 +546,7 @@ def run_test_series(
 
 def strictly(result: TestResult) -> TestResult:
     """A result that is spoiled if anything makes it doubtful."""
-    if result.status != "measured" or not result.doubtful:
+    if result.status == "spoiled" or not result.doubtful:
         return result
     words = next(words for _, severity, words in result.diagnostics if severity != "info")
     return dataclasses.replace(result, status="spoiled", reason=words)

@@ -432,6 +432,14 @@ class Calibration:
     result with the gauge's geometry; ``either_well`` holds the buckling level [m] that each well alone would
     ask for.  ``imperfection``, if one was asked for, gives each well its own first frequency; ``beam`` then has
     the buckling level that goes with it.  ``remarks`` say in words what was found, ``diagnostics`` what to beware of.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> measured = lab.Measurements(lower_well_frequencies=[84.0], lower_well_frequencies_se=[0.2])  # Hz
+    >>> found = lab.calibrate(measured, fit=("buckling_level",), modes=4)
+    >>> f"{1e3 * found.beam.buckling_level:.3f} mm"
+    '0.342 mm'
     """
 
     beam: Beam
@@ -554,6 +562,14 @@ def calibrate(
     covariance is that of the linearised fit, raised by chi-square per degree of freedom where that exceeds 1.
     A combination of parameters to which no measured frequency responds is found from the singular values of
     the sensitivities; its parameters stay as near to the start as they can and get no standard error.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> measured = lab.Measurements(lower_well_frequencies=[84.0], lower_well_frequencies_se=[0.2])  # Hz
+    >>> found = lab.calibrate(measured, fit=("buckling_level",), modes=4)
+    >>> list(found.values)
+    ['buckling_level']
     """
     if not isinstance(measured, Measurements):
         raise InputTypeError(f"measured: must be Measurements, not {type(measured).__name__}")
@@ -810,6 +826,23 @@ def stiffness_from_impacts(impacts: xr.Dataset, effective_mass: float) -> Contac
     ------
     InputError
         If fewer than three impacts can be used.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from snapbeam import lab
+    >>> impacts = xr.Dataset(
+    ...     {
+    ...         "duration": ("impact", [1.06e-3, 0.93e-3, 0.80e-3, 0.70e-3]),  # s
+    ...         "duration_stderr": ("impact", [1e-5] * 4),
+    ...         "closing_speed": ("impact", [0.025, 0.05, 0.1, 0.2]),  # m/s
+    ...         "frames": ("impact", [20, 18, 16, 14]),
+    ...         "bounded": ("impact", [1, 1, 1, 1]),
+    ...     }
+    ... )
+    >>> contact = lab.stiffness_from_impacts(impacts, effective_mass=0.02)  # kg
+    >>> f"{contact.stiffness:.1e} N/m^1.5"
+    '6.4e+07 N/m^1.5'
     """
     from snapbeam.util.datasets import xr
 

@@ -69,6 +69,22 @@ class Recording:
         What in the file makes measurements in it doubtful.
     edge_error
         Standard error [px] that the way the file stores pictures adds to every edge.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> time = np.arange(60) / 10e3  # s
+    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
+    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
+    >>> camera = lab.SyntheticCamera(shape=(160, 64))
+    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
+    >>> path = synthetic.write("test.cihx")
+    >>> with lab.open_recording(path, frame_rate=10e3, pixel_size=12e-6) as recording:
+    ...     tracked = lab.track(recording, buckling_level=0.335e-3)
+    >>> recording.frame_rate
+    10000.0
     """
 
     def __init__(
@@ -209,6 +225,22 @@ def open_recording(
     InputError
         If the file is malformed, or if frame rate or pixel size stand neither in the file nor in the call:
         they are never guessed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> time = np.arange(60) / 10e3  # s
+    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
+    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
+    >>> camera = lab.SyntheticCamera(shape=(160, 64))
+    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
+    >>> path = synthetic.write("test.cihx")
+    >>> with lab.open_recording(path, frame_rate=10e3, pixel_size=12e-6) as recording:
+    ...     tracked = lab.track(recording, buckling_level=0.335e-3)
+    >>> recording.pixel_size
+    1.2e-05
     """
     path = file_path("path", path)
     source = open_source(path)
@@ -343,6 +375,20 @@ def pixel_size_from_marks(
     ------
     InputError
         If a mark does not stand out, or the two are the same.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> row, column = np.mgrid[:120, :100]
+    >>> def mark(at_row, at_column):
+    ...     return 150.0 * np.exp(-((row - at_row) ** 2 + (column - at_column) ** 2) / 8.0)
+    >>> frame = 20.0 + mark(20, 18) + mark(98, 71) + np.random.default_rng(0).standard_normal((120, 100))
+    >>> np.save("marks.npy", frame[None].astype(np.uint8))
+    >>> with lab.open_recording("marks.npy", frame_rate=1000.0, pixel_size=1e-5) as recording:
+    ...     size, error = lab.pixel_size_from_marks(recording, (20, 18), (98, 71), 0.010)
+    >>> f"{1e6 * size:.1f} um"
+    '106.0 um'
     """
     length = positive("distance", distance, "m")
 
@@ -444,6 +490,14 @@ def write_photron(
     -------
     pathlib.Path
         The header's path.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> frames = np.random.default_rng(0).integers(0, 4096, (5, 64, 64), dtype=np.uint16)
+    >>> lab.write_photron("noise.cihx", frames, frame_rate=10e3, pixel_size=12e-6, bit_depth=12).name
+    'noise.cihx'
     """
     path = check_writable(path, "path", (".cih", ".cihx"))
     kind = path.suffix.lower()
@@ -499,6 +553,14 @@ def write_video(
         Frames shown per second [Hz], at most 1000; for high-speed video not the rate it was recorded at.
     max_value
         Grey level that becomes 255; frames above 8 bits lose their lower bits.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> frames = np.random.default_rng(0).integers(0, 256, (5, 64, 64), dtype=np.uint8)
+    >>> lab.write_video("noise.avi", frames).name
+    'noise.avi'
     """
     import av
 

@@ -13,6 +13,7 @@ __all__ = [
     "KINDS_COMPARISON",
     "KINDS_DECAY",
     "KINDS_RECORDING",
+    "KINDS_SIGNAL",
     "KINDS_VIBROMETER",
     "LOSSY_ERROR",
     "Kind",
@@ -194,9 +195,28 @@ KINDS_COMPARISON = table(
         ("start",),
     ),
     Kind(
+        "comparison.no_shaker", INFO,
+        "whether the measured run has the displacement of the shaker",
+        "the shaker was not recorded: start (--start) alone aligns the runs, and its error shifts them; amplitude and phase "
+        "of the drive are not compared",
+        ("start",),
+    ),
+    Kind(
         "comparison.amplitude", WARNING,
         "the amplitude of both shakers",
         "the measured shaker moves {ratio:.3f} times as far as the simulated one: another test, or another scale",
+    ),
+    Kind(
+        "comparison.units", ERROR,
+        "measured points on the map, against the same points in another unit or with columns exchanged",
+        "{inside:.0f} of {points:.0f} measured points lie on the map; {fitting:.0f} would, and with its classes, if "
+        "{told}: look at the columns of the table and at their units",
+    ),
+    Kind(
+        "comparison.contradicting", WARNING,
+        "classes of measured points with the same coordinates",
+        "{points:.0f} measured points have the coordinates of another point and a different class: they do not "
+        "count; correct the table",
     ),
     Kind(
         "comparison.gaps", INFO,
@@ -393,6 +413,30 @@ KINDS_RECORDING = table(
         "grey levels of every other pixel, against their neighbours",
         "pixels lie under a mosaic of colour filters (levels {spread_percent:.0f} % apart): each kind is "
         "brought to the same mean, which is right for grey things in white light only",
+    ),
+)  # fmt: skip
+
+
+# ----------------------------------------------------------------------------------------------------
+# A file of a time series against its own header.
+
+
+KINDS_SIGNAL = table(
+    Kind(
+        "signal.cut_in_number", WARNING,
+        "digits of the last number of a text table, against those above it",
+        "{told}, as a copy that was broken off does",
+    ),
+    Kind(
+        "signal.cut", WARNING,
+        "samples in the file, against the number in its header",
+        "{told}: the header promises {promised:.0f} samples and the file contains {found:.0f}: the file was cut; copy it again",
+    ),
+    Kind(
+        "signal.appended", WARNING,
+        "samples in the file, against the number in its header",
+        "{told}: the header promises {promised:.0f} samples and the file contains {found:.0f}: later records were appended, "
+        "which need not follow the first without a gap; save each record to a file of its own",
     ),
 )  # fmt: skip
 

@@ -40,6 +40,20 @@ class Alignment:
     ``clock_difference``, the camera's frequency over the vibrometer's less 1, and its standard error;
     ``certain`` says whether the start of the motion told the cycle, ``margin`` by what chi-square;
     ``diagnostics`` what makes the alignment doubtful.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> drive = lab.measure_drive(velocity, 100.0)
+    >>> import numpy as np
+    >>> time = np.arange(4000) / 10e3  # s; the camera starts 0.05 s after the vibrometer
+    >>> onset = np.clip(time - 0.05, 0.0, None)
+    >>> moved = 7e-3 / (2 * np.pi * 100) * np.sin(2 * np.pi * 100 * onset)
+    >>> noise = 1e-8 * np.random.default_rng(0).standard_normal(time.size)
+    >>> found = lab.align(lab.make_signal(moved + noise, "m", 10e3), velocity, 100.0, polarity=1)
+    >>> f"{found.delay:.3f} s"
+    '-0.050 s'
     """
 
     delay: float
@@ -96,6 +110,20 @@ def align(
     ------
     InputError
         If a signal is unfit, or the two do not oscillate at the same frequency.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> drive = lab.measure_drive(velocity, 100.0)
+    >>> import numpy as np
+    >>> time = np.arange(4000) / 10e3  # s; the camera starts 0.05 s after the vibrometer
+    >>> onset = np.clip(time - 0.05, 0.0, None)
+    >>> moved = 7e-3 / (2 * np.pi * 100) * np.sin(2 * np.pi * 100 * onset)
+    >>> noise = 1e-8 * np.random.default_rng(0).standard_normal(time.size)
+    >>> found = lab.align(lab.make_signal(moved + noise, "m", 10e3), velocity, 100.0, polarity=1)
+    >>> f"{found.delay:.3f} s"
+    '-0.050 s'
     """
     if polarity is not None and (not isinstance(polarity, (int, np.integer)) or polarity not in (1, -1)):
         raise InputError(f"polarity = {shown(polarity)}: must be 1, -1 or None")
@@ -310,6 +338,15 @@ def recorded_drive(
     InputError
         If the result could not hold the bandwidth, the record is too short for the filter, or its start-up is
         broken by a dropout.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> drive = lab.measure_drive(velocity, 100.0)
+    >>> recorded = lab.recorded_drive(velocity, 1e5, measurement=drive)
+    >>> list(recorded.data_vars)
+    ['displacement', 'velocity']
     """
     from scipy.interpolate import CubicSpline
     from scipy.signal import fftconvolve, firwin, kaiserord, resample_poly

@@ -428,6 +428,8 @@ def load_image(file: Path, *, grey: bool = True) -> NDArray[Any]:
     """
     import cv2
 
+    if not file.is_file():
+        raise InputError(f"{file}: no such file")
     try:
         raw = np.fromfile(file, dtype=np.uint8)
     except OSError as error:
@@ -686,7 +688,7 @@ def _open_source(path: Path) -> FrameSource:
     name, _, dataset = str(path).partition("::")  # a dataset's name may hold "/"
     path = path if path.exists() else Path(name)
     dataset, suffix = dataset.replace("\\", "/"), path.suffix.lower()
-    if not path.exists():
+    if not path.is_file():
         raise InputError(f"{path}: no such file")
     if suffix == ".mraw":
         headers = [path.with_suffix(one) for one in (".cihx", ".cih") if path.with_suffix(one).exists()]

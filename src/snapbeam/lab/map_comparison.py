@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.lab.diagnostics import KINDS_COMPARISON
 from snapbeam.sweeps.measured_points import MeasuredPoints
+from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, axis, finite, instance
 
@@ -21,6 +23,7 @@ __all__ = ["MapComparison", "compare_measured_points"]
 
 _Array = NDArray[np.float64]
 _AXES = ("frequency_ratio", "velocity_amplitude", "location")
+_FEW = 5  # points from which another unit is told
 _NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
 _CLASSES = tuple(kind for kind in ResponseClass if kind is not ResponseClass.UNKNOWN)
 
@@ -32,13 +35,31 @@ class MapComparison:
     ``table`` has one entry per measured point: its coordinates, ``measured`` and ``simulated`` class (that of the
     nearest point of the map), ``used`` (1 if it counts) and ``distance``, in steps of the map, to the
     nearest point that has the measured class (NaN if none has).  ``confusion[i, j]`` counts points of
-    measured class i and simulated class j, in the order of ``classes``.
+    measured class i and simulated class j, in the order of ``classes``.  ``diagnostics`` is what makes the
+    comparison doubtful.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import lab, paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> axes = {"frequency_ratio": [1.0, 1.2], "velocity_amplitude": [0.02, 0.1, 0.2]}
+    >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
+    >>> measured = sb.MeasuredPoints(
+    ...     frequency_ratio=[1.0, 1.2], velocity_amplitude=[0.02, 0.2], location=[0.4762, 0.4762], response_class=[0, 3]
+    ... )
+    >>> comparison = lab.compare_measured_points(measured, dataset)
+    >>> comparison.agreement
+    0.5
     """
 
     table: xr.Dataset
     confusion: NDArray[np.int64]
     classes: tuple[ResponseClass, ...]
     notes: tuple[str, ...]
+    diagnostics: tuple[Diagnostic, ...] = ()
 
     @property
     def used(self) -> int:
@@ -75,6 +96,7 @@ class MapComparison:
             "classes": [kind.label for kind in self.classes],
             "confusion": self.confusion.tolist(),
             "notes": list(self.notes),
+            "diagnostics": [one.plain() for one in self.diagnostics],
         }
 
 
@@ -106,7 +128,25 @@ def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -
     Notes
     -----
     A point does not count if it lies more than half a step outside the map, was measured at another value of a
-    coordinate that the map holds fixed (by more than 2 %), or has no class on either side.
+    coordinate that the map holds fixed (by more than 2 %), or has no class on either side.  Of several points with
+    the same coordinates and class only the first counts.  Points with the same coordinates and different classes do
+    not count.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import lab, paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> axes = {"frequency_ratio": [1.0, 1.2], "velocity_amplitude": [0.02, 0.1, 0.2]}
+    >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
+    >>> measured = sb.MeasuredPoints(
+    ...     frequency_ratio=[1.0, 1.2], velocity_amplitude=[0.02, 0.2], location=[0.4762, 0.4762], response_class=[0, 3]
+    ... )
+    >>> comparison = lab.compare_measured_points(measured, dataset)
+    >>> comparison.used
+    2
     """
     from snapbeam.util.datasets import xr
 
@@ -122,26 +162,23 @@ def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -
     where = {name: np.asarray(getattr(measurements, name), dtype=np.float64) for name in _AXES}
     measured = np.asarray(measurements.response_class, dtype=np.int8)
     count = measured.size
-    inside, belongs = np.ones(count, dtype=bool), np.ones(count, dtype=bool)
-    place: dict[str, _Array] = {}
+    belongs = np.ones(count, dtype=bool)
+    axes = {name: axis(name, dataset[name].values, -math.inf, math.inf) for name in dims}
+    place, inside, simulated = _on_map(response, axes, where)
     for name in _AXES:
         value = where[name]
         if name in dims:
-            points = axis(name, dataset[name].values, -math.inf, math.inf)
-            place[name] = _steps(points, value)
-            inside &= (place[name] >= -0.5) & (place[name] <= points.size - 0.5)
             continue
         fixed = dataset.coords[name].item() if name in dataset.coords else dataset.attrs.get(name)
         if fixed is not None:
             fixed = finite(name, fixed)
             belongs &= np.isnan(value) | (np.abs(value - fixed) <= _NEAR * abs(fixed))
-    index = {
-        name: np.clip(np.nan_to_num(np.round(p)), 0, dataset.sizes[name] - 1) for name, p in place.items()
-    }
-    pick = {name: xr.DataArray(i.astype(np.int64), dims="point") for name, i in index.items()}
-    simulated = response.isel(pick).values.astype(np.int8)
     known = (measured != ResponseClass.UNKNOWN) & (simulated != ResponseClass.UNKNOWN)
-    used = inside & belongs & known
+    repeated, contradicting = _repeated(where, measured)
+    used = inside & belongs & known & ~repeated & ~contradicting
+    diagnostics = _units(response, axes, where, measured, dataset.attrs)
+    if contradicting.any():
+        diagnostics.append(KINDS_COMPARISON["contradicting"].found(points=float(contradicting.sum())))
     confusion = np.zeros((len(_CLASSES), len(_CLASSES)), dtype=np.int64)
     np.add.at(confusion, (measured[used], simulated[used]), 1)
     notes = []
@@ -149,6 +186,7 @@ def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -
         (~inside, "outside the map"),
         (inside & ~belongs, "measured at another value of a coordinate the map holds fixed"),
         (inside & belongs & ~known, "without a class, measured or simulated"),
+        (inside & belongs & known & repeated, "repeated from an earlier row"),
     ):
         if mask.any():
             notes.append(f"{int(mask.sum())} of {count} measured points do not count: {text}")
@@ -164,7 +202,95 @@ def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -
             {"long_name": "steps to the nearest point alike"},
         ),
     }
-    return MapComparison(xr.Dataset(data), confusion, _CLASSES, tuple(notes))
+    return MapComparison(xr.Dataset(data), confusion, _CLASSES, tuple(notes), tuple(diagnostics))
+
+
+def _on_map(
+    response: xr.DataArray, axes: dict[str, _Array], where: dict[str, _Array]
+) -> tuple[dict[str, _Array], NDArray[np.bool_], NDArray[np.int8]]:
+    """Positions of points in steps of the map, whether they lie on it, and the class of the nearest point of it."""
+    from snapbeam.util.datasets import xr
+
+    place = {name: _steps(points, where[name]) for name, points in axes.items()}
+    inside = np.ones(where[_AXES[0]].size, dtype=bool)
+    pick = {}
+    for name, points in axes.items():
+        inside &= (place[name] >= -0.5) & (place[name] <= points.size - 0.5)
+        nearest = np.clip(np.nan_to_num(np.round(place[name])), 0, points.size - 1)
+        pick[name] = xr.DataArray(nearest.astype(np.int64), dims="point")
+    return place, inside, response.isel(pick).values.astype(np.int8)
+
+
+def _repeated(
+    where: dict[str, _Array], measured: NDArray[np.int8]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which points repeat an earlier one, and which have the coordinates of another one of another class."""
+    repeated, contradicting = np.zeros(measured.size, dtype=bool), np.zeros(measured.size, dtype=bool)
+    groups: dict[tuple[str, ...], list[int]] = {}
+    for i in np.flatnonzero(measured != ResponseClass.UNKNOWN):
+        groups.setdefault(tuple(f"{where[name][i]:.9g}" for name in _AXES), []).append(int(i))
+    for group in groups.values():
+        if np.unique(measured[group]).size > 1:
+            contradicting[group] = True
+        else:
+            repeated[group[1:]] = True
+    return repeated, contradicting
+
+
+def _units(
+    response: xr.DataArray,
+    axes: dict[str, _Array],
+    where: dict[str, _Array],
+    measured: NDArray[np.int8],
+    attrs: dict[str, Any],
+) -> list[Diagnostic]:
+    """Whether the points fit the map far better with another unit or with the columns exchanged."""
+    count = int((measured != ResponseClass.UNKNOWN).sum())
+    if count < _FEW:
+        return []
+
+    def fits(points: dict[str, _Array]) -> tuple[int, int]:
+        _, inside, simulated = _on_map(response, axes, where | points)
+        known = inside & (measured != ResponseClass.UNKNOWN)
+        return int(known.sum()), int((known & (simulated == measured)).sum())
+
+    frequency, velocity = where["frequency_ratio"], where["velocity_amplitude"]
+    turn = 2.0 * math.pi
+    others = {
+        "the frequency is in rad/s": {"frequency_ratio": frequency / turn},
+        "the velocity is in mm/s": {"velocity_amplitude": velocity / 1e3},
+        "the velocity is in km/s": {"velocity_amplitude": velocity * 1e3},
+        "the frequency is in rad/s and the velocity in mm/s": {
+            "frequency_ratio": frequency / turn,
+            "velocity_amplitude": velocity / 1e3,
+        },
+        "the columns of frequency and velocity are exchanged": {
+            "frequency_ratio": velocity,
+            "velocity_amplitude": frequency,
+        },
+    }
+    level, first = attrs.get("beam_buckling_level"), attrs.get("reference_frequency")
+    if level is not None:  # exchanged in Hz and m/s
+        scale = turn * float(level)
+        others["the columns of frequency (Hz) and velocity (m/s) are exchanged"] = {
+            "frequency_ratio": velocity * scale,
+            "velocity_amplitude": frequency / scale,
+        }
+    if first is not None:
+        others["the frequency ratio is a frequency in Hz"] = {"frequency_ratio": frequency / float(first)}
+    inside, alike = fits({})
+    best, (found, agree) = max(
+        ((words, fits(points)) for words, points in others.items()), key=lambda one: one[1]
+    )
+    off_map = inside < 0.5 * count and found > 0.8 * count
+    disagree = agree > 0.6 * count and alike < 0.5 * agree
+    if not (off_map or disagree):
+        return []
+    return [
+        KINDS_COMPARISON["units"].found(
+            told=best, inside=float(inside), fitting=float(found), points=float(count)
+        )
+    ]
 
 
 def _steps(axis: _Array, value: _Array) -> _Array:

@@ -142,6 +142,8 @@ def read_fields(path: Path) -> HeaderFields:
     if kind not in (".cih", ".cihx"):
         raise InputError(f"{path}: a Photron header ends in .cih or .cihx")
     try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path}: must be a regular file, not a device or a pipe")
         if path.stat().st_size > _MAX_HEADER_BYTES:
             raise InputError(f"{path}: is larger than 64 MiB, so it is no Photron header")
         raw = path.read_bytes()

@@ -16,7 +16,7 @@ import numpy as np
 
 from snapbeam.lab.signal_formats import READERS, WRITERS, Channel, Told
 from snapbeam.lab.signals import check_signal, make_signal, parse_sensitivity, si_unit
-from snapbeam.util.diagnostics import DiagnosticWarning
+from snapbeam.util.diagnostics import DiagnosticWarning, to_json
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError, InputTypeError, positive, shown
@@ -45,12 +45,20 @@ def read_channels(
     -------
     list of dict
         Keys ``data``, ``name``, ``unit_str``, and ``fs`` [Hz] or ``time`` [s].  ``unit_str`` is None
-        where the file states no unit.
+        where the file states no unit.  ``diagnostics`` lists what contradicts the header.
 
     Raises
     ------
     InputError
         If the file is missing, cut short, of no known kind, without sampling rate, or without a channel.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> path = lab.write_signal("velocity.csv", velocity)
+    >>> len(lab.read_channels(path))
+    1
     """
     if not isinstance(path, (str, os.PathLike)):
         raise InputTypeError(f"path = {shown(path)}: must be a path, not {type(path).__name__}")
@@ -130,6 +138,14 @@ def read_signal(
     InputError
         Naming the file and the field: a missing or contradicting unit, an unknown channel, NaN, times that
         do not increase or have gaps, a truncated file.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> path = lab.write_signal("velocity.csv", velocity)
+    >>> lab.read_signal(path).attrs["units"]
+    'm/s'
     """
     channels = read_channels(path, sampling_frequency, columns)
     names = [entry["name"] for entry in channels]
@@ -182,7 +198,10 @@ def _to_signal(entry: Channel, units: str | None, sensitivity: str | None, sourc
     kwargs: dict[str, Any] = {"time": entry["time"]} if "time" in entry else {}
     if not kwargs:
         kwargs = {"sampling_frequency": entry["fs"], "start": entry.get("time_offset", 0.0)}
-    signal = make_signal(data * factor, base, name=name, attrs={"source": source}, **kwargs)
+    attrs = {"source": source}
+    if entry.get("diagnostics"):
+        attrs["diagnostics"] = to_json(entry["diagnostics"])
+    signal = make_signal(data * factor, base, name=name, attrs=attrs, **kwargs)
     check_signal(signal, name=name)
     return signal
 
@@ -205,6 +224,13 @@ def write_signal(
     ------
     InputError
         If the path cannot be written, or a WAV would clip or needs a rate that is no whole number of hertz.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> lab.write_signal("velocity.wav", velocity, full_scale=0.1).name
+    'velocity.wav'
     """
     target = check_writable(path, "path", tuple(WRITERS))
     check_signal(signal)

@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.lab.diagnostics import KINDS_SIGNAL
 from snapbeam.lab.signals import check_signal, even_sampling, si_unit
 from snapbeam.util.diagnostics import Diagnostic, tell
-from snapbeam.util.netcdf import hdf5_stream
+from snapbeam.util.input_files import decoded
+from snapbeam.util.netcdf import hdf5_stream, refuse_large
 from snapbeam.util.validation import InputError, positive
 
 if TYPE_CHECKING:
@@ -32,7 +34,6 @@ __all__ = [
     "Table",
     "TextBlock",
     "Told",
-    "decoded",
     "header_rate",
     "header_unit",
     "header_values",
@@ -159,18 +160,26 @@ def write_npz(path: Path, signal: xr.DataArray, _full_scale: float | None) -> No
 
 
 # ----------------------------------------------------------------------------------------------------
-# HDF5 files: one-dimensional datasets, units and rates in attributes.
+# HDF5 files: vectors, and matrices with a channel in each row or column; units and rates in attributes.
+
+
+_LONGEST_SIDE = 64  # channels in a matrix
 
 
 def read_hdf5(path: Path, _told: Told) -> list[Channel]:
     """Return the channels of an HDF5 file."""
     import h5py
 
+    refuse_large(path)
     channels: list[Channel] = []
     with h5py.File(path, "r") as file:
 
         def visit(name: str, item: Any) -> None:
-            if not isinstance(item, h5py.Dataset) or item.ndim != 1 or item.dtype.kind not in "iuf":
+            if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "iuf":
+                return
+            if item.ndim not in (1, 2) or (
+                item.ndim == 2 and (item.size < 2 or min(item.shape) > _LONGEST_SIDE)
+            ):
                 return
             if item.external or item.is_virtual:
                 raise InputError(
@@ -180,10 +189,14 @@ def read_hdf5(path: Path, _told: Told) -> list[Channel]:
             stated = next((item.attrs[key] for key in UNIT_NAMES if key in item.attrs), None)
             rates = [level[key] for level in levels for key in RATE_NAMES if key in level]
             unit = None if stated is None else _text(stated)
-            channel: Channel = {"data": item[()], "name": name, "unit_str": unit}
-            if rates:
-                channel["fs"] = positive(f"{name}: sampling rate", np.asarray(rates[0]).item(), "Hz")
-            channels.append(channel)
+            rows = np.atleast_2d(item[()])
+            rows = rows if rows.shape[0] <= rows.shape[1] else rows.T
+            for k, data in enumerate(rows):
+                own = name if rows.shape[0] == 1 else f"{name} {k + 1}"
+                channel: Channel = {"data": data, "name": own, "unit_str": unit}
+                if rates:
+                    channel["fs"] = positive(f"{own}: sampling rate", np.asarray(rates[0]).item(), "Hz")
+                channels.append(channel)
 
         file.visititems(visit)
     return with_time(channels)
@@ -236,34 +249,6 @@ class TextBlock:
     rows: list[list[str]]
     lines: list[int]
     decimal_comma: bool
-
-
-def decoded(path: Path) -> str:
-    """The text of a file: UTF-8, UTF-16 or Latin-1.
-
-    Raises
-    ------
-    InputError
-        If it is no text.
-    """
-    raw = path.read_bytes()
-    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
-        kind = "utf-16"
-    elif raw[:400].count(0) > 0.3 * len(raw[:400]) and len(raw) % 2 == 0:
-        kind = "utf-16-le" if raw[1:400:2].count(0) > raw[0:400:2].count(0) else "utf-16-be"
-    else:
-        kind = "utf-8-sig"
-    if kind == "utf-8-sig" and b"\x00" in raw:
-        raise InputError(f"{path}: is no text (it holds zero bytes)")
-    try:
-        text = raw.decode(kind)
-    except UnicodeDecodeError:
-        if kind != "utf-8-sig":
-            raise InputError(f"{path}: is no text") from None
-        text = raw.decode("latin-1")
-    if "\x00" in text:
-        raise InputError(f"{path}: is no text (it holds zero bytes)")
-    return text
 
 
 def to_number(cell: str, decimal_comma: bool = False) -> float:
@@ -354,7 +339,7 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
     InputError
         If there is no row of numbers, or the way to read it is not clear.
     """
-    text = decoded(path)
+    text = decoded(path.read_bytes(), str(path))
     numbered = [(i, line.rstrip("\r")) for i, line in enumerate(text.split("\n"), 1) if line.strip()]
     comments = [line.strip().lstrip("#%/!").strip() for _, line in numbered if line.startswith(_COMMENT)]
     numbered = [(i, line) for i, line in numbered if not line.startswith(_COMMENT)]
@@ -378,8 +363,13 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
     if len(cells) != len(lines) - first:
         raise InputError(f"{path}: a quoted value runs over the end of a line")
     if not text.endswith("\n") and _is_short(cells):
-        words = f"{path}: ends inside its last number, {cells[-1][-1].strip()!r}, as a copy that was broken off does"
-        tell([Diagnostic("signal.cut", words, {"lines": float(len(lines))})])
+        tell(
+            [
+                KINDS_SIGNAL["cut_in_number"].found(
+                    told=f"{path}: ends inside its last number, {cells[-1][-1].strip()!r}"
+                )
+            ]
+        )
     return TextBlock(
         path=path,
         header=(*comments, *(line for k, line in enumerate(lines[: dialect.first]) if k not in taken)),
@@ -488,12 +478,15 @@ _END = "***end_of_header***"
 def read_lvm(path: Path, _told: Told) -> list[Channel]:
     """Channels of the first segment of an .lvm file.
 
+    A file whose number of samples is not that of its header is read with a diagnostic.  Channels that the header
+    names and that have no sample are left out.
+
     Raises
     ------
     InputError
         If the header is not that of such a file, or the file holds several segments: they need not join.
     """
-    lines = [line.rstrip("\r") for line in decoded(path).split("\n")]
+    lines = [line.rstrip("\r") for line in decoded(path.read_bytes(), str(path)).split("\n")]
     if not lines[0].lower().startswith("labview measurement"):
         raise InputError("does not begin with 'LabVIEW Measurement', so it is no .lvm file")
     file_header, at = _header(lines, 0, None)
@@ -511,16 +504,26 @@ def read_lvm(path: Path, _told: Told) -> list[Channel]:
     if not columns or (count and len(columns) != count):
         raise InputError(f"line {at + 1}: names {len(columns)} channel(s), the header says {count}")
     units = header.get("y_unit_label", [])
+    told: list[Diagnostic] = []
     channels: list[Channel] = []
     for number, k in enumerate(columns):
+        cells = [row[k] if k < len(row) else "" for _, row in rows]
+        if not any(cell.strip() for cell in cells):
+            continue
         step = to_number(header["delta_x"][min(number, len(header["delta_x"]) - 1)], comma)
         start = to_number(header.get("x0", ["0"])[min(number, len(header.get("x0", ["0"])) - 1)], comma)
         if not (math.isfinite(step) and step > 0.0):
             raise InputError(f"Delta_X = {header['delta_x'][0]!r}: must be a positive number of seconds")
         samples = int(to_number(header["samples"][min(number, len(header["samples"]) - 1)], comma))
+        clock: dict[str, Any] = {"fs": 1.0 / step, "time_offset": start if math.isfinite(start) else 0.0}
         if len(rows) != samples:
-            raise InputError(f"the header promises {samples} samples, the file has {len(rows)}")
-        data = np.array([to_number(cells[k], comma) if k < len(cells) else math.nan for _, cells in rows])
+            kind = KINDS_SIGNAL["cut" if len(rows) < samples else "appended"]
+            promised, present = float(samples), float(len(rows))
+            told = [kind.found(told=path.name, promised=promised, found=present)]
+            tell([kind.found(told=str(path), promised=promised, found=present)])
+            if names[0].lower() == "x_value" and rows[0][1][0].strip():
+                clock = {"time": np.array([to_number(row[0], comma) for _, row in rows])}
+        data = np.array([to_number(cell, comma) for cell in cells])
         bad = np.flatnonzero(~np.isfinite(data))
         if bad.size:
             raise InputError(f"line {rows[int(bad[0])][0]}, column {names[k]!r}: is not a finite number")
@@ -529,8 +532,8 @@ def read_lvm(path: Path, _told: Told) -> list[Channel]:
                 "data": data,
                 "name": names[k],
                 "unit_str": (units[number].strip() or None) if number < len(units) else None,
-                "fs": 1.0 / step,
-                "time_offset": start if math.isfinite(start) else 0.0,
+                "diagnostics": told,
+                **clock,
             }
         )
     return numbered(channels)
@@ -552,9 +555,6 @@ def _header(lines: list[str], at: int, separator: str | None) -> tuple[dict[str,
 
 # ----------------------------------------------------------------------------------------------------
 # MATLAB files: version 5 by SciPy, version 7.3 by h5py.  Numbers and text only; objects are left alone.
-
-
-_LONGEST_SIDE = 64  # channels in a matrix
 
 
 def read_matlab(path: Path, _told: Told) -> list[Channel]:
@@ -600,6 +600,7 @@ def _version_5(path: Path) -> dict[str, Any]:
 def _version_73(path: Path) -> dict[str, Any]:
     import h5py
 
+    refuse_large(path)
     values: dict[str, Any] = {}
     with h5py.File(path, "r") as file:
 
@@ -870,10 +871,17 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
     table = read_table(path, told.columns)
     columns = {name: split_unit(name) for name in table.columns}
     times = [name for name, (word, unit) in columns.items() if _is_time(word, unit)]
+    if not times:  # a row of units only, as "[ s ]"
+        times = [name for name, (_, unit) in columns.items() if unit and _in_seconds(name, unit)]
     if len(times) > 1:
         raise InputError(f"{path}: columns {times}: only one may be the time")
     values = header_values(table.header)
     rate = header_rate(values, str(path))
+    first, (word, unit) = next(iter(columns.items()))
+    if not times and (unit == "Hz" or word.lower().startswith("freq")):
+        raise InputError(
+            f"{path}: its first column, {first!r}, is a frequency, so that this is a spectrum; export the time signal"
+        )
     common: dict[str, Any] = {}
     if times:
         unit = columns[times[0]][1] or "s"
@@ -898,6 +906,13 @@ def _is_time(word: str, unit: str | None) -> bool:
     if not is_time(word) or unit is None or word.lower() not in ("x-axis", "x_value"):
         return is_time(word)
     return si_unit(f"column {word!r}", unit)[1] == "s"
+
+
+def _in_seconds(name: str, unit: str) -> bool:
+    try:
+        return si_unit(name, unit)[1] == "s"
+    except InputError:
+        return False
 
 
 def _agree(path: Path, time: NDArray[np.float64], rate: float) -> None:
@@ -1096,9 +1111,9 @@ def read_wav(path: Path, _told: Told) -> list[Channel]:
         raise InputError("the sound file is cut short")
     if rate <= 0:
         raise InputError(f"sampling rate of {rate} Hz in the header")
-    size = path.stat().st_size
-    if size < data.nbytes:
-        raise InputError(f"the header promises {data.nbytes} bytes of samples, the file has {size}")
+    size, promised = path.stat().st_size, data.shape[0] * _bytes_of_a_frame(path)
+    if size < promised:
+        raise InputError(f"the header promises {promised} bytes of samples, the file has {size}")
     columns = data[:, None] if data.ndim == 1 else data
     kind, unit = str(data.dtype), None
     if kind in _INTEGER_SCALE:
@@ -1110,6 +1125,14 @@ def read_wav(path: Path, _told: Told) -> list[Channel]:
         {"data": columns[:, i], "name": f"channel {i + 1}", "unit_str": unit, "fs": float(rate)}
         for i in range(columns.shape[1])
     ]
+
+
+def _bytes_of_a_frame(path: Path) -> int:
+    """Bytes of one sample of all channels, as the header says: 3 a channel for 24 bits."""
+    with open(path, "rb") as file:
+        head = file.read(4096)
+    at = head.find(b"fmt ") + 20
+    return int.from_bytes(head[at : at + 2], "big" if head.startswith(b"RIFX") else "little")
 
 
 def write_wav(path: Path, signal: xr.DataArray, full_scale: float | None) -> None:

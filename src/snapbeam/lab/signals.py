@@ -216,6 +216,13 @@ def make_signal(
     ------
     InputError
         For an unknown unit, numbers that are not finite, or a time axis that is not even.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> signal = lab.make_signal([0.0, 1.0, 0.0, -1.0], "mm", 1e3)
+    >>> signal.values
+    array([ 0.   ,  0.001,  0.   , -0.001])
     """
     from snapbeam.util.datasets import xr
 

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.lab.signals import SignalSamples
-from snapbeam.util.validation import InputError, instance, integer, positive
+from snapbeam.lab.signals import SignalSamples, check_signal
+from snapbeam.util.validation import InputError, integer, positive
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = [
     "Clipping",
@@ -42,6 +45,14 @@ class SineFit:
     ``amplitude``, ``offset`` and ``noise_rms`` are in the unit of the signal, ``frequency`` in Hz, ``phase``
     in radians at time 0 of the signal, in (-pi, pi]; ``*_se`` are standard errors.  ``harmonic_amplitude[k]``
     and ``harmonic_phase[k]`` belong to the multiple k + 1, the first being the sine itself.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> drive = lab.measure_drive(velocity, 100.0)
+    >>> f"{1e3 * drive.steady.amplitude:.2f} mm/s"
+    '6.99 mm/s'
     """
 
     amplitude: float
@@ -154,19 +165,20 @@ def white_variance(
 
 
 def fit_sine(
-    samples: SignalSamples,
+    samples: xr.DataArray | SignalSamples,
     frequency: float | None = None,
     harmonics: int = 10,
     *,
     fixed: bool = False,
     keep: NDArray[np.bool_] | None = None,
 ) -> SineFit:
-    """Fit a sine, its harmonics and an offset to evenly sampled numbers.
+    """Fit a sine, its harmonics and an offset to a signal.
 
     Parameters
     ----------
-    samples : SignalSamples
-        From :func:`~snapbeam.lab.signals.check_signal`.
+    samples : xarray.DataArray
+        A signal, as :func:`snapbeam.lab.make_signal` and :func:`snapbeam.lab.read_signal` return it; or its samples,
+        from :func:`~snapbeam.lab.signals.check_signal`.
     frequency : float, optional
         A guess [Hz]; the highest peak of the spectrum if left out.
     harmonics : int
@@ -191,8 +203,17 @@ def fit_sine(
     -----
     IEEE Std 1057-2017, Annex B; the standard errors reach the bound of Rife and Boorstyn, IEEE Trans. Inf.
     Theory 20 (1974), 591.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> fit = lab.fit_sine(velocity.isel(time=slice(5000, None)), 100.0)
+    >>> f"{fit.frequency:.1f} Hz"
+    '100.0 Hz'
     """
-    instance("samples", samples, SignalSamples, "SignalSamples, as snapbeam.lab.check_signal returns them")
+    if not isinstance(samples, SignalSamples):
+        samples = check_signal(samples)
     y, time, rate = samples
     guess = spectral_peak(samples) if frequency is None else positive("frequency", frequency, "Hz")
     n = y.size

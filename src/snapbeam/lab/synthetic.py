@@ -170,6 +170,17 @@ class SyntheticCamera:
         "gaussian", the edges that the tracker fits; "disk", a lens out of focus that sees areas.
     light
         Relative change of the light from left to right and from top to bottom.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> time = np.arange(60) / 10e3  # s
+    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
+    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
+    >>> camera = lab.SyntheticCamera(shape=(160, 64))
+    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
     """
 
     frame_rate: float = 10_000.0
@@ -212,6 +223,17 @@ class SyntheticStage:
     ``marker_distance`` is from the tip to the sticker, ``marker_thickness`` its height along the motion; 0
     for no sticker.  ``slope`` is the beam's at the contact.  A dark beam before bright light is
     ``background`` above ``beam``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> time = np.arange(60) / 10e3  # s
+    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
+    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
+    >>> camera = lab.SyntheticCamera(shape=(160, 64))
+    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
     """
 
     beam_thickness: float = 0.4e-3
@@ -497,6 +519,11 @@ class Defects:
         A bar that never moves.
     drift
         Rows by which the whole picture has sunk at the end of the recording [px], evenly over time.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> defects = lab.Defects(repeated_frames=(10, 11), flicker=0.02)
     """
 
     glare_frames: Sequence[int] = ()
@@ -787,6 +814,19 @@ def render_recording(
     ------
     InputError
         If arrays disagree or the scene does not fit in the region, with the number of rows it takes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> time = np.arange(60) / 10e3  # s
+    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
+    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
+    >>> camera = lab.SyntheticCamera(shape=(160, 64))
+    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
+    >>> dict(synthetic.truth["displacement_mm"].sizes)
+    {'time': 69}
     """
     for name, value, kind in (("camera", camera, SyntheticCamera), ("stage", stage, SyntheticStage)):
         if value is not None:
@@ -896,6 +936,16 @@ def render_run(
     camera, stage, seed, **options
         As for :func:`render_recording`.  Unless a stage is given, its beam is as thick as the run's and the
         shaker stands on the run's side.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import lab, paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> synthetic = lab.render_run(run, camera=lab.SyntheticCamera(shape=(192, 64)))
     """
     dataset = check_trajectory(
         getattr(run, "dataset", run), ("displacement_at_striker", "striker_displacement")
@@ -968,6 +1018,13 @@ def render_vibrometer(
     -------
     xarray.DataArray
         The signal [m/s] with the truth in its attributes; write it with :func:`write_signal`.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> velocity.attrs["units"]
+    'm/s'
     """
     freq = positive("frequency", frequency, "Hz")
     amplitude = positive("velocity_amplitude", velocity_amplitude, "m/s")

@@ -28,7 +28,7 @@ from snapbeam.lab.sine_fit import (
     spectral_peak,
     stuck_runs,
 )
-from snapbeam.util.diagnostics import Diagnostic, doubtful
+from snapbeam.util.diagnostics import Diagnostic, diagnostics_of, doubtful
 from snapbeam.util.validation import InputError, finite, positive, within
 
 if TYPE_CHECKING:
@@ -585,6 +585,14 @@ class DriveMeasurement:
     ``flaws`` are samples (first, one past the last) that are no part of the motion, ``lines`` hum, which is taken
     out, and lines beside the sine; ``clipping`` the levels at which tops are cut off; ``diagnostics`` what makes the
     result doubtful.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> drive = lab.measure_drive(velocity, 100.0)
+    >>> f"{drive.steady.frequency:.1f} Hz"
+    '100.0 Hz'
     """
 
     steady: SineFit
@@ -676,6 +684,14 @@ def measure_drive(
     ------
     InputError
         If the signal is no such signal, or holds fewer than five cycles of steady motion.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> drive = lab.measure_drive(velocity, 100.0)
+    >>> f"{drive.steady.amplitude:.4f} m/s"
+    '0.0070 m/s'
     """
     samples = check_signal(signal, ("m/s", "m"), "signal")
     limit = finite("snr_limit", snr_limit)
@@ -727,6 +743,7 @@ def measure_drive(
         startup = _start_up(onset, uncertainty, settled, period, amplitudes, steady.amplitude, tol)
         broken = _broken_start(samples, onset, onset + settled * period, steady, clipping)
     diagnostics = [
+        *diagnostics_of(signal),
         *_flaw_diagnostics(samples, everywhere, broken, clipping),
         *_doubts(steady, limit, wander, stray, frequency, stated),
         *_start_diagnostics(startup, period),
@@ -911,6 +928,14 @@ def displacement_from_velocity(
     ------
     InputError
         As :func:`measure_drive`.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> drive = lab.measure_drive(velocity, 100.0)
+    >>> lab.displacement_from_velocity(velocity, drive).attrs["units"]
+    'm'
     """
     from scipy.interpolate import CubicSpline, make_smoothing_spline
 

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.lab.diagnostics import KINDS_COMPARISON
-from snapbeam.lab.signals import SignalSamples, make_signal
-from snapbeam.lab.sine_fit import SineFit, fit_sine
+from snapbeam.lab.signals import check_signal, make_signal
 from snapbeam.lab.vibrometer import measure_drive
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.util.diagnostics import Diagnostic
@@ -22,6 +21,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
+    "LEAST_CYCLES",
+    "TOO_SHORT",
     "MeasuredResponse",
     "WaveformComparison",
     "compare_waveforms",
@@ -72,8 +73,9 @@ _RATIO = 0.05  # share by which the shakers' amplitudes may differ
 class WaveformComparison:
     """A measured and a simulated run over the same cycles of excitation.
 
-    ``waveforms`` over ``cycle``: displacement and shaker displacement of both [b].  ``spectra`` over
-    ``frequency_ratio`` (multiples of the excitation): amplitude spectra of the two displacements [b].
+    ``waveforms`` over ``cycle``: displacement and shaker displacement of both [b], the measured shaker NaN if it was not
+    recorded.  ``spectra`` over ``frequency_ratio`` (multiples of the excitation): amplitude spectra of the two
+    displacements [b].  ``at`` names the variable that is compared.
     ``shift`` [cycles] was added to the measured clock.  ``rms_difference`` [b] and ``correlation`` are
     those of the beam, ``shaker_rms_difference`` [b] that of the shaker; ``measured_rms`` and
     ``simulated_rms`` [b] are the beam's motion about its mean.  ``parted`` [cycles] is where the two beams
@@ -95,13 +97,51 @@ class WaveformComparison:
     measured_impacts: _Array
     simulated_impacts: _Array
     diagnostics: tuple[Diagnostic, ...]
+    at: str = "displacement_at_striker"
+
+
+_PLACES = ("displacement_at_striker", "midspan_displacement")
+
+
+def run_of_signal(signal: xr.DataArray, length: float, at: str = "midspan_displacement") -> xr.Dataset:
+    """A measured displacement as a run, without a shaker.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Displacement [m] over ``time`` [s], zero midway between the wells (see :func:`read_signal`).
+    length : float
+        Length scale b of the structure [m].
+    at : {"midspan_displacement", "displacement_at_striker"}
+        Where it was measured.
+
+    Returns
+    -------
+    xarray.Dataset
+        Displacement over b.
+
+    Raises
+    ------
+    InputError
+        If the signal is no displacement.
+    """
+    from snapbeam.util.datasets import xr
+
+    choice("at", at, _PLACES)
+    scale = positive("length", length, "m")
+    samples = check_signal(signal, "m", "measured")
+    return xr.Dataset(
+        {at: ("time", samples.values / scale, {"units": "1"})},
+        {"time": ("time", samples.time, {"units": "s"})},
+    )
 
 
 def compare_waveforms(
-    measured: xr.Dataset,
+    measured: xr.Dataset | xr.DataArray,
     simulated: xr.Dataset,
     frequency: float | None = None,
     *,
+    at: str = "displacement_at_striker",
     start: float | None = None,
     cycles: tuple[float, float] | None = None,
     measured_onsets: ArrayLike | None = None,
@@ -111,8 +151,13 @@ def compare_waveforms(
 
     Parameters
     ----------
-    measured, simulated : xarray.Dataset
-        Runs (see :mod:`snapbeam.simulation.dataset`) with ``displacement_at_striker`` and ``striker_displacement`` [b].
+    measured : xarray.Dataset or xarray.DataArray
+        A run with *at* and ``striker_displacement`` [b] over ``time`` [s], as tracking gives it, or the signal of a
+        displacement sensor [m], zero midway between the wells.  Without the shaker, *start* alone aligns the runs.
+    simulated : xarray.Dataset
+        A run of :func:`~snapbeam.simulate`.
+    at : {"displacement_at_striker", "midspan_displacement"}
+        Where the displacement was measured.
     frequency : float, optional
         Excitation frequency [Hz] of the measured run, where it has no coordinate ``cycle``.
     start : float, optional
@@ -127,40 +172,73 @@ def compare_waveforms(
     ------
     InputError
         If a run lacks the shaker, the two share fewer than two cycles, or no frequency is known.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import lab, paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> frequency = 1.2 * model.reference_frequency  # Hz
+    >>> comparison = lab.compare_waveforms(run.dataset, run.dataset, frequency, cycles=(2, 18))
+    >>> f"{comparison.amplitude_ratio:.2f}"
+    '1.00'
     """
     from snapbeam.util.datasets import xr
 
+    choice("at", at, _PLACES)
+    if isinstance(measured, xr.DataArray):
+        if "length_scale" not in simulated.attrs:
+            raise InputError(
+                "simulated: has no attribute length_scale, m, to compare a displacement in m with"
+            )
+        measured = run_of_signal(measured, float(simulated.attrs["length_scale"]), at)
+    shaker_seen = "striker_displacement" in measured
+    needs = (at, "striker_displacement") if shaker_seen else (at,)
     for name, run in (("measured", measured), ("simulated", simulated)):
         try:
-            check_trajectory(run, require=("displacement_at_striker", "striker_displacement"))
+            check_trajectory(run, require=needs)
         except InputError as error:
             raise InputError(f"{name}: {error}") from error
-    if start is None and frequency is not None:
+    if start is None and frequency is not None and shaker_seen:
         start = start_of_shaker(measured, positive("frequency", frequency, "Hz"))
+    if start is None and not shaker_seen and "cycle" not in measured.coords:
+        raise InputError(
+            "start (--start): must be given, s, since the shaker was not recorded: the time at which it starts to move"
+        )
     clock, rate = _clock(measured, frequency, start)
     if "cycle" not in simulated.coords:
         raise InputError("simulated: must have the coordinate cycle")
     model_clock = np.asarray(simulated["cycle"].values, dtype=np.float64)
     model_rate = _cycles_per_second(simulated)
-    seen = _shaker_sine(measured, clock)
-    wanted = _shaker_sine(simulated, model_clock)
-    # cos(2 pi cycle + phase) of the measured shaker must turn with that of the simulated one
-    turn = (seen.phase - wanted.phase) / (2.0 * math.pi)
-    shift = (turn + 0.5) % 1.0 - 0.5
-    clock = clock + shift
+    shift, ratio = 0.0, math.nan
+    if shaker_seen:
+        seen = _shaker_sine(measured, clock)
+        wanted = _shaker_sine(simulated, model_clock)
+        # cos(2 pi cycle + phase) of the measured shaker must turn with that of the simulated one
+        shift = ((seen[1] - wanted[1]) / (2.0 * math.pi) + 0.5) % 1.0 - 0.5
+        ratio = seen[0] / wanted[0]
+    clock = np.asarray(clock + shift, dtype=np.float64)
     low, high = max(clock[0], model_clock[0], 0.0), min(clock[-1], model_clock[-1])
     if cycles is not None:
         low, high = max(low, float(cycles[0])), min(high, float(cycles[1]))
     if high - low < 2.0:
         raise InputError(f"runs share {max(high - low, 0.0):.1f} cycles: must share at least 2")
+    low = float(clock[np.searchsorted(clock, low)])  # a sample, so that no measured value lies between two
     step = max(float(np.median(np.diff(clock))), 1.0 / 400.0)
-    grid = low + step * np.arange(int((high - low) / step + 1e-9) + 1)
+    grid = np.asarray(low + step * np.arange(int((high - low) / step + 1e-9) + 1), dtype=np.float64)
     columns = {
-        "measured_displacement": _on(grid, clock, measured["displacement_at_striker"].values),
-        "simulated_displacement": _on(grid, model_clock, simulated["displacement_at_striker"].values),
-        "measured_shaker": _on(grid, clock, measured["striker_displacement"].values),
-        "simulated_shaker": _on(grid, model_clock, simulated["striker_displacement"].values),
+        "measured_displacement": _on(grid, clock, measured[at].values),
+        "simulated_displacement": _on(grid, model_clock, simulated[at].values),
+        "measured_shaker": np.full(grid.size, np.nan),
+        "simulated_shaker": np.full(grid.size, np.nan),
     }
+    if shaker_seen:
+        columns["measured_shaker"] = _on(grid, clock, measured["striker_displacement"].values)
+    if "striker_displacement" in simulated:
+        columns["simulated_shaker"] = _on(grid, model_clock, simulated["striker_displacement"].values)
     waveforms = xr.Dataset(
         {name: ("cycle", value, {"units": "1"}) for name, value in columns.items()},
         {"cycle": ("cycle", grid, {"long_name": "cycles of excitation", "units": "1"})},
@@ -174,22 +252,25 @@ def compare_waveforms(
     spread = float(np.std(one[both])), float(np.std(two[both]))
     same = float(np.corrcoef(one[both], two[both])[0, 1]) if min(spread) > 0.0 else math.nan
     apart = max(_APART, 5.0 * float(measured.attrs.get("displacement_error_b", 0.0)))
-    diagnostics = _diagnostics(
-        columns, grid, shift, seen.amplitude / wanted.amplitude, start is not None or frequency is None
-    )
+    if shaker_seen:
+        diagnostics = _diagnostics(columns, grid, shift, ratio, start is not None or frequency is None)
+    else:
+        diagnostics = [KINDS_COMPARISON["no_shaker"].found()]
+    diagnostics += _gaps(columns)
     return WaveformComparison(
         waveforms=waveforms,
         spectra=_spectra(grid, step, columns),
         shift=shift,
         rms_difference=float(np.sqrt(np.mean((one[both] - two[both]) ** 2))),
         correlation=same,
-        shaker_rms_difference=float(np.std(shaker)),
+        shaker_rms_difference=float(np.std(shaker)) if shaker.size else math.nan,
         measured_rms=spread[0],
         simulated_rms=spread[1],
-        amplitude_ratio=seen.amplitude / wanted.amplitude,
+        amplitude_ratio=ratio,
         parted=_parted(grid, one - two, apart),
         apart=apart,
         diagnostics=tuple(diagnostics),
+        at=at,
         measured_impacts=_impacts(
             measured_onsets, start or float(measured["time"][0]), rate, shift, low, high
         ),
@@ -212,10 +293,13 @@ def _diagnostics(
             told.append(KINDS_COMPARISON["shifted"].found(shift=shift))
     if abs(ratio - 1.0) > _RATIO:
         told.append(KINDS_COMPARISON["amplitude"].found(ratio=ratio))
-    missing = float(np.mean(~np.isfinite(columns["measured_displacement"])))
-    if missing > 0.1:
-        told.append(KINDS_COMPARISON["gaps"].found(share_percent=100.0 * missing))
     return told
+
+
+def _gaps(columns: dict[str, _Array]) -> list[Diagnostic]:
+    """Whether much of the measured displacement is missing."""
+    missing = float(np.mean(~np.isfinite(columns["measured_displacement"])))
+    return [KINDS_COMPARISON["gaps"].found(share_percent=100.0 * missing)] if missing > 0.1 else []
 
 
 def _same_way(columns: dict[str, _Array], grid: _Array, shift: float) -> float:
@@ -255,8 +339,8 @@ def _cycles_per_second(run: xr.Dataset) -> float:
     return float((cycle[-1] - cycle[0]) / (time[-1] - time[0]))
 
 
-def _shaker_sine(run: xr.Dataset, clock: _Array) -> SineFit:
-    """The shaker's sine over cycles, fitted to the later two thirds of the run."""
+def _shaker_sine(run: xr.Dataset, clock: _Array) -> tuple[float, float]:
+    """Amplitude and phase of the shaker's sine over cycles, fitted to the samples of the later two thirds of the run."""
     values = np.asarray(run["striker_displacement"].values, dtype=np.float64)
     good = np.isfinite(values) & (clock >= 0.0)
     if good.sum() < 64:
@@ -264,13 +348,11 @@ def _shaker_sine(run: xr.Dataset, clock: _Array) -> SineFit:
     span = clock[good][-1] - clock[good][0]
     if span < 3.0:
         raise InputError(f"run: {span:.1f} cycles of the shaker: must be at least 3")
-    begin = clock[good][0] + span / 3.0 if span > 6.0 else clock[good][0]
-    count = int(min((clock[good][-1] - begin) * 64, 20_000))
-    even = begin + (clock[good][-1] - begin) * np.arange(count) / count
-    samples = SignalSamples(
-        np.interp(even, clock[good], values[good]), even, count / (clock[good][-1] - begin)
-    )
-    return fit_sine(samples, 1.0, 1, fixed=True)
+    good &= clock >= clock[good][0] + (span / 3.0 if span > 6.0 else 0.0)
+    turn = 2.0 * math.pi * clock[good]
+    columns = np.column_stack([np.cos(turn), np.sin(turn), np.ones_like(turn), turn])
+    cosine, sine = np.linalg.lstsq(columns, values[good], rcond=None)[0][:2]
+    return math.hypot(cosine, sine), math.atan2(-sine, cosine)
 
 
 def _on(grid: _Array, clock: _Array, values: NDArray[Any]) -> _Array:
@@ -315,6 +397,8 @@ def _impacts(
 
 
 _HYSTERESIS = 5.0  # in standard deviations of the noise
+TOO_SHORT = "too short"
+"""First words of the reason that too few cycles were recorded; the status of such a test."""
 LEAST_CYCLES = 20  # the rule of more than n/5 crossings in n cycles means nothing below n = 5
 _WHOLE = 0.98  # share of the wanted cycles that counts as all of them
 
@@ -326,6 +410,17 @@ class MeasuredResponse:
     ``response_class`` is UNKNOWN where ``reasons`` say why.  ``zero_crossings`` is at least what happened: more may
     hide in dropouts.  ``noise`` and ``hysteresis`` are in units of b; ``final_well`` is -1 or 1, the sign
     at the end.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import lab, paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> lab.measure_response(run.dataset, cycles=20).response_class.label
+    'continuous interwell'
     """
 
     response_class: ResponseClass
@@ -382,6 +477,17 @@ def measure_response(
     ------
     InputError
         If the dataset is no run, or neither *frequency* nor ``cycle`` says how long a cycle is.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import lab, paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> lab.measure_response(run.dataset, cycles=20).zero_crossings
+    16
     """
     choice("at", at, ("displacement_at_striker", "midspan_displacement"))
     check_trajectory(run, require=(at,))
@@ -423,10 +529,10 @@ def measure_response(
     if first == 0 or final == 0:
         reasons.append("the displacement never leaves the hysteresis about zero")
     if wanted < LEAST_CYCLES:
-        reasons.append(f"too short to tell: {wanted} cycles, the rule needs {LEAST_CYCLES}")
+        reasons.append(f"{TOO_SHORT} to tell: {wanted} cycles, the rule needs {LEAST_CYCLES}")
     certain_continuous = late > wanted / 20.0
     if total < _WHOLE * wanted and not certain_continuous:
-        reasons.append(f"too short to tell: {total:.1f} of {wanted} cycles recorded")
+        reasons.append(f"{TOO_SHORT} to tell: {total:.1f} of {wanted} cycles recorded")
     typical = float(np.median(gaps)) if gaps.size else 0.0
     if longest > max(0.25, 4.0 * typical) and not certain_continuous:
         reasons.append(f"a dropout of {longest:.2f} cycles could hide crossings")

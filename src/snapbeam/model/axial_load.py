@@ -43,6 +43,11 @@ class HarmonicLoad(LoadMotion):
         P_1, N.
     phase : float
         At the start, rad.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))
     """
 
     frequency_ratio: float = quantity(
@@ -94,6 +99,11 @@ class LoadRamp(LoadMotion, Timed):
         Periods of the first mode that the change takes.
     hold_periods : float
         Periods that it stays; then it goes back as it came.  Infinite, as by default: it never goes back.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> load = sb.AxialLoadModulation(motion=sb.LoadRamp(change=2.0, duration=5.0))
     """
 
     change: float = quantity("N", "change of the axial load", scope=RUN, short="load_change")
@@ -161,6 +171,13 @@ class AxialLoadModulation:
     ----------
     motion : LoadMotion
         :class:`~snapbeam.HarmonicLoad` or :class:`~snapbeam.LoadRamp`.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))
+    >>> load.motion.amplitude
+    3.0
     """
 
     motion: Drive

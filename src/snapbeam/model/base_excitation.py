@@ -46,6 +46,15 @@ class BaseExcitation:
     ------
     InputError
         For a motion without an acceleration, such as a record or a free flight.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> base = sb.BaseExcitation(
+    ...     motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25), direction="up"
+    ... )
+    >>> base.striker_on_base
+    True
     """
 
     motion: Drive

@@ -60,6 +60,15 @@ class Beam:
     InputError
         If a value is not finite or not positive where it must be, or if both or neither of
         ``buckling_level`` and ``axial_load`` are given.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> beam = sb.Beam(
+    ...     length=0.16, thickness=0.4e-3, width=4e-3, density=8000.0, young_modulus=200e9, buckling_level=0.5e-3
+    ... )
+    >>> f"{beam.axial_load:.1f} N"
+    '14.3 N'
     """
 
     length: float = quantity(

@@ -28,6 +28,13 @@ class BoundaryConditions:
         Rotational stiffness, N m/rad: 0 is a pinned end, and clamped is what nothing is given for.
     axial_support_stiffness : float, optional
         K, N/m; rigid by default.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> ends = sb.BoundaryConditions(left_rotational_stiffness=5.0, right_rotational_stiffness=5.0)
+    >>> ends.is_clamped
+    False
     """
 
     left_rotational_stiffness: float | None = quantity(

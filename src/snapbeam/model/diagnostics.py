@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from snapbeam.model.beam import Beam
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.harvester import Harvester, PiezoelectricHarvester
@@ -17,6 +19,8 @@ _STEEP = 0.2
 """Greatest slope of the buckled beam, pi b / L, up to which w is small against L."""
 _STOCKY = 0.1
 """Thickness over length up to which shear and rotary inertia may be left out."""
+_CENTRAL = 0.05
+"""Distance of a striker from the centre, over the length, below which it hardly excites antisymmetric modes."""
 _LARGEST_RATIO = 20.0
 _LARGEST_AMPLITUDE = 20.0
 
@@ -29,7 +33,7 @@ def doubts_of(
     model: ReducedModel, striker: Striker | None, harvester: Harvester | None = None
 ) -> tuple[Diagnostic, ...]:
     """Diagnostics about a structure, what strikes it and its harvester."""
-    found = [] if model.beam is None else _of_beam(model.beam) + _of_modes(model, model.beam)
+    found = [] if model.beam is None else _of_beam(model.beam) + _of_modes(model, model.beam, striker)
     if striker is not None and isinstance(striker.drive, Sine):
         found += _of_sine(striker.drive, model)
     if isinstance(harvester, PiezoelectricHarvester) and model.beam is not None:
@@ -92,24 +96,27 @@ def _of_beam(beam: Beam) -> list[Diagnostic]:
     return found
 
 
-def _of_modes(model: ReducedModel, beam: Beam) -> list[Diagnostic]:
-    if (
-        model.modes < 2
-        or not beam.is_buckled
-        or model.parity[0] >= 0
-        or model.given_reference_frequency is not None
-    ):
+def _of_modes(model: ReducedModel, beam: Beam, striker: Striker | None) -> list[Diagnostic]:
+    if model.modes < 2 or model.given_reference_frequency is not None:
         return []
-    symmetric = float(model.natural_frequencies[model.parity > 0][0])
+    well = model.about_reference_well
+    symmetric = well.natural_frequencies[well.parity > 0]
+    if well.parity[0] >= 0 or not symmetric.size or not np.any(well.well_amplitude):
+        return []
     level = beam.buckling_level / beam.radius_of_gyration
+    words = {"upper": "the upper well", "lower": "the lower well", "only": "the equilibrium"}
+    name = words.get(model.reference_well, "a well")
+    perfect = f"b/r = {level:.3g}: " if model.imperfection is None else ""
+    limit = " (of a clamped beam above 6.21)" if model.imperfection is None else ""
+    central = striker is None or abs(striker.location - 0.5) < _CENTRAL
+    hint = ", which a striker at the centre does not excite" if central else ""
     return [
         Diagnostic(
             "first-mode-antisymmetric",
-            f"b/r = {level:.3g}: the lowest mode about a well is antisymmetric (of the beam itself above 6.21), and "
-            "omega_1, by which Omega and V are normalised, is its frequency "
-            f"({model.natural_frequencies[0]:.5g} Hz), although a striker at the centre cannot excite it; set "
-            f"model.reference_frequency = {symmetric:.5g} Hz to normalise by the first symmetric mode",
-            {"buckling_level_over_radius": level, "symmetric_frequencies": symmetric},
+            f"{perfect}the lowest mode about {name} is antisymmetric{limit}, and omega_1, by which Omega and V are "
+            f"normalised, is its frequency ({well.natural_frequencies[0]:.5g} Hz){hint}; set "
+            f"model.reference_frequency = {symmetric[0]:.5g} Hz to normalise by the first symmetric mode",
+            {"buckling_level_over_radius": level, "symmetric_frequencies": float(symmetric[0])},
         )
     ]
 

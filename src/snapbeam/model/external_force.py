@@ -51,6 +51,11 @@ class HarmonicForce(ForceHistory):
         F_0, N.
     phase : float
         At the start, rad; pi/2 gives a cosine.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> force = sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=0.9, amplitude=0.1), location=0.5)
     """
 
     frequency_ratio: float = quantity(
@@ -111,6 +116,11 @@ class ConstantForce(ForceHistory, Timed):
     ----------
     force : float
         N.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> weight = sb.ExternalForce(history=sb.ConstantForce(force=-9.81e-3))
     """
 
     force: float = quantity("N", "constant force", scope=RUN, short="constant_force")
@@ -153,6 +163,13 @@ class RecordedForce(ForceHistory, Timed):
         N, the first sample at the start of the run.
     sampling_frequency : float
         Samples per second, Hz.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> record = 0.1 * np.sin(2.0 * np.pi * 80.0 * np.arange(2000) / 1e4)
+    >>> force = sb.ExternalForce(history=sb.RecordedForce(record=record, sampling_frequency=1e4), location=0.5)
     """
 
     record: NDArray[np.float64] = quantity("N", "force, sampled", kind=object)

@@ -93,6 +93,11 @@ class PiezoelectricHarvester(Harvester):
         R of the load, ohm.
     patch_start, patch_end : float
         x_1 and x_2 over the length.  A patch from clamp to clamp couples to nothing: the slopes at its ends are 0.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> harvester = sb.PiezoelectricHarvester(moment_per_volt=1e-5, capacitance=60e-9, resistance=1e5)
     """
 
     moment_per_volt: float = quantity(
@@ -226,6 +231,11 @@ class ElectromagneticHarvester(Harvester):
         R_c (ohm) and L_c (H) of the coil; without an inductance the current follows the velocity at once.
     location : float
         x_c over the length.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> harvester = sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resistance=10.0)
     """
 
     force_factor: float = quantity("N/A", "force of the coil per ampere", symbol="K")

@@ -105,6 +105,14 @@ class Imperfection:
     ------
     InputError
         For values that are not finite or out of range, and for a profile that does not go from end to end.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, imperfection=sb.Imperfection(midspan_amplitude=2e-6))
+    >>> len(model.wells)
+    2
     """
 
     midspan_amplitude: float = quantity(

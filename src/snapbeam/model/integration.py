@@ -52,6 +52,13 @@ class Integration:
     ------
     InputError
         For values out of range, or a tolerance beside a step or an accuracy.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> integration = sb.Integration(cycles=200, accuracy="reference")
+    >>> integration.replace(cycles=1000).cycles
+    1000
     """
 
     cycles: int | None = quantity(

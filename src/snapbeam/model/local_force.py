@@ -54,6 +54,17 @@ class LocalForce:
     -----
     In modal coordinates about a well, p' = ... + r F(u, v) with r = V^T shape, u = u_well + r . q and v = r . p.  The wells of
     the model are those without the force: where F is not 0 in a well, a run that begins there begins out of equilibrium.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=2),
+    ...     local_force=sb.LocalSpring(stiffness=20.0, location=0.4),
+    ... )
+    >>> system.get("local_force.stiffness")
+    20.0
     """
 
     location: float | None = quantity(

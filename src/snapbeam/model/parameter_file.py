@@ -63,7 +63,7 @@ __all__ = [
 
 
 MATERIALS = {
-    "radius": ("m", "radius of the sphere", (1e-9, 10.0, "mm")),
+    "radius": ("m", "radius of the sphere", (1e-7, 1.0, "mm")),
     "young_modulus": ("Pa", "Young's moduli of sphere and beam", None),
     "poisson_ratio": ("1", "Poisson ratios of sphere and beam", None),
 }

@@ -95,7 +95,16 @@ class ParameterField:
 
 
 def quantity(unit: str, words: str, *, default: Any = dataclasses.MISSING, **more: Any) -> Any:
-    """A dataclass field that is a :class:`ParameterField`."""
+    """A dataclass field that is a :class:`ParameterField`.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> import snapbeam as sb
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class Magnet(sb.LocalForce):
+    ...     constant: float = sb.quantity("N m^2", "constant of the magnet", low=0.0)
+    """
     return dataclasses.field(default=default, metadata={"quantity": ParameterField(unit, words, **more)})
 
 

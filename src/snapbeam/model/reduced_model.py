@@ -248,6 +248,7 @@ class Wells:
     transverse_force: _Array | None
     imperfection: Imperfection | None
     beam: Beam | None
+    given_reference_frequency: float | None
     natural_frequencies: Any
     mass: _Array
     elongation_matrix: _Array | None
@@ -324,8 +325,8 @@ class Wells:
         )
 
     @property
-    def _about_deepest(self) -> Self:
-        """The model, or its mirror image, whose lower well is the one of least energy."""
+    def about_reference_well(self) -> Self:
+        """The model, or its mirror image, whose lower well is the one of least energy: its first frequency normalises."""
         if self.landscape is None or not self.is_bistable:
             return self
         own, other = (each.energy for each in (self.landscape.lower, self.landscape.upper))
@@ -364,6 +365,36 @@ class Wells:
             f"{what} needs a buckled beam: axial_load = {self.beam.axial_load:g} N must exceed the critical "
             f"load of {self.beam.critical_load:g} N"
         )
+
+    @property
+    def as_fabricated_well(self) -> str | None:
+        """The well on the side of the initial shape, "lower" or "upper"; None without an initial shape at the centre."""
+        if self.beam is None or self.imperfection is None:
+            return None
+        initial = self.imperfection.initial_shape(self.beam.buckling_modes(self.well_amplitude.size))
+        height = float(self.midspan_shape @ initial)
+        return None if height == 0.0 else "upper" if height > 0.0 else "lower"
+
+    @property
+    def reference_well(self) -> str:
+        """The well whose first natural frequency normalises: "lower", "upper", "either" of equal ones, or "only".
+
+        "given" if a reference frequency was given.
+        """
+        if self.given_reference_frequency is not None:
+            return "given"
+        if not self.is_bistable:
+            return "only"
+        if self.landscape is None:
+            return "either"
+        return "lower" if self.about_reference_well is self else "upper"
+
+    def side_of(self, amplitude: ArrayLike) -> str:
+        """The well on whose side of :attr:`dividing_height` the centre is, "lower" or "upper"; "only" of one well."""
+        if not self.is_bistable:
+            return "only"
+        height = float(self.midspan_shape @ self._amplitudes("amplitude", amplitude))
+        return "upper" if height > self.dividing_height else "lower"
 
     @cached_property
     def two_well_limits(self) -> str:
@@ -535,6 +566,16 @@ class ReducedModel(Wells):
         Displacement of each coordinate per unit of the base's, of a structure given by matrices.
     elongation_matrix : array of shape (N, N) or None
         S of the term gamma (alpha . S alpha) S alpha, of a structure given by matrices; None for the identity.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=8, damping_ratio=0.005)
+    >>> round(model.reference_frequency, 2)
+    81.92
+    >>> model.is_bistable
+    True
     """
 
     mass: _Array
@@ -837,13 +878,29 @@ class ReducedModel(Wells):
         """
         if self.given_reference_frequency is not None:
             return self.given_reference_frequency
-        first = float(self._about_deepest.natural_frequencies[0])
+        first = float(self.about_reference_well.natural_frequencies[0])
         if first == 0.0:
             raise InputError(
                 "reference_frequency is not given and the first natural frequency is 0: "
                 "give reference_frequency in Hz, greater than 0"
             )
         return first
+
+    @property
+    def reference_text(self) -> str:
+        """In words, the frequency that normalises, its well, and the well where a run without a striker begins."""
+        names = {
+            "given": "as given",
+            "only": "the first frequency about the equilibrium",
+            "either": "the first frequency about either well",
+        }
+        well = names.get(self.reference_well, f"the first frequency about the {self.reference_well} well")
+        text = f"Omega = 1 is {self.reference_frequency:.3f} Hz, {well}"
+        if not self.is_bistable:
+            return text
+        start = self.as_fabricated_well
+        begins = "the lower well" if start is None else f"the {start} well, as fabricated"
+        return f"{text}; a run without a striker begins in {begins}"
 
 
 def _symmetric(matrix: _Array) -> _Array:

@@ -71,6 +71,15 @@ class State:
     ------
     InputError
         For shapes that do not fit each other, or numbers that are not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=0.005)
+    >>> start = sb.State(amplitude=1.1 * model.well_amplitude, velocity=np.zeros(2))
+    >>> system = sb.System(model, initial_state=start)
     """
 
     amplitude: _Array
@@ -283,8 +292,12 @@ def amplitude_scale(model: ReducedModel) -> float:
 
 
 def rest_state(model: ReducedModel, striker: Striker | None = None) -> State:
-    """At rest in the well that the striker pushes away from, and touched by it."""
-    if striker is not None and striker.side == "above":
+    """At rest in the well that the striker pushes away from, and touched by it.
+
+    Without a striker: in the as-fabricated well, on the side of the initial shape; in the lower one of a beam without.
+    """
+    fabricated = striker is None and model.is_bistable and model.as_fabricated_well == "upper"
+    if fabricated or (striker is not None and striker.side == "above"):
         return State(amplitude=-model.mirrored.well_amplitude)
     return State(amplitude=model.well_amplitude)
 

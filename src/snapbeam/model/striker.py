@@ -57,6 +57,13 @@ class Striker:
         Stiffness k_s of its suspension, N/m; 0 is a free flying mass.
     suspension_damping : float
         Damper c_s of its suspension, N s/m, below critical; a coil of force factor K on a resistance R adds K^2/R.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> striker = sb.Striker(
+    ...     drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.18), location=0.4, side="above", gap=2e-5
+    ... )
     """
 
     drive: Drive
@@ -142,6 +149,11 @@ class Shaker:
     side : {"below", "above"}
         Side of the beam the shaker pushes from.  ``"below"``: it pushes upward on the beam at rest in
         its lower well.  ``"above"`` is the mirror image, downward on the upper well.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18, location=1 / 2.1)
     """
 
     frequency_ratio: float
@@ -178,6 +190,12 @@ class ContactPair:
     striker : Striker
         Without a gap its tip touches the beam at rest in the well that the first striker pushes away from.
     contact : ContactLaw
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5)
+    >>> pair = sb.ContactPair(stop, sb.HertzContact(1e9))
     """
 
     striker: Striker

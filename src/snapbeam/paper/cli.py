@@ -95,7 +95,13 @@ def reproduce(
             given["measured"] = [str(file) for file in measured]
         files = FIGURES[name].write(output, results=results, **given)
         written += files
-        out().print(f"{name}: {FIGURES[name].about} ({size}, {duration(time.monotonic() - start)})")
+        took = duration(time.monotonic() - start)
+        if full:
+            out().print(f"{name}: {FIGURES[name].about} ({size}, {took})")
+        else:
+            out().print(
+                f"{name}: quick sketch, {_computed(results, name)} ({took}); with --full {FIGURES[name].about}"
+            )
         for file in files:
             out().print(f"  {file_line(file)}")
     if figure in ("claims", "all"):
@@ -111,6 +117,16 @@ def reproduce(
             out().print(f"  {file_line(file)}")
 
     add_json(figure=figure, size=size, files=written)
+
+
+def _computed(results: Any, name: str) -> str:
+    """Modes and cycles that were run for a figure, from the attributes of its data."""
+    words = []
+    for key, symbol in (("modes", "N = {}"), ("cycles", "{} cycles")):
+        found = sorted({float(each.attrs[key]) for each in results[name].values() if key in each.attrs})
+        if found:
+            words.append(symbol.format(" and ".join(f"{value:g}" for value in found)))
+    return ", ".join(words) or "with a small grid"
 
 
 def _check_measured(

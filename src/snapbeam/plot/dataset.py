@@ -17,6 +17,7 @@ from snapbeam.plot.dynamics import (
     plot_section,
     plot_survival,
 )
+from snapbeam.plot.force_displacement import plot_force_displacement
 from snapbeam.plot.map import plot_response_map, plot_statistic
 from snapbeam.plot.run import (
     plot_energies,
@@ -37,7 +38,7 @@ __all__ = ["figures_of", "plot_dataset"]
 
 
 _Draws = Callable[..., "Axes"]
-_RUN = {
+_RUN: dict[str, tuple[_Draws, str]] = {
     "run": (plot_run, "displacement_at_striker"),
     "modal_amplitudes": (plot_modal_amplitudes, "modal_amplitude"),
     "energies": (plot_energies, "energy_beam"),
@@ -65,7 +66,11 @@ def _named(function: Callable[..., Axes], name: str) -> _Draws:
 
 
 def _run(dataset: xr.Dataset) -> dict[str, _Draws]:
-    return {name: function for name, (function, needed) in _RUN.items() if needed in dataset}
+    figures: dict[str, _Draws] = {}
+    for name, (function, needed) in _RUN.items():
+        if needed in dataset:
+            figures[name] = function
+    return figures
 
 
 def _map(dataset: xr.Dataset) -> dict[str, _Draws]:
@@ -76,6 +81,12 @@ def _map(dataset: xr.Dataset) -> dict[str, _Draws]:
         if item.dtype.kind in "biuf" and set(item.dims) == over and name != "response_class"
     ]
     return {"response_class": plot_response_map} | {name: _named(plot_statistic, name) for name in others}
+
+
+def _swept(dataset: xr.Dataset) -> dict[str, _Draws]:
+    figures = _map(dataset)
+    del figures["response_class"]
+    return figures
 
 
 def _lifetimes(dataset: xr.Dataset) -> dict[str, _Draws]:
@@ -130,6 +141,11 @@ _KINDS = (
     _Kind("basins of attraction", {"basin"}, set(), lambda _: {"basin": plot_basins}),
     _Kind("bifurcation diagram", set(), {"sweep", "period"}, _diagram),
     _Kind("section", {"drive_phase"}, {"point"}, _section),
+    _Kind("statistics swept up and down", {"response_class"}, {"sweep"}, _swept),
+    _Kind(
+        "force-displacement curve", {"snap_through_force"}, {"branch_number"},
+        lambda _: {"force": plot_force_displacement},
+    ),
     _Kind("map", {"response_class"}, set(), _map),
 )  # fmt: skip
 
@@ -179,6 +195,17 @@ def plot_dataset(
     ------
     InputError
         If the dataset has no such figure; the message lists those that it has.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=10))
+    >>> ax = sb.plot.plot_dataset(run.dataset, "phase_portrait")
+    >>> ax = run.dataset.snapbeam.plot()
     """
     from snapbeam.util.datasets import xr
 

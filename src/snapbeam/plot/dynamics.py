@@ -64,6 +64,16 @@ def plot_diagram(
     ------
     InputError
         If there is nothing to draw, or branches are asked for beside another variable.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> diagram = sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", [0.02, 0.03, 0.04])
+    >>> ax = sb.plot.plot_diagram(diagram)
     """
     branches = list(branches)
     if dataset is None and not branches:
@@ -185,6 +195,20 @@ def plot_lifetimes(
     ------
     InputError
         If the dataset holds no lifetimes over one or two parameters.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> axes = {"drive.velocity_amplitude": [0.1, 0.2]}
+    >>> settings = sb.dynamics.LifetimeSettings(settling_cycles=5)
+    >>> lifetimes = sb.dynamics.lifetime_map(
+    ...     system, axes, sb.Integration(cycles=20), initial_conditions=4, settings=settings
+    ... )
+    >>> ax = sb.plot.plot_lifetimes(lifetimes)
     """
     if "lifetime" not in dataset:
         raise InputError(f"no lifetimes among {list(map(str, dataset.variables))}")
@@ -245,6 +269,20 @@ def plot_survival(
 
     The curve ends ``settling_cycles`` before the end of the runs.  A ring there marks the fraction of right-censored
     runs, which were still snapping.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> axes = {"drive.velocity_amplitude": [0.1, 0.2]}
+    >>> settings = sb.dynamics.LifetimeSettings(settling_cycles=5)
+    >>> lifetimes = sb.dynamics.lifetime_map(
+    ...     system, axes, sb.Integration(cycles=20), initial_conditions=4, settings=settings
+    ... )
+    >>> ax = sb.plot.plot_survival(lifetimes)
     """
     if "last_snap" not in dataset:
         raise InputError("dataset: holds no lifetimes of starts")
@@ -337,6 +375,15 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     ------
     InputError
         If the dataset has no exponents over at most two parameters, or does not contain the period.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> ax = sb.plot.plot_exponents(sb.dynamics.lyapunov_spectrum(system, periods=40, transient=20))
     """
     if "exponent" not in dataset:
         raise InputError(f"no exponents among {list(map(str, dataset.variables))}")
@@ -448,6 +495,16 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     ------
     InputError
         If the dataset has no multipliers.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> orbit = sb.dynamics.periodic_orbit(system, transient=200)
+    >>> ax = sb.plot.plot_multipliers(orbit.to_dataset())
     """
     if not {"multiplier_real", "multiplier_imag"} <= set(map(str, dataset.variables)):
         raise InputError(f"no multipliers among {list(map(str, dataset.variables))}")
@@ -518,6 +575,16 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     ------
     InputError
         If the dataset has no attractors.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> attractors = sb.dynamics.find_attractors(system, 12)
+    >>> ax = sb.plot.plot_attractors(attractors.to_dataset())
     """
     if "points" not in dataset or "attractor" not in dataset["points"].dims:
         raise InputError(f"no attractors among {list(map(str, dataset.variables))}")
@@ -549,7 +616,17 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
 
 @checked
 def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_displacement") -> Axes:
-    """Draw a Poincare section: a displacement against its velocity."""
+    """Draw a Poincare section: a displacement against its velocity.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> ax = sb.plot.plot_section(sb.dynamics.poincare_section(system, "impact", 20, transient=20))
+    """
     y = x.replace("displacement", "velocity")
     if x not in dataset or y not in dataset:
         raise InputError(f"no {x} and {y} among {list(map(str, dataset.variables))}")
@@ -580,7 +657,19 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
 
 @checked
 def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
-    """Draw basins of attraction: a colour an attractor, grey where it is undecided, attractors as rings."""
+    """Draw basins of attraction: a colour an attractor, grey where it is undecided, attractors as rings.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> found = sb.dynamics.find_attractors(system, 12)
+    >>> grid = {"amplitude[1]": [-1.2, 0.0, 1.2], "velocity[1]": [-0.5, 0.5]}
+    >>> ax = sb.plot.plot_basins(sb.dynamics.basins_of_attraction(found, grid))
+    """
     if "basin" not in dataset:
         raise InputError(f"no basins among {list(map(str, dataset.variables))}")
     names = [str(name) for name in dataset["basin"].dims]

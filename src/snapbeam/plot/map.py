@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 import warnings
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,8 @@ from snapbeam.plot.axes import axis_label, dress, edges_of, positions, symbol_of
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CLASS_COLORS,
+    SHAKER_COLOR,
+    base_and_load,
     beam_text,
     class_cells,
     figure_style,
@@ -57,6 +60,8 @@ UPWARD = ("velocity_amplitude", "location")
 
 _CURVES = ("min_midspan_displacement", "max_midspan_displacement")
 """Drawn over the classes of a map over one axis."""
+_LONGEST = 38
+"""Characters of a line beside a map of one column."""
 _NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
 
 
@@ -98,6 +103,17 @@ def plot_response_map(
     ------
     InputError
         If the dataset is not a map of one or two axes.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> axes = {"drive.frequency_ratio": [0.7, 0.8], "drive.velocity_amplitude": [0.1, 0.2]}
+    >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_response_map(dataset)
     """
     from snapbeam.util.datasets import xr
 
@@ -225,6 +241,7 @@ def subtitle(dataset: xr.Dataset, axes: tuple[str, ...]) -> str:
         value = _scalar(dataset, name)
         if name not in axes and value is not None:
             parts.append(f"{symbol_of(dataset, name)} = {value:.4g}")
+    parts += base_and_load(dataset)
     beam = "" if any(name.startswith("beam") for name in axes) else beam_text(dataset.attrs)
     return "\n".join(line for line in (beam, ", ".join(parts)) if line)
 
@@ -235,7 +252,13 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     Parameters
     ----------
     kinds : int8 array, optional
-        Classes of runs, whose shares then stand beside the names; unknown ones are named if there are any.
+        Classes of runs, whose shares then stand beside the names; classes without runs are left out.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> [handle.get_label() for handle in sb.plot.class_handles()][:2]
+    ['intrawell', 'transient interwell 1']
     """
     if kinds is not None:
         try:
@@ -340,7 +363,7 @@ def plot_statistic(
     Parameters
     ----------
     dataset : xarray.Dataset
-        A map.
+        A map, or a result of :func:`snapbeam.dynamics.hysteresis`, whose two sweeps are drawn as two lines.
     name : str
         One of :data:`snapbeam.STATISTICS`, or any other variable over the axes.
     ax : matplotlib.axes.Axes, optional
@@ -356,6 +379,17 @@ def plot_statistic(
     ------
     InputError
         If there is no such variable, or it is over more than two axes.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> axes = {"drive.frequency_ratio": [0.7, 0.8], "drive.velocity_amplitude": [0.1, 0.2]}
+    >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_statistic(dataset, "peak_force")
     """
     from snapbeam.util.datasets import xr
 
@@ -364,7 +398,9 @@ def plot_statistic(
         raise InputError(f"variable = {shown(name)}: the map has {', '.join(map(str, dataset.data_vars))}")
     if dataset[name].dims == ("point",):
         return plot_points(dataset, name, ax)
-    values = dataset[name].squeeze()
+    values = dataset[name].squeeze(
+        [each for each, size in dataset[name].sizes.items() if size == 1 and each != "sweep"]
+    )
     dims = [str(each) for each in values.dims]
     if not 1 <= len(dims) <= 2 or "point" in dims:
         sizes = ", ".join(f"{key} {size}" for key, size in values.sizes.items()) or "none"
@@ -380,7 +416,11 @@ def plot_statistic(
         if ax is None:
             ax = new_figure("single", 74.0).add_subplot()
         fix_ticks(ax)
-        if len(dims) == 1:
+        if dims[:1] == ["sweep"]:
+            _swept(ax, dataset, data, dims[1])
+            ax.set_ylabel(label)
+            ax.set_yscale("log" if log else "linear")
+        elif len(dims) == 1:
             points, _ = positions(dataset, dims[0])
             ax.plot(points, data.values, ".-", color=BEAM_COLOR, markersize=3)
             dress(ax.xaxis, dataset, dims[0])
@@ -402,6 +442,17 @@ def plot_statistic(
             dress(ax.yaxis, dataset, upward)
         set_title(ax, subtitle(dataset, (*dims,)))
     return ax
+
+
+def _swept(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, name: str) -> None:
+    """Draw a statistic over a parameter that was swept up and down: filled and open markers."""
+    points, _ = positions(dataset, name)
+    looks = {"up": ("^-", BEAM_COLOR, BEAM_COLOR), "down": ("v--", SHAKER_COLOR, "white")}
+    for row, kind in zip(data.values, dataset["sweep"].values, strict=True):
+        look, color, face = looks[str(kind)]
+        ax.plot(points, row, look, color=color, markerfacecolor=face, markersize=3.5, label=f"swept {kind}")
+    dress(ax.xaxis, dataset, name)
+    ax.legend(loc="best")
 
 
 def scaled_values(dataset: xr.Dataset, name: str) -> tuple[_Array, str]:
@@ -427,9 +478,9 @@ def _label(dataset: xr.Dataset, name: str, values: np.ndarray) -> tuple[float, s
     unit = str(attrs.get("units", row.unit if row else "1"))
     words = words[:1].upper() + words[1:]
     if unit == "1":
-        return 1.0, words
+        return 1.0, textwrap.fill(words, _LONGEST)
     factor, scaled = scale_of(values, unit)
-    return factor, f"{words} ({scaled})"
+    return factor, textwrap.fill(f"{words} ({scaled})", _LONGEST)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -486,6 +537,23 @@ def plot_points(
     ------
     InputError
         If the dataset is not a list of points, or its points have no such variable or parameters.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> import xarray as xr
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> points = xr.Dataset(
+    ...     {
+    ...         "drive.frequency_ratio": ("point", [0.7, 0.75, 0.8]),
+    ...         "drive.velocity_amplitude": ("point", [0.1, 0.2, 0.3]),
+    ...     }
+    ... )
+    >>> dataset = sb.sweep(system, points, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_points(dataset, "peak_force")
     """
     from snapbeam.util.datasets import xr
 

@@ -23,7 +23,7 @@ from snapbeam.plot.style import (
 )
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.simulation.run import Run
-from snapbeam.util.si_prefixes import scale_of
+from snapbeam.util.si_prefixes import prefixed, scale_of
 from snapbeam.util.validation import InputError, checked, choice, integer, interval
 
 if TYPE_CHECKING:
@@ -86,6 +86,16 @@ def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, mode
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_modal_amplitudes(run, modes=2)
     """
     dataset = dataset_of(run, "modal_amplitude")
     count = min(integer("modes", modes, 1), dataset.sizes["mode"])
@@ -138,6 +148,16 @@ def plot_energies(run: Run | xr.Dataset, ax: Axes | None = None) -> Axes:
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_energies(run)
     """
     dataset = dataset_of(run, "energy_beam")
     name, label = across(dataset)
@@ -178,6 +198,16 @@ def plot_spectrum(
     -------
     matplotlib.axes.Axes
         Over the excitation frequency where the run has cycles, else over hertz.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_spectrum(run)
     """
     dataset = dataset_of(run, variable)
     choice(
@@ -227,6 +257,16 @@ def plot_phase_portrait(
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_phase_portrait(run)
     """
     at_midspan = choice("of", of, ("midspan", "striker")) == "midspan"
     names = ("midspan_displacement", "midspan_velocity")
@@ -256,6 +296,17 @@ _CURVES = (
     ("displacement_at_striker", "beam, at the striker", BEAM_COLOR),
     ("striker_displacement", "striker", SHAKER_COLOR),
 )
+_PANELS = {
+    "penetration_normalised": ("Penetration\n$d$", "1"),
+    "contact_force": ("Contact\nforce $f$", "N"),
+    "voltage": ("Voltage\n$v$", "V"),
+    "power_load": ("Power in\nthe load", "W"),
+}
+"""Variables below the displacements: label and unit."""
+_ENVELOPE = 100
+"""Cycles above which a run over cycles is drawn by its range in intervals, of which there are about so many."""
+_FEW = 200
+"""Samples below which a close-up shows each of them, and a smooth curve through them."""
 _MANY = 20_000  # samples above which a curve is stored as pixels in a vector file
 
 
@@ -265,7 +316,8 @@ def plot_run(
 ) -> Axes:
     """Draw the displacements, the penetration and the contact force of a run, and its hardest impact closer.
 
-    Left, over cycles of excitation: the whole run or a window.  Right, over time: the samples about
+    Left, over cycles of excitation: the whole run or a window.  More than 100 cycles are drawn by the range, minimum to
+    maximum, in intervals of whole cycles; choose a window to see each cycle.  Right, over time: the samples about
     the greatest contact force within the window, from a little before the contact to a little after it.  A
     measured run, which has no force, is drawn without what it lacks.
 
@@ -287,22 +339,36 @@ def plot_run(
     ------
     InputError
         If the dataset is no run or the window holds less than two samples.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_run(run, window=(10.0, 15.0))
     """
     dataset = dataset_of(run, "displacement_at_striker")
     axis_name, label = across(dataset)
     part = _cut(dataset, axis_name, window)
     has_force = "contact_force" in part and bool((part["contact_force"] > 0.0).any())
-    rows = 1 + ("penetration_normalised" in part) + ("contact_force" in part)
+    rows = 1 + sum(name in part for name in _PANELS)
     if ax is not None:
         return _alone(ax, part, part[axis_name].values, label)
     with figure_style():
         figure = new_figure("double", 35.0 + 28.0 * rows)
         grid = figure.add_gridspec(
             rows, 2 if has_force else 1, width_ratios=(2.2, 1.0) if has_force else None,
-            height_ratios=(1.6, 1.0, 1.0)[:rows],
+            height_ratios=(1.6, *(1.0,) * (rows - 1)),
         )  # fmt: skip
-        force = scale_of(part["contact_force"].values, "N") if "contact_force" in part else (1.0, "N")
-        left = _column(figure, grid, 0, part, part[axis_name].values, force)
+        scales = {
+            name: scale_of(part[name].values, unit) for name, (_, unit) in _PANELS.items() if name in part
+        }
+        left = _column(figure, grid, 0, part, part[axis_name].values, scales)
+        if "power_load" in part:
+            _mean_power(left[-1], dataset, axis_name, scales["power_load"])
         left[-1].set_xlabel(label)
         first, last = float(part[axis_name][0]), float(part[axis_name][-1])
         left[0].set_xlim(_from(first, last), last)
@@ -317,20 +383,26 @@ def plot_run(
             near, seconds, peak = _hardest_impact(part)
             scale, unit = scale_of(seconds, "s")
             around = seconds / scale
-            right = _column(figure, grid, 1, near, around, force)
-            after = f"\nafter $\\tau$ = {peak:.4g}" if axis_name == "cycle" else ""
+            right = _column(figure, grid, 1, near, around, scales)
+            digits = _digits(near, axis_name)
+            after = f"\nafter $\\tau$ = {peak:.{digits}f}" if axis_name == "cycle" else ""
             right[-1].set_xlabel(f"Time ({unit}){after}", loc="right")
             right[-1].xaxis.set_major_locator(MaxNLocator(3))
             right[0].set_xlim(min(around[0], -0.12 * around[-1]), around[-1])
     return left[0]
 
 
+def _curves(part: xr.Dataset) -> list[tuple[str, str, str]]:
+    """The displacements that a run has; without a striker, that of the beam at the striker is left out."""
+    struck = "striker_displacement" in part or "midspan_displacement" not in part
+    return [each for each in _CURVES if each[0] in part and (struck or each[0] != "displacement_at_striker")]
+
+
 def _alone(ax: Axes, part: xr.Dataset, x: np.ndarray, label: str) -> Axes:
     """Draw the displacements on the given axes."""
     with figure_style():
-        for name, words, color in _CURVES:
-            if name in part:
-                ax.plot(x, part[name].values, color=color, label=words, rasterized=x.size > _MANY)
+        for name, words, color in _curves(part):
+            ax.plot(x, part[name].values, color=color, label=words, rasterized=x.size > _MANY)
         ax.axhline(0.0, color="0.6", linewidth=0.5, zorder=0)
         ax.set(xlabel=label, ylabel="Displacement $w/b$", xlim=(_from(x[0], x[-1]), x[-1]))
         low, high = ax.get_ylim()
@@ -359,7 +431,12 @@ def _cut(dataset: xr.Dataset, across: str, window: tuple[float, float] | None) -
 
 
 def _column(
-    figure: Figure, grid: GridSpec, at: int, part: xr.Dataset, x: np.ndarray, force_scale: tuple[float, str]
+    figure: Figure,
+    grid: GridSpec,
+    at: int,
+    part: xr.Dataset,
+    x: np.ndarray,
+    scales: dict[str, tuple[float, str]],
 ) -> list[Axes]:
     rows = grid.nrows
     axes: list[Axes] = []
@@ -369,26 +446,76 @@ def _column(
         axes[-1].tick_params(labelbottom=row == rows - 1)
         axes[-1].margins(x=0.0)
     pixels = x.size > _MANY
-    for name, label, color in _CURVES:
-        if name in part:
+    far = at == 0 and "cycle" in part.variables and float(x[-1] - x[0]) > _ENVELOPE
+    for name, label, color in _curves(part):
+        if far:
+            _envelope(axes[0], x, part[name].values, color, f"{label} (range)")
+        elif at == 1 and x.size < _FEW:
+            axes[0].plot(*_smooth(x, part[name].values), color=color, label=label)
+        else:
             axes[0].plot(x, part[name].values, color=color, label=label, rasterized=pixels)
     if at == 0:
         axes[0].axhline(0.0, color="0.6", linewidth=0.5, zorder=0)
-    row = 1
-    if "penetration_normalised" in part:
-        depth = 1e3 * np.maximum(part["penetration_normalised"].values, 0.0)
-        axes[row].plot(x, depth, color=BEAM_COLOR, rasterized=pixels)
-        axes[row].set_ylim(bottom=0.0)
+    for row, name in enumerate((each for each in _PANELS if each in part), 1):
+        factor, unit = scales[name]
+        values = part[name].values / factor
+        if name == "penetration_normalised":
+            factor, unit = 1.0, "$10^{-3}\\,b$"
+            values = 1e3 * np.maximum(part[name].values, 0.0)
+        if far:
+            _envelope(axes[row], x, values, BEAM_COLOR, None)
+        elif at == 1 and x.size < _FEW:
+            axes[row].plot(*_smooth(x, values), color=BEAM_COLOR)
+            axes[row].plot(x, values, ".", color=BEAM_COLOR, markersize=2.5)
+        else:
+            axes[row].plot(x, values, color=BEAM_COLOR, rasterized=pixels)
+        if name != "voltage":
+            axes[row].set_ylim(bottom=0.0)
         if at == 0:
-            axes[row].set_ylabel("Penetration\n$d$ ($10^{-3}\\,b$)")
-        row += 1
-    if "contact_force" in part:
-        factor, unit = force_scale
-        axes[row].plot(x, part["contact_force"].values / factor, color=BEAM_COLOR, rasterized=pixels)
-        axes[row].set_ylim(bottom=0.0)
-        if at == 0:
-            axes[row].set_ylabel(f"Contact\nforce $f$ ({unit})")
+            axes[row].set_ylabel(f"{_PANELS[name][0]} ({unit})")
     return axes
+
+
+def _mean_power(ax: Axes, dataset: xr.Dataset, across: str, scale: tuple[float, str]) -> None:
+    """Draw the mean power over the last quarter of the run, which leaves out the transient before it."""
+    x, time, power = (dataset[name].values for name in (across, "time", "power_load"))
+    late = time >= time[0] + 0.75 * (time[-1] - time[0])
+    if late.sum() < 2 or not np.isfinite(power[late]).all():
+        return
+    mean = float(np.trapezoid(power[late], time[late]) / (time[late][-1] - time[late][0]))
+    ax.axvspan(x[late][0], x[late][-1], color="0.9", zorder=0)
+    words = f"mean over the last quarter of the run: {prefixed(mean, 'W')}"
+    ax.plot(x[late][[0, -1]], [mean / scale[0]] * 2, color=SHAKER_COLOR, linewidth=1.2, label=words)
+    ax.set_ylim(0.0, 1.3 * ax.get_ylim()[1])
+    ax.legend(loc="upper left")
+
+
+def _digits(near: xr.Dataset, across: str) -> int:
+    """Digits after the point of a cycle, so that rounding shifts the close-up by less than a hundredth of it."""
+    span = float(near[across][-1] - near[across][0])
+    return int(np.clip(np.ceil(-np.log10(max(span, 1e-12) / 50.0)), 0, 12))
+
+
+def _smooth(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a curve through samples that has no maximum between them (monotone cubic interpolation)."""
+    from scipy.interpolate import PchipInterpolator
+
+    good = np.isfinite(y)
+    if good.sum() < 3:
+        return x, y
+    dense = np.union1d(x[good], np.linspace(x[good][0], x[good][-1], 600))
+    return dense, PchipInterpolator(x[good], y[good])(dense)
+
+
+def _envelope(ax: Axes, x: np.ndarray, y: np.ndarray, color: str, label: str | None) -> None:
+    """Draw the range of a curve in each of about :data:`_ENVELOPE` intervals of whole cycles."""
+    width = np.ceil((x[-1] - x[0]) / _ENVELOPE)
+    interval = np.floor((x - x[0]) / width).astype(int)
+    starts = np.flatnonzero(np.diff(interval, prepend=-1))
+    low, high = (np.asarray(f.reduceat(y, starts)) for f in (np.fmin, np.fmax))
+    at = np.append(x[starts], x[-1])
+    look: dict[str, Any] = {"step": "post", "color": color, "linewidth": 0.6, "label": label}
+    ax.fill_between(at, np.append(low, low[-1]), np.append(high, high[-1]), alpha=0.35, **look)
 
 
 def _hardest_impact(part: xr.Dataset) -> tuple[xr.Dataset, np.ndarray, float]:

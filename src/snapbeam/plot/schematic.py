@@ -194,6 +194,15 @@ def plot_system(system: System, title: str = "") -> Figure:
     ------
     InputError
         For a structure given by matrices.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> figure = sb.plot.plot_system(system, title="Beam of the paper")
     """
     instance("system", system, System, "a System")
     instance("title", title, str, "text")
@@ -263,6 +272,8 @@ def _draw_beam(ax: Axes, system: System) -> None:
             ax.add_patch(Rectangle((min(at, at + 0.3 * outward), -0.35), 0.3, 0.7, **clamp))
         else:
             _draw_hinge(ax, at, outward, stiffness, sign, clamp)
+    if system.axial_load is None and beam.axial_load == 0.0:
+        return
     arrow: Any = {"arrowstyle": "-|>", "lw": 0.8, "color": BEAM_COLOR}
     for x, toward in ((-0.85, 0.5), (_WIDE + 0.85, -0.5)):
         ax.annotate("", (x + toward, 0.0), (x, 0.0), arrowprops=arrow)

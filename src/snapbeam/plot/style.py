@@ -36,6 +36,7 @@ __all__ = [
     "COLUMN_WIDTHS",
     "FIGURE_SUFFIXES",
     "SHAKER_COLOR",
+    "base_and_load",
     "beam_text",
     "caption",
     "cell_edges",
@@ -106,6 +107,12 @@ def figure_style() -> AbstractContextManager[None]:
 
     Matplotlib loads its backend first.  In a notebook the backend switches ``rcParams["interactive"]`` on, and the end
     of the context would switch it off again if the backend were loaded inside.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> with sb.plot.figure_style():
+    ...     figure = sb.plot.new_figure("single")
     """
     import matplotlib.pyplot as plt
 
@@ -118,8 +125,9 @@ def fix_ticks(*axes: Axes) -> None:
     """Give the ticks of *axes* the style of this package, at most seven along x, so that their numbers stay apart."""
     for ax in axes:
         ax.tick_params(labelsize=_RC["xtick.labelsize"], width=_RC["xtick.major.width"])
-        if isinstance(ax.xaxis.get_major_locator(), AutoLocator):
-            ax.xaxis.get_major_locator().set_params(nbins=6, steps=[1, 2, 5, 10])
+        locator = ax.xaxis.get_major_locator()
+        if isinstance(locator, AutoLocator):
+            locator.set_params(nbins=6, steps=[1, 2, 5, 10])
 
 
 def new_figure(width: str = "single", height: float = 75.0) -> Figure:
@@ -131,6 +139,13 @@ def new_figure(width: str = "single", height: float = 75.0) -> Figure:
         One column (90 mm) or two (190 mm).
     height : float
         Height, mm.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> figure = sb.plot.new_figure("double", height=60.0)
+    >>> f"{25.4 * figure.get_figwidth():.0f} mm"
+    '190 mm'
     """
     import matplotlib.pyplot as plt
 
@@ -165,6 +180,17 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
     ------
     InputError
         If the path cannot be written or has another suffix.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> sb.plot.save_figure(run.plot(), "run.pdf").name
+    'run.pdf'
     """
     target = check_writable(path, "plot", FIGURE_SUFFIXES)
     if isinstance(figure, Axes):
@@ -193,8 +219,9 @@ def beam_text(attrs: Any) -> str:
     if not {"beam_length", "beam_thickness"} <= set(attrs):
         return ""
     words = [f"beam {prefixed(attrs['beam_length'], 'm')} × {prefixed(attrs['beam_thickness'], 'm')}"]
-    if attrs.get("beam_buckling_level"):
-        words.append(f"$b$ = {prefixed(attrs['beam_buckling_level'], 'm')}")
+    # an arch without axial load: the height of its centre at rest
+    if scale := attrs.get("beam_buckling_level") or attrs.get("length_scale"):
+        words.append(f"$b$ = {prefixed(scale, 'm')}")
     return ", ".join(words)
 
 
@@ -223,10 +250,36 @@ def caption(dataset: xr.Dataset, lines: int = 1) -> str:
         how.append(text)
     if "location" in attrs and "location" not in dataset.dims:
         how.append(rf"$x_\mathrm{{s}}$ = {attrs['location']:.3g}")
+    how += base_and_load(dataset)
     parts = [", ".join(part for part in each if part) for each in (what, how)]
     text = ("\n" if lines > 1 else ", ").join(part for part in parts if part)
     kind = attrs.get("response_class")
     return f"{text}: {kind}" if isinstance(kind, str) and text else text
+
+
+_GRAVITY = 9.80665
+
+
+def base_and_load(dataset: xr.Dataset) -> list[str]:
+    """The base excitation in Hz and g, and the load resistance of a harvester."""
+    attrs, words, given = dataset.attrs, [], {}
+    for name in (
+        "base_excitation_frequency_ratio", "base_excitation_acceleration_amplitude", "harvester_resistance",
+    ):  # fmt: skip
+        if name in dataset.coords and dataset[name].size == 1:
+            given[name] = float(dataset[name].squeeze())
+        elif name in attrs and name not in dataset.dims:
+            given[name] = attrs[name]
+    omega = 2.0 * np.pi * attrs.get("reference_frequency", np.nan)
+    unit = omega**2 * attrs.get("length_scale", np.nan)
+    for name, value in given.items():
+        if name.endswith("resistance"):
+            words.append(f"$R$ = {prefixed(value, 'Ω')}")
+        elif name.endswith("ratio") and np.isfinite(omega):
+            words.append(f"base {prefixed(value * omega / (2.0 * np.pi), 'Hz')}")
+        elif name.endswith("amplitude") and np.isfinite(unit):
+            words.append(f"{value * unit / _GRAVITY:.3g} $g$")
+    return words
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -81,6 +81,20 @@ def advance(
     ------
     InputError
         For bad input; for tangents with a contact law whose force jumps; for more periods than a recorded motion has.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05),
+    ...     paper.CONTACT,
+    ...     sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03),
+    ... )
+    >>> state = sb.advance(system, periods=20)
+    >>> state = sb.advance(system, state, periods=1)
+    >>> state.amplitude.shape
+    (1,)
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")

@@ -18,6 +18,7 @@ from snapbeam.solver.assemble import motions_of, tip_of
 from snapbeam.solver.ensemble import CircuitCoupling, Ensemble
 from snapbeam.solver.further_contacts import OFFSET, REST, SIGN
 from snapbeam.solver.statistics import Recorded
+from snapbeam.solver.terms import WORKS
 from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, shown
 
 if TYPE_CHECKING:
@@ -226,9 +227,13 @@ def strikers_of(
     assert others is not None and system.striker is not None
     count, samples = 1 + len(system.further_contacts), recorded.times.size
     force, depth, tip = (np.zeros((samples, count)) for _ in range(3))
-    energy = values[:, 3].copy()
+    energy = values[:, _COLUMN["contact"]].copy()
     sign = ensemble.structure.sign
-    force[:, 0], depth[:, 0], tip[:, 0] = values[:, 1], values[:, 0] / length, first
+    force[:, 0], depth[:, 0], tip[:, 0] = (
+        values[:, _COLUMN["force"]],
+        values[:, _COLUMN["penetration"]] / length,
+        first,
+    )
     for j, each in enumerate(system.further_contacts):
         numbers, row = others.numbers[0, j], others.rows[others.places[0, j]]
         reached = recorded.q @ row
@@ -265,6 +270,13 @@ def _follows(ensemble: Ensemble, system: System, recorded: Recorded) -> _Array:
 
 _Array = NDArray[np.float64]
 
+_COLUMN = {
+    name: number
+    for number, name in enumerate(
+        ("penetration", "force", "energy", "contact", "work", "dissipated", "lost", *WORKS, "circuit")
+    )
+}
+"""Columns of the recorded values."""
 IMPACT_COLUMNS = (
     ("onset", "s", "onset of the impact"),
     ("duration", "s", "duration of the impact"),
@@ -312,11 +324,11 @@ def run_dataset(
     if structure.body_mass is not None:
         body = model.modes
         own = 0.5 * (recorded.p[:, body] ** 2 + (structure.omega[body] * recorded.q[:, body]) ** 2)
-        values[:, 2] -= own
+        values[:, _COLUMN["energy"]] -= own
     if structure.circuit:
-        values[:, 2] -= 0.5 * recorded.p[:, -1] ** 2
+        values[:, _COLUMN["energy"]] -= 0.5 * recorded.p[:, -1] ** 2
     if ensemble.tapped is not None:  # dissipated in the resistance of the coil
-        values[:, 5] += (1.0 - ensemble.tapped.share[0]) * values[:, 9]
+        values[:, _COLUMN["dissipated"]] += (1.0 - ensemble.tapped.share[0]) * values[:, _COLUMN["circuit"]]
     location = 0.5 if system.striker is None else system.striker.location
     shape = model.shape_at(location)
     displacement = alpha @ shape / scale
@@ -328,18 +340,25 @@ def run_dataset(
     }
     struck = system.striker is not None
     if struck:
-        penetration = values[:, 0] / scale
+        penetration = values[:, _COLUMN["penetration"]] / scale
         variables |= {
             "striker_displacement": displacement + structure.sign * penetration,
             "penetration_normalised": penetration,
-            "contact_force": values[:, 1],
+            "contact_force": values[:, _COLUMN["force"]],
         }
-    variables |= {"modal_amplitude": alpha, "modal_velocity": rate, "energy_beam": values[:, 2]}
+    variables |= {
+        "modal_amplitude": alpha,
+        "modal_velocity": rate,
+        "energy_beam": values[:, _COLUMN["energy"]],
+    }
     if struck:
-        variables |= {"energy_contact": values[:, 3], "striker_work": values[:, 4]}
+        variables |= {
+            "energy_contact": values[:, _COLUMN["contact"]],
+            "striker_work": values[:, _COLUMN["work"]],
+        }
     if structure.body_mass is not None:
         variables["energy_striker"] = own
-    variables["energy_dissipated"] = values[:, 5]
+    variables["energy_dissipated"] = values[:, _COLUMN["dissipated"]]
     variables |= _around(ensemble, system, recorded, values)
     if ensemble.others is not None:
         of_each = strikers_of(ensemble, system, recorded, values, variables["striker_displacement"])
@@ -348,7 +367,7 @@ def run_dataset(
     if ensemble.tapped is not None:
         variables |= _harvested(ensemble, ensemble.tapped, recorded, values)
     if struck and system.contact is not None and system.contact.is_dissipative:
-        variables["energy_lost_contact"] = values[:, 6]
+        variables["energy_lost_contact"] = values[:, _COLUMN["lost"]]
     at = recorded.times
     valid = np.asarray(np.isfinite(values[:, 2:]).all(axis=1) & np.isfinite(alpha).all(axis=1))
     if times is not None and at.size < times.size:
@@ -381,7 +400,7 @@ def _harvested(
     found = {
         "voltage": tapped.volts[0] * y,
         "power_load": tapped.share[0] * lost,
-        "energy_harvested": tapped.share[0] * values[:, -1],
+        "energy_harvested": tapped.share[0] * values[:, _COLUMN["circuit"]],
     }
     if structure.circuit:
         found["energy_circuit"] = 0.5 * y * y
@@ -392,20 +411,20 @@ def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Arr
     """Return the variables of a base excitation, of a changing axial load and of an external force."""
     found: dict[str, _Array] = {}
     if system.local_force is not None and system.local_force.dissipative:
-        found["local_force_work"] = values[:, 9]
+        found["local_force_work"] = values[:, _COLUMN["local_force_work"]]
     if system.base_excitation is None and system.axial_load is None and system.external_force is None:
         return found
     motions = motions_of(ensemble, system, recorded.times)
     if system.base_excitation is not None:
         found["base_displacement"] = motions["base_excitation"][0] / system.scale.length
         found["base_velocity"] = motions["base_excitation"][1] / (system.scale.length * system.scale.omega)
-        found["base_work"] = values[:, 7]
+        found["base_work"] = values[:, _COLUMN["base_work"]]
     if system.axial_load is not None:
         found["load_change"] = motions["axial_load"][0]
-        found["load_work"] = values[:, 8]
+        found["load_work"] = values[:, _COLUMN["load_work"]]
     if system.external_force is not None:
         found["external_force"] = motions["external_force"][0]
-        found["force_work"] = values[:, 7]
+        found["force_work"] = values[:, _COLUMN["base_work"]]
     return found
 
 

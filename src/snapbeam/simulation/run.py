@@ -17,6 +17,7 @@ from snapbeam.util.display import html_table, plotter
 from snapbeam.util.validation import choice
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
 __all__ = ["Run"]
@@ -50,6 +51,20 @@ class Run:
         Error estimate, if a tolerance was given.
     final_state : State or None
         State at the end of the run; None if the run failed.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
+    ...     paper.CONTACT,
+    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18),
+    ... )
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> run.summary.response_class.label
+    'continuous interwell'
+    >>> displacement = run.dataset["midspan_displacement"]
     """
 
     dataset: xr.Dataset
@@ -91,6 +106,23 @@ class Run:
         from snapbeam.simulation.save import save_run
 
         save_run(self, path)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the time series as a table: one row for each time, a column for each mode of a modal variable.
+
+        Examples
+        --------
+        >>> import snapbeam as sb
+        >>> from snapbeam import paper
+        >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2)
+        >>> system = sb.System(model, paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))
+        >>> frame = sb.simulate(system, sb.Integration(cycles=2)).to_dataframe()
+        >>> "modal_amplitude_2" in frame
+        True
+        """
+        from snapbeam.util.tables import data_frame
+
+        return data_frame(self.dataset)
 
     def plot(self, kind: str = "run", ax: Any = None, **options: Any) -> Any:
         """Plot the run: ``"run"``, ``"modal_amplitudes"``, ``"energies"``, ``"spectrum"`` or ``"phase_portrait"``.

@@ -71,6 +71,20 @@ def load(path: str | os.PathLike[str]) -> Run:
     ------
     InputError
         If the file cannot be read or does not contain a run.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
+    ...     paper.CONTACT,
+    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18),
+    ... )
+    >>> sb.simulate(system, sb.Integration(cycles=2)).save("run.nc")
+    >>> run = sb.load("run.nc")
+    >>> run.system == system
+    True
     """
     path = file_path("path", path)
     dataset = read_netcdf(path)

@@ -15,7 +15,7 @@ from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import quantities
-from snapbeam.model.state import State
+from snapbeam.model.state import State, rest_state
 from snapbeam.model.striker import numbered
 from snapbeam.model.system import System
 from snapbeam.simulation.dataset import impact_table, joined, run_dataset
@@ -82,6 +82,9 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
         attrs |= _short(model.beam.boundary)
     if model.imperfection is not None:
         attrs |= _short(model.imperfection)
+    if model.transverse_force is not None:
+        start = system.initial_state or rest_state(model, system.striker)
+        attrs |= {"reference_well": model.reference_well, "initial_well": model.side_of(start.amplitude)}
     sections = system.to_mapping() if system.has_environment else {}
     for section in ("base_excitation", "axial_load", "external_force", "local_force", "harvester"):
         for name, value in sections.get(section, {}).items():
@@ -398,6 +401,19 @@ def simulate(
     InputError
         For bad input, and for a run whose samples need more than 4 GiB.  A run that fails numerically does not
         raise: ``run.summary.status`` gives the reason.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
+    ...     paper.CONTACT,
+    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18),
+    ... )
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> run.summary.response_class.label
+    'continuous interwell'
     """
     if isinstance(system, (list, tuple)):
         return _several(system, integration, sample_times, progress)

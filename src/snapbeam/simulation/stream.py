@@ -73,6 +73,17 @@ def simulate_to_file(
         For bad input.
     NoRoomError
         If the disk is full.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
+    ...     paper.CONTACT,
+    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18),
+    ... )
+    >>> summary = sb.simulate_to_file(system, sb.Integration(cycles=2), path="run.nc")
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")

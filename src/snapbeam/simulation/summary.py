@@ -26,6 +26,19 @@ class RunSummary(Mapping[str, Any]):
     is True if the run provably stays in that well.  ``other_well_reached`` is True if the centre came more than half of
     the way from the border of the wells to the other well; with unequal wells or without a striker, only such a run is
     interwell.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
+    ...     paper.CONTACT,
+    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18),
+    ... )
+    >>> summary = sb.simulate(system, sb.Integration(cycles=20)).summary
+    >>> summary.impacts == summary["impacts"]
+    True
     """
 
     response_class: ResponseClass

@@ -51,7 +51,21 @@ _BETWEEN = 2.0
 
 @dataclass(frozen=True)
 class ErrorEstimate:
-    """Error estimate of a run of :func:`~snapbeam.simulate` with a tolerance."""
+    """Error estimate of a run of :func:`~snapbeam.simulate` with a tolerance.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
+    ...     paper.CONTACT,
+    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.05),
+    ... )
+    >>> run = sb.simulate(system, sb.Integration(cycles=5, tolerance=1e-6))
+    >>> run.accuracy.reached, run.accuracy.estimated_error < 1e-6
+    (True, True)
+    """
 
     tolerance: float
     """Requested maximum error of the displacement at the striker and at mid-span, in units of b."""
@@ -108,6 +122,17 @@ def perturbation_growth(
     ------
     InputError
         For bad input.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05),
+    ...     paper.CONTACT,
+    ...     sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03),
+    ... )
+    >>> growth = sb.perturbation_growth(system, sb.Integration(cycles=5))
     """
     from snapbeam.util.datasets import xr
 

@@ -103,6 +103,7 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
     ("lost", np.float64, 0.0),  # in contact
     *((name, np.float64, 0.0) for name in WORKS),
     ("circuit_energy", np.float64, 0.0),  # lost in a harvester's circuit, load included
+    ("circuit_energy_last_quarter", np.float64, 0.0),
     ("peak_circuit", np.float64, 0.0),  # maximum voltage or current, as the circuit's coordinate
     ("first_energy", np.float64, 0.0),
     ("energy", np.float64, 0.0),  # at the end, contact included
@@ -140,6 +141,14 @@ class Statistic:
         What *update* begins with.
     comment : str
         Relative error of the integration over time, beside the error of the run.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> row = sb.Statistic(
+    ...     "mean_force", "float64", "N", "mean contact force",
+    ...     lambda reading: reading.seen("total_impulse") / reading.duration,
+    ... )
     """
 
     name: str
@@ -233,6 +242,27 @@ def _harvested_per_cycle(reading: Reading) -> Values:
     with np.errstate(invalid="ignore", divide="ignore"):
         done = reading.cycles * reading.duration / (runs["end"] * runs["tick"])
         return np.where(done > 0.0, _harvested(reading) / done, np.nan)
+
+
+def _late_load_power(reading: Reading) -> Values:
+    """Mean power in the circuit over the last quarter of the run; NaN for a run that ended before it."""
+    runs = reading.ensemble.runs
+    inside = (reading.accumulators["time"] - runs["last_quarter"]) * runs["tick"]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(inside > 0.0, reading.seen("circuit_energy_last_quarter") / inside, np.nan)
+
+
+def _late_harvested_power(reading: Reading) -> Values:
+    tapped = reading.ensemble.tapped
+    return _late_load_power(reading) * (0.0 if tapped is None else tapped.share)
+
+
+def _late_voltage(reading: Reading) -> Values:
+    tapped = reading.ensemble.tapped
+    if tapped is None:
+        return _late_load_power(reading) * 0.0
+    per_square = tapped.rate if reading.ensemble.structure.circuit else 1.0 / tapped.rate
+    return np.sqrt(_late_load_power(reading) / per_square) * np.abs(tapped.volts)
 
 
 def _peak_voltage(reading: Reading) -> Values:
@@ -345,6 +375,14 @@ _ROWS = (
         "harvested_per_cycle", "float64", "J", "energy in the harvester's load over the cycles of the run",
         _harvested_per_cycle,
     ),
+    Statistic(
+        "harvested_power_last_quarter", "float64", "W", "power in the harvester's load, last quarter of the run",
+        _late_harvested_power,
+    ),
+    Statistic(
+        "rms_voltage_last_quarter", "float64", "V", "root mean square voltage across the load, last quarter of the run",
+        _late_voltage,
+    ),
     Statistic("peak_voltage", "float64", "V", "greatest voltage across the load at the end of a step", _peak_voltage),
 )  # fmt: skip
 
@@ -370,6 +408,19 @@ def register_statistic(statistic: Statistic) -> None:
     ------
     InputError
         If the name is taken or cannot name a variable.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> sb.register_statistic(
+    ...     sb.Statistic(
+    ...         "mean_force", "float64", "N", "mean contact force",
+    ...         lambda reading: reading.seen("total_impulse") / reading.duration,
+    ...     )
+    ... )
+    >>> "mean_force" in sb.STATISTICS
+    True
+    >>> sb.unregister_statistic("mean_force")
     """
     if not statistic.name.isidentifier():
         raise InputError(f"statistic {statistic.name!r}: must be a name, such as 'rms_force'")
@@ -385,6 +436,13 @@ def unregister_statistic(name: str) -> None:
     ------
     InputError
         If there is none of that name, or it is one of the package's own.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> row = sb.Statistic("impulse_per_second", "float64", "N", "impulse per second", lambda reading: 0.0)
+    >>> sb.register_statistic(row)
+    >>> sb.unregister_statistic("impulse_per_second")
     """
     if name not in list(STATISTICS) or STATISTICS[name] in _ROWS:
         raise InputError(f"statistic {name!r}: was not registered")

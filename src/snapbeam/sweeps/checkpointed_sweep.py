@@ -23,7 +23,7 @@ from snapbeam.sweeps.distributed import (
     parse_cluster,
 )
 from snapbeam.sweeps.export import to_dataset, to_netcdf
-from snapbeam.sweeps.points import Points
+from snapbeam.sweeps.points import Points, require_memory
 from snapbeam.sweeps.refine import MAX_LEVELS, RefinedRows, refine
 from snapbeam.sweeps.replicates import Replicates
 from snapbeam.sweeps.setup import Progress, SweepSetup
@@ -41,9 +41,6 @@ __all__ = ["CheckpointOptions", "SweepReport", "compute_sweep", "compute_table"]
 Note = Callable[[str], object]
 
 
-_POINT_BYTES = 700
-"""Memory of a point of a sweep until its dataset is complete."""
-_MEMORY = 4 * 2**30
 _MOST_POINTS = 10**9
 
 
@@ -53,7 +50,14 @@ class _Incomplete(Exception):
 
 @dataclass
 class SweepReport:
-    """Counts of computed, resumed, damaged and failed tasks of a sweep."""
+    """Counts of computed, resumed, damaged and failed tasks of a sweep.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> report = sb.SweepReport()
+    >>> options = sb.CheckpointOptions("sweep.checkpoint", report=report)  # of sb.sweep(..., checkpoint=options)
+    """
 
     tasks: int = 0
     """Tasks of all stages."""
@@ -90,6 +94,11 @@ class CheckpointOptions:
         Function that receives a message about the computation, as ``note(text)``.
     report : SweepReport, optional
         Object that receives the counts of computed, resumed, damaged and failed tasks.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> options = sb.CheckpointOptions("sweep.checkpoint", points_per_task=64)
     """
 
     path: str | os.PathLike[str] | None = None
@@ -161,7 +170,9 @@ class CheckpointRunner:
         total, done = sum(sizes.values()), 0
         if total < stage.size and not self.only_damaged:
             self.note(
-                f"{stage.name}: {stage.size - total} of {stage.size} points are finished, {total} remain"
+                f"checkpoint: {stage.size - total} of {stage.size} points are finished, {total} remain"
+                if stage.name == "base"
+                else f"{stage.name}: {stage.size - total} of {stage.size} points are finished, {total} remain"
             )
 
         def report(inside: int) -> None:
@@ -202,7 +213,10 @@ def compute_sweep(
     asked = None if cluster is None else parse_cluster(cluster)
     if options.path is None and asked is not None:
         raise InputError("cluster: needs a checkpoint; give its folder")
-    _require_room(setup.points.size, options)
+    if setup.points.size > _MOST_POINTS:
+        raise InputError(f"{setup.points.size} points: must be at most {_MOST_POINTS}")
+    if options.path is None:
+        require_memory(setup.points.size, "give fewer points, or a checkpoint")
     setup, words = snapped(setup, options.path)
     if words and options.note is not None:
         options.note(words)
@@ -211,18 +225,6 @@ def compute_sweep(
         points, rows = _computed(runner, levels, progress)
         more = {} if not isinstance(runner, CheckpointRunner) else runner.store.made_with()
         return _result(work, points, rows, more, target)
-
-
-def _require_room(points: int, options: CheckpointOptions) -> None:
-    """Refuse a sweep whose results do not fit into the memory, before any run."""
-    size = points * _POINT_BYTES
-    if options.path is None and size > _MEMORY:
-        raise InputError(
-            f"{points} points would take {size / 2**30:.3g} GiB of memory, the limit is {_MEMORY / 2**30:.0f} GiB: "
-            "give fewer points, or a checkpoint"
-        )
-    if points > _MOST_POINTS:
-        raise InputError(f"{points} points: must be at most {_MOST_POINTS}")
 
 
 def _computed(runner: StageRunner, levels: int, progress: Progress | None) -> tuple[Points, ResultRows]:

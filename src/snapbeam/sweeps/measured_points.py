@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.util.input_files import input_text
+from snapbeam.util.input_files import decoded, input_bytes
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, InputTypeError, file_path, positive
 
@@ -45,6 +45,15 @@ class MeasuredPoints:
         Omega, V and x_s; the location is NaN where the table does not give it.
     response_class : int8 array of shape (points,)
         :class:`~snapbeam.ResponseClass` of each.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> measured = sb.MeasuredPoints(
+    ...     frequency_ratio=[1.0, 1.2], velocity_amplitude=[0.02, 0.2], location=[0.4762, 0.4762], response_class=[0, 3]
+    ... )
+    >>> len(measured)
+    2
     """
 
     frequency_ratio: _Array
@@ -60,6 +69,9 @@ class MeasuredPoints:
             raise InputTypeError("MeasuredPoints: must be arrays of numbers")
         if not np.isin(columns[-1], [int(kind) for kind in ResponseClass]).all():
             raise InputError("response_class: must contain the numbers of response classes only")
+        for item, column in zip(fields(self), columns, strict=True):
+            kind = np.int8 if item.name == "response_class" else np.float64
+            object.__setattr__(self, item.name, column.astype(kind))
 
     def __len__(self) -> int:
         return len(self.response_class)
@@ -92,9 +104,19 @@ def read_measured_points(
     ------
     InputError
         Names the file, the line and the column of what cannot be used.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import snapbeam as sb
+    >>> lines = ["frequency_hz,velocity_m_s,response_class", "50,0.03,transient 1"]
+    >>> _ = Path("measured.csv").write_text(chr(10).join(lines))
+    >>> measured = sb.read_measured_points("measured.csv", reference_frequency=45.7, buckling_level=1.8e-4)
+    >>> measured.frequency_ratio.round(3)
+    array([1.094])
     """
     file = file_path("path", path)
-    text = input_text("measurements", file)
+    text = decoded(input_bytes("measurements", file), file.name)
     first = next(
         (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), ""
     )

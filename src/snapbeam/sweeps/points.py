@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -19,7 +20,7 @@ from snapbeam.util.validation import InputError, InputTypeError, axis, finite_ar
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Columns", "Grid", "PointList", "Points", "points_of"]
+__all__ = ["Columns", "Grid", "PointList", "Points", "labels_of", "points_of", "require_memory"]
 
 
 Columns = dict[str, NDArray[Any]]
@@ -70,7 +71,7 @@ class Grid:
     @property
     def size(self) -> int:
         """Number of points."""
-        return int(np.prod(self.shape, dtype=np.int64))
+        return math.prod(self.shape)
 
     def take(self, which: NDArray[np.int64]) -> Columns:
         """Return the values of the points with the given numbers."""
@@ -136,7 +137,7 @@ class PointList:
     def coordinates(self) -> dict[str, Any]:
         """Return dimension, values and attributes of each parameter and label, by name."""
         found: dict[str, Any] = {
-            lookup(name).short: ((POINT,), values, _labels(lookup(name)))
+            lookup(name).short: ((POINT,), values, labels_of(lookup(name)))
             for name, values in self.columns.items()
         }
         return found | {name: ((POINT,), values, {}) for name, values in self.labels.items()}
@@ -150,6 +151,19 @@ class PointList:
 
 
 Points = Grid | PointList
+
+_POINT_BYTES = 700
+"""Memory of a point of a sweep until its dataset is complete."""
+_MEMORY = 4 * 2**30
+
+
+def require_memory(points: int, remedy: str) -> None:
+    """Refuse a sweep whose results do not fit into the memory, before any of them is computed or read."""
+    size = points * _POINT_BYTES
+    if size > _MEMORY:
+        raise InputError(
+            f"{points} points would take {size / 2**30:.3g} GiB of memory, the limit is {_MEMORY / 2**30:.0f} GiB: {remedy}"
+        )
 
 
 def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:
@@ -275,9 +289,10 @@ def _length(columns: Mapping[str, NDArray[Any]]) -> int:
     return max((values.size for values in columns.values() if values.ndim == 1), default=1)
 
 
-def _labels(row: Parameter) -> dict[str, Any]:
+def labels_of(row: Parameter) -> dict[str, Any]:
+    """Attributes of a coordinate that holds values of a parameter."""
     return {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
 
 
 def _coordinate(row: Parameter, values: NDArray[Any]) -> tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]:
-    return (row.short,), values, _labels(row)
+    return (row.short,), values, labels_of(row)

@@ -35,6 +35,11 @@ class Replicates:
         Whether to add a run with the unperturbed initial condition and half the step.
     seed : int
         Seed of the random perturbations.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> replicates = sb.Replicates(count=8, seed=1)
     """
 
     count: int

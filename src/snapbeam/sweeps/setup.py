@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +22,10 @@ from snapbeam.solver.assemble import cycles_of, make_ensemble, plans_of, run_col
 from snapbeam.solver.registry import resolve
 from snapbeam.solver.statistics import STATISTICS, statistics_of
 from snapbeam.solver.step_size import Plan, require_resolved
-from snapbeam.sweeps.points import Columns, Grid, Points, points_of
+from snapbeam.sweeps.points import Columns, Grid, Points, labels_of, points_of
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, shown
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = [
     "Progress",
@@ -302,7 +299,11 @@ class SweepSetup:
                 "longest_contact_step",
                 "shortest_contact_step",
                 "length_scale",
+                "reference_well",
+                "initial_well",
             }
+        if any(name == "striker.side" or name.startswith("initial_state.") for name in self.points.names):
+            varied.add("initial_well")
         beam = self.system.model.beam
         if beam is not None and any(name.startswith(("beam.", "boundary.")) for name in self.points.names):
             # the one that follows from the other differs at every point
@@ -325,7 +326,7 @@ class SweepSetup:
         coords = self.points.coordinates()
         for name, value in self.fixed.items():
             row = lookup(name)
-            coords[row.short] = ((), value, {"units": row.quantity.unit, "long_name": row.quantity.long_name})
+            coords[row.short] = ((), value, labels_of(row))
         if self.structural:
             coords |= self._of_structure()
         return coords

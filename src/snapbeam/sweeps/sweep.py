@@ -80,7 +80,15 @@ def sweep(
 
     Examples
     --------
-    >>> ds = sb.sweep(system, {"model.damping_ratio": [0.002, 0.005], "frequency_ratio": omega})  # doctest: +SKIP
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> axes = {"model.damping_ratio": [0.002, 0.005], "drive.frequency_ratio": [0.8, 1.0, 1.2]}
+    >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
+    >>> dict(dataset.sizes)
+    {'damping_ratio': 2, 'frequency_ratio': 3}
     """
     setup = sweep_setup(system, axes, integration)
     options = checkpoint if isinstance(checkpoint, CheckpointOptions) else CheckpointOptions(checkpoint)

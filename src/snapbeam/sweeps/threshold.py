@@ -100,6 +100,22 @@ def threshold(
     InputError
         For bad input, such as a parameter that belongs to the model and cannot differ between the runs of an
         ensemble.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
+    ...     paper.CONTACT,
+    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18),
+    ... )
+    >>> found = sb.threshold(
+    ...     system, "drive.velocity_amplitude", [0.02, 0.08, 0.14, 0.2],
+    ...     {"drive.frequency_ratio": [1.0, 1.2]}, sb.Integration(cycles=20),
+    ... )
+    >>> found["lower_threshold"].dims
+    ('frequency_ratio',)
     """
     row = lookup(parameter)
     if not row.is_run or row.quantity.kind is not float:
@@ -139,7 +155,7 @@ def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
     symbol = f" {row.quantity.symbol}" if row.quantity.symbol else ""
     padded = np.append(values, np.nan)
     for name, text in (
-        ("lower_threshold", f"lowest {words}{symbol} that makes an interwell response"),
+        ("lower_threshold", f"lower threshold of the interwell response: {words}{symbol}"),
         ("upper_threshold", f"{words}{symbol} above which all runs are interwell"),
         ("last_intrawell", f"highest {words}{symbol} run below that without snap-through"),
         ("lower_threshold_min", f"lowest {words}{symbol} that may be interwell, failed runs included"),

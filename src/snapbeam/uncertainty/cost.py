@@ -49,6 +49,23 @@ class CostEstimate:
         Bytes, the second in a checkpoint.
     trial_runs : int
         Runs of the trial.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> uncertainty = sb.uncertainty.ParameterUncertainty(
+    ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
+    ... )
+    >>> estimate = sb.uncertainty.estimate_cost(
+    ...     sb.uncertainty.probability_map, system, {"velocity_amplitude": [0.1, 0.2]}, uncertainty, 16,
+    ...     integration=sb.Integration(cycles=5), trial=0.1,
+    ... )
+    >>> estimate.runs
+    32
     """
 
     runs: int
@@ -96,7 +113,20 @@ def estimate_cost(
 
     Examples
     --------
-    >>> print(sb.uncertainty.estimate_cost(sb.uncertainty.probability_map, system, axes, uncertainty))  # doctest: +SKIP
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> uncertainty = sb.uncertainty.ParameterUncertainty(
+    ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
+    ... )
+    >>> estimate = sb.uncertainty.estimate_cost(
+    ...     sb.uncertainty.probability_map, system, {"velocity_amplitude": [0.1, 0.2]}, uncertainty, 16,
+    ...     integration=sb.Integration(cycles=5), trial=0.1,
+    ... )
+    >>> estimate.runs, estimate.seconds > 0.0
+    (32, True)
     """
     within("trial", trial, 0.0, _LONGEST, closed="right", unit="s")
     if question is sweep:

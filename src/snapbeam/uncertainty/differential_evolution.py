@@ -36,7 +36,8 @@ class DifferentialEvolution:
     Examples
     --------
     >>> import numpy as np
-    >>> search = Evolution([(-1.0, 1.0)] * 2, population=20)
+    >>> import snapbeam as sb
+    >>> search = sb.uncertainty.DifferentialEvolution([(-1.0, 1.0)] * 2, population=20)
     >>> for _ in range(40):
     ...     x = search.ask()
     ...     search.tell(np.sum(x**2, axis=1)[:, None], np.zeros(len(x)))

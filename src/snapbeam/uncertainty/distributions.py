@@ -67,6 +67,13 @@ class Normal(Distribution):
         In the unit of the parameter, or as a share of the nominal value.
     relative : bool
         Whether it is a share.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> level = sb.uncertainty.Normal(0.01, relative=True)  # 1 % of the nominal value
+    >>> level
+    Normal(standard_deviation=0.01, relative=True)
     """
 
     standard_deviation: float
@@ -95,6 +102,13 @@ class UniformTolerance(Distribution):
         In the unit of the parameter, or as a share of the nominal value.
     relative : bool
         Whether it is a share.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> thickness = sb.uncertainty.UniformTolerance(5e-6)  # m
+    >>> thickness
+    UniformTolerance(half_width=5e-06, relative=False)
     """
 
     half_width: float
@@ -119,6 +133,13 @@ class LogNormal(Distribution):
     ----------
     sigma : float
         Standard deviation of the logarithm.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> stiffness = sb.uncertainty.LogNormal(0.2)
+    >>> stiffness
+    LogNormal(sigma=0.2)
     """
 
     sigma: float
@@ -140,6 +161,12 @@ class UniformRange(Distribution):
     ----------
     low, high : float
         In the unit of the parameter.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> sb.uncertainty.UniformRange(0.0, 3.14)
+    UniformRange(low=0.0, high=3.14)
     """
 
     low: float
@@ -230,6 +257,15 @@ class ParameterUncertainty:
     Notes
     -----
     With a phase or a ringing start the tip's mid-position is fixed in space, as everywhere in dynamics.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> uncertainty = sb.uncertainty.ParameterUncertainty(
+    ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
+    ... )
+    >>> uncertainty.hold_fixed
+    'physical'
     """
 
     of: Mapping[str, Distribution] = field(default_factory=dict)

@@ -73,6 +73,26 @@ def score_measurements(
     ------
     InputError
         If the dataset is not such a map, or a measurement is outside it or none has a class.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> uncertainty = sb.uncertainty.ParameterUncertainty(
+    ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
+    ... )
+    >>> axes = {"velocity_amplitude": [0.02, 0.1, 0.2], "frequency_ratio": [1.0, 1.2]}
+    >>> integration = sb.Integration(cycles=5)
+    >>> ds = sb.uncertainty.probability_map(system, axes, uncertainty, 16, integration=integration)
+    >>> measurements = sb.MeasuredPoints(
+    ...     frequency_ratio=[1.0, 1.2], velocity_amplitude=[0.02, 0.2], location=[0.4762, 0.4762], response_class=[0, 3]
+    ... )
+    >>> score = sb.uncertainty.score_measurements(ds, measurements)
+    >>> int(score.attrs["agree"])
+    2
     """
     from snapbeam.util.datasets import xr
 

@@ -38,6 +38,12 @@ class ContactTest:
         1/(1/m_1 + 1/m_2), kg.
     relative_error : float
         Standard error of each of the two as a share of it.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> test = lab.ContactTest(closing_speed=0.1, duration=5e-4, peak_force=4.0)  # m/s, s, N
+    >>> measured = lab.Measurements(contact=[test])
     """
 
     closing_speed: float
@@ -100,6 +106,13 @@ class Measurements:
     thickness, buckling_level : float, optional
         As measured with a gauge, m: compared with the result, not fitted to.
     contact : sequence of ContactTest
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> measured = lab.Measurements(lower_well_frequencies=[84.0], lower_well_frequencies_se=[0.2])  # Hz
+    >>> measured.lower_well_frequencies
+    (84.0,)
     """
 
     straight_frequencies: Sequence[float] = ()
@@ -181,6 +194,16 @@ def load_measurements(path: str | os.PathLike[str]) -> tuple[Measurements, dict[
     ------
     InputError
         If the file cannot be read, or holds an unknown or unusable entry; the message names file and entry.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from snapbeam import lab
+    >>> lines = ["[measured]", "lower_well_frequencies = [84.0]", "lower_well_frequencies_se = [0.2]"]
+    >>> _ = Path("measured.toml").write_text(chr(10).join(lines))
+    >>> measured, _ = lab.load_measurements("measured.toml")
+    >>> measured.lower_well_frequencies
+    (84.0,)
     """
     source = file_path("path", path)
     sections = read_toml("path", source)

@@ -25,7 +25,7 @@ from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, compute_table
 from snapbeam.sweeps.points import Columns, PointList
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
 from snapbeam.sweeps.tasks import PointWork
-from snapbeam.uncertainty.distributions import ParameterUncertainty
+from snapbeam.uncertainty.distributions import Distribution, Normal, ParameterUncertainty, UniformTolerance
 from snapbeam.util.diagnostics import DiagnosticWarning
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, choice, shown, within
@@ -116,7 +116,7 @@ class Trials:
         for j, (name, each) in enumerate(uncertainty.of.items()):
             nominal = points[name] if name in points else np.full(numbers.size, self._nominal(name))
             found[name] = each.at(nominal, scores[:, j])
-            _require_allowed(name, found[name])
+            _require_allowed(name, found[name], each)
         if uncertainty.hold_fixed == "physical" and uncertainty.structural:
             self._hold(points, found, numbers.size)
         if uncertainty.displacement > 0.0:
@@ -274,15 +274,30 @@ def _folder(path: Path) -> Path:
     return path
 
 
-def _require_allowed(name: str, values: NDArray[np.float64]) -> None:
+def _remedy(name: str, distribution: Distribution | None) -> str:
+    """Advice for samples out of range; a width in the unit of the parameter may be meant as a share of its value."""
+    others = "make the uncertainty smaller, or use a LogNormal or a UniformRange"
+    if not isinstance(distribution, (Normal, UniformTolerance)) or distribution.relative:
+        return others
+    width = (
+        distribution.half_width
+        if isinstance(distribution, UniformTolerance)
+        else distribution.standard_deviation
+    )
+    unit = lookup(name).quantity.unit
+    meant = f"{width:g}{'' if unit == '1' else f' {unit}'}"
+    return f"{meant} is in the unit of the parameter; for a share of its value set relative = true; {others}"
+
+
+def _require_allowed(
+    name: str, values: NDArray[np.float64], distribution: Distribution | None = None
+) -> None:
     """Refuse samples that no system can have, with the advice to sample from something else."""
     for value in (values.min(), values.max()):
         try:
             lookup(name).quantity.check(name, float(value))
         except InputError as error:
-            raise InputError(
-                f"{error}; a sample is out of range; make the uncertainty smaller, or use a LogNormal or a UniformRange"
-            ) from None
+            raise InputError(f"{error}; a sample is out of range; {_remedy(name, distribution)}") from None
 
 
 def trials_of(

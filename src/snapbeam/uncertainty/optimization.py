@@ -171,6 +171,13 @@ class Objective:
         Of a statistic, in (0, 1): what is exceeded by no more than the rest of the runs; its mean by default.
     maximize : bool
         Whether it is to be large.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> objective = sb.uncertainty.Objective(quantity="peak_force", quantile=0.9)
+    >>> objective.maximize
+    False
     """
 
     quantity: str
@@ -251,6 +258,13 @@ class Constraint:
         One of them at least.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
     probability : float
         Of a statistic of runs: share of all systems that must keep it, in (0, 1).
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> force = sb.uncertainty.Constraint(quantity="peak_force", upper=60.0, probability=0.9)  # N
+    >>> force.upper
+    60.0
     """
 
     quantity: str
@@ -636,6 +650,13 @@ class OptimizerSettings:
         the design to its constraints.
     confidence : float
     seed : int
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> settings = sb.uncertainty.OptimizerSettings(generations=10, population=12, samples=32)
+    >>> settings.validation_samples
+    400
     """
 
     generations: int = 30
@@ -691,6 +712,29 @@ def design_problem(
     ------
     InputError
         For variables, objectives and constraints that cannot be, and an uncertainty without uncertain parameters.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> uncertainty = sb.uncertainty.ParameterUncertainty(
+    ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
+    ... )
+    >>> problem = sb.uncertainty.design_problem(
+    ...     system,
+    ...     {"velocity_amplitude": (0.05, 0.4)},
+    ...     "speed",
+    ...     sb.uncertainty.Constraint(quantity="snap", lower=0.8),
+    ...     uncertainty,
+    ...     samples=8,
+    ...     integration=sb.Integration(cycles=5),
+    ... )
+    >>> objectives, violation, runs = problem.evaluate([[0.1], [0.3]])
+    >>> objectives.shape
+    (2, 1)
     """
     trials = trials_of(
         system, uncertainty, integration, checkpoint=checkpoint, early=_early(objectives, constraints)
@@ -754,13 +798,27 @@ def optimize_design(
 
     Examples
     --------
-    >>> ds = sb.uncertainty.optimize_design(  # doctest: +SKIP
-    ...     system,
-    ...     {"location": (0.2, 0.5), "frequency_ratio": (0.5, 2.0), "velocity_amplitude": (0.05, 0.5)},
-    ...     "peak_force",
-    ...     [sb.uncertainty.Constraint(quantity="other_well", lower=0.95), sb.uncertainty.Constraint(quantity="stroke", upper=1e-3)],
-    ...     uncertainty,
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> uncertainty = sb.uncertainty.ParameterUncertainty(
+    ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
+    >>> best = sb.uncertainty.optimize_design(
+    ...     system,
+    ...     {"velocity_amplitude": (0.05, 0.4)},
+    ...     "speed",
+    ...     [sb.uncertainty.Constraint(quantity="snap", lower=0.8)],
+    ...     uncertainty,
+    ...     sb.uncertainty.OptimizerSettings(
+    ...         generations=3, population=6, samples=12, validation_samples=40, candidates=2
+    ...     ),
+    ...     integration=sb.Integration(cycles=5),
+    ... )
+    >>> best.velocity_amplitude.dims
+    ('design',)
     """
     settings = OptimizerSettings() if settings is None else settings
     if not isinstance(settings, OptimizerSettings):

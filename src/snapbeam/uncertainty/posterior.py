@@ -158,6 +158,19 @@ class Waveform:
         Where it was measured.
     drive_error : float
         Relative error of what is known of the drive's amplitude.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=5))
+    >>> displacement = run.dataset.displacement_at_striker.values * system.scale.length  # m, here of a simulation
+    >>> waveform = sb.uncertainty.Waveform(
+    ...     system=system, time=run.dataset.time.values, displacement=displacement, standard_error=5e-6
+    ... )
     """
 
     system: System
@@ -302,6 +315,20 @@ class Posterior:
         Add up to 1.
     termination_reason : str
         Why the search for the most likely beam stopped, and how many samples the weighted ones are worth.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> from snapbeam.lab import Measurements
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=0.005)
+    >>> measured = Measurements(lower_well_frequencies=[46.0], lower_well_frequencies_se=[0.2])  # Hz
+    >>> posterior = sb.uncertainty.estimate_posterior(
+    ...     measured, paper.BEAM, {"buckling_level": 0.05}, modes=2, samples=200
+    ... )
+    >>> posterior.parameters, posterior.is_doubtful
+    (('beam.buckling_level',), False)
     """
 
     parameters: tuple[str, ...]
@@ -449,6 +476,21 @@ def estimate_posterior(
     -----
     Population Monte Carlo (Cappe et al., J. Comput. Graph. Stat. 13 (2004) 907): samples of a Student's t about the
     most likely beam, weighed by likelihood times prior over their density, twice fitted again to the weighted samples.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> from snapbeam.lab import Measurements
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=0.005)
+    >>> measured = Measurements(lower_well_frequencies=[46.0], lower_well_frequencies_se=[0.2])  # Hz
+    >>> posterior = sb.uncertainty.estimate_posterior(
+    ...     measured, paper.BEAM, {"buckling_level": 0.05}, modes=2, samples=200
+    ... )
+    >>> middle, low, high = posterior.interval()["beam.buckling_level"]  # m
+    >>> low < middle < high
+    True
     """
     if measured is not None and not isinstance(measured, Measurements):
         raise InputTypeError(f"measured = {shown(measured)}: must be Measurements")
@@ -655,6 +697,29 @@ def class_likelihood(
     ------
     InputError
         For bad input, an uncertainty with a parameter of the posterior, and measurements without a class.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> from snapbeam.lab import Measurements
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=0.005)
+    >>> measured = Measurements(lower_well_frequencies=[46.0], lower_well_frequencies_se=[0.2])  # Hz
+    >>> posterior = sb.uncertainty.estimate_posterior(
+    ...     measured, paper.BEAM, {"buckling_level": 0.05}, modes=2, samples=200
+    ... )
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> measurements = sb.MeasuredPoints(
+    ...     frequency_ratio=[1.2], velocity_amplitude=[0.2], location=[0.4762], response_class=[3]
+    ... )
+    >>> uncertainty = sb.uncertainty.ParameterUncertainty(of={"location": sb.uncertainty.Normal(0.005)})
+    >>> likelihood = sb.uncertainty.class_likelihood(
+    ...     posterior.resampled(4), system, measurements, uncertainty, runs=4, integration=sb.Integration(cycles=5)
+    ... )
+    >>> likelihood.shape
+    (4,)
     """
     integer("runs", runs, 2, 10**6)
     shared = sorted(set(posterior.parameters) & set(uncertainty.of))

@@ -63,6 +63,13 @@ class SamplingPlan:
     ------
     InputError
         For values out of range, and names of outcomes or intervals that there are not.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> plan = sb.uncertainty.SamplingPlan(half_width=0.1, initial_runs=16, max_runs=200)
+    >>> plan.interval
+    'wilson'
     """
 
     half_width: float | None = 0.05
@@ -247,8 +254,19 @@ def probability_map(
 
     Examples
     --------
-    >>> uncertainty = sb.uncertainty.ParameterUncertainty(of={"beam.thickness": sb.uncertainty.Normal(0.01, relative=True)}, phase=True)  # doctest: +SKIP
-    >>> ds = sb.uncertainty.probability_map(system, {"velocity_amplitude": v, "location": x}, uncertainty)  # doctest: +SKIP
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> uncertainty = sb.uncertainty.ParameterUncertainty(
+    ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
+    ... )
+    >>> axes = {"velocity_amplitude": [0.02, 0.1, 0.2], "frequency_ratio": [1.0, 1.2]}
+    >>> integration = sb.Integration(cycles=5)
+    >>> ds = sb.uncertainty.probability_map(system, axes, uncertainty, 16, integration=integration)
+    >>> ds.probability.sel(outcome="snap", frequency_ratio=1.2).values
+    array([0., 0., 1.])
     """
     allocation = allocation_of(runs)
     trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint, cluster=cluster)

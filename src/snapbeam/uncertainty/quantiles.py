@@ -276,6 +276,12 @@ class QuantileSearchSettings:
         Chooses the values at which runs are made.
     outcome : str
         What the probability is of, as in :class:`SamplingPlan`.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> sb.uncertainty.QuantileSearchSettings(probabilities=(0.5,), runs=80).confidence
+    0.95
     """
 
     probabilities: tuple[float, ...] = (0.05, 0.5, 0.95)
@@ -440,9 +446,25 @@ def quantile_threshold(
 
     Examples
     --------
-    >>> ds = sb.uncertainty.quantile_threshold(  # doctest: +SKIP
-    ...     system, "velocity_amplitude", (0.01, 0.6), {"frequency_ratio": omega}, uncertainty
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> uncertainty = sb.uncertainty.ParameterUncertainty(
+    ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
+    >>> ds = sb.uncertainty.quantile_threshold(
+    ...     system,
+    ...     "velocity_amplitude",
+    ...     (0.02, 0.4),
+    ...     {"frequency_ratio": [1.2]},
+    ...     uncertainty,
+    ...     sb.uncertainty.QuantileSearchSettings(probabilities=(0.5,), runs=80),
+    ...     integration=sb.Integration(cycles=5),
+    ... )
+    >>> bool((ds.threshold_low < ds.threshold).all())
+    True
     """
     row = lookup(parameter)
     if not row.is_run or row.quantity.kind is not float or row.section == "initial_state":

@@ -88,6 +88,15 @@ def sobol_indices_from_samples(
     ------
     InputError
         For fewer than 200 runs, or an output that does not vary.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> inputs = np.random.default_rng(0).uniform(size=(4000, 2))
+    >>> result = sb.uncertainty.sobol_indices_from_samples(inputs, inputs[:, 0] + 2.0 * inputs[:, 1])
+    >>> np.round(result.estimate, 1)
+    array([0.2, 0.8])
     """
     x, y = finite_array("inputs", inputs, 2), finite_array("output", output, 1)
     if x.shape[0] != y.size:
@@ -174,6 +183,14 @@ def sobol_indices(
     ------
     InputError
         For bad input, or a function that does not vary.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> result = sb.uncertainty.sobol_indices(lambda x: x[0] + 2.0 * x[1], inputs=2, samples=256)
+    >>> np.round(result.total.estimate, 1)
+    array([0.2, 0.8])
     """
     integer("inputs", inputs, 1, 1000)
     integer("replicates", replicates, 4, 10_000)
@@ -254,6 +271,21 @@ class StatisticQoI:
     name : str
         Of :data:`snapbeam.STATISTICS`, of one of several strikers, such as ``"peak_force_striker_2"``, or an outcome
         such as ``"snap"``: 1 where it happens, else 0.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> uncertainty = sb.uncertainty.ParameterUncertainty(
+    ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
+    ... )
+    >>> tornado = sb.uncertainty.sensitivity(
+    ...     system, sb.uncertainty.StatisticQoI("peak_force"), uncertainty, samples=4,
+    ...     integration=sb.Integration(cycles=5),
+    ... )
     """
 
     name: str
@@ -296,6 +328,11 @@ class ThresholdQoI:
         Of the step below the lowest that snaps.
     at : mapping of str to float, optional
         Other parameters, as they are meant to be.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> quantity = sb.uncertainty.ThresholdQoI(parameter="velocity_amplitude", bounds=(0.02, 0.4), values=10)
     """
 
     parameter: str = "velocity_amplitude"
@@ -366,6 +403,11 @@ class NotchQoI:
     threshold : ThresholdQoI
     depth : bool
         Whether the threshold there is meant, and not the place.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> quantity = sb.uncertainty.NotchQoI(parameter="frequency_ratio", values=[1.1, 1.2, 1.3])
     """
 
     parameter: str = "frequency_ratio"
@@ -432,6 +474,12 @@ class LifetimeQoI:
     initial_conditions : InitialConditions
         The same for every sample.
     settings : LifetimeSettings, optional
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> starts = sb.dynamics.InitialConditions(count=16, displacement=1e-6)
+    >>> quantity = sb.uncertainty.LifetimeQoI(initial_conditions=starts)
     """
 
     initial_conditions: InitialConditions = field(default_factory=lambda: InitialConditions(count=16))
@@ -544,6 +592,22 @@ def sensitivity(
     InputError
         For bad input, a quantity that is missing for some samples, such as a threshold out of range, correlated
         parameters with Sobol's indices, and a quantity that does not vary.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> uncertainty = sb.uncertainty.ParameterUncertainty(
+    ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
+    ... )
+    >>> tornado = sb.uncertainty.sensitivity(
+    ...     system, "peak_force", uncertainty, samples=4, integration=sb.Integration(cycles=5)
+    ... )
+    >>> [float(value) for value in tornado.effect.round(2)]  # N a standard deviation
+    [0.82, 0.11]
     """
     choice("method", method, METHODS)
     within("confidence", confidence, 0.0, 1.0)

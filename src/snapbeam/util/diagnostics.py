@@ -32,7 +32,15 @@ __all__ = [
 
 
 class DiagnosticWarning(UserWarning):
-    """Something that can be computed but is probably not what was meant."""
+    """Something that can be computed but is probably not what was meant.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import snapbeam as sb
+    >>> warnings.simplefilter("error", sb.DiagnosticWarning)  # a doubtful input then ends the script
+    >>> warnings.resetwarnings()
+    """
 
 
 class Severity(StrEnum):
@@ -41,6 +49,12 @@ class Severity(StrEnum):
     INFO: worth knowing, the numbers stand.  WARNING: the numbers may not be what was meant, or be off by more than
     their standard errors, which were widened where that could be told.  ERROR: the numbers contradict something
     known and cannot be right as they are.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> [each.value for each in lab.Severity]
+    ['info', 'warning', 'error']
     """
 
     INFO = "info"
@@ -63,6 +77,13 @@ class Diagnostic:
         The figures behind the words, by name.
     severity : Severity
         How much it takes from the result; its name does, too.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> diagnostic = sb.Diagnostic("beam.steep", "the slopes of the beam are not small", {"slope": 0.2})
+    >>> diagnostic.numbers["slope"]
+    0.2
     """
 
     code: str
@@ -97,7 +118,14 @@ class Diagnostic:
 
 
 class DiagnosticError(InputError):
-    """A measurement refused because of its diagnostics, which are in ``diagnostics``."""
+    """A measurement refused because of its diagnostics, which are in ``diagnostics``.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> issubclass(lab.DiagnosticError, ValueError)
+    True
+    """
 
     def __init__(self, message: str, diagnostics: tuple[Diagnostic, ...]) -> None:
         super().__init__(message)
@@ -142,7 +170,16 @@ def from_json(text: str) -> tuple[Diagnostic, ...]:
 
 
 def diagnostics_of(result: Any) -> tuple[Diagnostic, ...]:
-    """The diagnostics of a result: of a measurement, or of a dataset or its file's attributes; none if it has none."""
+    """The diagnostics of a result: of a measurement, or of a dataset or its file's attributes; none if it has none.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
+    >>> drive = lab.measure_drive(velocity, 100.0)
+    >>> [each.code for each in lab.diagnostics_of(drive)]
+    []
+    """
     own = getattr(result, "diagnostics", None)
     if isinstance(own, tuple):
         return own

@@ -11,7 +11,7 @@ from typing import Any
 
 from snapbeam.util.validation import InputError, file_path
 
-__all__ = ["LARGEST_INPUT", "input_bytes", "input_text", "parsed_toml", "read_toml"]
+__all__ = ["LARGEST_INPUT", "decoded", "input_bytes", "input_text", "parsed_toml", "read_toml"]
 
 
 LARGEST_INPUT = 64 * 2**20
@@ -63,6 +63,39 @@ def input_text(name: str, path: str | os.PathLike[str]) -> str:
         return input_bytes(name, path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{name} = {str(path)!r}: cannot be read, {error}") from error
+
+
+def decoded(raw: bytes, where: str) -> str:
+    """Return the text of a table that an instrument or a spreadsheet wrote: UTF-8, UTF-16 or Latin-1.
+
+    Parameters
+    ----------
+    raw : bytes
+        Contents of the file.
+    where : str
+        Name of the file, for the message.
+
+    Raises
+    ------
+    InputError
+        If the bytes are not text.
+    """
+    start = raw[:400]
+    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+        kind = "utf-16"
+    elif start.count(0) > 0.3 * len(start) and len(raw) % 2 == 0:
+        kind = "utf-16-le" if start[1::2].count(0) > start[0::2].count(0) else "utf-16-be"
+    else:
+        kind = "utf-8-sig"
+    try:
+        text = raw.decode(kind)
+    except UnicodeDecodeError:
+        if kind != "utf-8-sig":
+            raise InputError(f"{where}: is no text") from None
+        text = raw.decode("latin-1")
+    if "\x00" in text:
+        raise InputError(f"{where}: is no text (it holds zero bytes)")
+    return text
 
 
 # Strings and comments, which may contain any number of full stops.  Each alternative also matches a string without an

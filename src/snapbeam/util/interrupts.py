@@ -1,4 +1,4 @@
-"""Ctrl-C and termination of the program: a sentence and a status, from its first moment on.
+"""Ctrl-C, termination and a closed terminal: the program ends with a sentence and a status.
 
 Only the program installs the handler; the library leaves the signals of a process as they are.
 """
@@ -10,7 +10,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -18,7 +18,7 @@ __all__ = ["WORDS", "during_command", "end", "install"]
 
 
 WORDS = "interrupted; no file was left half written"
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 _GRACE = 0.5
 """Seconds that the main thread has to react, before it is asked whether it is compiling."""
 
@@ -32,7 +32,7 @@ class _State:
 
 
 def install() -> None:
-    """Handle both signals, unless the process was told to ignore them, as a background job is."""
+    """Handle the signals that the process was not told to ignore, as a background job and ``nohup`` are."""
     for number in _SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _stop)
@@ -55,8 +55,9 @@ def during_command() -> Iterator[None]:
 def end(code: Any) -> None:
     """End an interrupted program with the status of the signal; threads that still compile are not awaited."""
     if _State.number and code:
-        sys.stdout.flush()
-        sys.stderr.flush()
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError):  # a closed terminal
+                stream.flush()
         os._exit(128 + _State.number)
 
 
@@ -86,5 +87,6 @@ def _compiles(frame: FrameType | None) -> bool:
 
 
 def _leave(number: int) -> NoReturn:
-    os.write(2, f"{WORDS}\n".encode())
+    with suppress(OSError):  # a closed terminal
+        os.write(2, f"{WORDS}\n".encode())
     os._exit(128 + number)

@@ -25,7 +25,53 @@ if TYPE_CHECKING:
     import h5netcdf
     import xarray as xr
 
-__all__ = ["hdf5_stream", "netcdf_file", "read_netcdf", "write_netcdf"]
+__all__ = ["hdf5_stream", "netcdf_file", "read_netcdf", "refuse_large", "write_netcdf"]
+
+
+_MEMORY = 4 * 2**30
+_MOST_TEXTS = 100_000
+_COMPRESSED = 20
+"""Bytes in memory for each byte on the disk, beyond which a large file is refused."""
+
+
+def refuse_large(path: str | os.PathLike[str], name: str = "path") -> None:
+    """Refuse an HDF5 file whose contents fill the memory although the file is small.
+
+    Fill values and compression can turn a file of some kilobytes into any size.
+
+    Parameters
+    ----------
+    path : path
+    name : str
+        The parameter to name in a refusal.
+
+    Raises
+    ------
+    InputError
+        If the numbers need more than 4 GiB and more than twenty times the file, or there are more than 100,000 texts.
+    """
+    import h5py
+
+    size = texts = 0
+
+    def add(_: str, item: Any) -> None:
+        nonlocal size, texts
+        if not isinstance(item, h5py.Dataset) or not item.size:
+            return
+        size += item.size * max(item.dtype.itemsize, 8)
+        texts += item.size if item.dtype.hasobject else 0
+
+    with h5py.File(path, "r") as file:
+        file.visititems(add)
+    found = os.stat(path)
+    stored = min(found.st_size, getattr(found, "st_blocks", found.st_size) * 512)
+    if size > max(_MEMORY, _COMPRESSED * stored):
+        raise InputError(
+            f"{name} = {str(path)!r}: would take {size / 2**30:.3g} GiB of memory, from {stored / 1e6:.3g} MB on the "
+            f"disk: must be at most {_MEMORY / 2**30:.0f} GiB, or {_COMPRESSED} times the file"
+        )
+    if texts > _MOST_TEXTS:
+        raise InputError(f"{name} = {str(path)!r}: has {texts} texts: must be at most {_MOST_TEXTS}")
 
 
 def read_netcdf(
@@ -44,8 +90,9 @@ def read_netcdf(
         raise InputError(f"{name} = {str(path)!r}: no such file")
     read = xr.open_dataset if lazily else xr.load_dataset
     try:
+        refuse_large(path, name)
         return read(path, engine="h5netcdf", group=group)
-    except MemoryError:
+    except (InputError, MemoryError):
         raise
     except Exception as error:  # of damaged bytes the libraries make errors of every kind
         said = str(error).strip().split("\n")[0][:200]
@@ -77,6 +124,12 @@ def write_netcdf(
         If *data* are no datasets, or nothing can be written to *path*, which ends in ``.nc``.
     NoRoomError
         If there is no room for the file; it says how much is needed, and where the file is kept instead.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> import xarray as xr
+    >>> sb.write_netcdf(xr.Dataset({"gap": ("time", [0.0, 1.0])}), "gap.nc")
     """
     from xarray.backends import H5NetCDFStore
 

@@ -19,6 +19,12 @@ class ResponseClass(IntEnum):
     Decided from the zero crossings of the displacement at the centre of the beam: none is intrawell;
     more than n/5 in the last quarter (n cycles) is continuous interwell; anything else is transient,
     1 if it ends about the well it started in and 2 if about the other.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> sb.ResponseClass(1).label
+    'transient interwell 1'
     """
 
     UNKNOWN = -1
@@ -48,7 +54,14 @@ _LABELS = {
 
 
 class RunStatus(IntEnum):
-    """How a run ended.  All but ``OK``, ``EARLY_STOP`` and ``FILLED`` leave the response class unknown."""
+    """How a run ended.  All but ``OK``, ``EARLY_STOP`` and ``FILLED`` leave the response class unknown.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> sb.RunStatus(0).name
+    'OK'
+    """
 
     OK = 0
     EARLY_STOP = 1
@@ -102,6 +115,13 @@ def classify(
     Returns
     -------
     int8 array of the broadcast shape, values of :class:`ResponseClass`
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> codes = sb.classify([40, 2, 0], [10, 0, 0], [40, 40, 40], [1, 1, -1])
+    >>> [sb.ResponseClass(code).label for code in codes]
+    ['continuous interwell', 'transient interwell 2', 'intrawell']
     """
     given = {
         "zero_crossings": zero_crossings,

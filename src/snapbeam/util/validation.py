@@ -48,11 +48,31 @@ __all__ = [
 
 
 class InputError(ValueError):
-    """A parameter that cannot be used: the message names it, its value and what is allowed."""
+    """A parameter that cannot be used: the message names it, its value and what is allowed.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> try:
+    ...     sb.HertzContact(-1.0)
+    ... except sb.InputError as error:
+    ...     print(error)
+    stiffness = -1.0: must be a finite number greater than 0 N/m^1.5
+    """
 
 
 class InputTypeError(InputError, TypeError):
-    """A parameter of a kind that cannot be used, such as text where a number belongs."""
+    """A parameter of a kind that cannot be used, such as text where a number belongs.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> try:
+    ...     sb.HertzContact("stiff")
+    ... except sb.InputTypeError as error:
+    ...     print(type(error).__name__)
+    InputTypeError
+    """
 
 
 _LONGEST = 300

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import cli_command, file_line, out
+from snapbeam.cli.console import add_json, cli_command, file_line, out
 from snapbeam.cli.parameter_options import configured
 from snapbeam.lab.cli import options as lab
 
@@ -134,7 +134,6 @@ def calibrate(
     modes: Modes = None,
     output: Output = None,
     plot: opt.Plot = None,
-    report: lab.JsonFile = None,
     strict: lab.Strict = False,
 ) -> None:
     """Fit thickness and buckling level to natural frequencies, and report what the data leave open.
@@ -157,7 +156,7 @@ def calibrate(
     from snapbeam.util.validation import InputError
 
     for name, path, suffixes in (
-        ("output", output, (".toml",)), ("plot", plot, FIGURE_SUFFIXES), ("json", report, (".json",)),
+        ("output", output, (".toml",)), ("plot", plot, FIGURE_SUFFIXES),
     ):  # fmt: skip
         if path is not None:
             check_writable(path, name, suffixes)
@@ -228,9 +227,7 @@ def calibrate(
 
         save_figure(plot_calibration(result), plot)
         console.print(f"Written: {file_line(plot)}")
-    if report is not None:
-        lab.write_json(report, result.summary())
-        console.print(f"Written: {file_line(report)}")
+    add_json(**result.summary())
 
 
 def _shapes(text: str) -> tuple[str, tuple[str, ...]]:

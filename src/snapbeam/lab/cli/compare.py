@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import cli_command, file_line, open_result, out
+from snapbeam.cli.console import add_json, cli_command, file_line, open_result, out
 from snapbeam.lab.cli import options as lab
 from snapbeam.util.status_codes import ResponseClass
 
@@ -22,6 +22,7 @@ __all__ = ["compare"]
 
 
 _RUN = "Measured run"
+_AT = {"striker": "displacement_at_striker", "midspan": "midspan_displacement"}
 
 
 @cli_command
@@ -29,7 +30,9 @@ def compare(
     measured: Annotated[
         Path,
         typer.Argument(
-            help="CSV table of measured responses, or NetCDF file of a tracked run.", metavar="MEASURED"
+            help="With a map: CSV table of measured responses. With a run: NetCDF file of a tracked run, or a signal "
+            "file of a displacement sensor, zero midway between the wells.",
+            metavar="MEASURED",
         ),
     ],
     simulated: Annotated[
@@ -40,6 +43,15 @@ def compare(
     cycles: Annotated[
         int, opt.count_option("Cycles of excitation the response class is asked for (200).", _RUN)
     ] = 200,
+    at: Annotated[
+        str,
+        typer.Option(help="striker or midspan: where the displacement was measured.", rich_help_panel=_RUN),
+    ] = "striker",
+    channel: lab.Channel = None,
+    units: lab.Units = None,
+    sensitivity: lab.Sensitivity = None,
+    sampling_frequency: lab.SamplingFreq = None,
+    columns: lab.Columns = None,
     window: opt.Window = None,
     plot: opt.Plot = None,
     overlay: Annotated[
@@ -50,35 +62,41 @@ def compare(
             rich_help_panel="Output",
         ),
     ] = False,
-    report: lab.JsonFile = None,
     strict: lab.Strict = False,
 ) -> None:
     """Compare measured responses with a simulated map, or a measured waveform with a simulated one.
 
     A CSV table of responses is laid on a map: the share that agrees and a table of measured against simulated
-    classes.  A tracked run is put beside a simulated one, aligned by the shaker's phase.
+    classes.  A tracked run is put beside a simulated one, aligned by the shaker's phase; the signal of a displacement
+    sensor is aligned by --start, the time at which the shaker starts.
 
-    Example: snapbeam compare tests.csv map.nc --plot agreement.png
+    Example: snapbeam compare laser.csv run.nc --at midspan --frequency 100 --start 0.2 --plot waves.png
     """
+    from snapbeam.lab.waveform_comparison import run_of_signal
     from snapbeam.plot.style import FIGURE_SUFFIXES, save_figure
     from snapbeam.util.diagnostics import refuse
     from snapbeam.util.files import check_writable
+    from snapbeam.util.validation import choice
 
     if plot is not None:
         check_writable(plot, "plot", FIGURE_SUFFIXES)
-    if report is not None:
-        check_writable(report, "json", (".json",))
     dataset = open_result(simulated)
-    if measured.suffix.lower() == ".csv":
-        summary, figure = _map(measured, dataset, plot is not None)
-        diagnostics: tuple[Diagnostic, ...] = ()
+    place = choice("at", at, tuple(_AT))
+    if "time" not in dataset.dims:
+        summary, figure, diagnostics = _map(measured, dataset, plot is not None)
     else:
+        if measured.suffix.lower() == ".nc":
+            run = open_result(measured)
+        else:
+            signal = lab.open_signal(measured, channel, units, sensitivity, sampling_frequency, columns)
+            run = run_of_signal(signal, float(dataset.attrs["length_scale"]), _AT[place])
         summary, figure, diagnostics = _run(
-            open_result(measured),
+            run,
             dataset,
             frequency,
             start,
             cycles,
+            _AT[place],
             opt.parse_window(window),
             ("overlay" if overlay else "beside") if plot is not None else "",
         )
@@ -88,12 +106,10 @@ def compare(
         console.print(f"Written: {file_line(plot)}")
     if strict:
         refuse(diagnostics, str(measured))
-    if report is not None:
-        lab.write_json(report, summary)
-        console.print(f"Written: {file_line(report)}")
+    add_json(**summary)
 
 
-def _map(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | None]:
+def _map(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | None, tuple[Diagnostic, ...]]:
     from rich.table import Table
 
     from snapbeam.lab.map_comparison import compare_measured_points
@@ -123,12 +139,13 @@ def _map(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | No
     console.print(table)
     for note in result.notes:
         console.print(f"[yellow]note[/] {note}")
+    lab.print_diagnostics(console, result.diagnostics)
     figure = None
     if draw:
         from snapbeam.lab.plot.comparison import plot_map_comparison
 
         figure = plot_map_comparison(dataset, points, result)
-    return result.summary(), figure
+    return result.summary(), figure, result.diagnostics
 
 
 def _short(kind: ResponseClass) -> str:
@@ -141,6 +158,7 @@ def _run(
     frequency: float | None,
     start: float | None,
     cycles: int,
+    at: str,
     window: tuple[float, float] | None,
     draw: str,
 ) -> tuple[dict, Figure | None, tuple[Diagnostic, ...]]:
@@ -154,18 +172,20 @@ def _run(
         from snapbeam.lab.tracking.track import contact_onsets
 
         onsets = contact_onsets(run)["onset"].values
-    result = compare_waveforms(run, model, frequency, start=start, measured_onsets=onsets)
-    seen = measure_response(run, frequency, cycles=cycles, start=start)
+    result = compare_waveforms(run, model, frequency, at=at, start=start, measured_onsets=onsets)
+    seen = measure_response(run, frequency, cycles=cycles, at=at, start=start)
     console = out()
     console.print(f"  measured class      {seen.description}")
     console.print(
-        f"  beam                rms difference {result.rms_difference:.4g} b of {result.measured_rms:.4g} b"
+        f"  beam                rms difference {result.rms_difference:.4g} b; rms of the measured motion "
+        f"{result.measured_rms:.4g} b"
     )
     console.print(f"  correlation         {result.correlation:.4f}")
-    console.print(
-        f"  shaker              rms difference {result.shaker_rms_difference:.4g} b, amplitude ratio "
-        f"{result.amplitude_ratio:.4f}"
-    )
+    if not np.isnan(result.amplitude_ratio):
+        console.print(
+            f"  shaker              rms difference {result.shaker_rms_difference:.4g} b, amplitude ratio "
+            f"{result.amplitude_ratio:.4f}"
+        )
     parted = "never" if np.isnan(result.parted) else f"at cycle {result.parted:.2f}"
     console.print(f"  the two part        {parted} (by more than {result.apart:.2g} b)")
     diagnostics = (*diagnostics_of(run), *result.diagnostics)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import cli_command, file_line, out
+from snapbeam.cli.console import add_json, cli_command, file_line, out
 from snapbeam.lab.cli import options as lab
 
 __all__ = [
@@ -97,7 +97,6 @@ def fit_decay(
     columns: lab.Columns = None,
     plot: opt.Plot = None,
     stabilisation: Stabilisation = None,
-    report: lab.JsonFile = None,
     strict: lab.Strict = False,
 ) -> None:
     """Fit frequency, damping ratio and softening to a free decay, with standard errors.
@@ -118,8 +117,6 @@ def fit_decay(
     for name, path in (("plot", plot), ("stabilisation", stabilisation)):
         if path is not None:
             check_writable(path, name, FIGURE_SUFFIXES)
-    if report is not None:
-        check_writable(report, "json", (".json",))
     choice("method", method, (*METHODS, "all"))
     data = lab.open_signal(signal, channel, units, sensitivity, sampling_frequency, columns)
     rough = lab.numbers("frequencies", frequencies) or None
@@ -175,6 +172,4 @@ def fit_decay(
         console.print(f"Written: {file_line(stabilisation)}")
     if strict:
         refuse(diagnostics, str(signal))
-    if report is not None:
-        lab.write_json(report, {name: fit.summary() for name, fit in fits.items()})
-        console.print(f"Written: {file_line(report)}")
+    add_json(**{name: fit.summary() for name, fit in fits.items()})

@@ -1,4 +1,4 @@
-"""What the laboratory commands share: the options of a signal file, diagnostics, and figures as JSON."""
+"""What the laboratory commands share: the options of a signal file, and diagnostics."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from rich.console import Console
 from rich.markup import escape
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import write_json
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
 __all__ = [
     "Channel",
     "Columns",
-    "JsonFile",
     "SamplingFreq",
     "Sensitivity",
     "SignalFile",
@@ -31,7 +29,6 @@ __all__ = [
     "open_signal",
     "print_diagnostics",
     "whole_numbers",
-    "write_json",
 ]
 
 
@@ -80,15 +77,6 @@ Strict = Annotated[
         "--strict",
         help="Refuse a result with any diagnostic that makes it doubtful; write none.",
         rich_help_panel=_OUTPUT,
-    ),
-]
-JsonFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--json",
-        help="JSON file of the figures to write; - for standard output, in place of the words.",
-        rich_help_panel=_OUTPUT,
-        metavar="FILE",
     ),
 ]
 

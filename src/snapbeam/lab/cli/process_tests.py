@@ -79,6 +79,7 @@ def process_tests(
     map.nc
     """
     from snapbeam.lab.batch import load_settings, run_test_series
+    from snapbeam.lab.waveform_comparison import TOO_SHORT
     from snapbeam.util.files import check_writable
 
     wanted = load_settings(
@@ -99,8 +100,11 @@ def process_tests(
         if target.is_dir():
             check_writable(target / name)
     results = run_test_series(folder, wanted, target, table=table, strict=strict, progress=_tell)
-    spoiled = [result for result in results if result.status != "measured"]
-    console.print(f"{len(results)} tests, {len(spoiled)} spoiled")
+    spoiled = [result for result in results if result.status == "spoiled"]
+    short = [result for result in results if result.status == TOO_SHORT]
+    console.print(
+        f"{len(results)} tests, {len(spoiled)} spoiled" + (f", {len(short)} too short" if short else "")
+    )
     import matplotlib
 
     matplotlib.use("Agg")
@@ -111,9 +115,11 @@ def process_tests(
         target / "tests.csv",
         save_figure(plot_test_series(results, target / "tests"), target / "tests.png"),
     ]
-    if simulated is not None and len(spoiled) < len(results):
+    if simulated is not None and len(spoiled) + len(short) < len(results):
         files.append(_on_map(target, simulated))
-    add_json(tests=[asdict(result) for result in results], spoiled=len(spoiled), files=files)
+    add_json(
+        tests=[asdict(result) for result in results], spoiled=len(spoiled), too_short=len(short), files=files
+    )
     for path in files:
         console.print(f"Written: {file_line(path)}")
     if len(spoiled) == len(results):
@@ -133,7 +139,7 @@ def _tell(done: int, total: int, result: Any) -> None:
             markup=False,
         )
     else:
-        console.print(f"{head}spoiled: {result.reason}", markup=False)
+        console.print(f"{head}{result.status}: {result.reason}", markup=False)
     for code, severity, words in result.diagnostics:
         if severity != "info" and words != result.reason:
             console.print(f"    {severity} [{code}] {words}", markup=False)
@@ -163,4 +169,5 @@ def _on_map(target: Path, simulated: Path) -> Path:
         )
     for note in result.notes:
         console.print(f"[yellow]note[/] {note}")
+    lab.print_diagnostics(console, result.diagnostics)
     return save_figure(plot_map_comparison(dataset, points, result), target / "measurements.png")

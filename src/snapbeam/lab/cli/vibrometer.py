@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import cli_command, file_line, out
+from snapbeam.cli.console import add_json, cli_command, file_line, out
 from snapbeam.lab.cli import options as lab
 
 __all__ = [
@@ -92,7 +92,6 @@ def vibrometer(
     drive_output: DriveOutput = None,
     drive_sampling_frequency: DriveSamplingFreq = None,
     plot: opt.Plot = None,
-    report: lab.JsonFile = None,
     strict: lab.Strict = False,
 ) -> None:
     """Measure the motion of the shaker from a vibrometer signal, and check whether the test is acceptable.
@@ -111,7 +110,6 @@ def vibrometer(
 
     for name, path, suffixes in (
         ("plot", plot, FIGURE_SUFFIXES),
-        ("json", report, (".json",)),
         ("drive_output", drive_output, (".nc",)),
     ):
         if path is not None:
@@ -166,6 +164,4 @@ def vibrometer(
         )  # fmt: skip
         write_netcdf(resampled, drive_output)
         console.print(f"Written: {file_line(drive_output)}")
-    if report is not None:
-        lab.write_json(report, summary)
-        console.print(f"Written: {file_line(report)}")
+    add_json(**summary)

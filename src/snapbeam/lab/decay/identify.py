@@ -28,6 +28,7 @@ from snapbeam.lab.decay.window import find_centres, noise_fall, prepared, undone
 from snapbeam.lab.diagnostics import KINDS_DECAY
 from snapbeam.lab.signals import SignalSamples, check_signal
 from snapbeam.lab.sine_fit import white_variance
+from snapbeam.util.diagnostics import diagnostics_of
 from snapbeam.util.validation import InputError, choice, finite_array, integer, positive
 
 if TYPE_CHECKING:
@@ -93,6 +94,18 @@ def identify_decay(
     ------
     InputError
         If the signal is unfit, fewer than 8 cycles long, or does not hold that many modes above the noise.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> time = np.arange(20000) / 10e3
+    >>> noise = 1e-7 * np.random.default_rng(0).standard_normal(time.size)
+    >>> decay = 1e-4 * np.exp(-0.005 * 2 * np.pi * 80 * time) * np.cos(2 * np.pi * 80 * time) + noise
+    >>> signal = lab.make_signal(decay, "m", 10e3)
+    >>> fit = lab.identify_decay(signal)
+    >>> f"{fit.modes[0].natural_frequency:.2f} Hz, {fit.modes[0].damping_ratio:.4f}"
+    '80.00 Hz, 0.0050'
     """
     check_signal(signal, _UNITS, "signal")
     units = str(signal.attrs["units"])
@@ -156,7 +169,7 @@ def identify_decay(
         misfit=misfit.ratio,
         lines=decay.lines,
         poles=diagram,
-        diagnostics=(*decay.diagnostics, *told, *doubts),
+        diagnostics=(*diagnostics_of(signal), *decay.diagnostics, *told, *doubts),
         backbone_amplitude=amplitude,
         backbone_frequency=freq,
         backbone_frequency_se=freq_se,

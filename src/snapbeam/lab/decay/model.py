@@ -460,6 +460,18 @@ def mode_shapes(first: xr.DataArray, second: xr.DataArray, fit: DecayFit) -> tup
     ------
     InputError
         If the records differ in length or rate.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> time = np.arange(20000) / 10e3
+    >>> noise = 1e-7 * np.random.default_rng(0).standard_normal(time.size)
+    >>> decay = 1e-4 * np.exp(-0.005 * 2 * np.pi * 80 * time) * np.cos(2 * np.pi * 80 * time) + noise
+    >>> signal = lab.make_signal(decay, "m", 10e3)
+    >>> fit = lab.identify_decay(signal)
+    >>> lab.mode_shapes(signal, signal, fit)  # here twice the same signal
+    ('symmetric',)
     """
     one, two = check_signal(first, (), "first"), check_signal(second, (), "second")
     if (
@@ -543,6 +555,13 @@ def compare_wells(
         Decays about either well, or their frequencies [Hz].
     lower_se, upper_se : float, optional
         Standard errors of frequencies given as numbers.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> wells = lab.compare_wells(84.0, 86.0, 0.2, 0.2)  # Hz
+    >>> f"{wells.difference:.1f} +- {wells.difference_se:.1f} Hz"
+    '-2.0 +- 0.3 Hz'
     """
     values, errors = [], []
     for name, well, se in (("lower", lower, lower_se), ("upper", upper, upper_se)):

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_map_comparison", "plot_waveform_comparison", "plot_waveform_overlay"]
 
 
+_PLACES = {"displacement_at_striker": "beam at the shaker", "midspan_displacement": "beam at midspan"}
 _DRAWN = ("frequency_ratio", "location", "velocity_amplitude")  # across first, then upward
 
 
@@ -43,7 +44,9 @@ def plot_map_comparison(dataset: xr.Dataset, points: MeasuredPoints, result: Map
     and what does not is red and bold, each the darker the greater its share of the measured class is.
     """
     with figure_style():
-        figure = new_figure("double", 92.0)
+        told = result.diagnostics
+        figure = new_figure("double", 92.0 + diagnostics_height(told, COLUMN_WIDTHS["double"], 3))
+        draw_diagnostics(figure, told, 3)
         grid = figure.add_gridspec(1, 2, width_ratios=(1.15, 1.0))
         left = plot_response_map(dataset, figure.add_subplot(grid[0]), measurements=points)
         _mark_disagreeing(left, dataset, result)
@@ -133,7 +136,7 @@ def plot_waveform_comparison(
         for i, (name, beam, shaker, impacts) in enumerate(columns):
             top, bottom = axes[0, i], axes[1, i]
             top.axhline(0.0, color="0.7", linewidth=0.5)
-            top.plot(cycle, waveforms[beam], color=BEAM_COLOR, label="beam, at the shaker")
+            top.plot(cycle, waveforms[beam], color=BEAM_COLOR, label=_PLACES[result.at])
             top.plot(cycle, waveforms[shaker], color=SHAKER_COLOR, label="shaker")
             shown = impacts[(impacts >= cycle[0]) & (impacts <= cycle[-1])]
             if shown.size:
@@ -176,7 +179,7 @@ def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float
         draw_diagnostics(figure, told, 3)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0))
         pairs = (
-            (top, "displacement", "beam, at the shaker"),
+            (top, "displacement", _PLACES[result.at]),
             (middle, "shaker", "shaker"),
         )
         for ax, name, word in pairs:

@@ -21,7 +21,9 @@ __all__ = ["plot_test_series"]
 
 
 _ACROSS = 4
-_LINES = 6  # of a reason in a picture; the table has all of it
+_WIDTH = 44  # letters of a line in a picture
+_LINES = 12  # of a reason in a picture; the table has all of it
+_ROOM = 0.3  # of the height of a picture above the curves, for the codes of diagnostics
 _LABELS = {kind.label: kind for kind in ResponseClass}
 
 
@@ -61,19 +63,19 @@ def plot_test_series(results: list[TestResult], folder: Path) -> Figure:
 
 def _thumbnail(ax: Axes, result: TestResult, path: Path) -> None:
     color = CLASS_COLORS[_LABELS.get(result.response_class, ResponseClass.UNKNOWN)]
-    if path.exists():
+    told = result.status != "measured"
+    if path.exists() and not told:
         from snapbeam.util.datasets import xr
 
         with xr.open_dataset(path, engine="h5netcdf") as run:
             time = run["time"].values
             step = max(1, time.size // 2000)
-            faint = 1.0 if result.status == "measured" else 0.25
             for name, line, width in (
                 ("striker_displacement", SHAKER_COLOR, 0.4), ("displacement_at_striker", BEAM_COLOR, 0.5)
             ):  # fmt: skip
                 if name in run:
                     shown = run[name].values[::step]
-                    ax.plot(time[::step], shown, color=line, linewidth=width, alpha=faint)
+                    ax.plot(time[::step], shown, color=line, linewidth=width)
             ax.set_xlim(time[0], time[-1])
         ax.axhline(0.0, color="0.8", linewidth=0.4, zorder=0)
     else:
@@ -85,12 +87,14 @@ def _thumbnail(ax: Axes, result: TestResult, path: Path) -> None:
         title += f": {result.frequency_hz:.4g} Hz, {1e3 * result.velocity_m_s:.3g} mm/s"
     ax.set_title(title, fontsize=6, loc="left")
     codes = dict.fromkeys(code for code, severity, _ in result.diagnostics if severity != "info")
-    if result.status != "measured":
-        lines = textwrap.wrap("spoiled: " + result.reason, 44)
+    if told:
+        lines = textwrap.wrap(f"{result.status}: {result.reason}", _WIDTH)
         text = "\n".join(
             lines if len(lines) <= _LINES else [*lines[: _LINES - 1], lines[_LINES - 1] + " ..."]
         )
         ax.text(0.04, 0.93, text, transform=ax.transAxes, fontsize=4.2, va="top", color=SHAKER_COLOR)
     elif codes:
-        text = "\n".join(textwrap.wrap("! " + " ".join(codes), 44))
+        low, high = ax.get_ylim()
+        ax.set_ylim(low, high + _ROOM * (high - low))
+        text = "\n".join(textwrap.wrap("! " + " ".join(codes), _WIDTH))
         ax.text(0.04, 0.93, text, transform=ax.transAxes, fontsize=4.2, va="top", color=SHAKER_COLOR)

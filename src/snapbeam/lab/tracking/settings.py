@@ -149,6 +149,13 @@ class TrackingSettings:
     fixed_marks
         Parts of the picture, each (first row, last row + 1, first column, last column + 1), that show
         something which stands still; their motion is the camera's and is taken out.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> settings = lab.TrackingSettings(buckling_level=0.335e-3, location=1 / 2.1)
+    >>> settings.side
+    'below'
     """
 
     buckling_level: float | None = None
@@ -490,6 +497,12 @@ class FrameFlag(IntFlag):
 
     A position that could not be measured is NaN and its frame carries the reason.  ``BLUR`` alone leaves the
     position in place: it is the mean over a long exposure.
+
+    Examples
+    --------
+    >>> from snapbeam import lab
+    >>> [each.name for each in lab.FrameFlag][:2]
+    ['GAP', 'BLUR']
     """
 
     OK = 0

@@ -256,6 +256,22 @@ def track(
     ------
     InputError
         For settings out of range, or a recording in which beam or shaker cannot be found.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> time = np.arange(60) / 10e3  # s
+    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
+    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
+    >>> camera = lab.SyntheticCamera(shape=(160, 64))
+    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
+    >>> path = synthetic.write("test.cihx")
+    >>> with lab.open_recording(path, frame_rate=10e3, pixel_size=12e-6) as recording:
+    ...     tracked = lab.track(recording, buckling_level=0.335e-3)
+    >>> list(tracked.data_vars)[:2]
+    ['valid', 'displacement_at_striker']
     """
     instance("recording", recording, Recording, "a Recording")
     if settings is not None:
@@ -401,6 +417,22 @@ def tracking_quality(dataset: xr.Dataset) -> dict[str, Any]:
         ``frames``; ``measured_share`` and ``flagged_share``; ``counts`` by name of flag; ``longest_gap`` in
         frames; ``beam_stderr_px`` and ``shaker_stderr_px`` (medians; NaN without a shaker); ``confidence``
         (median); ``largest_step_px``, the most the beam moved between frames; ``snr_db``; ``edge_width``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> time = np.arange(60) / 10e3  # s
+    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
+    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
+    >>> camera = lab.SyntheticCamera(shape=(160, 64))
+    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
+    >>> path = synthetic.write("test.cihx")
+    >>> with lab.open_recording(path, frame_rate=10e3, pixel_size=12e-6) as recording:
+    ...     tracked = lab.track(recording, buckling_level=0.335e-3)
+    >>> sorted(lab.tracking_quality(tracked))[:3]
+    ['beam_stderr_px', 'confidence', 'counts']
     """
     dataset = check_tracked(dataset)
     flags = dataset["flags"].values.astype(int)
@@ -435,7 +467,24 @@ def _median(values: np.ndarray) -> float:
 
 
 def tracking_report(dataset: xr.Dataset, *, diagnostics: bool = True) -> str:
-    """The quality of a tracked recording in plain lines: advice for every kind of trouble met, and *diagnostics*."""
+    """The quality of a tracked recording in plain lines: advice for every kind of trouble met, and *diagnostics*.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> time = np.arange(60) / 10e3  # s
+    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
+    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
+    >>> camera = lab.SyntheticCamera(shape=(160, 64))
+    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
+    >>> path = synthetic.write("test.cihx")
+    >>> with lab.open_recording(path, frame_rate=10e3, pixel_size=12e-6) as recording:
+    ...     tracked = lab.track(recording, buckling_level=0.335e-3)
+    >>> print(lab.tracking_report(tracked).splitlines()[0])
+    69 frames at 10000 Hz, 12 um per pixel; 100.00 % measured, 0.00 % flagged
+    """
     quality = tracking_quality(dataset)
     attrs = dataset.attrs
     pixel = attrs["pixel_size"] * 1e6
@@ -499,6 +548,22 @@ def contact_onsets(
     ------
     InputError
         If the dataset holds no penetration.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> time = np.arange(60) / 10e3  # s
+    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
+    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
+    >>> camera = lab.SyntheticCamera(shape=(160, 64))
+    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
+    >>> path = synthetic.write("test.cihx")
+    >>> with lab.open_recording(path, frame_rate=10e3, pixel_size=12e-6) as recording:
+    ...     tracked = lab.track(recording, buckling_level=0.335e-3)
+    >>> lab.contact_onsets(tracked).sizes["impact"]
+    0
     """
     from snapbeam.util.datasets import xr
 

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from snapbeam.model.quantity import check_fields, numbers_type
+from snapbeam.util.validation import InputError
 
 __all__ = ["LAWS", "ContactLaw", "LawProperties", "hertzian_time"]
 
@@ -56,6 +57,15 @@ class ContactLaw:
     max(0, force + damping times the rate of penetration).
 
     They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone, and never allocate.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> law = sb.HertzContact(1e9)
+    >>> isinstance(law, sb.ContactLaw), law.is_dissipative
+    (True, False)
+    >>> f"{law.impact_duration(mass=1e-3, velocity=0.1):.2e} s"
+    '8.08e-05 s'
     """
 
     name: ClassVar[str] = ""
@@ -72,6 +82,13 @@ class ContactLaw:
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
+        if cls.name and not cls.impulsive:
+            missing = [each for each in ("force", "energy", "slope") if not hasattr(cls, each)]
+            if missing:
+                raise InputError(
+                    f"contact law {cls.name!r}: has no {' and no '.join(missing)}; write them as static methods of "
+                    "(law, penetration): the force (N), its integral (J) and its derivative (N/m)"
+                )
         if cls.name:
             LAWS[cls.name] = cls
 

@@ -28,6 +28,13 @@ class HertzContact(ContactLaw):
     ----------
     stiffness : float
         Contact stiffness k_c, N/m^1.5.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> contact = sb.HertzContact.from_materials(radius=4e-3, young_modulus=(210e9, 210e9), poisson_ratio=(0.3, 0.3))
+    >>> f"{contact.stiffness:.3g} N/m^1.5"
+    '9.73e+09 N/m^1.5'
     """
 
     stiffness: float = quantity(

@@ -31,6 +31,13 @@ class HuntCrossley(ContactLaw):
         Contact stiffness k_c, N/m^1.5.
     damping_factor : float
         chi, s/m; 0 is Hertz's law.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> contact = sb.HuntCrossley.from_restitution(1e9, restitution=0.8, speed=0.1)
+    >>> round(contact.restitution(0.1), 6)
+    0.8
     """
 
     stiffness: float = quantity(

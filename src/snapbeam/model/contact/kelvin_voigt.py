@@ -30,6 +30,11 @@ class KelvinVoigt(ContactLaw):
         k, N/m.
     linear_damping : float
         c, N s/m; 0 is a spring alone.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> contact = sb.KelvinVoigt(linear_stiffness=1e6, linear_damping=2.0)
     """
 
     linear_stiffness: float = quantity(

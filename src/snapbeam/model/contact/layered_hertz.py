@@ -37,6 +37,11 @@ class LayeredHertz(ContactLaw):
         k_c of the two bodies, N/m^1.5.
     layer_stiffness : float
         k_l, N/m^2.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> contact = sb.LayeredHertz(stiffness=1e9, layer_stiffness=1e6)
     """
 
     stiffness: float = quantity(

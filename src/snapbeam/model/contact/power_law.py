@@ -29,6 +29,11 @@ class PowerLaw(ContactLaw):
         f_1, N.
     exponent : float
         p, in [1, 10].
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> contact = sb.PowerLaw.from_stiffness(1e13, exponent=2.0)
     """
 
     force_at_1um: float = quantity(

@@ -22,6 +22,11 @@ class Restitution(ContactLaw):
     ----------
     coefficient : float
         Coefficient of restitution e, in [0, 1].
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> contact = sb.Restitution(coefficient=0.9)
     """
 
     coefficient: float = quantity(

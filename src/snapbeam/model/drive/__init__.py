@@ -7,6 +7,7 @@ from snapbeam.model.drive import (  # noqa: F401, I001  the order of DRIVES
     half_sine,
     noise,
     recorded_motion,
+    shock,
     sine,
     fixed_stop,
     sum,

@@ -45,6 +45,12 @@ class Drive:
     that is not a sine brings ``motion(drive, memory, argument)``, a scalar function of numbers that every engine
     compiles for itself and that returns displacement (m) and velocity (m/s), and ``acceleration`` likewise (m/s^2);
     ``drive`` stands for its numbers and ``memory[drive.table:]`` for its samples.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> isinstance(sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.18), sb.Drive)
+    True
     """
 
     name: ClassVar[str] = ""

@@ -46,6 +46,11 @@ class Burst(Timed):
         Cycles that they take, each greater than 0, together at most *duration_cycles*.
     retraction : float
         How far the tip withdraws in the cycle after the burst, over b: a beam released after so many cycles.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> striker = sb.Striker(drive=sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.1, duration_cycles=20.0))
     """
 
     frequency_ratio: float = quantity(

@@ -39,6 +39,12 @@ class Chirp(Timed):
     sweep_cycles : float
         Duration over the first period 2 pi/(start_ratio omega_1): the cycles of the run are counted in these.
     sweep_type : {"linear", "log"}
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> chirp = sb.Chirp(start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_cycles=200.0)
+    >>> striker = sb.Striker(drive=chirp)
     """
 
     start_ratio: float = quantity("1", "frequency ratio at the start of the sweep", low=0.0, scope=RUN)

@@ -30,6 +30,11 @@ class ConstantVelocity(Timed):
     ----------
     speed : float
         Over b omega_1.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> striker = sb.Striker(drive=sb.ConstantVelocity(speed=0.1))
     """
 
     speed: float = quantity(

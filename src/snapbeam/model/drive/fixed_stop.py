@@ -22,7 +22,13 @@ _Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class FixedStop(Drive):
-    """No motion: a stop.  A cycle is a period of the first mode."""
+    """No motion: a stop.  A cycle is a period of the first mode.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> stop = sb.Striker(drive=sb.FixedStop(), gap=1e-4)
+    """
 
     name = "fixed"
     harmonic = True
@@ -96,6 +102,11 @@ class DisplacementSine(_OwnAmplitude):
         A over the buckling level b.
     phase : float
         At the start, rad.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> striker = sb.Striker(drive=sb.DisplacementSine(frequency_ratio=1.2, displacement_amplitude=0.15))
     """
 
     displacement_amplitude: float = quantity(
@@ -123,6 +134,11 @@ class AccelerationSine(_OwnAmplitude):
         a over b omega_1^2.
     phase : float
         At the start, rad.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> base = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25))
     """
 
     acceleration_amplitude: float = quantity(

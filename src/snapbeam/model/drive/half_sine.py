@@ -35,6 +35,11 @@ class HalfSine(Timed):
         A over the buckling level b.
     duration : float
         T over the period of the first mode.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> striker = sb.Striker(drive=sb.HalfSine(displacement_amplitude=0.5, duration=0.5))
     """
 
     displacement_amplitude: float = quantity(

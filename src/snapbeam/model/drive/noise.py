@@ -47,6 +47,12 @@ class BandLimitedNoise(Timed):
         0 to 2^31 - 1.
     ramp_up_cycles : float
         Cycles of the middle of the band in which the noise rises.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> noise = sb.BandLimitedNoise(low_ratio=0.8, high_ratio=1.4, velocity_rms=0.1, seed=1)
+    >>> striker = sb.Striker(drive=noise)
     """
 
     low_ratio: float = quantity(

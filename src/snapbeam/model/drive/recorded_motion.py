@@ -42,6 +42,17 @@ class RecordedMotion(Drive):
         Samples per second, Hz.
     frequency : float
         Nominal frequency of the excitation, Hz: what a cycle is.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> angle = 2.0 * np.pi * 100.0 * np.arange(2000) / 2e4
+    >>> motion = sb.RecordedMotion(
+    ...     displacement=5e-5 * np.sin(angle), velocity=5e-5 * 200.0 * np.pi * np.cos(angle),
+    ...     sampling_frequency=2e4, frequency=100.0,
+    ... )
+    >>> striker = sb.Striker(drive=motion)
     """
 
     displacement: NDArray[np.float64] = quantity("m", "displacement of the tip, sampled", kind=object)

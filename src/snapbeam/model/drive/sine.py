@@ -36,6 +36,11 @@ class Sine(Drive):
         Velocity amplitude over b omega_1, V; 0 is a striker at rest.
     phase : float
         At the start, rad.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> striker = sb.Striker(drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.18))
     """
 
     frequency_ratio: float = quantity(

@@ -35,6 +35,15 @@ class SumDrive(Timed):
     In parameter files the type of a sum joins those of its terms, ``"sine+burst"``.  The parameters of term i end
     with its number, counted from 1: ``frequency_ratio_1``, ``duration_cycles_2``.  A cycle is a cycle of the first
     term.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> drive = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1) + sb.Sine(
+    ...     frequency_ratio=1.8, velocity_amplitude=0.05
+    ... )
+    >>> isinstance(drive, sb.SumDrive)
+    True
     """
 
     terms: ClassVar[tuple[type[Drive], ...]] = ()

@@ -37,6 +37,11 @@ class TwoTone(Timed):
         Omega and V of the second.
     second_phase : float
         Its phase at the start, rad.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> drive = sb.TwoTone(frequency_ratio=1.2, velocity_amplitude=0.1, second_ratio=1.8, second_amplitude=0.02)
     """
 
     frequency_ratio: float = quantity(

@@ -27,9 +27,17 @@ __all__ = ["PIEZO", "SPLIT", "compute", "draw", "power_above"]
 
 _Array = NDArray[np.float64]
 
-PIEZO = sb.PiezoelectricHarvester(
-    moment_per_volt=4e-3, capacitance=60e-9, resistance=2e4, patch_start=0.0, patch_end=0.25
+PIEZO = sb.PiezoelectricHarvester.from_material(
+    stress_constant=-16.6,
+    permittivity=25.55e-9,
+    layer_thickness=0.1e-3,
+    layer_width=BEAM.width,
+    beam=BEAM,
+    resistance=1e4,
+    patch_start=0.0,
+    patch_end=0.25,
 )
+"""Two layers of PZT-5H: the effective e_31 (C/m^2) and the permittivity at constant strain (F/m)."""
 SPLIT = 5.0
 """Over the first natural frequency: what is above is up-converted."""
 _RATE = 400.0

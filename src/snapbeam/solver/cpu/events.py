@@ -491,7 +491,8 @@ def accept_step(
         accumulators.lost += done.lost
     accumulate_further_contacts(memory, layout.others, touching, done, accumulators)
     accumulate_work(layout.terms, accumulators, done.external)
-    accumulate_circuit(memory, layout, layout.circuit, step.p1, accumulators, done.circuit)
+    late = min(max((t + step.ticks - clock.last_quarter) / step.ticks, 0.0), 1.0)
+    accumulate_circuit(memory, layout, layout.circuit, step.p1, accumulators, done.circuit, late)
     if outputs is not None:
         accumulators.dissipated += done.dissipated + done.lost
     accumulate_displacement(accumulators, seen, seen1, step.length)

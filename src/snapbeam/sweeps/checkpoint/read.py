@@ -11,10 +11,10 @@ import numpy as np
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.solver.statistics import rows_for
-from snapbeam.sweeps.checkpoint.records import Record, TaskLog
-from snapbeam.sweeps.checkpoint.store import BASE, is_table, layers_of, read_description
+from snapbeam.sweeps.checkpoint.records import Record, TaskLog, refuse_links
+from snapbeam.sweeps.checkpoint.store import BASE, layers_of, read_description, read_task, reading
 from snapbeam.sweeps.export import to_dataset
-from snapbeam.sweeps.points import Grid
+from snapbeam.sweeps.points import points_of, require_memory
 from snapbeam.sweeps.replicates import Replicates
 from snapbeam.sweeps.setup import SweepSetup
 from snapbeam.sweeps.tasks import PointWork, ResultTable, Stage
@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["read_checkpoint"]
-
-
-_TABLES = ("integers", "numbers")
 
 
 def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
@@ -52,6 +49,22 @@ def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
         recorded motion, or other statistics.
     CheckpointError
         If the description is damaged.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
+    ...     paper.CONTACT,
+    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18),
+    ... )
+    >>> found = sb.sweep(
+    ...     system, {"drive.velocity_amplitude": [0.05, 0.2]}, sb.Integration(cycles=2),
+    ...     checkpoint=sb.CheckpointOptions("sweep.checkpoint"),
+    ... )
+    >>> sb.read_checkpoint("sweep.checkpoint")["response_class"].shape
+    (2,)
     """
     if not isinstance(checkpoint, (str, os.PathLike)):
         raise InputTypeError(f"checkpoint = {shown(checkpoint)}: must be a folder")
@@ -59,15 +72,18 @@ def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
     file = folder / "map.json"
     if file.is_symlink() or not file.is_file():
         raise InputError(f"checkpoint = {str(checkpoint)!r}: is not the folder of a sweep")
+    refuse_links(folder, sweep=False)
     held = read_description(file)
     task_log = TaskLog(folder / "tasks.jsonl")
     done: dict[str, dict[int, Record]] = {}
     for (name, task), record in task_log.records.items():
         if record.state == "done":
             done.setdefault(name, {})[task] = record
-    work = _work(held, str(checkpoint), {} if "grown" in held else done.get(BASE, {}))
+    with reading(file):
+        work = _work(held, str(checkpoint), {} if "grown" in held else done.get(BASE, {}))
+        layers = layers_of(work, held.get("grown", []), held["points_per_task"])
     table, points = work.unfinished(work.setup.points.size), 0
-    for layer in layers_of(work, held.get("grown", []), int(held["points_per_task"])):
+    for layer in layers:
         part, count = _rows(folder, layer.work, layer.stage, done.get(layer.stage.name, {}))
         points += count
         table.integers[layer.places], table.numbers[layer.places] = part.integers, part.numbers
@@ -107,7 +123,8 @@ def _work(described: dict[str, Any], name: str, done: dict[int, Record]) -> Poin
     })  # fmt: skip
     integration = Integration(**held["integration"])
     repeats = Replicates(**held["replicates"]) if "replicates" in held else None
-    points = Grid({axis: np.array(axes[axis]) for axis in described["axes"]})
+    points = points_of({axis: axes[axis] for axis in described["axes"]})
+    require_memory(points.size, "read the file that its command writes with --output")
     work = PointWork(SweepSetup(system, integration, points), repeats)
     number, record = next(iter(done.items()), (0, None))
     if record is not None and work.task_hash(Stage(BASE, points, chunk).columns(number)) != record.parameters:
@@ -121,30 +138,10 @@ def _rows(folder: Path, work: PointWork, stage: Stage, done: dict[int, Record]) 
     """Return the rows of all points of a stage, and the number of points that are finished."""
     found = work.unfinished(stage.size)
     points = 0
-    if not done:
-        return found, points
-    import zarr
-
-    try:
-        arrays = [
-            zarr.open_array(folder / "runs.zarr", path=f"{stage.name}/{name}", mode="r") for name in _TABLES
-        ]
-    except (OSError, ValueError, KeyError):  # another process is creating the arrays
-        return found, points
-    if not all(
-        is_table(array, stage, len(names))
-        for array, names in zip(arrays, (work.integers, work.numbers), strict=True)
-    ):
-        return found, points
     for task, record in done.items():
-        if not 0 <= task < stage.tasks:
-            continue
-        start, stop = stage.bounds(task)
-        try:
-            part = ResultTable(*(np.asarray(array[start:stop]) for array in arrays))
-        except Exception:  # any error of a codec while another process writes the chunk
-            continue
-        if part.content_hash() == record.content:
+        part = read_task(folder, stage, work, record) if 0 <= task < stage.tasks else None
+        if part is not None:
+            start, stop = stage.bounds(task)
             found.integers[start:stop], found.numbers[start:stop] = part
             points += stop - start
     return found, points

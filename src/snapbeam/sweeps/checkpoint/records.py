@@ -43,7 +43,17 @@ __all__ = [
 
 
 class CheckpointError(OSError):
-    """A checkpoint cannot be written or read, or its workers cannot compute; the message contains the remedy."""
+    """A checkpoint cannot be written or read, or its workers cannot compute; the message contains the remedy.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> try:
+    ...     sb.read_checkpoint("no_such_folder")
+    ... except (sb.CheckpointError, sb.InputError) as error:
+    ...     print(type(error).__name__)
+    InputError
+    """
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -113,7 +123,10 @@ def refuse_links(folder: Path, *, sweep: bool) -> None:
     while pending:
         with os.scandir(pending.pop()) as entries:
             for entry in entries:
-                mode = entry.stat(follow_symlinks=False).st_mode
+                try:
+                    mode = entry.stat(follow_symlinks=False).st_mode
+                except FileNotFoundError:  # the writer has renamed its partial file
+                    continue
                 if stat.S_ISDIR(mode):
                     pending.append(Path(entry.path))
                 elif not stat.S_ISREG(mode):
@@ -208,6 +221,8 @@ def _lock(handle: int) -> None:
 
 
 _CHECK_DIGITS = 16
+_LARGEST_LOG = 2**30
+"""Largest task log, bytes: about a million tasks."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -272,6 +287,8 @@ class TaskLog:
         self.records: dict[tuple[str, int], Record] = {}
         self.torn = 0
         if path.exists():
+            if path.stat().st_size > _LARGEST_LOG:
+                raise InputError(f"checkpoint = {str(path.parent)!r}: {path.name!r} is larger than 1 GiB")
             with path.open(encoding="utf-8", errors="replace") as stream:
                 for line in stream:
                     record = Record.from_line(line)

@@ -19,7 +19,8 @@ import json
 import os
 import warnings
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from types import TracebackType
@@ -68,12 +69,13 @@ __all__ = [
     "checkpoint_folder",
     "grown",
     "is_growth",
-    "is_table",
     "layers_of",
     "open_tables",
     "read_description",
     "read_stored_config",
     "read_stored_points",
+    "read_task",
+    "reading",
     "refuse_foreign",
     "refuse_other",
     "snapped",
@@ -128,9 +130,6 @@ def read_description(file: Path) -> dict[str, Any]:
     InputError
         If the file has another format, or is no regular file.
     """
-    damaged = CheckpointError(
-        f"checkpoint = {str(file.parent)!r}: map.json is damaged; restore it from a copy, or give another folder"
-    )
     data = input_bytes("checkpoint", file)
     try:
         held = json.loads(data)
@@ -139,17 +138,37 @@ def read_description(file: Path) -> dict[str, Any]:
             isinstance(held["parameters"], dict)
             and held["parameter_hash"] == parameter_hash(held["parameters"])
             and isinstance(held["points_per_task"], int)
-            and held["points_per_task"] >= 1
+            and 1 <= held["points_per_task"] < 2**63
         )
-    except (ValueError, KeyError, TypeError, RecursionError):
-        raise damaged from None
+    except _NO_DESCRIPTION:
+        raise _damaged(file) from None
     if described != FORMAT:
         raise InputError(
             f"checkpoint = {str(file.parent)!r}: has the format {described}, not {FORMAT}; give another folder"
         )
     if not sound:
-        raise damaged
+        raise _damaged(file)
     return dict(held)
+
+
+_NO_DESCRIPTION = (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, RecursionError)
+
+
+@contextmanager
+def reading(file: Path) -> Iterator[None]:
+    """Refuse a description whose hash is right but whose contents are not those of a sweep."""
+    try:
+        yield
+    except InputError:
+        raise
+    except _NO_DESCRIPTION as error:
+        raise _damaged(file) from error
+
+
+def _damaged(file: Path) -> CheckpointError:
+    return CheckpointError(
+        f"checkpoint = {str(file.parent)!r}: map.json is damaged; restore it from a copy, or give another folder"
+    )
 
 
 def read_stored_config(path: str | Path) -> dict[str, Any] | None:
@@ -304,6 +323,13 @@ def layers_of(work: PointWork, earlier: Sequence[Mapping[str, Any]], chunk: int)
         Grid({name: np.array(each["points"][name], now.axes[name].dtype) for name in each["axes"]})
         for each in earlier
     ]
+    for grid in grids:  # before any array over their points is made
+        for name, values in now.axes.items():
+            if (
+                len(set(grid.axes[name].tolist())) < grid.axes[name].size
+                or not np.isin(grid.axes[name], values).all()
+            ):
+                raise ValueError(f"{name}: is no part of the extended axis")
     found = []
     for number, grid in enumerate([*grids, now]):
         own = replace(work, setup=work.setup.with_points(grid)) if grid is not now else work
@@ -348,11 +374,14 @@ def snapped(setup: SweepSetup, path: str | os.PathLike[str] | None) -> tuple[Swe
         return setup, ""
     axes, moved, most = {}, 0, 0.0
     for name, values in points.axes.items():
-        stored = np.array(held[name]) if isinstance(held[name], list) else np.zeros(0)
+        with reading(Path(path) / "map.json"):
+            stored = np.unique(held[name]) if isinstance(held[name], list) else np.zeros(0)
         axes[name] = values
         if values.dtype.kind != "f" or stored.dtype.kind != "f" or not stored.size:
             continue
-        near = stored[np.abs(values[:, None] - stored[None, :]).argmin(axis=1)]
+        after = stored[np.clip(np.searchsorted(stored, values), 0, stored.size - 1)]
+        before = stored[np.clip(np.searchsorted(stored, values) - 1, 0, stored.size - 1)]
+        near = np.where(np.abs(values - before) < np.abs(after - values), before, after)
         apart = np.abs(values - near)
         same = (apart > 0.0) & (apart <= _SAME * np.abs(near))
         axes[name] = np.where(same, near, values)
@@ -462,11 +491,13 @@ class Checkpoint:
         wanted = json.loads(canonical_json(self.work.parameters))
         if file.exists():
             held = read_description(file)
-            if grow and type(self.work) is PointWork and is_growth(held["parameters"], wanted):
-                held = self._grown(file, held, wanted, config)
-            refuse_other(self.path, held["parameters"], wanted)
+            with reading(file):
+                if grow and type(self.work) is PointWork and is_growth(held["parameters"], wanted):
+                    held = self._grown(file, held, wanted, config)
+                refuse_other(self.path, held["parameters"], wanted)
             if "grown" in held:
-                self.layers = layers_of(self.work, held["grown"], int(held["points_per_task"]))
+                with reading(file):
+                    self.layers = layers_of(self.work, held["grown"], held["points_per_task"])
             return int(held["points_per_task"])
         setup = self.work.setup
         chunk = chunk_size(setup.points.size, setup.integration.engine) if chunk is None else chunk
@@ -528,12 +559,11 @@ class Checkpoint:
     def open_stage(self, stage: Stage) -> None:
         """Check every finished task of a stage against the task log, and drop those that are damaged."""
         member(stage.name)
-        try:
-            self._arrays[stage.name] = open_tables(
-                self.path / _DATA, stage, self.work_of(stage), self.read_only
-            )
-        except OSError as error:
-            raise self._cannot_write(error) from error
+        if not self.read_only:
+            try:
+                self._arrays[stage.name] = open_tables(self.path / _DATA, stage, self.work_of(stage))
+            except OSError as error:
+                raise self._cannot_write(error) from error
         for task in range(stage.tasks):
             record = self.task_log.records.get((stage.name, task))
             if record is None or record.state != "done":
@@ -606,14 +636,7 @@ class Checkpoint:
 
     def _load(self, stage: Stage, task: int) -> ResultTable | None:
         """Return the results of a finished task; None if they do not match the task log."""
-        start, stop = stage.bounds(task)
-        try:
-            columns = ResultTable(
-                *(np.asarray(self._arrays[stage.name][name][start:stop]) for name in _TABLES)
-            )
-        except Exception:  # whatever a codec makes of damaged bytes
-            return None
-        return columns if columns.content_hash() == self.task_log.records[stage.name, task].content else None
+        return read_task(self.path, stage, self.work_of(stage), self.task_log.records[stage.name, task])
 
     def reader(self, stage: Stage) -> ResultRows:
         """Return the results of a stage, which are read when they are needed."""
@@ -693,8 +716,31 @@ class CheckpointRows:
 # The Zarr arrays of a checkpoint: one row for each run, one chunk with a check sum for each task.
 
 
-def open_tables(folder: Path, stage: Stage, work: PointWork, read_only: bool = False) -> dict[str, Any]:
-    """Open the arrays of a stage; creates missing arrays and repairs damaged descriptions."""
+def read_task(folder: Path, stage: Stage, work: PointWork, record: Record) -> ResultTable | None:
+    """Return the results of a finished task; None if they are missing or do not match its record.
+
+    The descriptions of the Zarr arrays, which could request any codec and any size, are not used.
+    """
+    from numcodecs.checksum32 import CRC32C
+    from numcodecs.zstd import Zstd
+
+    start, stop = stage.bounds(record.task)
+    parts = []
+    for name, (kind, columns) in _tables(work).items():
+        rows = np.empty(_chunks(stage, len(columns)), np.dtype(kind).newbyteorder("<"))
+        file = folder / _DATA / stage.name / name / f"c.{record.task}.0"
+        try:
+            data = input_bytes("checkpoint", file, 2 * rows.nbytes + 1024)
+            Zstd().decode(CRC32C().decode(data), rows)  # fails if the data are longer than the rows
+        except (InputError, ValueError, RuntimeError):
+            return None
+        parts.append(rows[: stop - start])
+    table = ResultTable(*parts)
+    return table if table.content_hash() == record.content else None
+
+
+def open_tables(folder: Path, stage: Stage, work: PointWork) -> dict[str, Any]:
+    """Open the arrays of a stage for writing; creates missing arrays and repairs damaged descriptions."""
     import zarr
     from zarr.storage import MemoryStore
 
@@ -702,15 +748,14 @@ def open_tables(folder: Path, stage: Stage, work: PointWork, read_only: bool = F
     fresh = MemoryStore(held)
     _create(fresh, stage, work)
     folder.mkdir(exist_ok=True)
-    mode: Any = "r" if read_only else "r+"
     for key, value in held.items():
         path, data = folder / key, value.to_bytes()
-        if not path.is_file() or path.read_bytes() != data:
+        if not path.is_file() or path.stat().st_size != len(data) or path.read_bytes() != data:
             path.parent.mkdir(parents=True, exist_ok=True)
             durable_write(path, data)
     store = _durable_store(folder)
     return {
-        name: zarr.open_array(store, path=f"{stage.name}/{name}", mode=mode, config=_CONFIG)
+        name: zarr.open_array(store, path=f"{stage.name}/{name}", mode="r+", config=_CONFIG)
         for name in _tables(work)
     }
 
@@ -723,13 +768,8 @@ def _tables(work: PointWork) -> dict[str, tuple[str, tuple[str, ...]]]:
 
 
 def _chunks(stage: Stage, columns: int) -> tuple[int, int]:
-    """Return the shape of a chunk: one task.  The number in map.json may be any, and Zarr allocates whole chunks."""
+    """Return the shape of a chunk: one task.  The number in map.json may be any, and whole chunks are allocated."""
     return max(min(stage.chunk, stage.size), 1), columns
-
-
-def is_table(array: Any, stage: Stage, columns: int) -> bool:
-    """Whether a stored array has the shape and the chunks that the stage determines."""
-    return bool(array.shape == (stage.size, columns) and array.chunks == _chunks(stage, columns))
 
 
 def _create(store: Any, stage: Stage, work: PointWork) -> None:

@@ -264,11 +264,15 @@ def missed_onset(circuit, terms, event, depth, depth1):
 
 
 @inlined
-def accumulate_circuit(memory, layout, circuit, p, accumulators, tap):
-    """Enter what a step lost in the circuit in the statistics, and its maximum y."""
+def accumulate_circuit(memory, layout, circuit, p, accumulators, tap, late):
+    """Enter what a step lost in the circuit in the statistics, and its maximum y.
+
+    *late* is the share of the step that lies in the last quarter of the run.
+    """
     if circuit is None:
         return
     accumulators.circuit_energy += tap.energy
+    accumulators.circuit_energy_last_quarter += late * tap.energy
     accumulators.peak_circuit = max(
         accumulators.peak_circuit, abs(_state(memory, layout.size, circuit, circuit.own, p))
     )

@@ -1,0 +1,176 @@
+"""Shock pulses given by their acceleration: half-sine, haversine and trapezoid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.quantity import RUN, STRUCTURE, quantity
+from snapbeam.util.validation import nonnegative, positive
+
+__all__ = ["GRAVITY", "SHAPES", "Shock"]
+
+
+_Array = NDArray[np.float64]
+
+GRAVITY = 9.80665
+"""Standard acceleration of gravity, m/s^2: 1 g."""
+SHAPES = ("half_sine", "haversine", "trapezoid")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shock(Timed):
+    """A shock by its acceleration: a half-sine, haversine or trapezoidal pulse, as IEC 60068-2-27 has them.
+
+    With the peak A and the duration D the acceleration, for 0 < t < D, is
+
+        half_sine   A sin(pi t/D)
+        haversine   A (1 - cos(2 pi t/D))/2
+        trapezoid   A t/r,  A,  A (D - t)/r,   with the rise time r at both ends
+
+    and zero afterwards.  What moves then goes on at the velocity that the pulse has given it: 2 A D/pi, A D/2 and
+    A (D - r).  Use it as the motion of a base; displacements are in the frame of the base.  A cycle is a period of the
+    first mode.
+
+    Parameters
+    ----------
+    acceleration_g : float
+        Peak acceleration A in g = 9.80665 m/s^2; :meth:`from_si` takes m/s^2.
+    duration_ms : float
+        Duration D, ms.
+    shape : {"half_sine", "haversine", "trapezoid"}
+        Half-sine by default.
+    rise_fraction : float
+        Of a trapezoid: rise time and fall time over the duration, 0.1 by default.
+
+    Raises
+    ------
+    InputError
+        If a value is out of range.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> base = sb.BaseExcitation(motion=sb.Shock(acceleration_g=5000, duration_ms=0.2), direction="down")
+    """
+
+    acceleration_g: float = quantity(
+        "g", "peak acceleration of the shock", low=0.0, closed="left", scope=RUN, symbol="A",
+        short="shock_acceleration_g",
+    )  # fmt: skip
+    duration_ms: float = quantity(
+        "ms", "duration of the shock", low=0.0, scope=RUN, symbol="D", short="shock_duration_ms"
+    )
+    shape: str = quantity(
+        "1", "shape of the shock", default="half_sine", kind=str, choices=SHAPES, scope=STRUCTURE,
+        short="shock_shape",
+    )  # fmt: skip
+    rise_fraction: float = quantity(
+        "1", "rise time of a trapezoidal shock over its duration", default=0.1, low=0.0, high=0.5, closed="right",
+        scope=RUN, short="shock_rise_fraction",
+    )  # fmt: skip
+
+    name = "shock"
+    number_names = ("omega", "fastest", "peak", "duration", "rise", "fall", "form")
+    amplitudes = ("peak",)
+    discontinuities = ("rise", "fall", "duration")
+
+    @classmethod
+    def from_si(
+        cls, acceleration: float, duration: float, *, shape: str = "half_sine", rise_fraction: float = 0.1
+    ) -> Shock:
+        """Return a shock whose peak acceleration is given in m/s^2 and whose duration in s.
+
+        Examples
+        --------
+        >>> import snapbeam as sb
+        >>> round(sb.Shock.from_si(980.665, 11e-3).acceleration_g, 9)
+        100.0
+        """
+        return cls(
+            acceleration_g=nonnegative("acceleration", acceleration, "m/s^2") / GRAVITY,
+            duration_ms=1e3 * positive("duration", duration, "s"),
+            shape=shape,
+            rise_fraction=rise_fraction,
+        )
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """A period of the first mode."""
+        return np.full(next(iter(columns.values())).size, 2.0 * math.pi / scale.omega)
+
+    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """The peak in m/s^2; duration, end of the rise and begin of the fall in s; the shape."""
+        peak, duration = GRAVITY * columns["acceleration_g"], 1e-3 * columns["duration_ms"]
+        fastest, rise = math.pi / duration, 0.5 * duration
+        if self.shape == "haversine":
+            fastest = 2.0 * fastest
+        if self.shape == "trapezoid":
+            rise = columns["rise_fraction"] * duration
+            fastest = 0.5 * math.pi / rise
+        return {
+            "fastest": fastest,
+            "peak": peak,
+            "duration": duration,
+            "rise": rise,
+            "fall": duration - rise,
+            "form": np.full(duration.size, float(SHAPES.index(self.shape))),
+        }
+
+    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
+        """It goes on and on, at its last velocity."""
+        found = self.shape_numbers(columns, scale)
+        mean = {"half_sine": 2.0 / math.pi, "haversine": 0.5}
+        length = found["fall"] if self.shape == "trapezoid" else mean[self.shape] * found["duration"]
+        speed = found["peak"] * length
+        return np.where(speed > 0.0, np.inf, 0.0), speed
+
+    def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """It never goes the other way."""
+        return np.zeros(next(iter(columns.values())).size)
+
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """The peak."""
+        return self.shape_numbers(columns, scale)["peak"]
+
+    @staticmethod
+    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+        """Twice and once the integral of the acceleration."""
+        t, d, a = argument / drive.omega, drive.duration, drive.peak
+        s, turn = min(t, d), 3.141592653589793 / d
+        if drive.form < 0.5:
+            speed = a / turn * (1.0 - math.cos(turn * s))
+            moved = a / turn * (s - math.sin(turn * s) / turn)
+        elif drive.form < 1.5:
+            turn = 2.0 * turn
+            speed = 0.5 * a * (s - math.sin(turn * s) / turn)
+            moved = 0.5 * a * (0.5 * s * s - (1.0 - math.cos(turn * s)) / (turn * turn))
+        else:
+            r = drive.rise
+            if s < r:
+                speed, moved = a * s * s / (2.0 * r), a * s * s * s / (6.0 * r)
+            elif s < drive.fall:
+                u = s - r
+                speed, moved = a * (0.5 * r + u), a * (r * r / 6.0 + 0.5 * r * u + 0.5 * u * u)
+            else:
+                u, last = d - s, a * drive.fall
+                speed = last - a * u * u / (2.0 * r)
+                moved = 0.5 * last * d - last * u + a * u * u * u / (6.0 * r)
+        return moved + speed * (t - s), speed
+
+    @staticmethod
+    def acceleration(drive: Any, memory: Any, argument: float) -> float:
+        """The pulse, then none."""
+        t, d = argument / drive.omega, drive.duration
+        if t <= 0.0 or t >= d:
+            return 0.0
+        if drive.form < 0.5:
+            return drive.peak * math.sin(3.141592653589793 * t / d)
+        if drive.form < 1.5:
+            return 0.5 * drive.peak * (1.0 - math.cos(6.283185307179586 * t / d))
+        return drive.peak * min(t / drive.rise, 1.0, (d - t) / drive.rise)

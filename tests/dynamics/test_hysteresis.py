@@ -1,0 +1,95 @@
+"""Sweeps up and down: the state is carried on, with the circuit of a harvester too."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+import snapbeam as sb
+from snapbeam.cli.app import app
+from snapbeam.model.default_values import BEAM
+
+NAME = "base_excitation.acceleration_amplitude"
+STEPS = sb.Integration(cycles=12)
+
+
+@pytest.fixture(scope="module")
+def shaken():
+    layers = sb.PiezoelectricHarvester(moment_per_volt=-1.245e-4, capacitance=3.085e-7, resistance=1e4)
+    motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.02)
+    model = sb.ReducedModel.from_beam(BEAM, modes=2, damping_ratio=0.02)
+    return sb.System(model, base_excitation=sb.BaseExcitation(motion=motion), harvester=layers)
+
+
+def test_each_run_begins_with_the_last_state_of_the_run_before(shaken):
+    found = sb.dynamics.hysteresis(shaken, NAME, [0.02, 0.06], STEPS)
+    assert found["harvested_power"].dims == ("sweep", "base_excitation_acceleration_amplitude")
+    state, power = None, []
+    for value in (0.02, 0.06, 0.06, 0.02):
+        run = sb.simulate(shaken.replace(**{NAME: value, "initial_state": state}), STEPS, sample_times=[0.0])
+        state = run.final_state
+        power.append(run.summary.harvested_power_last_quarter)
+    late = found["harvested_power_last_quarter"].values
+    np.testing.assert_array_equal(np.append(late[0], late[1, ::-1]), power)
+    assert late[0, 1] != late[1, 1], "the second run at one value begins with another state"
+    ax = sb.plot.plot_statistic(found, "harvested_power_last_quarter")
+    assert [line.get_label() for line in ax.lines] == ["swept up", "swept down"]
+    plt.close("all")
+
+
+def test_the_runs_after_a_failed_one_are_marked(shaken, monkeypatch):
+    """A run without a last state ends the sweeps; the runs that follow are not computed."""
+    done = sb.simulate(shaken, STEPS, sample_times=[0.0])
+    failed = done.summary.__class__(
+        dict(done.summary)
+        | {"status": sb.RunStatus.DIVERGED, "response_class": -1, "harvested_power": np.nan}
+    )
+    of_failed = dataclasses.replace(done, summary=failed, final_state=None)
+    monkeypatch.setattr("snapbeam.dynamics.swept_statistics.simulate", lambda *_, **__: of_failed)
+    found = sb.dynamics.hysteresis(shaken, NAME, [0.02, 0.06], STEPS)
+    status = found["status"].values
+    assert status[0, 0] == sb.RunStatus.DIVERGED
+    assert (np.append(status[0, 1], status[1]) == sb.RunStatus.NOT_RUN).all()
+    assert (found["response_class"] == sb.ResponseClass.UNKNOWN).all()
+    assert np.isnan(found["harvested_power"]).all()
+
+
+@pytest.mark.slow
+def test_a_softening_beam_has_two_answers():
+    """Within a well the resonance bends to low frequencies: the two sweeps differ where both responses exist."""
+    motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.006)
+    model = sb.ReducedModel.from_beam(BEAM, modes=1, damping_ratio=0.01)
+    system = sb.System(model, base_excitation=sb.BaseExcitation(motion=motion))
+    found = sb.dynamics.hysteresis(
+        system, "base_excitation.frequency_ratio", np.linspace(0.7, 1.1, 21), sb.Integration(cycles=150)
+    )
+    up, down = found["rms_midspan_velocity"].values
+    apart = np.abs(up - down) > 0.1 * np.maximum(up, down)
+    assert 4 <= apart.sum() <= 8 and not apart[0] and not apart[-1]
+    assert (down[apart] > up[apart]).all(), "the strong response is found from above"
+
+
+def test_bad_input_is_refused(shaken):
+    with pytest.raises(sb.InputError, match="must contain 'up', 'down' or both, each once"):
+        sb.dynamics.hysteresis(shaken, NAME, [0.02], sweeps=())
+    with pytest.raises(sb.InputError, match="early_termination = False"):
+        sb.dynamics.hysteresis(shaken, NAME, [0.02], sb.Integration(early_termination=True))
+
+
+def test_the_command(shaken, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shaken.save("harvester.toml")
+    command = [
+        "dynamics", "hysteresis", "--config", "harvester.toml", "--parameter", NAME, "--values", "0.02,0.06",
+        "--cycles", "12", "--statistic", "harvested_power_last_quarter", "--plot", "power.png",
+    ]  # fmt: skip
+    answer = CliRunner().invoke(app, command, catch_exceptions=False)
+    assert answer.exit_code == 0, answer.output
+    assert "2 values up and down" in answer.stdout
+    assert xr.load_dataset("hysteresis.nc", engine="h5netcdf")["peak_voltage"].shape == (2, 2)
+    assert (tmp_path / "power.png").stat().st_size > 5_000

@@ -1,0 +1,37 @@
+"""The figure of a force-displacement curve."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import snapbeam as sb
+from snapbeam.util.validation import InputError
+
+BEAM = sb.Beam(length=5e-4, thickness=2e-6, width=2e-5, density=2330.0, young_modulus=160e9, axial_load=0.0)
+
+
+def test_branches_units_and_snaps() -> None:
+    model = sb.ReducedModel.from_beam(BEAM, modes=3, imperfection=sb.Imperfection(midspan_amplitude=6e-6))
+    curve = sb.force_displacement(model, 0.5)
+    ax = sb.plot.plot_force_displacement(curve)
+    assert "µm" in ax.get_xlabel()
+    assert "µN" in ax.get_ylabel()
+    texts = [each.get_text() for each in ax.texts]
+    assert any(each.startswith("snap-through -37") for each in texts)
+    legend = [each.get_text() for each in ax.get_legend().get_texts()]
+    assert legend == [
+        "stable",
+        "stable only if the displacement is held",
+        "unstable",
+        "bifurcation point",
+    ]
+    low, high = ax.get_ylim()
+    assert low < 1e6 * float(curve.snap_through_force) < 1e6 * float(curve.snap_back_force) < high
+    stable = [line for line in ax.lines if line.get_color() == "#16245E"]
+    assert len(stable) == 2
+    drawn = np.concatenate([line.get_ydata() for line in stable])
+    assert np.isfinite(drawn).all()
+    with pytest.raises(InputError, match="must be a result of force_displacement"):
+        sb.plot.plot_force_displacement(xr.Dataset({"force": 0.0}))

@@ -1,0 +1,86 @@
+"""Tables of datasets: rows, columns of modes, text and MATLAB files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from scipy.io import loadmat
+from typer.testing import CliRunner
+
+import snapbeam as sb
+from snapbeam.cli.app import app
+from snapbeam.util.tables import data_frame
+
+RUN = xr.Dataset(
+    {
+        "voltage": ("time", [1.0, 2.0, 1.0 / 3.0], {"units": "V"}),
+        "power": ("time", [0.0, 1.0, 2.0], {"units": "W"}),
+        "modal_amplitude": (("time", "mode"), np.arange(6.0).reshape(3, 2)),
+        "shape": (("mode", "place"), np.ones((2, 4))),
+    },
+    {"time": ("time", [0.0, 0.1, 0.2], {"units": "s"}), "cycle": ("time", [0.0, 1.0, 2.0]), "mode": [1, 2]},
+)
+
+
+def test_a_run_has_a_row_for_each_time_and_a_column_for_each_mode():
+    frame = data_frame(RUN)
+    assert list(frame.columns) == [
+        "time",
+        "cycle",
+        "voltage",
+        "power",
+        "modal_amplitude_1",
+        "modal_amplitude_2",
+    ]
+    assert len(frame) == 3 and list(frame["modal_amplitude_2"]) == [1.0, 3.0, 5.0]
+    assert frame.attrs["left_out"] == ["shape"]
+
+
+def test_a_map_has_a_row_for_each_point(synthetic_map):
+    frame = data_frame(synthetic_map)
+    assert len(frame) == synthetic_map["response_class"].size
+    row = frame.iloc[27]
+    there = synthetic_map.sel(
+        frequency_ratio=row["frequency_ratio"], velocity_amplitude=row["velocity_amplitude"]
+    )
+    assert int(there["response_class"]) == row["response_class"]
+    turned = synthetic_map.assign(
+        peak=synthetic_map["response_class"].T * 1.0, more=synthetic_map["response_class"]
+    )
+    assert (data_frame(turned)["peak"] == data_frame(turned)["more"]).all()
+
+
+def test_text_keeps_every_digit_and_states_units(tmp_path):
+    assert sb.write_table(RUN, tmp_path / "run.csv") == ["shape"]
+    back = pd.read_csv(tmp_path / "run.csv")
+    assert list(back.columns)[:3] == ["time (s)", "cycle", "voltage (V)"]
+    assert back["voltage (V)"][2] == 1.0 / 3.0
+
+
+def test_a_matlab_file_has_every_array(tmp_path):
+    assert sb.write_table(RUN, tmp_path / "run.mat") == []
+    back = loadmat(tmp_path / "run.mat")
+    np.testing.assert_array_equal(back["modal_amplitude"], RUN["modal_amplitude"])
+    np.testing.assert_array_equal(back["time"].ravel(), RUN["time"])
+
+
+def test_refusals(tmp_path):
+    with pytest.raises(sb.InputError, match=r"must end in \.csv or \.mat"):
+        sb.write_table(RUN, tmp_path / "run.xls")
+    with pytest.raises(sb.InputError, match="a table needs rows"):
+        sb.write_table(xr.Dataset({"a": 1.0}), tmp_path / "a.csv")
+
+
+def test_the_command(tmp_path, monkeypatch, synthetic_map):
+    monkeypatch.chdir(tmp_path)
+    sb.write_netcdf(synthetic_map, "map.nc")
+    for _ in range(2):  # the second replaces a file that snapbeam wrote
+        for name in ("map.csv", "map.mat"):
+            answer = CliRunner().invoke(app, ["info", "map.nc", "--export", name], catch_exceptions=False)
+            assert answer.exit_code == 0, answer.output
+    assert len(pd.read_csv("map.csv")) == synthetic_map["response_class"].size
+    (tmp_path / "own.csv").write_text("mine\n1\n")
+    assert CliRunner().invoke(app, ["info", "map.nc", "--export", "own.csv"]).exit_code == 2
+    assert (tmp_path / "own.csv").read_text() == "mine\n1\n"
