@@ -79,7 +79,7 @@ def test_the_label_of_a_close_up_resolves_it(synthetic_run):
     """At 20 kHz and late in a run, the onset is stated to a hundredth of the close-up."""
     fast = synthetic_run.assign_coords(time=synthetic_run.time / 200.0, cycle=synthetic_run.cycle + 90.0)
     close = plot_run(fast).figure.axes[5]
-    digits = re.search(r"= \d+\.(\d+) ", close.get_xlabel())[1]
+    digits = re.search(r"= \d+\.(\d+)$", close.get_xlabel())[1]
     span = np.ptp(close.lines[0].get_xdata()) * 1e-6 * 20e3  # cycles
     assert 0.5 * 10.0 ** -len(digits) <= 0.01 * span
 
