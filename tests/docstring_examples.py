@@ -6,6 +6,8 @@ import doctest
 import inspect
 from types import ModuleType
 
+import matplotlib.pyplot as plt
+
 
 def check_examples(module: ModuleType) -> None:
     """Every class and function of a namespace has an example in its docstring that gives what it shows."""
@@ -21,5 +23,6 @@ def check_examples(module: ModuleType) -> None:
         if not examples.examples:
             without.append(name)
         runner.run(examples, out=lines.append)
+        plt.close("all")
     assert not lines, "".join(lines)
     assert not without, f"no example: {', '.join(without)}"

@@ -4,10 +4,25 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-HEAVY = ("matplotlib", "dask", "distributed", "cv2", "av", "pandas", "zarr", "typer", "rich", "pydantic")
+import snapbeam
+
+HEAVY = (
+    "matplotlib",
+    "dask",
+    "distributed",
+    "cv2",
+    "av",
+    "pandas",
+    "zarr",
+    "typer",
+    "rich",
+    "pydantic",
+    "xarray",
+)
 
 
 @pytest.mark.parametrize("module", ["snapbeam", "snapbeam.cli"])
@@ -18,6 +33,19 @@ def test_import_is_light(module):
     ).stdout.split()
     allowed = {"typer", "rich"} if module == "snapbeam.cli" else set()
     assert set(loaded) <= allowed
+
+
+def test_xarray_is_imported_in_one_module_only():
+    """Every dataset of snapbeam has ``dataset.snapbeam``, because each module takes xarray from util.datasets."""
+    source = Path(snapbeam.__file__).parent
+    found = set()
+    for path in source.rglob("*.py"):
+        block = ""
+        for line in path.read_text(encoding="utf-8").splitlines():
+            block = line if line[:1].strip() else block
+            if line.strip().startswith("import xarray") and block != "if TYPE_CHECKING:":
+                found.add(path.relative_to(source).as_posix())
+    assert found == {"util/datasets.py"}
 
 
 def loaded_by(*arguments):
@@ -44,8 +72,6 @@ def test_a_run_without_files_loads_no_pictures_and_no_tables():
 
 
 def test_every_public_name_is_found_where_it_stands():
-    import snapbeam
-
     for name in snapbeam.__all__:
         assert getattr(snapbeam, name) is not None, name
     assert set(snapbeam.__all__) <= set(dir(snapbeam))

@@ -44,7 +44,7 @@ def test_close_up_shows_one_whole_impact(synthetic_run):
     assert 1e-3 * force.max() == pytest.approx(float(synthetic_run["contact_force"].max()), rel=1e-6)
     assert touching[0] > 0.0 and 1e-3 * touching[-1] == pytest.approx(0.5, abs=0.01)
     assert milliseconds[0] < 0.0 and milliseconds[-1] > touching[-1]
-    shown = float(re.search(r"= (\S+) ", close[2].get_xlabel())[1])
+    shown = float(re.search(r"= (\S+)$", close[2].get_xlabel())[1])
     assert shown == pytest.approx(3.0995, abs=1e-3)
 
 
@@ -79,7 +79,7 @@ def test_the_label_of_a_close_up_resolves_it(synthetic_run):
     """At 20 kHz and late in a run, the onset is stated to a hundredth of the close-up."""
     fast = synthetic_run.assign_coords(time=synthetic_run.time / 200.0, cycle=synthetic_run.cycle + 90.0)
     close = plot_run(fast).figure.axes[5]
-    digits = re.search(r"= \d+\.(\d+) ", close.get_xlabel())[1]
+    digits = re.search(r"= \d+\.(\d+)$", close.get_xlabel())[1]
     span = np.ptp(close.lines[0].get_xdata()) * 1e-6 * 20e3  # cycles
     assert 0.5 * 10.0 ** -len(digits) <= 0.01 * span
 

@@ -42,12 +42,7 @@ __all__ = [
     "check_pictures",
     "cli_command",
     "count_text",
-    "draw_dynamics",
-    "draw_force_displacement",
-    "draw_map",
-    "draw_run",
-    "draw_statistic",
-    "draw_threshold",
+    "draw",
     "duration",
     "errors",
     "file_line",
@@ -431,74 +426,12 @@ def write_map(dataset: xr.Dataset, path: Path) -> Path:
     return path
 
 
-def _save(drawn: Any, path: Path) -> Path:
+def draw(dataset: xr.Dataset, path: Path, variable: str | None = None, **options: Any) -> Path:
+    """Draw a result of any kind to a figure file, as ``dataset.snapbeam.plot`` does."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from snapbeam.plot.dataset import plot_dataset
     from snapbeam.plot.style import save_figure
 
-    return save_figure(drawn, path)
-
-
-def draw_map(dataset: xr.Dataset, path: Path, overlay: Any, quasi_static_line: bool) -> Path:
-    """Draw a map to a picture file."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from snapbeam.plot.map import plot_response_map
-
-    return _save(plot_response_map(dataset, measurements=overlay, quasi_static_line=quasi_static_line), path)
-
-
-def draw_statistic(dataset: xr.Dataset, path: Path, name: str) -> Path:
-    """Draw a statistic of a map to a picture file."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from snapbeam.plot.map import plot_statistic
-
-    return _save(plot_statistic(dataset, name), path)
-
-
-def draw_threshold(dataset: xr.Dataset, path: Path) -> Path:
-    """Draw a threshold to a picture file."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from snapbeam.plot.threshold import plot_threshold
-
-    return _save(plot_threshold(dataset), path)
-
-
-def draw_force_displacement(dataset: xr.Dataset, path: Path) -> Path:
-    """Draw a force-displacement curve to a picture file."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from snapbeam.plot.force_displacement import plot_force_displacement
-
-    return _save(plot_force_displacement(dataset), path)
-
-
-def draw_run(dataset: xr.Dataset, path: Path, window: tuple[float, float] | None) -> Path:
-    """Draw a run to a picture file."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from snapbeam.plot.run import plot_run
-
-    return _save(plot_run(dataset, window), path)
-
-
-def draw_dynamics(dataset: xr.Dataset, path: Path, picture: str) -> Path:
-    """Draw results of dynamics to a picture file."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from snapbeam.plot import dynamics as figures
-
-    if picture == "branch":
-        return _save(figures.plot_diagram(None, branches=[dataset]), path)
-    plots: dict[str, Any] = {
-        "lifetimes": figures.plot_lifetimes, "survival": figures.plot_survival, "diagram": figures.plot_diagram,
-        "exponents": figures.plot_exponents, "section": figures.plot_section, "basins": figures.plot_basins,
-        "edge": figures.plot_edge,
-    }  # fmt: skip
-    return _save(plots[picture](dataset), path)
+    return save_figure(plot_dataset(dataset, variable, **options), path)

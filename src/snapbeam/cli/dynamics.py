@@ -91,16 +91,16 @@ def _plain(found: object) -> str:
     return repr(found).removeprefix("<").removesuffix(">")
 
 
-def _finish(dataset: xr.Dataset, output: Path, plot: Path | None, picture: str, lines: list[str]) -> None:
+def _finish(dataset: xr.Dataset, output: Path, plot: Path | None, lines: list[str]) -> None:
     """Write the results, draw them, and say what they are."""
-    from snapbeam.cli.console import draw_dynamics, write_map
+    from snapbeam.cli.console import draw, write_map
 
     reason = dataset.attrs.get("termination_reason")
     if reason and not any(str(reason) in line for line in lines):
         lines = [*lines, f"stopped: {reason}"]
     files = [write_map(dataset, output)]
     if plot is not None:
-        files.append(draw_dynamics(dataset, plot, picture))
+        files.append(draw(dataset, plot))
     small = {str(name): each.values for name, each in dataset.data_vars.items() if each.size <= _FEW}
     add_json(results=small, summary=lines, files=files)
     out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
@@ -174,7 +174,7 @@ def lifetimes(
     else:
         known = int(dataset["lifetime"].notnull().sum())
         lines.append(f"a lifetime at {known} of {dataset['lifetime'].size} points")
-    _finish(dataset, output, plot, "survival" if dataset["lifetime"].ndim == 0 else "lifetimes", lines)
+    _finish(dataset, output, plot, lines)
 
 
 @dynamics.command("bifurcation-diagram", cls=ShortHelpCommand)
@@ -217,7 +217,7 @@ def bifurcation_diagram(
         found = dataset["minimal_period"].sel(sweep=sweep).values
         kinds = ", ".join(f"{int((found == m).sum())} of period {m}" for m in np.unique(found) if m > 0)
         lines.append(f"{sweep}: {kinds or 'no value repeats'}, {int((found == 0).sum())} that do not repeat")
-    _finish(dataset, output, plot, "diagram", lines)
+    _finish(dataset, output, plot, lines)
 
 
 @dynamics.command("hysteresis", cls=ShortHelpCommand)
@@ -239,7 +239,7 @@ def hysteresis(
     Example: snapbeam dynamics hysteresis --config harvester.toml --parameter base_excitation.frequency_ratio
     --values 0.2:1.4:25 --statistic harvested_power_last_quarter --plot power.png
     """
-    from snapbeam.cli.console import check_pictures, draw_statistic, write_map
+    from snapbeam.cli.console import check_pictures, draw, write_map
     from snapbeam.dynamics.swept_statistics import hysteresis as swept
     from snapbeam.model.parameter_axes import parse_axis
     from snapbeam.solver.statistics import STATISTICS
@@ -261,7 +261,7 @@ def hysteresis(
     ]
     files = [write_map(dataset, output)]
     if plot is not None:
-        files.append(draw_statistic(dataset, plot, statistic))
+        files.append(draw(dataset, plot, statistic))
     add_json(summary=lines, files=files)
     out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
     if failed:
@@ -305,8 +305,13 @@ def lyapunov_spectrum(
     if "running" in dataset:
         for i in range(min(dataset.sizes["exponent_number"], 6)):
             value, error = (float(dataset[name][0, i]) for name in ("exponent", "exponent_error"))
-            lines.append(f"exponent {i + 1}: {value:.4g} +- {error:.2g} 1/s")
-    _finish(dataset, output, plot, "exponents", lines)
+            # on a periodic orbit all blocks agree; what remains is the finite time, of the order of 1/T
+            finite = 1.0 / (dataset.attrs["periods"] * dataset.attrs["period"])
+            words = f"+- {error:.2g}" if error > finite else f"+- {finite:.2g}, from the finite time"
+            lines.append(
+                f"exponent {i + 1}: {value:.4g} {words}, 1/s; {value * dataset.attrs['period']:.4g} per period"
+            )
+    _finish(dataset, output, plot, lines)
 
 
 @dynamics.command("poincare-section", cls=ShortHelpCommand)
@@ -337,7 +342,7 @@ def poincare_section(
         settings.system, at, 1000 if periods is None else periods,
         transient=transient, integration=settings.integration,
     )  # fmt: skip
-    _finish(dataset, output, plot, "section", [f"{dataset.sizes['point']} points"])
+    _finish(dataset, output, plot, [f"{dataset.sizes['point']} points"])
 
 
 @dynamics.command("branch", cls=ShortHelpCommand)
@@ -389,7 +394,7 @@ def branch(
         orbit, parameter, limits, direction=direction, max_points=500 if max_points is None else max_points
     )
     lines = [_plain(found), *map(_plain, found.special_points), f"in {duration(time.monotonic() - begun)}"]
-    _finish(found.to_dataset(), output, plot, "branch", lines)
+    _finish(found.to_dataset(), output, plot, lines)
 
 
 @dynamics.command("basins", cls=ShortHelpCommand)
@@ -456,7 +461,7 @@ def basins(
         lines.append(f"search for attractors: {found.termination_reason}")
     lines.append(f"undecided: {100 * dataset.attrs['undecided']:.3g} %")
     lines += _entropy_lines(basin_entropy(dataset["basin"].values, 5))
-    _finish(dataset, output, plot, "basins", lines)
+    _finish(dataset, output, plot, lines)
 
 
 def _entropy_lines(entropy: BasinEntropy) -> list[str]:
@@ -518,4 +523,4 @@ def edge(
         horizon=ahead,
     )
     lines = [_plain(found), f"in {duration(time.monotonic() - begun)}"]
-    _finish(found.to_dataset(), output, plot, "edge", lines)
+    _finish(found.to_dataset(), output, plot, lines)

@@ -12,7 +12,7 @@ from snapbeam.cli.console import (
     add_json,
     check_pictures,
     cli_command,
-    draw_force_displacement,
+    draw,
     file_line,
     out,
     write_map,
@@ -196,4 +196,4 @@ def _force_displacement(
     if output is not None:
         console.print(f"Written: {file_line(write_map(curve, output))}")
     if plot is not None:
-        console.print(f"Written: {file_line(draw_force_displacement(curve, plot))}")
+        console.print(f"Written: {file_line(draw(curve, plot))}")

@@ -55,7 +55,7 @@ def compute_map(
     Example: snapbeam map --modes 32 --cycles 200 --frequency-ratio 0.1:4:64 --velocity-amplitude
     0.01:0.65:40 --location 1/2.1 -o map.nc --plot map.png
     """
-    from snapbeam.cli.console import check_pictures, draw_map, read_overlay
+    from snapbeam.cli.console import check_pictures, draw, read_overlay
     from snapbeam.cli.summary import map_facts, map_summary
     from snapbeam.util.files import check_writable
 
@@ -102,7 +102,9 @@ def compute_map(
         write_map(dataset, output)
     files = [output]
     if plot is not None:
-        files.append(draw_map(dataset, plot, overlay, quasi_static_line))
+        files.append(
+            draw(dataset, plot, "response_class", measurements=overlay, quasi_static_line=quasi_static_line)
+        )
     add_json(**map_facts(dataset), seconds=elapsed, files=files)
     out().print(map_summary(dataset, files, None if opt.is_long(keeping) else elapsed))
     out().print(*lines, sep="\n", markup=False, end="\n" if lines else "")

@@ -1,4 +1,4 @@
-"""``snapbeam plot``: plot a stored map or run."""
+"""``snapbeam plot``: plot a stored result."""
 
 from __future__ import annotations
 
@@ -21,10 +21,20 @@ _SLICE = "Slice of a map, at the nearest grid value"
 
 @cli_command
 def plot(
-    file: Annotated[Path, typer.Argument(help="NetCDF file of a map or a run.", metavar="FILE")],
+    file: Annotated[
+        Path,
+        typer.Argument(help="NetCDF file of a map, a run, or the result of an analysis.", metavar="FILE"),
+    ],
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Figure file to write: .png, .pdf or .svg.", metavar="FILE")
     ],
+    variable: Annotated[
+        str | None,
+        typer.Option(
+            help="What to draw, such as a statistic of a map or phase_portrait of a run; an unknown name lists all.",
+            metavar="NAME",
+        ),
+    ] = None,
     frequency_ratio: Annotated[float | None, opt.number_option("Frequency ratio Omega.", _SLICE)] = None,
     velocity_amplitude: Annotated[float | None, opt.number_option("Velocity amplitude V.", _SLICE)] = None,
     location: Annotated[float | None, opt.number_option("Location x_s.", _SLICE)] = None,
@@ -36,26 +46,14 @@ def plot(
             metavar="NAME=VALUE",
         ),
     ] = None,
-    statistic: Annotated[
-        str | None,
-        typer.Option(
-            help="Statistic of a map to draw instead of the response class, such as "
-            "harvested_power_last_quarter.",
-            rich_help_panel=_SLICE,
-            metavar="NAME",
-        ),
-    ] = None,
     measurements: opt.Measurements = None,
     quasi_static_line: opt.QuasiStaticLine = False,
     window: opt.Window = None,
 ) -> None:
-    """Plot a stored map or run: in another format, with measured responses, or a slice of a map of three axes."""
+    """Plot a stored result: in another format, another variable, with measured responses, or a slice of a map."""
     from snapbeam.cli.console import (
         check_pictures,
-        draw_map,
-        draw_run,
-        draw_statistic,
-        draw_threshold,
+        draw,
         open_result,
         read_overlay,
     )
@@ -63,34 +61,28 @@ def plot(
 
     check_pictures(("output", output))
     dataset = open_result(file)
-    if statistic is not None and ("time" in dataset.dims or "lower_threshold" in dataset):
-        raise InputError(f"statistic = {statistic!r}: must be left out; {file} is not a map")
-    if statistic is not None and (measurements is not None or quasi_static_line):
+    wanted = {
+        "frequency_ratio": frequency_ratio,
+        "velocity_amplitude": velocity_amplitude,
+        "location": location,
+    }
+    dataset = _sliced(dataset, wanted, at or [])
+    if variable not in (None, "response_class") and (measurements is not None or quasi_static_line):
         raise InputError(
-            f"statistic = {statistic!r}: measured responses and the quasi-static line are drawn over response classes; "
+            f"variable = {variable!r}: measured responses and the quasi-static line are drawn over response classes; "
             "leave them out"
         )
     if "time" in dataset.dims:
-        draw_run(dataset, output, opt.parse_window(window))
-    elif "lower_threshold" in dataset:
-        draw_threshold(dataset, output)
+        options = {} if variable not in (None, "run") else {"window": opt.parse_window(window)}
+        draw(dataset, output, variable, **options)
+    elif "response_class" not in dataset or variable not in (None, "response_class"):
+        draw(dataset, output, variable)
     else:
-        wanted = {
-            "frequency_ratio": frequency_ratio,
-            "velocity_amplitude": velocity_amplitude,
-            "location": location,
-        }
-        dataset = _sliced(dataset, wanted, at or [])
-        if statistic is not None:
-            draw_statistic(dataset, output, statistic)
-            add_json(files=[output])
-            out().print(f"Written: {file_line(output)}")
-            return
         attrs = dataset.attrs
         overlay = read_overlay(
             measurements, attrs.get("reference_frequency"), attrs.get("beam_buckling_level")
         )
-        draw_map(dataset, output, overlay, quasi_static_line)
+        draw(dataset, output, measurements=overlay, quasi_static_line=quasi_static_line)
     add_json(files=[output])
     out().print(f"Written: {file_line(output)}")
 

@@ -88,7 +88,7 @@ def simulate(
     Example: snapbeam simulate --frequency-ratio 1.21 --velocity-amplitude 0.18 -o run.nc --plot run.png
     --window 0:20
     """
-    from snapbeam.cli.console import check_pictures, draw_run
+    from snapbeam.cli.console import check_pictures, draw
     from snapbeam.util.files import check_writable
 
     settings = configured(given)
@@ -141,7 +141,7 @@ def simulate(
             run.save(output)
         console.print(f"Written: {file_line(output)}")
     if run is not None and plot is not None:
-        console.print(f"Written: {file_line(draw_run(run.dataset, plot, part))}")
+        console.print(f"Written: {file_line(draw(run.dataset, plot, window=part))}")
     if run is not None and animate is not None:
         console.print(f"Written: {file_line(_animated(run.dataset, animate, part))}")
     files = [path for path in (output, plot, animate) if path is not None]

@@ -62,7 +62,7 @@ def threshold(
     Example: snapbeam threshold --modes 1,32 --frequency-ratio 0.1:4:64 --velocity-amplitude 0.005:0.64:128
     -o threshold.nc --plot threshold.png
     """
-    from snapbeam.cli.console import check_pictures, draw_threshold, write_map
+    from snapbeam.cli.console import check_pictures, draw, write_map
     from snapbeam.model.parameters import lookup
     from snapbeam.util.files import check_writable
 
@@ -85,7 +85,7 @@ def threshold(
     elapsed = time.monotonic() - start
     files = [write_map(dataset, output)]
     if plot is not None:
-        files.append(draw_threshold(dataset, plot))
+        files.append(draw(dataset, plot))
     names = (
         "lower_threshold", "upper_threshold", "lower_threshold_min", "upper_threshold_max", "failed_runs",
     )  # fmt: skip

@@ -14,12 +14,20 @@ from scipy.spatial import cKDTree
 from scipy.stats import beta
 
 from snapbeam.dynamics.bifurcation import minimal_period
-from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, flow_of, settling_periods
+from snapbeam.dynamics.flow import (
+    AdvancedStates,
+    Flow,
+    Stroboscope,
+    fixed_parameters,
+    flow_of,
+    settling_periods,
+)
 from snapbeam.dynamics.lyapunov import lyapunov_spectrum
 from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, orbit_tolerance, shoot
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.util.diagnostics import counting
+from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, finite_array, integer, within
 
 if TYPE_CHECKING:
@@ -193,8 +201,9 @@ class Attractor:
         return balls_of(self.orbit) if self.orbit is not None else cloud_of(self.points)
 
     def __repr__(self) -> str:
-        what = f"period {self.period}" if self.orbit is not None else "chaotic"
-        return f"<Attractor: {what}, exponent {self.exponent:.4g} +- {self.exponent_error:.2g}>"
+        if self.orbit is not None:
+            return f"<Attractor: period {self.period}, exponent {self.exponent:.4g} from its multipliers>"
+        return f"<Attractor: chaotic, exponent {self.exponent:.4g} +- {self.exponent_error:.2g}>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,9 +260,13 @@ class Attractors:
             f"others have less than {100 * self.unseen_share():.2g} % of the sampled states at 95 %>"
         )
 
+    def plot(self, ax: Any = None, **options: Any) -> Any:
+        """Draw the attractors once a period, with the share of the states that go to each; returns the axes."""
+        return plotter("plot_dataset")(self.to_dataset(), None, ax, **options)
+
     def to_dataset(self) -> xr.Dataset:
         """Kinds, periods, exponents, shares and points, labelled."""
-        import xarray as xr
+        from snapbeam.util.datasets import xr
 
         size = max((len(each.points) for each in self.attractors), default=1)
         points = np.full((len(self.attractors), size, self.flow.dimension), np.nan)
@@ -279,7 +292,7 @@ class Attractors:
             },
             {"coordinate": list(names)},
             {
-                "title": "attractors", "undecided": self.undecided, "check_periods": self.check_periods,
+                **fixed_parameters(self.flow), "title": "attractors", "undecided": self.undecided, "check_periods": self.check_periods,
                 "unseen_share_95": self.unseen_share(), "termination_reason": self.termination_reason,
             },
         )  # fmt: skip

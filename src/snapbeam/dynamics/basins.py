@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage, stats
 
 from snapbeam.dynamics.attractors import UNDECIDED, Attractors, Cloud
-from snapbeam.dynamics.flow import Flow, Stroboscope, settling_periods
+from snapbeam.dynamics.flow import Flow, Stroboscope, fixed_parameters, settling_periods
 from snapbeam.model.state import State
 from snapbeam.util.diagnostics import Diagnostic, counting, tell, to_json
 from snapbeam.util.validation import InputError, InputTypeError, axis, checked, finite_array, integer, shown
@@ -203,7 +203,7 @@ def _dataset(
     after: _Array,
     total: int,
 ) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     shape = tuple(column.size for column in columns)
     words = {"units": "1", "long_name": "number of the attractor that a state goes to; -1: undecided"}
@@ -225,7 +225,7 @@ def _dataset(
             ),
         },
         of,
-        {"title": "basins of attraction", "periods": total, "undecided": float((label == UNDECIDED).mean())},
+        fixed_parameters(found.flow) | {"title": "basins of attraction", "periods": total, "undecided": float((label == UNDECIDED).mean())},
     )  # fmt: skip
 
 

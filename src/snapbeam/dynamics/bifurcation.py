@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.dynamics.flow import InitialConditions, Stroboscope, settling_periods, starts_of
+from snapbeam.dynamics.flow import (
+    InitialConditions,
+    Stroboscope,
+    fixed_parameters,
+    settling_periods,
+    starts_of,
+)
 from snapbeam.dynamics.periodic_orbits import passage_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
@@ -213,7 +219,7 @@ class _Diagram:
 
     def dataset(self, grazing: bool) -> xr.Dataset:
         """The diagram, labelled."""
-        import xarray as xr
+        from snapbeam.util.datasets import xr
 
         row, rows, counts = lookup(self.name), np.array(self.rows), np.array(self.counts)
         system, modes = self.flow.system, self.flow.modes
@@ -224,8 +230,9 @@ class _Diagram:
         labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
         dataset = xr.Dataset(
             coords={"sweep": self.sweeps, row.short: (row.short, self.values, labels)},
-            attrs={"title": "bifurcation diagram", "parameter": row.short, "periods_left_out": self.leave}
-            | {"system_hash": system.hash, "modes": modes},
+            attrs=fixed_parameters(self.flow, row.short)
+            | {"title": "bifurcation diagram", "parameter": row.short, "periods_left_out": self.leave}
+            | {"system_hash": system.hash},
         )
         dims = ("sweep", row.short)
         for part, shape in shapes.items():

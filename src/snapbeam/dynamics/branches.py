@@ -10,12 +10,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.dynamics.flow import Flow, Stroboscope
+from snapbeam.dynamics.flow import Flow, Stroboscope, fixed_parameters
 from snapbeam.dynamics.periodic_orbits import (
     Corrector,
     Family,
@@ -26,6 +26,7 @@ from snapbeam.dynamics.periodic_orbits import (
     orbit_tolerance,
 )
 from snapbeam.util.diagnostics import counting, tell, to_json
+from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, choice, integer, shown, within
 
 if TYPE_CHECKING:
@@ -123,15 +124,18 @@ class Branch:
         """Of each orbit."""
         return np.array([orbit.is_stable for orbit in self.orbits])
 
+    def plot(self, variable: str | None = None, ax: Any = None, **options: Any) -> Any:
+        """Draw the branch: ``"midspan_displacement"`` over the parameter, or ``"multipliers"``; returns the axes."""
+        return plotter("plot_dataset")(self.to_dataset(), variable, ax, **options)
+
     def to_dataset(self) -> xr.Dataset:
         """Return the branch as a dataset.
 
         Over ``orbit``: the parameter, the state, the multipliers, stability, impacts and the mid-span displacement,
         once and at every ``return``.  Over ``special_point``: kind, value, error, state and the orbit before it.
         """
-        import xarray as xr
-
         from snapbeam.model.parameters import lookup
+        from snapbeam.util.datasets import xr
 
         first = self.orbits[0]
         names = getattr(first.flow, "names", tuple(f"x[{i + 1}]" for i in range(first.coordinates.size)))
@@ -200,6 +204,7 @@ class Branch:
                 short: ("orbit", self.values, {"units": unit, "long_name": words, "parameter": self.name}),
             },
             {
+                **fixed_parameters(first.flow, short),
                 "title": "branch of periodic orbits",
                 "parameter": short,
                 "period": first.period,

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.dynamics.bifurcation import minimal_period
-from snapbeam.dynamics.flow import Flow, Stroboscope, flow_of
+from snapbeam.dynamics.flow import Flow, Stroboscope, fixed_parameters, flow_of
 from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, shoot
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.util.diagnostics import counting
+from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, integer, positive
 
 if TYPE_CHECKING:
@@ -61,9 +62,13 @@ class EdgeState:
     termination_reason: str
     """Why the tracking stopped, whether the bisection reached its threshold, and why there is no orbit."""
 
+    def plot(self, ax: Any = None, **options: Any) -> Any:
+        """Draw the motion once a period, and the unstable orbit that it settles on; returns the axes."""
+        return plotter("plot_dataset")(self.to_dataset(), None, ax, **options)
+
     def to_dataset(self) -> xr.Dataset:
         """The motion, labelled."""
-        import xarray as xr
+        from snapbeam.util.datasets import xr
 
         names = getattr(self.flow, "names", tuple(f"x[{i + 1}]" for i in range(self.flow.dimension)))
         labels = {"units": "1", "long_name": "state on the border once a period"}
@@ -91,6 +96,7 @@ class EdgeState:
             },
             {"coordinate": list(names)},
             {
+                **fixed_parameters(self.flow),
                 "title": "edge state",
                 "period": 0 if self.orbit is None else self.orbit.period,
                 "termination_reason": self.termination_reason,

@@ -38,6 +38,7 @@ __all__ = [
     "InitialConditions",
     "Stroboscope",
     "common_cycles",
+    "fixed_parameters",
     "flow_of",
     "held_in_space",
     "leaving",
@@ -732,6 +733,29 @@ TIME_CONSTANTS = 16.0
 """Time constants of the slowest decay after which a motion counts as settled: free vibration has fallen to 1e-7."""
 _LONGEST = 20_000
 """Maximum number of periods that the damping chooses."""
+
+
+def fixed_parameters(flow: Flow, varied: str = "") -> dict[str, Any]:
+    """Return the parameters that a figure states: beam, modes, excitation and location, without the varied one."""
+    if not isinstance(flow, Stroboscope):
+        return {}
+    system, model = flow.system, flow.system.model
+    attrs: dict[str, Any] = {
+        "modes": model.modes,
+        "length_scale": model.length_scale,
+        "reference_frequency": model.reference_frequency,
+    }
+    if model.beam is not None:
+        attrs |= {
+            f"beam_{name}": float(getattr(model.beam, name))
+            for name in ("length", "thickness", "buckling_level")
+        }
+    if system.primary_excitation is not None:
+        section, drive = system.primary_excitation
+        attrs |= {lookup(f"{section}.{name}").short: float(value) for name, value in drive.values().items()}
+    if system.striker is not None:
+        attrs["location"] = float(system.striker.location)
+    return {name: value for name, value in attrs.items() if name != varied}
 
 
 def settling_periods(flow: Flow, rates: ArrayLike = (), least: int = 200) -> tuple[int, str]:

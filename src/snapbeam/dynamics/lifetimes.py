@@ -497,7 +497,7 @@ def _single(setup: SweepSetup, dataset: xr.Dataset) -> xr.Dataset:
 
 def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Dataset:
     """What was kept of every run, labelled."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     setup, points = work.setup, work.setup.points
     more = made | {

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, flow_of, settling_periods
+from snapbeam.dynamics.flow import (
+    AdvancedStates,
+    Flow,
+    Stroboscope,
+    fixed_parameters,
+    flow_of,
+    settling_periods,
+)
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State
@@ -85,7 +92,8 @@ def lyapunov_spectrum(
         ``exponent`` (1/s, over ``exponent_number`` and the axes or runs) with ``exponent_error``, one standard error
         from the means of blocks; ``exponent_snapping`` and ``exponent_settled``, of the periods before and after the
         last crossing (NaN if there are none), with ``periods_snapping``; and, without axes, ``running``, the estimate
-        after each period, and the attribute ``period`` (s): multiply by it for exponents per period.
+        after each period, and the attribute ``period`` (s); with axes ``excitation_period`` (s) of each point: multiply by
+        it for exponents per period.
 
     Raises
     ------
@@ -217,7 +225,7 @@ def _orthogonal(tangents: _Array | None) -> tuple[_Array, _Array]:
 def _dataset(
     flow: Flow, growth: _Array, crossed: NDArray[np.bool_], points: Points | None, before: int
 ) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     total, _, count = growth.shape
     rate = growth / flow.period if points is None else growth / _periods(flow, points)[None, :, None]
@@ -247,7 +255,9 @@ def _dataset(
     coords: dict[str, Any] = {"exponent_number": np.arange(1, count + 1)}
     coords |= {} if points is None else points.coordinates()
     dataset = xr.Dataset(
-        coords=coords, attrs={"title": "Lyapunov exponents", "periods": total, "transient": before}
+        coords=coords,
+        attrs={name: value for name, value in fixed_parameters(flow).items() if name not in coords}
+        | {"title": "Lyapunov exponents", "periods": total, "transient": before},
     )
     for name, (values, words) in table.items():
         dataset[name] = ((*dims, "exponent_number"), arranged(values), {"units": unit, "long_name": words})
@@ -258,6 +268,9 @@ def _dataset(
         labels = {"units": unit, "long_name": "exponent so far"}
         dataset["running"] = (("period", *dims, "exponent_number"), running, labels)
         dataset.attrs["period"] = flow.period
+    else:
+        labels = {"units": "s", "long_name": "period of the excitation"}
+        dataset["excitation_period"] = (dims, arranged(_periods(flow, points)), labels)
     return dataset
 
 
@@ -325,7 +338,7 @@ def largest_lyapunov(
     >>> bool(result.exponent < 0.0)
     True
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     flow = flow_of(system, integration)
     total = integer("periods", periods, _BLOCKS, 10**7)
@@ -358,7 +371,7 @@ def largest_lyapunov(
             "exponent": ("run", _sums(rate) / total, {"units": unit, "long_name": "largest Lyapunov exponent"}),
             "exponent_error": ("run", _error(means), {"units": unit, "long_name": "standard error"}),
         },
-        attrs={
+        attrs=fixed_parameters(flow) | {
             "title": "largest Lyapunov exponent from two trajectories", "periods": total, "period": flow.period,
             "transient": before, "termination_reason": _stopped(total, before, rule), "merged": merged,
             "diagnostics": to_json(told),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, flow_of
+from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, fixed_parameters, flow_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State
@@ -18,10 +18,12 @@ from snapbeam.model.system import System
 from snapbeam.simulation.simulate import simulate
 from snapbeam.solver.cpu.driver import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, tell, to_json
+from snapbeam.util.display import plotter
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
     checked,
+    choice,
     finite_array,
     integer,
     shown,
@@ -466,9 +468,35 @@ class PeriodicOrbit:
             raise InputTypeError("orbit: its flow is not a System")
         return self.flow
 
+    def plot(self, kind: str = "phase_portrait", ax: Any = None, **options: Any) -> Any:
+        """Draw the orbit over its whole period, or its Floquet multipliers.
+
+        Parameters
+        ----------
+        kind : {"phase_portrait", "multipliers"}
+        ax : matplotlib.axes.Axes, optional
+        **options
+            Options of :func:`snapbeam.plot.plot_phase_portrait` or :func:`snapbeam.plot.plot_multipliers`.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        InputError
+            For another kind, and for the phase portrait of an orbit of a map.
+        """
+        if choice("kind", kind, ("phase_portrait", "multipliers")) == "multipliers":
+            return plotter("plot_multipliers")(self.to_dataset(), ax=ax, **options)
+        flow = self._stroboscope
+        cycles = self.period * flow.cycles_per_period
+        run = simulate(self.system, flow.integration.replace(cycles=cycles, early_termination=False))
+        return plotter("plot_phase_portrait")(run, ax=ax, **options)
+
     def to_dataset(self) -> xr.Dataset:
         """The orbit once a period, and its multipliers, labelled."""
-        import xarray as xr
+        from snapbeam.util.datasets import xr
 
         names = getattr(self.flow, "names", tuple(f"x[{i + 1}]" for i in range(self.coordinates.size)))
         values = self.multipliers
@@ -492,6 +520,7 @@ class PeriodicOrbit:
             },
             {"coordinate": list(names)},
             {
+                **fixed_parameters(self.flow),
                 "period": self.period,
                 "residual": self.residual,
                 "stable": int(self.is_stable),

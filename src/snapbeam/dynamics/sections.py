@@ -184,7 +184,7 @@ def _passages(
 
 
 def _dataset(system: System, how: Integration, times: _Array, flow: Stroboscope, section: Any) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not times.size:
         raise InputError(f"section = {shown(section)}: is never met within the periods asked for")

@@ -79,7 +79,7 @@ def hysteresis(
     >>> found["peak_force"].dims
     ('sweep', 'velocity_amplitude')
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")

@@ -449,9 +449,8 @@ def axes_dataset(system: System, axes: Mapping[str, Any], integration: Integrati
     """Coordinates and attributes of a sweep that is not computed."""
     import json
 
-    import xarray as xr
-
     from snapbeam.model.parameters import lookup
+    from snapbeam.util.datasets import xr
 
     coords: dict[str, Any] = {}
     for name, values in axes.items():
@@ -505,7 +504,7 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
     InputError
         If it cannot be read, or is no map.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if what is None or isinstance(what, System):
         from snapbeam.model.parameter_axes import parse_axis
@@ -1307,7 +1306,7 @@ def _is_run(name: str) -> bool:
 
 def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) -> dict[str, NDArray[Any]]:
     """Statistics of some cells, by name."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     rows = np.array([item[2] for item in points])
     columns = np.array([item[3] for item in points])

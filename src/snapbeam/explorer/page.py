@@ -163,6 +163,7 @@ class Page:
             self.doc.add_periodic_callback(self._look_for_more, _GROWTH)
         with self._together():
             self.runs[0].stand()
+            self._ask_address()
         self.later(self._at_rest, _AFTER)
 
     def _at_rest(self) -> None:
@@ -242,7 +243,7 @@ class Page:
         self.typed.objects = [*self.fields.values(), self.go]
 
     def _begin(self) -> None:
-        """Show what the address names, once the page stands."""
+        """Take the system that the address names."""
         if self.address.changes and self.shared.system is not None:
             try:
                 of_run = {
@@ -254,10 +255,13 @@ class Page:
                 self.system_card().take(first.replace(**own), how.replace(**of_run))
             except InputError as error:
                 self.card.say(f"address, set: {error}")
-        at = dict(self.address.at)
+
+    def _ask_address(self) -> None:
+        """Compute the point that the address names; changes made before the browser is connected may be lost."""
+        at = self.address.at
         names = set(self.card.plane.parameters)
         if at and names <= at.keys():
-            self.post(lambda: self.ask(Point({name: at[name] for name in at if name in names})))
+            self.ask(Point({name: at[name] for name in at if name in names}))
 
     def _look_for_more(self) -> None:
         """Show what was added to a checkpoint since the last look."""

@@ -800,6 +800,7 @@ class WaveformPanel(RunPanel):
         look = self.look
         self.sources = {name: columns(x=[], y=[]) for name in (*_CURVES_WAVEFORM, "contact_force")}
         self.sources["midspan_displacement"].name = self.named("waveform")
+        self.sources["contact_force"].name = self.named("force")
         common: dict[str, Any] = {
             "x_range": self.cursor.range, "tools": "xpan,xbox_zoom,xwheel_zoom,reset",
             "active_drag": "xbox_zoom", "active_scroll": "xwheel_zoom", "output_backend": "canvas",

@@ -844,7 +844,7 @@ def stiffness_from_impacts(impacts: xr.Dataset, effective_mass: float) -> Contac
     >>> f"{contact.stiffness:.1e} N/m^1.5"
     '6.4e+07 N/m^1.5'
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     mass = positive("effective_mass", effective_mass, "kg")
     if not isinstance(impacts, xr.Dataset):

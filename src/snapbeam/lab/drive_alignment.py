@@ -348,9 +348,10 @@ def recorded_drive(
     >>> list(recorded.data_vars)
     ['displacement', 'velocity']
     """
-    import xarray as xr
     from scipy.interpolate import CubicSpline
     from scipy.signal import fftconvolve, firwin, kaiserord, resample_poly
+
+    from snapbeam.util.datasets import xr
 
     samples = check_signal(velocity, "m/s", "velocity")
     rate = positive("sampling_frequency", sampling_frequency, "Hz")

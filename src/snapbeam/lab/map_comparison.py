@@ -148,7 +148,7 @@ def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -
     >>> comparison.used
     2
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not isinstance(dataset, xr.Dataset) or "response_class" not in dataset:
         raise InputError("dataset: must be a map with the variable response_class")
@@ -209,7 +209,7 @@ def _on_map(
     response: xr.DataArray, axes: dict[str, _Array], where: dict[str, _Array]
 ) -> tuple[dict[str, _Array], NDArray[np.bool_], NDArray[np.int8]]:
     """Positions of points in steps of the map, whether they lie on it, and the class of the nearest point of it."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     place = {name: _steps(points, where[name]) for name, points in axes.items()}
     inside = np.ones(where[_AXES[0]].size, dtype=bool)

@@ -224,7 +224,7 @@ def make_signal(
     >>> signal.values
     array([ 0.   ,  0.001,  0.   , -0.001])
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     array = finite_array(name, values, 1)
     factor, unit = si_unit(name, units)
@@ -259,7 +259,7 @@ def check_signal(
     InputError
         Naming what is wrong: the dimensions, a missing or wrong unit, NaN, times that do not increase.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not isinstance(signal, xr.DataArray):
         raise InputTypeError(

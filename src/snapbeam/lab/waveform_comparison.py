@@ -125,7 +125,7 @@ def run_of_signal(signal: xr.DataArray, length: float, at: str = "midspan_displa
     InputError
         If the signal is no displacement.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     choice("at", at, _PLACES)
     scale = positive("length", length, "m")
@@ -186,7 +186,7 @@ def compare_waveforms(
     >>> f"{comparison.amplitude_ratio:.2f}"
     '1.00'
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     choice("at", at, _PLACES)
     if isinstance(measured, xr.DataArray):
@@ -365,7 +365,7 @@ def _on(grid: _Array, clock: _Array, values: NDArray[Any]) -> _Array:
 
 
 def _spectra(grid: _Array, step: float, columns: dict[str, _Array]) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     window = np.hanning(grid.size)
     data = {}

@@ -482,7 +482,7 @@ def force_displacement(
     >>> print(f"{float(curve.snap_through_force) * 1e3:.2f} mN, {curve.attrs['snap_through_kind']}")
     -6.11 mN, bifurcation
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not isinstance(system, (System, ReducedModel)):
         raise InputTypeError(f"system = {shown(system)}: must be a System or a ReducedModel")

@@ -380,6 +380,12 @@ class System:
             lines.append(f"{section:8s}  {words}")
         return "\n".join(lines)
 
+    def plot(self, title: str = "") -> Any:
+        """Draw the schematic of the system, and return the figure; see :func:`snapbeam.plot.plot_system`."""
+        from snapbeam.util.display import plotter
+
+        return plotter("plot_system")(self, title)
+
     def _repr_html_(self) -> str:
         from snapbeam.util.display import html_table
 

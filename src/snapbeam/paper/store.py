@@ -25,7 +25,7 @@ def save_results(results: Mapping[str, xr.Dataset], path: Path, size: str) -> Pa
     Every dataset keeps the attributes that say what it was computed from and by what; the file says which engine
     it was, by its fingerprint.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     target = check_writable(path, "output", (".nc",))
     groups: dict[str | None, xr.Dataset] = {
@@ -48,7 +48,7 @@ def save_results(results: Mapping[str, xr.Dataset], path: Path, size: str) -> Pa
 
 def load_results(path: Path, size: str | None = None) -> dict[str, xr.Dataset]:
     """Read what :func:`save_results` wrote; refuse a file of another *size*."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     try:
         with xr.open_datatree(path, engine="h5netcdf") as tree:

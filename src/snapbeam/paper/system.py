@@ -110,7 +110,7 @@ def relative_map(
     The relative amplitude follows the limit of the map, V < 2 V_QS1(x_s), which a rectangle in V would leave
     half empty.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     model = paper_model(modes)
     columns, made = [], []

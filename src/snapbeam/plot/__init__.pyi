@@ -1,9 +1,12 @@
 """Public names; each is loaded when it is first used."""
 
+from .dataset import plot_dataset as plot_dataset
+from .dynamics import plot_attractors as plot_attractors
 from .dynamics import plot_basins as plot_basins
 from .dynamics import plot_diagram as plot_diagram
 from .dynamics import plot_exponents as plot_exponents
 from .dynamics import plot_lifetimes as plot_lifetimes
+from .dynamics import plot_multipliers as plot_multipliers
 from .dynamics import plot_section as plot_section
 from .dynamics import plot_survival as plot_survival
 from .force_displacement import plot_force_displacement as plot_force_displacement

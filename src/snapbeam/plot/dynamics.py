@@ -13,19 +13,22 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from snapbeam.plot.axes import dress, edges_of, positions
-from snapbeam.plot.style import axes_or_new, figure_style, fix_ticks
+from snapbeam.plot.style import axes_or_new, figure_style, fix_ticks, set_title
 from snapbeam.util.status_codes import RunStatus
-from snapbeam.util.validation import InputError, checked
+from snapbeam.util.validation import InputError, checked, choice
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
+    "MAX_CURVES",
+    "plot_attractors",
     "plot_basins",
     "plot_diagram",
     "plot_edge",
     "plot_exponents",
     "plot_lifetimes",
+    "plot_multipliers",
     "plot_section",
     "plot_survival",
 ]
@@ -33,6 +36,8 @@ __all__ = [
 
 _UP, _DOWN, _LINE = "#16245E", "#B03A27", "#000000"
 _STARTS = "#8A8A8A"
+MAX_CURVES = 5
+"""The most points of a map that :func:`plot_survival` draws."""
 _SPECIAL_POINTS = {"fold": "s", "flip": "D", "Neimark-Sacker": "o", "branch point": "^", "grazing": "x"}
 
 
@@ -84,7 +89,7 @@ def plot_diagram(
         if each is not None and not needed <= set(getattr(each, "dims", ())):
             raise InputError(f"{name}: must have the dimensions {', '.join(sorted(needed))}")
     with figure_style():
-        ax = axes_or_new(ax, "double", 84.0)
+        ax = axes_or_new(ax, first, "double", 84.0)
         handles: list[Line2D] = []
         if dataset is not None:
             if variable not in dataset:
@@ -211,7 +216,7 @@ def plot_lifetimes(
     if not 1 <= len(dims) <= 2 or "point" in dims:
         raise InputError(f"lifetime over {dims}: is drawn over one or two parameters")
     with figure_style():
-        ax = axes_or_new(ax)
+        ax = axes_or_new(ax, dataset)
         if len(dims) == 1:
             x, _ = positions(dataset, dims[0])
             low, high = dataset["lifetime_low"].values, dataset["lifetime_high"].values
@@ -283,11 +288,11 @@ def plot_survival(
         raise InputError("dataset: holds no lifetimes of starts")
     runs = dataset.transpose(..., "start")
     rows = np.atleast_2d(runs["last_snap"].values).reshape(-1, runs.sizes["start"])
-    if len(rows) > 5:
-        raise InputError(f"dataset: has {len(rows)} points; choose at most 5 of them")
+    if len(rows) > MAX_CURVES:
+        raise InputError(f"dataset: has {len(rows)} points; choose at most {MAX_CURVES} of them")
     tau, delay = (np.atleast_1d(runs[name].values).ravel() for name in ("lifetime", "delay"))
     with figure_style():
-        ax = axes_or_new(ax)
+        ax = axes_or_new(ax, dataset)
         seen = float(dataset.attrs["cycles"]) - float(dataset.attrs["settling_cycles"])
         settled = runs["final_well_proven"].values.astype(bool) | (
             runs["status"].values == int(RunStatus.EARLY_STOP)
@@ -323,6 +328,8 @@ def plot_survival(
             ylim=(0.6 / rows.shape[1], 1.3),
         )
         ax.set_xlim(left=0.0)
+        if not np.isfinite(rows).any():
+            ax.text(0.5, 0.5, "no run snaps through", transform=ax.transAxes, ha="center")
         handles, _ = ax.get_legend_handles_labels()
         handles.append(Line2D([], [], color="0.3", dashes=(4, 2), linewidth=0.7, label="fitted"))
         if open_ends:
@@ -344,9 +351,30 @@ _UP_STATES, _DOWN_STATES = "#16245E", "#B03A27"
 _UNDECIDED = "#858585"
 
 
+_SETTLED, _CHAOS = "#16245E", "#B03A27"
+_PER = {"second": r"s$^{-1}$", "period": "per period of the excitation"}
+
+
 @checked
-def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
-    """Draw Lyapunov exponents: how they converge over periods, or the largest over one or two parameters.
+def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "second") -> Axes:
+    """Draw Lyapunov exponents: their convergence over periods, or the largest over one or two parameters.
+
+    Order and chaos are distinguished by an interval of two standard errors: the largest exponent is negative, positive,
+    or its sign is not decided.  Colours of a map over two parameters diverge at 0.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`snapbeam.dynamics.lyapunov_spectrum` or :func:`snapbeam.dynamics.largest_lyapunov`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure one column wide by default.
+    per : {"second", "period"}
+        Unit of time: 1 s, or one period of the excitation.
+
+    Raises
+    ------
+    InputError
+        If the dataset has no exponents over at most two parameters, or does not contain the period.
 
     Examples
     --------
@@ -359,42 +387,229 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     """
     if "exponent" not in dataset:
         raise InputError(f"no exponents among {list(map(str, dataset.variables))}")
+    unit = _PER[choice("per", per, tuple(_PER))]
+    of_map = str(dataset["exponent"].attrs.get("units", "1/s")) == "1"
+    factor: Any = 1.0
+    if per == "period" and not of_map:
+        if "period" not in dataset.attrs and "excitation_period" not in dataset:
+            raise InputError("per = 'period': the dataset does not contain the period; compute it again")
+        factor = dataset.attrs["period"] if "period" in dataset.attrs else dataset["excitation_period"]
+    unit = "per iteration of the map" if of_map else unit
+    first = {"exponent_number": 0} if "exponent_number" in dataset.dims else {}
+    value, error = (factor * dataset[name].isel(first) for name in ("exponent", "exponent_error"))
     dims = [str(name) for name in dataset["exponent"].dims if name != "exponent_number"]
+    value, error = (each.transpose(*dims) for each in (value, error))
     with figure_style():
-        ax = axes_or_new(ax)
+        ax = axes_or_new(ax, dataset)
         if "running" in dataset:
-            period = np.arange(1, dataset.sizes["period"] + 1)
-            ax.axhline(0.0, color="0.6", linewidth=0.5)
-            shown = min(dataset.sizes["exponent_number"], 10)
-            for number in range(shown):
-                color = cm.batlow(0.85 * number / max(shown - 1, 1))
-                label = rf"$\lambda_{{{number + 1}}}$"
-                ax.plot(period, dataset["running"].values[:, 0, number], color=color, label=label)
-            ax.legend(loc="best", ncols=2)
-            ax.set(xlabel="Periods of the drive", ylabel=r"Lyapunov exponent so far (s$^{-1}$)", xscale="log")
-        elif len(dims) == 1:
-            x, _ = positions(dataset, dims[0])
-            value = dataset["exponent"].isel(exponent_number=0).values
-            error = dataset["exponent_error"].isel(exponent_number=0).values
-            ax.axhline(0.0, color="0.6", linewidth=0.5)
-            ax.fill_between(
-                x, value - 2 * error, value + 2 * error, color=_UP_STATES, alpha=0.25, linewidth=0.0
+            _running(factor * dataset["running"], ax)
+            ax.set(
+                xlabel="Periods of the excitation", ylabel=f"Lyapunov exponent so far ({unit})", xscale="log"
             )
-            ax.plot(x, value, color=_UP_STATES)
-            ax.set_ylabel(r"Largest Lyapunov exponent (s$^{-1}$)")
-            dress(ax.xaxis, dataset, dims[0])
+        elif len(dims) == 1:
+            _exponent_line(dataset, ax, dims[0], value.values, error.values)
+            ax.set_ylabel(f"Largest Lyapunov exponent\n({unit})")
         elif len(dims) == 2:
-            value = dataset["exponent"].isel(exponent_number=0).values.T
-            most = float(np.nanmax(np.abs(value))) or 1.0
+            most = float(np.nanmax(np.abs(value.values))) or 1.0
             edges = [edges_of(dataset, name) for name in dims]
-            cells = ax.pcolormesh(*edges, value, cmap=cm.vik, vmin=-most, vmax=most, rasterized=True)
+            cells = ax.pcolormesh(*edges, value.values.T, cmap=cm.vik, vmin=-most, vmax=most, rasterized=True)
             figure = ax.get_figure()
             assert figure is not None
-            figure.colorbar(cells, ax=ax, label=r"Largest Lyapunov exponent (s$^{-1}$)")
+            figure.colorbar(cells, ax=ax, label=f"Largest Lyapunov exponent ({unit})")
+            _undecided_cells(ax, edges, value.values.T, error.values.T)
             dress(ax.xaxis, dataset, dims[0])
             dress(ax.yaxis, dataset, dims[1])
         else:
             raise InputError(f"exponent over {dims}: is drawn over one or two parameters")
+        fix_ticks(ax)
+    return ax
+
+
+def _running(running: xr.DataArray, ax: Axes) -> None:
+    period = np.arange(1, running.sizes["period"] + 1)
+    ax.axhline(0.0, color="0.6", linewidth=0.5)
+    shown = min(running.sizes["exponent_number"], 10)
+    values = running.transpose("period", ..., "exponent_number").values
+    for number in range(shown):
+        color = cm.batlow(0.85 * number / max(shown - 1, 1))
+        ax.plot(period, values[:, 0, number], color=color, label=rf"$\lambda_{{{number + 1}}}$")
+    ax.legend(loc="best", ncols=2)
+
+
+def _exponent_line(dataset: xr.Dataset, ax: Axes, name: str, value: Any, error: Any) -> None:
+    """The largest exponent over one parameter, with its interval; marker and colour state its sign."""
+    x, _ = positions(dataset, name)
+    ax.axhline(0.0, color="0.6", linewidth=0.5)
+    ax.fill_between(x, value - 2 * error, value + 2 * error, color="0.6", alpha=0.35, linewidth=0.0)
+    ax.plot(x, value, color="0.45", linewidth=0.6)
+    settled, chaotic = value + 2 * error < 0.0, value - 2 * error > 0.0
+    for which, mark, color, words in (
+        (settled, "o", _SETTLED, "negative: periodic"),
+        (chaotic, "^", _CHAOS, "positive: chaotic"),
+        (np.isfinite(value) & ~settled & ~chaotic, "x", "0.3", "sign not decided"),
+    ):
+        if which.any():
+            ax.plot(x[which], value[which], mark, color=color, markersize=3.0, label=words)
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(loc="best")
+    if name in dataset.coords:
+        dress(ax.xaxis, dataset, name)
+    else:
+        ax.set_xlabel("Run")
+
+
+def _undecided_cells(ax: Axes, edges: list[Any], value: Any, error: Any) -> None:
+    """Mark the cells whose sign is not decided, and state the meaning of the colours."""
+    undecided = np.isfinite(value) & (np.abs(value) <= 2 * error)
+    middle = [0.5 * (edge[1:] + edge[:-1]) for edge in edges]
+    handles: list[Any] = [
+        Patch(facecolor=cm.vik(share), edgecolor="black", linewidth=0.4, label=words)
+        for share, words in ((0.15, "negative: periodic"), (0.85, "positive: chaotic"))
+    ]
+    if undecided.any():
+        row, column = np.nonzero(undecided)
+        marks = ax.plot(
+            middle[0][column], middle[1][row], "x", color="0.2", markersize=2.5, markeredgewidth=0.6,
+            label="sign not decided",
+        )  # fmt: skip
+        handles += marks
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+
+
+@checked
+def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw Floquet multipliers: of one orbit in the complex plane, of a branch their absolute values over the parameter.
+
+    A multiplier outside the unit circle, or above 1, makes the orbit unstable.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of ``to_dataset`` of a :class:`snapbeam.dynamics.PeriodicOrbit` or a :class:`snapbeam.dynamics.Branch`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure one column wide by default.
+
+    Raises
+    ------
+    InputError
+        If the dataset has no multipliers.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> orbit = sb.dynamics.periodic_orbit(system, transient=200)
+    >>> ax = sb.plot.plot_multipliers(orbit.to_dataset())
+    """
+    if not {"multiplier_real", "multiplier_imag"} <= set(map(str, dataset.variables)):
+        raise InputError(f"no multipliers among {list(map(str, dataset.variables))}")
+    values = dataset["multiplier_real"].values + 1j * dataset["multiplier_imag"].values
+    with figure_style():
+        ax = axes_or_new(ax, dataset, height=84.0)
+        if "orbit" in dataset.dims:
+            _multipliers_along(dataset, ax, np.abs(values))
+        else:
+            angle = np.linspace(0.0, 2.0 * np.pi, 361)
+            ax.plot(np.cos(angle), np.sin(angle), color="0.5", linewidth=0.7, label="unit circle")
+            outside = np.abs(values) > 1.0
+            for which, mark, color, words in (
+                (~outside, "o", _SETTLED, "inside: decays"),
+                (outside, "^", _CHAOS, "outside: grows"),
+            ):
+                if which.any():
+                    ax.plot(
+                        values[which].real, values[which].imag, mark, color=color, markersize=3.5, label=words
+                    )
+            ax.set_aspect("equal", adjustable="datalim")
+            ax.set(xlabel="Floquet multiplier, real part", ylabel="Floquet multiplier, imaginary part")
+            ax.legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=3)
+        fix_ticks(ax)
+    return ax
+
+
+def _multipliers_along(dataset: xr.Dataset, ax: Axes, sizes: Any) -> None:
+    over = dataset["multiplier_real"].dims
+    sizes = -np.sort(-(sizes if over[0] == "orbit" else sizes.T), axis=1)
+    along = next(
+        str(name)
+        for name in dataset.variables
+        if "parameter" in dataset[name].attrs or name == dataset.attrs.get("parameter")
+    )
+    shown = min(sizes.shape[1], 6)
+    for number in range(shown):
+        color = cm.batlow(0.85 * number / max(shown - 1, 1))
+        ax.plot(dataset[along].values, sizes[:, number], color=color, label=f"multiplier {number + 1}")
+    ax.axhline(1.0, color=_CHAOS, linewidth=0.8, dashes=(4, 2), label="limit of stability")
+    for value, kind in zip(
+        dataset["special_point_value"].values, dataset["special_point_kind"].values, strict=True
+    ):
+        ax.axvline(float(value), color="0.6", linewidth=0.5)
+        ax.annotate(
+            str(kind), (float(value), 1.0), (2.0, -3.0), xycoords=("data", "axes fraction"),
+            textcoords="offset points", rotation=90, va="top", fontsize=6,
+        )  # fmt: skip
+    ax.set(yscale="log", ylabel="Absolute value of the Floquet multipliers")
+    ax.legend(loc="best", ncols=2)
+    dress(ax.xaxis, dataset.swap_dims(orbit=along).drop_duplicates(along), along)
+
+
+@checked
+def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the attractors once a period, in their first two coordinates, with the share of the states that go to each.
+
+    The title states the upper bound of the share of states that go to attractors that were not found.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :meth:`snapbeam.dynamics.Attractors.to_dataset`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure one column wide by default.
+
+    Raises
+    ------
+    InputError
+        If the dataset has no attractors.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> attractors = sb.dynamics.find_attractors(system, 12)
+    >>> ax = sb.plot.plot_attractors(attractors.to_dataset())
+    """
+    if "points" not in dataset or "attractor" not in dataset["points"].dims:
+        raise InputError(f"no attractors among {list(map(str, dataset.variables))}")
+    names = [str(name) for name in dataset["coordinate"].values]
+    modes = sum(name.startswith("amplitude[") for name in names)
+    pair = (0, modes if 0 < modes < len(names) else min(1, len(names) - 1))
+    points = dataset["points"].transpose("attractor", "point", "coordinate").values
+    count = dataset.sizes["attractor"]
+    with figure_style():
+        ax = axes_or_new(ax, dataset, height=88.0)
+        for number in range(count):
+            color = cm.batlow(0.08 + 0.84 * number / max(count - 1, 1))
+            period = int(dataset["period"][number])
+            words = f"period {period}" if period else "chaotic"
+            ax.plot(
+                points[number, :, pair[0]], points[number, :, pair[1]], "o" if period else ".", color=color,
+                markersize=4.0 if period else 1.5, label=f"{number}: {words}, {100 * float(dataset['share'][number]):.1f} % of the states",
+            )  # fmt: skip
+        ax.set(xlabel=_coordinate(names[pair[0]]), ylabel=_coordinate(names[pair[1]]))
+        unseen = 100 * float(dataset.attrs["unseen_share_95"])
+        words = f"Attractors not found: below {unseen:.2g} % of the states (95 %)"
+        set_title(ax, f"{ax.get_title('left')}\n{words}".lstrip())
+        figure = ax.get_figure(root=True)
+        assert figure is not None
+        figure.legend(loc="outside lower center", ncols=1)
         fix_ticks(ax)
     return ax
 
@@ -416,7 +631,7 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
     if x not in dataset or y not in dataset:
         raise InputError(f"no {x} and {y} among {list(map(str, dataset.variables))}")
     with figure_style():
-        ax = axes_or_new(ax)
+        ax = axes_or_new(ax, dataset)
         ax.plot(
             dataset[x].values,
             dataset[y].values,
@@ -426,6 +641,14 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
             markeredgewidth=0.0,
             rasterized=True,
         )
+        for limits, name in (
+            ("xlim", x),
+            ("ylim", y),
+        ):  # a point that repeats is not magnified to its rounding errors
+            values = dataset[name].values
+            middle, least = 0.5 * (values.min() + values.max()), 1e-3 * np.abs(values).max()
+            if 0.0 < least > np.ptp(values):
+                ax.set(**{limits: (middle - 10.0 * least, middle + 10.0 * least)})
         where = "Centre" if x.startswith("midspan") else "Contact point's"
         ax.set(xlabel=f"{where} displacement, over $b$", ylabel=rf"{where} velocity, over $b\,\omega_1$")
         fix_ticks(ax)
@@ -455,7 +678,7 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     colors = [_UNDECIDED, *(cm.batlow(0.08 + 0.84 * i / max(count - 1, 1)) for i in range(count))]
     meanings = str(dataset["basin"].attrs["flag_meanings"]).split()
     with figure_style():
-        ax = axes_or_new(ax, height=84.0)
+        ax = axes_or_new(ax, dataset, height=84.0)
         edges = [edges_of(dataset, name) for name in names]
         norm = BoundaryNorm(np.arange(-1.5, count), count + 1)
         ax.pcolormesh(*edges, labels.T, cmap=ListedColormap(colors), norm=norm, rasterized=True)
@@ -493,7 +716,7 @@ def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     name = str(dataset["coordinate"].values[0])
     values = dataset["state"].values[:, 0]
     with figure_style():
-        ax = axes_or_new(ax)
+        ax = axes_or_new(ax, dataset)
         for at, words in ((-1.0, "well"), (0.0, "straight")):
             if name == "amplitude[1]" and values.min() - 0.3 < at < values.max() + 0.3:
                 ax.axhline(at, color="0.75", linewidth=0.5, zorder=0)

@@ -28,6 +28,7 @@ from snapbeam.plot.style import (
     figure_style,
     fix_ticks,
     new_figure,
+    set_title,
 )
 from snapbeam.solver.statistics import STATISTICS
 from snapbeam.sweeps.measured_points import MeasuredPoints
@@ -114,7 +115,7 @@ def plot_response_map(
     >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_response_map(dataset)
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "response_class" in dataset and dataset["response_class"].dims == ("point",):
@@ -144,7 +145,7 @@ def plot_response_map(
         fix_ticks(ax)
         dress(ax.xaxis, dataset, across)
         dress(ax.yaxis, dataset, upward)
-        ax.set_title(subtitle(dataset, (across, upward)), loc="left")
+        set_title(ax, subtitle(dataset, (across, upward)))
         handles = class_handles(kinds)
         if "class_fraction" in dataset:
             handles.append(draw_agreement(ax, dataset, (across, upward), edges))
@@ -176,7 +177,7 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
         assert ax is not None
         fix_ticks(ax)
         _draw_line(ax, dataset, name)
-        ax.set_title(subtitle(dataset, (name,)), loc="left")
+        set_title(ax, subtitle(dataset, (name,)))
         handles = class_handles(dataset["response_class"].values)
         if legend and own is not None:
             own.legend(handles=handles, loc="outside lower center", ncols=2)
@@ -205,7 +206,7 @@ def _draw_line(ax: Axes, dataset: xr.Dataset, name: str) -> None:
 
 
 def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "response_class" not in dataset:
@@ -390,7 +391,7 @@ def plot_statistic(
     >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_statistic(dataset, "peak_force")
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if instance("name", name, str, "text") not in dataset:
@@ -439,7 +440,7 @@ def plot_statistic(
             ax.figure.colorbar(mesh, ax=ax, label=label, pad=0.02).ax.tick_params(labelsize=7)
             dress(ax.xaxis, dataset, across)
             dress(ax.yaxis, dataset, upward)
-        ax.set_title(subtitle(dataset, (*dims,)), loc="left")
+        set_title(ax, subtitle(dataset, (*dims,)))
     return ax
 
 
@@ -554,7 +555,7 @@ def plot_points(
     >>> dataset = sb.sweep(system, points, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_points(dataset, "peak_force")
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if instance("name", name, str, "text") not in dataset.data_vars or dataset[name].dims != ("point",):
@@ -584,7 +585,7 @@ def plot_points(
             own.legend(handles=handles, loc="outside lower center", ncols=2)
         elif legend and handles:
             ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2)
-        ax.set_title(subtitle(dataset, along), loc="left")
+        set_title(ax, subtitle(dataset, along))
     return ax
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
+from matplotlib.ticker import MaxNLocator
 
 from snapbeam.plot.style import (
     BEAM_COLOR,
@@ -18,6 +19,7 @@ from snapbeam.plot.style import (
     figure_style,
     fix_ticks,
     new_figure,
+    set_title,
 )
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.simulation.run import Run
@@ -65,7 +67,7 @@ def across(dataset: xr.Dataset) -> tuple[str, str]:
 def _axes(ax: Axes | None, dataset: xr.Dataset) -> Axes:
     if ax is None:
         ax = new_figure("single", 66.0).add_subplot()
-        ax.set_title(caption(dataset, 2), loc="left", fontsize=7)
+        set_title(ax, caption(dataset, 2))
     fix_ticks(ax)
     return ax
 
@@ -373,9 +375,9 @@ def plot_run(
         left[0].set_ylabel("Displacement $w/b$")
         handles, labels = left[0].get_legend_handles_labels()
         figure.legend(
-            handles, labels, loc="outside upper left", ncols=3, title=caption(dataset, 2), alignment="left",
-            title_fontsize=7,
+            handles, labels, loc="outside lower left", ncols=3,
         )  # fmt: skip
+        set_title(left[0], caption(dataset, 2))
         figure.align_ylabels(left)
         if has_force:
             near, seconds, peak = _hardest_impact(part)
@@ -383,11 +385,9 @@ def plot_run(
             around = seconds / scale
             right = _column(figure, grid, 1, near, around, scales)
             digits = _digits(near, axis_name)
-            right[-1].set_xlabel(
-                f"Time after $\\tau$ = {peak:.{digits}f} ({unit})"
-                if axis_name == "cycle"
-                else f"Time ({unit})"
-            )
+            after = f"\nafter $\\tau$ = {peak:.{digits}f}" if axis_name == "cycle" else ""
+            right[-1].set_xlabel(f"Time ({unit}){after}", loc="right")
+            right[-1].xaxis.set_major_locator(MaxNLocator(3))
             right[0].set_xlim(min(around[0], -0.12 * around[-1]), around[-1])
     return left[0]
 

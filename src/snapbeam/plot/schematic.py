@@ -443,7 +443,7 @@ def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
     )
     color = SHAKER_COLOR if section == "drive" else _LOAD_COLOR
     ax.plot(cycles, (-moved if down else moved) / per, color=color)
-    ax.set_xlabel("Cycles of the drive" if section == "drive" else "Cycles")
+    ax.set_xlabel("Cycles")
     ax.set_ylabel(
         {
             "drive": "Tip / $b$",

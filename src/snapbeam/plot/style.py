@@ -17,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.ticker import AutoLocator
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.util.diagnostics import Diagnostic, Severity
@@ -48,6 +49,7 @@ __all__ = [
     "new_figure",
     "panel_letters",
     "save_figure",
+    "set_title",
 ]
 
 
@@ -120,9 +122,12 @@ def figure_style() -> AbstractContextManager[None]:
 
 
 def fix_ticks(*axes: Axes) -> None:
-    """Give the ticks of *axes* the style of this package; Matplotlib makes them only when it draws."""
+    """Give the ticks of *axes* the style of this package, at most seven along x, so that their numbers stay apart."""
     for ax in axes:
         ax.tick_params(labelsize=_RC["xtick.labelsize"], width=_RC["xtick.major.width"])
+        locator = ax.xaxis.get_major_locator()
+        if isinstance(locator, AutoLocator):
+            locator.set_params(nbins=6, steps=[1, 2, 5, 10])
 
 
 def new_figure(width: str = "single", height: float = 75.0) -> Figure:
@@ -149,9 +154,21 @@ def new_figure(width: str = "single", height: float = 75.0) -> Figure:
         return plt.figure(figsize=(millimetres / 25.4, positive("height", height, "mm") / 25.4))
 
 
-def axes_or_new(ax: Axes | None, width: str = "single", height: float = 72.0) -> Axes:
-    """The axes that were given, or those of a new figure."""
-    return new_figure(width, height).add_subplot() if ax is None else ax
+def axes_or_new(
+    ax: Axes | None, dataset: xr.Dataset | None = None, width: str = "single", height: float = 72.0
+) -> Axes:
+    """The axes that were given, or those of a new figure whose title states the fixed parameters of the dataset."""
+    if ax is not None:
+        return ax
+    ax = new_figure(width, height).add_subplot()
+    if dataset is not None:
+        set_title(ax, caption(dataset, 2))
+    return ax
+
+
+def set_title(ax: Axes, text: str) -> None:
+    """Write a title that begins at the left edge of *ax* and continues on a new line at the edge of the figure."""
+    ax.set_title(text, loc="left", fontsize=7, wrap=True)
 
 
 def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.quasi_static import quasi_static_threshold
 from snapbeam.plot.axes import dress, edges_of, positions, symbol_of
-from snapbeam.plot.style import figure_style, fix_ticks, new_figure
+from snapbeam.plot.style import figure_style, fix_ticks, new_figure, set_title
 from snapbeam.util.validation import InputError, checked, instance
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def plot_threshold(
     ... )
     >>> ax = sb.plot.plot_threshold(dataset)
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if not set(_NEEDED) <= set(dataset.variables):
@@ -112,10 +112,10 @@ def plot_threshold(
         marks = _mark_no_threshold(ax, curves, x, edges)
         if "cycles" in dataset.attrs:
             step = float(np.max(np.diff(amplitude)))
-            ax.set_title(
-                f"{int(dataset.attrs['cycles'])} cycles, steps of {step:.2g} in {symbol_of(dataset, raised)}",
-                loc="left",
+            words = (
+                f"{int(dataset.attrs['cycles'])} cycles, steps of {step:.2g} in {symbol_of(dataset, raised)}"
             )
+            set_title(ax, words)
         if legend:
             shade = Patch(facecolor="0.75", label="up to where all runs are interwell")
             handles, _ = ax.get_legend_handles_labels()

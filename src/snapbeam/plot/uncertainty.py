@@ -16,7 +16,7 @@ from matplotlib.ticker import EngFormatter
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quasi_static import quasi_static_threshold
 from snapbeam.plot.axes import dress, edges_of, is_geometric, positions, symbol_of
-from snapbeam.plot.style import CLASS_COLORS, figure_style, fix_ticks, new_figure
+from snapbeam.plot.style import CLASS_COLORS, figure_style, fix_ticks, new_figure, set_title
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, instance, shown
 
@@ -53,7 +53,7 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     InputError
         If the dataset holds no designs, or nothing of that name.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "constraints_satisfied" not in dataset or "tried" not in dataset.dims:
@@ -156,7 +156,7 @@ def plot_probability(
     InputError
         If the dataset holds no such map.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "probability" not in dataset or "outcome" not in dataset["probability"].dims:
@@ -279,7 +279,7 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
     InputError
         If the dataset holds no such thresholds, or those over more than one parameter.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "threshold" not in dataset or "quantile" not in dataset["threshold"].dims:
@@ -323,7 +323,7 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
         reach = np.nanmax(np.where(np.isfinite(data["threshold_high"]), data["threshold_high"], np.nan))
         ax.set_ylim(min(0.0, bottom), min(top, 1.08 * float(reach)) if np.isfinite(reach) else top)
         share = 100.0 * float(data.attrs.get("confidence", 0.95))
-        ax.set_title(f"{int(data['runs'].max())} runs a point, {share:g} % bands", loc="left")
+        set_title(ax, f"{int(data['runs'].max())} runs a point, {share:g} % bands")
         ax.legend(loc="best")
     return ax
 
@@ -355,7 +355,7 @@ def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     InputError
         If the dataset holds no sensitivities.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "parameter" not in dataset.dims or not {"effect", "first_order"} & set(map(str, dataset.variables)):

@@ -123,7 +123,7 @@ def trajectory_dataset(
     InputError
         For an unknown name, a wrong shape, times that do not increase, or numbers that are not finite.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     coords: dict[str, Any] = {"time": _labelled("time", axis("time", time, -np.inf, np.inf, closed="both"))}
     if cycle is not None:
@@ -177,7 +177,7 @@ def check_trajectory(
         If ``time`` or a required variable is missing, dimensions or units differ from :data:`SCHEMA`, times do not
         increase strictly, or a number is not finite although its sample is valid.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not isinstance(dataset, xr.Dataset):
         raise InputTypeError(f"dataset: must be an xarray.Dataset, not {type(dataset).__name__}")
@@ -430,7 +430,7 @@ def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Arr
 
 def impact_table(table: _Array, attrs: dict[str, Any]) -> xr.Dataset:
     """Return the table of the impacts of a run."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     data = {
         name: (

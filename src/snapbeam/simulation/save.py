@@ -112,7 +112,7 @@ def load(path: str | os.PathLike[str]) -> Run:
 
 def summary_dataset(outcome: RunSummary) -> xr.Dataset:
     """Return the statistics of a run as scalar variables, with the meanings of codes."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     variables: dict[str, Any] = {}
     for name, value in outcome.items():

@@ -134,7 +134,7 @@ def perturbation_growth(
     ... )
     >>> growth = sb.perturbation_growth(system, sb.Integration(cycles=5))
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     size = positive("perturbation", perturbation)
     level = choice("accuracy", accuracy, ACCURACIES)

@@ -256,7 +256,7 @@ def _runner(work: PointWork, options: CheckpointOptions, cluster: Cluster | None
 def _result(
     work: PointWork, points: Points, rows: ResultRows, more: dict[str, Any], target: Path | None
 ) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if work.replicates is not None:
         repeats = work.replicates

@@ -33,7 +33,7 @@ def class_coordinate() -> tuple[tuple[str], Any, dict[str, Any]]:
 
 def to_dataset(work: PointWork, points: Points, rows: ResultRows, attrs: dict[str, Any]) -> xr.Dataset:
     """Return the dataset of a sweep."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     table = rows.read(0, points.size)
     dataset = xr.Dataset(coords=_coordinates(work, points), attrs=attrs)

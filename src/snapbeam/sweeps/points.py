@@ -181,7 +181,7 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:
     InputError
         For unknown names, parameters that cannot be swept, and values out of range.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if isinstance(given, xr.Dataset):
         return _list_of({str(name): np.asarray(given[name].values) for name in given.variables})

@@ -138,7 +138,7 @@ def threshold(
 
 def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
     """Reduce the response classes of a whole grid to thresholds."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     assert isinstance(setup.points, Grid)
     row = lookup(along)

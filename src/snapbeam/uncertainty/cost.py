@@ -223,7 +223,7 @@ def _of_threshold(
 
 def _column(parameter: str, values: NDArray[np.float64]) -> Columns:
     """The column of a parameter."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     found = points_of(xr.Dataset({parameter: ("point", values)}))
     assert isinstance(found, PointList)

@@ -94,7 +94,7 @@ def score_measurements(
     >>> int(score.attrs["agree"])
     2
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not hasattr(measurements, "response_class") or not hasattr(measurements, "frequency_ratio"):
         raise InputTypeError("measurements: must be MeasuredPoints, as read_measured_points reads them")

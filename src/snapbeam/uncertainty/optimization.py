@@ -1007,7 +1007,7 @@ def _dataset(
     chosen: list[int],
     found: list[Estimate],
 ) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     trials = problem.trials
     attrs: dict[str, Any] = {

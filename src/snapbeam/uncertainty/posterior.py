@@ -410,7 +410,7 @@ class Posterior:
 
     def to_dataset(self) -> xr.Dataset:
         """Samples and weights, labelled."""
-        import xarray as xr
+        from snapbeam.util.datasets import xr
 
         dataset = xr.Dataset(
             attrs={

@@ -337,7 +337,7 @@ def _reason(counts: Counts, allocation: SamplingPlan) -> str:
 
 
 def _dataset(setup: SweepSetup, trials: Trials, counts: Counts, allocation: SamplingPlan) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     points = setup.points
     drawn = dict(trials.uncertainty.describe())

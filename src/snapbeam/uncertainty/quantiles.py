@@ -575,7 +575,7 @@ def _labelled(
     options: QuantileSearchSettings,
     parameter: str,
 ) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     row = lookup(parameter)
     dataset = xr.Dataset(coords=coordinates, attrs=attributes)

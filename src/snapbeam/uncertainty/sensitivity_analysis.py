@@ -729,7 +729,7 @@ def _dataset(
     table: dict[str, _Array],
     values: _Array,
 ) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     names = list(trials.uncertainty.of)
     attrs: dict[str, Any] = {

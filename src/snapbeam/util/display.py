@@ -1,6 +1,6 @@
-"""How results show themselves: pictures and tables, looked up by name when somebody asks for one.
+"""Figures and tables of results.
 
-Nothing of a drawing library is loaded before, and no room below the figures knows one.
+The functions of :mod:`snapbeam.plot` are found by name when a figure is requested, because Matplotlib loads slowly.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from importlib import import_module
 from typing import Any
 
-__all__ = ["html_table", "plotter"]
+__all__ = ["DatasetFigures", "html_table", "plotter"]
 
 
 def plotter(name: str) -> Any:
@@ -27,3 +27,19 @@ def html_table(title: str, rows: Iterable[Sequence[object]]) -> str:
         for row in rows
     ]
     return f"<div><strong>{html.escape(title)}</strong><table>{''.join(lines)}</table></div>"
+
+
+class DatasetFigures:
+    """Figures of a dataset, as ``dataset.snapbeam``.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    """
+
+    def __init__(self, dataset: Any) -> None:
+        self._dataset = dataset
+
+    def plot(self, variable: str | None = None, ax: Any = None, **options: Any) -> Any:
+        """Draw the dataset; see :func:`snapbeam.plot.plot_dataset`."""
+        return plotter("plot_dataset")(self._dataset, variable, ax, **options)

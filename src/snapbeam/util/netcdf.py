@@ -84,7 +84,7 @@ def read_netcdf(
     InputError
         If there is no such file, or it is none of NetCDF, or is damaged; *name* is that of the parameter.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not file_path(name, path).is_file():
         raise InputError(f"{name} = {str(path)!r}: no such file")
@@ -131,8 +131,9 @@ def write_netcdf(
     >>> import xarray as xr
     >>> sb.write_netcdf(xr.Dataset({"gap": ("time", [0.0, 1.0])}), "gap.nc")
     """
-    import xarray as xr
     from xarray.backends import H5NetCDFStore
+
+    from snapbeam.util.datasets import xr
 
     target = check_writable(path, "path", (".nc",))
     groups = {None: data} if isinstance(data, xr.Dataset) else mapping("data", data)

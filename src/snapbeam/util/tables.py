@@ -46,7 +46,8 @@ def data_frame(dataset: xr.Dataset, *, units: bool = False) -> pd.DataFrame:
         If the dataset has no variable with a dimension.
     """
     import pandas as pd
-    import xarray as xr
+
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     of_dims = Counter(each.dims for each in dataset.data_vars.values() if each.ndim)
@@ -123,7 +124,7 @@ def write_table(dataset: xr.Dataset, path: str | os.PathLike[str]) -> list[str]:
     0,0.0
     1,1.0
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if Path(path).suffix.lower() == ".mat":

@@ -65,7 +65,7 @@ def _thumbnail(ax: Axes, result: TestResult, path: Path) -> None:
     color = CLASS_COLORS[_LABELS.get(result.response_class, ResponseClass.UNKNOWN)]
     told = result.status != "measured"
     if path.exists() and not told:
-        import xarray as xr
+        from snapbeam.util.datasets import xr
 
         with xr.open_dataset(path, engine="h5netcdf") as run:
             time = run["time"].values

@@ -388,7 +388,7 @@ class _FixedMarks:
 
 def check_tracked(dataset: xr.Dataset) -> xr.Dataset:
     """Return *dataset* if it came from :func:`snapbeam.lab.track`; refuse it if not."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not isinstance(dataset, xr.Dataset):
         raise InputTypeError(f"dataset: must be an xarray.Dataset, not {type(dataset).__name__}")
@@ -565,7 +565,7 @@ def contact_onsets(
     >>> lab.contact_onsets(tracked).sizes["impact"]
     0
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     if not isinstance(dataset, xr.Dataset):
         raise InputTypeError(f"dataset: must be an xarray.Dataset, not {type(dataset).__name__}")

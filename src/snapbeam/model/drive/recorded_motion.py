@@ -77,7 +77,7 @@ class RecordedMotion(Drive):
         *dataset* has ``displacement`` (m) and ``velocity`` (m/s) over an even ``time`` (s), and the nominal
         ``frequency`` (Hz) among its attributes.
         """
-        import xarray as xr
+        from snapbeam.util.datasets import xr
 
         instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
         missing = [name for name in ("time", "displacement", "velocity") if name not in dataset.variables]

@@ -23,7 +23,7 @@ __all__ = ["compute", "draw"]
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
     """The two wells along the beam, in units of b."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     model = paper_model(1)
     x, shapes = shapes_along(model, 201)

@@ -35,7 +35,7 @@ _AROUND = 0.9  # cycles shown before and after the snap-through
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
     """The run over the cycles shown, and the shapes along the beam."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     modes = MODES  # a sketch too: with half of them the beam does not snap within these cycles
     model = paper_model(modes)

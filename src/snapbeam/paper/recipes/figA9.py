@@ -26,7 +26,7 @@ _COUNT = 10
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
     """Error of each frequency of each model against the exact one; NaN where a model has too few modes."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     modes = np.arange(1, results.pick(32, 64) + 1)
     exact = sb.model.exact_natural_frequencies(BEAM, _COUNT)

@@ -186,7 +186,7 @@ _IMPACT_COLUMNS = {
 def _class_table(
     points: _Array, kinds: dict[str, list[int]], border: list[bool], attrs: dict[str, Any]
 ) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     names = list(kinds)
     data: dict[str, Any] = {
@@ -199,7 +199,7 @@ def _class_table(
 
 
 def _impact_table(rows: _Array, attrs: dict[str, Any]) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     data = {
         name: (("impact",), rows[:, i], {"units": units, "long_name": words})

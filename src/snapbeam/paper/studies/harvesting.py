@@ -56,7 +56,7 @@ def power_above(voltage: _Array, rate: float, resistance: float, freq: float) ->
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
     """Power, share and class over frequency and velocity."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     modes, cycles = results.pick(2, 8), results.pick(8, 40)
     ratio = np.round(np.linspace(0.4, 3.6, results.pick(3, 14)), 6)

@@ -47,7 +47,7 @@ def _system(modes: int, ratio: float, velocity: float) -> sb.System:
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
     """Lifetime maps, points, long runs, exponents and sensitivity."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     found = {}
     cycles = results.pick(120, LONG_CYCLES)
@@ -102,7 +102,7 @@ def _sensitivity(results: Results, modes: int) -> xr.Dataset:
     Two runs part after ln(1/epsilon)/lambda, and both still snap then with a probability that falls as kappa says: the
     share goes with epsilon to the power kappa/lambda.
     """
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     count, cycles = results.pick(6, 400), results.pick(30, LONG_CYCLES)
     base = np.random.default_rng(_SEED).uniform(0.27, 0.33, count)

@@ -23,7 +23,7 @@ __all__ = ["compute", "draw"]
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
     """Classes over V/V_QS1 at each frequency, fine about 1."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     ratios = results.pick((0.15, 0.4, 1.0), (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0))
     step = results.pick(0.1, 0.01)

@@ -119,7 +119,7 @@ VARIANTS: dict[str, tuple[str, Callable[[int], sb.System]]] = {
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
     """First amplitude that snaps, over frequency and two places of the tip, for each variant."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     modes, cycles = results.pick(2, 8), results.pick(20, _CYCLES)
     ratio = np.round(np.arange(WINDOW[0], WINDOW[1] + 1e-9, results.pick(0.1, 0.025)), 6)

@@ -51,7 +51,7 @@ def fold_load(modes: int) -> float:
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
     """Share of runs that end in the upper well, and their median work, over bias, length and velocity."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     modes, repeats = results.pick(2, 4), results.pick(4, 16)
     lengths = results.pick(np.array([1.0, 3.0]), np.array([0.75, 1.0, 1.5, 2.0, 3.0, 5.0]))

@@ -205,7 +205,7 @@ def _follow(
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
     """Height at the snap of every pair of tips of one beam, and of the best tip and pair over the buckling level."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     modes, step = results.pick(5, 8), 2.0 * _STEP
     # none at the centre and none symmetric about it: there chance decides to which side the beam gives way

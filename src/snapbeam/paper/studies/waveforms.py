@@ -127,7 +127,7 @@ def _shares(run: sb.Run, modes: int) -> tuple[dict[str, Any], _Array]:
 
 
 def _run_table(points: _Array, rows: list[dict[str, Any]], attrs: dict[str, Any]) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     words = {
         "samples": (("run", "bin"), "samples with |alpha_1| in the bin"),
@@ -150,7 +150,7 @@ def _run_table(points: _Array, rows: list[dict[str, Any]], attrs: dict[str, Any]
 
 
 def _table(dim: str, columns: dict[str, tuple[str, str]], rows: _Array, attrs: dict[str, Any]) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     data = {
         name: ((dim,), rows[:, i], {"units": units, "long_name": words})
@@ -161,7 +161,7 @@ def _table(dim: str, columns: dict[str, tuple[str, str]], rows: _Array, attrs: d
 
 def _strobed(results: Results, modes: int, points: _Array, attrs: dict[str, Any]) -> xr.Dataset:
     """Displacement at the contact at 16 phases of the last cycles of long runs that do not snap."""
-    import xarray as xr
+    from snapbeam.util.datasets import xr
 
     cycles = results.pick(60, 800)
     kept_cycles = min(cycles // 2, _STROBED)

@@ -1,0 +1,219 @@
+"""The figure of any result: the dataset decides which function draws it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from snapbeam.plot.dynamics import (
+    MAX_CURVES,
+    plot_attractors,
+    plot_basins,
+    plot_diagram,
+    plot_edge,
+    plot_exponents,
+    plot_lifetimes,
+    plot_multipliers,
+    plot_section,
+    plot_survival,
+)
+from snapbeam.plot.force_displacement import plot_force_displacement
+from snapbeam.plot.map import plot_response_map, plot_statistic
+from snapbeam.plot.run import (
+    plot_energies,
+    plot_modal_amplitudes,
+    plot_phase_portrait,
+    plot_run,
+    plot_spectrum,
+)
+from snapbeam.plot.threshold import plot_threshold
+from snapbeam.plot.uncertainty import plot_designs, plot_probability, plot_quantiles, plot_tornado
+from snapbeam.util.validation import InputError, checked, instance, shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+__all__ = ["figures_of", "plot_dataset"]
+
+
+_Draws = Callable[..., "Axes"]
+_RUN: dict[str, tuple[_Draws, str]] = {
+    "run": (plot_run, "displacement_at_striker"),
+    "modal_amplitudes": (plot_modal_amplitudes, "modal_amplitude"),
+    "energies": (plot_energies, "energy_beam"),
+    "spectrum": (plot_spectrum, "midspan_displacement"),
+    "phase_portrait": (plot_phase_portrait, "midspan_velocity"),
+}
+"""The function that draws each figure of a run, and a variable that it needs."""
+
+
+class _Kind(NamedTuple):
+    """A kind of result: variables and dimensions that all its datasets have, and the functions that draw them."""
+
+    words: str
+    variables: set[str]
+    dimensions: set[str]
+    figures: Callable[[xr.Dataset], dict[str, _Draws]]
+
+
+def _branch(dataset: xr.Dataset, ax: Axes | None = None, **options: Any) -> Axes:
+    return plot_diagram(None, ax, branches=[dataset], **options)
+
+
+def _named(function: Callable[..., Axes], name: str) -> _Draws:
+    return lambda dataset, ax=None, **options: function(dataset, name, ax, **options)
+
+
+def _run(dataset: xr.Dataset) -> dict[str, _Draws]:
+    figures: dict[str, _Draws] = {}
+    for name, (function, needed) in _RUN.items():
+        if needed in dataset:
+            figures[name] = function
+    return figures
+
+
+def _map(dataset: xr.Dataset) -> dict[str, _Draws]:
+    over = set(dataset["response_class"].dims)
+    others = [
+        str(name)
+        for name, item in dataset.data_vars.items()
+        if item.dtype.kind in "biuf" and set(item.dims) == over and name != "response_class"
+    ]
+    return {"response_class": plot_response_map} | {name: _named(plot_statistic, name) for name in others}
+
+
+def _swept(dataset: xr.Dataset) -> dict[str, _Draws]:
+    figures = _map(dataset)
+    del figures["response_class"]
+    return figures
+
+
+def _lifetimes(dataset: xr.Dataset) -> dict[str, _Draws]:
+    figures: dict[str, _Draws] = {"lifetime": plot_lifetimes} if dataset["lifetime"].ndim else {}
+    return figures | ({"survival": plot_survival} if dataset["lifetime"].size <= MAX_CURVES else {})
+
+
+def _section(dataset: xr.Dataset) -> dict[str, _Draws]:
+    pairs = ("midspan_displacement", "displacement_at_striker")
+    return {
+        name: lambda data, ax=None, x=name: plot_section(data, ax, x=x) for name in pairs if name in dataset
+    }
+
+
+def _designs(dataset: xr.Dataset) -> dict[str, _Draws]:
+    def function(name: str | None) -> _Draws:
+        return lambda data, ax=None: plot_designs(data, name, ax)
+
+    tried = [str(name).removeprefix("tried_") for name in dataset.data_vars if str(name).startswith("tried_")]
+    over = [name for name in tried if not name.startswith("objective_")]
+    return {"objectives": function(None)} | {name: function(name) for name in over}
+
+
+def _diagram(dataset: xr.Dataset) -> dict[str, _Draws]:
+    def function(name: str) -> _Draws:
+        return lambda data, ax=None, **options: plot_diagram(data, ax, variable=name, **options)
+
+    names = [str(name) for name, item in dataset.data_vars.items() if {"sweep", "period"} <= set(item.dims)]
+    return {name: function(name) for name in sorted(names, key=lambda each: each != "midspan_displacement")}
+
+
+_KINDS = (
+    _Kind("run", {"displacement_at_striker"}, {"time"}, _run),
+    _Kind("threshold", {"lower_threshold"}, set(), lambda _: {"threshold": plot_threshold}),
+    _Kind("quantiles of a threshold", {"threshold"}, {"quantile"}, lambda _: {"threshold": plot_quantiles}),
+    _Kind(
+        "probability map", {"probability"}, {"outcome"},
+        lambda ds: {str(name): _named(plot_probability, str(name)) for name in ds["outcome"].values},
+    ),
+    _Kind("sensitivities", {"effect"}, {"parameter"}, lambda _: {"effect": plot_tornado}),
+    _Kind("sensitivity indices", {"first_order"}, {"parameter"}, lambda _: {"first_order": plot_tornado}),
+    _Kind("designs", {"constraints_satisfied"}, {"tried"}, _designs),
+    _Kind("lifetimes", {"lifetime", "last_snap"}, set(), _lifetimes),
+    _Kind("edge state", {"orbit_state", "distance"}, set(), lambda _: {"state": plot_edge}),
+    _Kind(
+        "branch of orbits", {"multiplier_real", "stable"}, {"orbit"},
+        lambda _: {"midspan_displacement": _branch, "multipliers": plot_multipliers},
+    ),
+    _Kind("periodic orbit", {"multiplier_real", "state"}, set(), lambda _: {"multipliers": plot_multipliers}),
+    _Kind("attractors", {"points", "share"}, {"attractor"}, lambda _: {"points": plot_attractors}),
+    _Kind("Lyapunov exponents", {"exponent"}, set(), lambda _: {"exponent": plot_exponents}),
+    _Kind("basins of attraction", {"basin"}, set(), lambda _: {"basin": plot_basins}),
+    _Kind("bifurcation diagram", set(), {"sweep", "period"}, _diagram),
+    _Kind("section", {"drive_phase"}, {"point"}, _section),
+    _Kind("statistics swept up and down", {"response_class"}, {"sweep"}, _swept),
+    _Kind(
+        "force-displacement curve", {"snap_through_force"}, {"branch_number"},
+        lambda _: {"force": plot_force_displacement},
+    ),
+    _Kind("map", {"response_class"}, set(), _map),
+)  # fmt: skip
+
+
+def figures_of(dataset: xr.Dataset) -> tuple[str, dict[str, _Draws]]:
+    """Return the kind of a dataset, and a function that draws for each name that can be drawn, the default first.
+
+    Raises
+    ------
+    InputError
+        If the dataset is not a result of snapbeam that has a figure.
+    """
+    for kind in _KINDS:
+        if kind.variables <= set(map(str, dataset.variables)) and kind.dimensions <= set(
+            map(str, dataset.dims)
+        ):
+            return kind.words, kind.figures(dataset)
+    known = ", ".join(map(str, dataset.data_vars)) or "none"
+    raise InputError(
+        f"dataset: must be a result of snapbeam that has a figure ({', '.join(k.words for k in _KINDS)}); "
+        f"its variables are {known}"
+    )
+
+
+@checked
+def plot_dataset(
+    dataset: xr.Dataset, variable: str | None = None, ax: Axes | None = None, **options: Any
+) -> Axes:
+    """Draw a result of any kind; ``dataset.snapbeam.plot`` calls this function.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A run, map, threshold, or result of :mod:`snapbeam.dynamics` or :mod:`snapbeam.uncertainty`.
+    variable : str, optional
+        Which figure of this kind of result, such as a statistic of a map; by default the first one.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure by default.
+    **options
+        Options of the function that draws, such as ``quasi_static_line`` of :func:`plot_response_map`.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If the dataset has no such figure; the message lists those that it has.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> run = sb.simulate(system, sb.Integration(cycles=10))
+    >>> ax = sb.plot.plot_dataset(run.dataset, "phase_portrait")
+    >>> ax = run.dataset.snapbeam.plot()
+    """
+    from snapbeam.util.datasets import xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    words, figures = figures_of(dataset)
+    name = next(iter(figures), "") if variable is None else variable
+    if name not in figures:
+        raise InputError(
+            f"variable = {shown(name)}: is not drawn of this {words}; choose one of {', '.join(figures) or 'none'}"
+        )
+    return figures[name](dataset, ax=ax, **options)

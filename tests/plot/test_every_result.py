@@ -1,0 +1,145 @@
+"""Every result of an analysis draws itself: ``dataset.snapbeam.plot``, ``.plot()`` and the command line agree."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam.model.parameter_file import Config
+from snapbeam.plot.dynamics import plot_attractors, plot_exponents, plot_multipliers
+from snapbeam.util.datasets import xr
+
+SMALL = Config().system.replace(**{"model.modes": 1})
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    yield
+    plt.close("all")
+
+
+def exponents() -> xr.Dataset:
+    """Exponents over a frequency: two negative, one not decided, two positive."""
+    value = np.array([-3.0, -2.0, 0.1, 1.0, 2.0])
+    labels = {"units": "1/s"}
+    return xr.Dataset(
+        {
+            "exponent": (("frequency_ratio", "exponent_number"), value[:, None], labels),
+            "exponent_error": (("frequency_ratio", "exponent_number"), np.full((5, 1), 0.2), labels),
+            "excitation_period": ("frequency_ratio", np.full(5, 0.01), {"units": "s"}),
+        },
+        {"frequency_ratio": np.linspace(0.5, 1.5, 5), "exponent_number": [1]},
+    )
+
+
+def orbit_dataset(values: np.ndarray) -> xr.Dataset:
+    return xr.Dataset(
+        {
+            "state": (("period", "coordinate"), np.zeros((1, values.size))),
+            "multiplier_real": ("multiplier", values.real),
+            "multiplier_imag": ("multiplier", values.imag),
+        }
+    )
+
+
+def test_a_map_is_drawn_by_what_it_is(synthetic_map) -> None:
+    table = synthetic_map.assign(peak_force=synthetic_map["response_class"] + 0.5)
+    ax = table.snapbeam.plot(quasi_static_line=True)
+    assert ax.get_ylabel().startswith("Velocity amplitude")
+    other = table.snapbeam.plot("peak_force")
+    assert len(other.figure.axes) == 2, "the map and its colour bar"
+    with pytest.raises(sb.InputError, match="of this map; choose one of response_class, peak_force"):
+        table.snapbeam.plot("force")
+
+
+def test_the_dataset_of_a_sweep_draws_itself() -> None:
+    table = sb.sweep(SMALL, {"drive.velocity_amplitude": [0.05, 0.1]}, sb.Integration(cycles=2))
+    assert table.snapbeam.plot("peak_force").get_ylabel() == "Peak contact force (N)"
+
+
+def test_a_stored_run_draws_itself_in_a_program_that_imports_snapbeam_alone(tmp_path) -> None:
+    sb.simulate(SMALL, sb.Integration(cycles=2)).save(tmp_path / "run.nc")
+    script = (
+        "import sys, snapbeam as sb; assert 'xarray' not in sys.modules\n"
+        f"print(sb.load({str(tmp_path / 'run.nc')!r}).dataset.snapbeam.plot('phase_portrait').get_xlabel())"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | {"MPLBACKEND": "Agg"},
+    )
+    assert "isplacement" in ended.stdout
+
+
+def test_a_run_is_drawn_by_what_it_is(synthetic_run) -> None:
+    _, ax = plt.subplots()
+    assert synthetic_run.snapbeam.plot("spectrum", ax=ax) is ax
+    with pytest.raises(sb.InputError, match=r"of this run; choose one of run, spectrum$"):
+        synthetic_run.snapbeam.plot("class")
+
+
+def test_other_datasets_are_refused() -> None:
+    with pytest.raises(sb.InputError, match="its variables are temperature"):
+        xr.Dataset({"temperature": ("x", [1.0])}).snapbeam.plot()
+
+
+def test_order_and_chaos_are_told_apart_and_the_unit_of_time_chosen() -> None:
+    ax = plot_exponents(exponents())
+    counts = {line.get_label(): len(line.get_xdata()) for line in ax.lines if ":" in line.get_label()}
+    assert counts == {"negative: periodic": 2, "positive: chaotic": 2}
+    assert any(line.get_label() == "sign not decided" and len(line.get_xdata()) == 1 for line in ax.lines)
+    other = plot_exponents(exponents(), per="period")
+    line = next(line for line in other.lines if line.get_label() == "positive: chaotic")
+    np.testing.assert_allclose(line.get_ydata(), [0.01, 0.02])
+    assert "per period" in other.get_ylabel()
+    with pytest.raises(sb.InputError, match="does not contain the period"):
+        plot_exponents(exponents().drop_vars("excitation_period"), per="period")
+
+
+def test_a_map_of_exponents_diverges_at_zero() -> None:
+    table = exponents().expand_dims(velocity_amplitude=[0.1, 0.2]).transpose("frequency_ratio", ...)
+    ax = plot_exponents(table)
+    low, high = ax.collections[0].get_clim()
+    assert low == -high
+    marks = next(line for line in ax.lines if line.get_label() == "sign not decided")
+    assert set(np.asarray(marks.get_xdata())) == {1.0}
+
+
+def test_multipliers_inside_and_outside_the_unit_circle() -> None:
+    found = orbit_dataset(np.array([1.4, 0.5 + 0.5j, 0.5 - 0.5j]))
+    ax = plot_multipliers(found)
+    outside = next(line for line in ax.lines if line.get_label() == "outside: grows")
+    np.testing.assert_array_equal(outside.get_xdata(), [1.4])
+    assert found.snapbeam.plot().get_xlabel() == ax.get_xlabel()
+
+
+def test_attractors_state_what_may_be_unseen() -> None:
+    points = np.array([[[1.0, 0.0]], [[-1.0, 0.1]]])
+    found = xr.Dataset(
+        {
+            "points": (("attractor", "point", "coordinate"), points),
+            "share": ("attractor", [0.7, 0.3]),
+            "period": ("attractor", [1, 1]),
+        },
+        {"coordinate": ["amplitude[1]", "velocity[1]"]},
+        {"unseen_share_95": 0.07},
+    )
+    ax = plot_attractors(found)
+    assert "below 7 %" in ax.get_title(loc="left")
+    assert [line.get_label() for line in ax.lines] == [
+        "0: period 1, 70.0 % of the states",
+        "1: period 1, 30.0 % of the states",
+    ]
+
+
+def test_objects_draw_themselves() -> None:
+    system = Config().system.replace(**{"model.modes": 1})
+    assert len(system.plot().axes) > 0
