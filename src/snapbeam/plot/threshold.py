@@ -98,8 +98,8 @@ def plot_threshold(
             quasi_static and raised == "velocity_amplitude" and along in ("frequency_ratio", "location")
         )
         if quasi_static:
-            ax.plot(x, _quasi_static(dataset, along, x), color="black", linewidth=0.8, dashes=(4, 2),
-                    label=r"quasi-static, $V_\mathrm{QS1}$")  # fmt: skip
+            static = _quasi_static(dataset, along, x)
+            (line,) = ax.plot(x, static, color="black", linewidth=0.8, dashes=(4, 2))
         amplitude = dataset[raised].values
         upper = dataset["upper_threshold_max"].where(dataset["lower_threshold"].notnull(), -np.inf)
         closed = bool(upper.notnull().all()) and bool(np.isfinite(upper).any())
@@ -109,6 +109,9 @@ def plot_threshold(
         dress(ax.yaxis, dataset, raised)
         low = amplitude[0] if ax.get_yscale() == "log" else min(0.0, amplitude[0])
         ax.set(xlim=x[[0, -1]], ylim=(low, top))
+        if quasi_static:
+            where = ": above the range" if static.min() > top else ""
+            line.set_label(rf"quasi-static, $V_\mathrm{{QS1}}${where}")
         marks = _mark_no_threshold(ax, curves, x, edges)
         if "cycles" in dataset.attrs:
             step = float(np.max(np.diff(amplitude)))
@@ -117,9 +120,11 @@ def plot_threshold(
             )
             set_title(ax, words)
         if legend:
-            shade = Patch(facecolor="0.75", label="up to where all runs are interwell")
             handles, _ = ax.get_legend_handles_labels()
-            ax.legend(handles=[*handles, shade, *marks], loc="best", frameon=True, edgecolor="none")
+            first, always = dataset["lower_threshold"], dataset["upper_threshold"]
+            if bool((first.notnull() & ~(always <= first)).any()):
+                handles.append(Patch(facecolor="0.75", label="up to where all runs are interwell"))
+            ax.legend(handles=[*handles, *marks], loc="best", frameon=True, edgecolor="none")
     return ax
 
 
