@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from snapbeam.lab.drive_alignment import align, recorded_drive
 from snapbeam.lab.signals import SignalSamples, make_signal
@@ -234,3 +235,36 @@ def test_resampling_noise_free_is_faithful():
 def test_refusals(make, word):
     with pytest.raises(InputError, match=word):
         make()
+
+
+def _of_the_sensor(change):
+    """A record of the usual shaker with one thing wrong, as the change of its values over time."""
+    time = np.arange(20_000) / 2e4
+    noise = 3e-4 * np.random.default_rng(2).standard_normal(time.size)  # after 0.15 s of rest
+    return make_signal(change(shaker(time - 0.1)[1] + noise, time), "m/s", 2e4, name="velocity")
+
+
+@pytest.mark.parametrize(
+    ("kind", "change"),
+    [
+        ("low_pass", lambda v, t: scipy.signal.lfilter(*scipy.signal.butter(2, 150.0, fs=2e4), v)),
+        ("crosstalk", lambda v, t: v + 0.05 * V * np.cos(2.0 * np.pi * 100.0 * t + 1.0)),
+        ("saturated", lambda v, t: 1.5 * V * np.tanh(v / (1.5 * V))),
+        ("one_sided", lambda v, t: v**2 / V),
+        ("not_there", lambda v, t: np.abs(v)),
+        ("beyond_shakers", lambda v, t: 1e3 * v),
+    ],
+)
+def test_an_error_of_the_sensor_is_told(kind, change):
+    code = f"vibrometer.{kind}"
+    assert code not in [d.code for d in measure_drive(_of_the_sensor(lambda v, t: v), 100.0).diagnostics]
+    assert code in [d.code for d in measure_drive(_of_the_sensor(change), 100.0).diagnostics]
+
+
+def test_the_amplitude_behind_a_filter_and_a_saturated_amplifier_is_covered():
+    for change in (
+        lambda v, t: scipy.signal.lfilter(*scipy.signal.butter(2, 150.0, fs=2e4), v),
+        lambda v, t: 1.5 * V * np.tanh(v / (1.5 * V)),
+    ):
+        steady = measure_drive(_of_the_sensor(change), 100.0).steady
+        assert abs(steady.amplitude - V) < 2.0 * steady.amplitude_se

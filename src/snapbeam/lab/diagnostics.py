@@ -513,6 +513,45 @@ KINDS_VIBROMETER = table(
         ("amplitude", "sensitivity"),
     ),
     Kind(
+        "vibrometer.low_pass", WARNING,
+        "noise of the sensor, octave by octave",
+        "the noise falls steeply from {corner:.3g} Hz on, as behind a low-pass filter: at the drive's frequency it takes "
+        "up to {loss_percent:.2g} % of the amplitude, and delays the start by up to {delay_ms:.2g} ms, which is in the "
+        "standard errors; switch the filter off, or set it above {wanted:.3g} Hz",
+    ),
+    Kind(
+        "vibrometer.crosstalk", WARNING,
+        "a line at the drive's own frequency in the rest before the start",
+        "{share_percent:.2g} % of the amplitude is there at the drive's frequency before the start (crosstalk, or a floor "
+        "that moves): taken out for the start, and in the standard error of the amplitude; look at cables and supports",
+    ),
+    Kind(
+        "vibrometer.saturated", WARNING,
+        "third harmonic with its crests opposite to those of the motion, and no other",
+        "the tops are pressed flat as by an amplifier near its limit (third harmonic {third_percent:.2g} %): the amplitude "
+        "may be {loss_percent:.2g} % too small, which is in its standard error; choose a larger range",
+    ),
+    Kind(
+        "vibrometer.one_sided", ERROR,
+        "the mean of the motion against the level at rest",
+        "the mean moves by {share:.2g} times the amplitude when the motion starts, so this is no velocity or displacement "
+        "of a shaker: rectified or squared, with half its frequency; record the signal itself",
+    ),
+    Kind(
+        "vibrometer.not_there", ERROR,
+        "the sine at the frequency that was set, against the highest line of the spectrum",
+        "at the frequency (--frequency) of {stated:g} Hz there is hardly any motion; the highest line is at {found:.6g} Hz: "
+        "another frequency, another channel (--channel), or a rectified or squared signal",
+        ("frequency", "channel"),
+    ),
+    Kind(
+        "vibrometer.beyond_shakers", ERROR,
+        "velocity, acceleration and travel against those of electrodynamic shakers",
+        "no shaker moves at {speed:.3g} m/s, {acceleration_g:.3g} g and {travel_mm:.3g} mm at once: check the unit "
+        "(units, --units; mm/s may have been read as m/s) and sensitivity (--sensitivity)",
+        ("units", "sensitivity"),
+    ),
+    Kind(
         "vibrometer.slow_start", INFO,
         "how well the start of the motion is told",
         "the shaker starts so gently that its start is known to {uncertainty_ms:.2g} ms only",

@@ -16,6 +16,16 @@ from numpy.typing import NDArray
 
 from snapbeam.lab.decay.poles import Line, without_lines
 from snapbeam.lab.diagnostics import KINDS_VIBROMETER
+from snapbeam.lab.sensor_errors import (
+    LowPass,
+    beyond_shakers,
+    find_crosstalk,
+    find_low_pass,
+    noise_colour,
+    one_sided,
+    saturation_loss,
+    with_loss,
+)
 from snapbeam.lab.signals import SignalSamples, check_signal, make_signal
 from snapbeam.lab.sine_fit import (
     Clipping,
@@ -436,7 +446,9 @@ def find_onset(samples: SignalSamples, first: int, rough: SineFit) -> tuple[floa
     if early < 8 or float(np.std(quiet)) > 0.35 * rough.amplitude:
         return None, 0.0
     rest = _baseline(samples.time[: quiet.size], quiet)
-    noise = max(float(np.std(quiet - rest(samples.time[: quiet.size]))), _NOISE_FLOOR * rough.amplitude)
+    left = quiet - rest(samples.time[: quiet.size])
+    noise = float(np.std(left)) * noise_colour(left, samples.sampling_frequency, rough.frequency)
+    noise = max(noise, _NOISE_FLOOR * rough.amplitude)
     begin = max(early - 2 * width, 0)
     end = min(first + 2 * width, samples.values.size)
     every = max(1, (end - begin) // _LONGEST)
@@ -718,7 +730,19 @@ def measure_drive(
         first, last = moving_part(samples, rough.frequency)
         moving = _slice(samples, first, last)
         rough = robust_fit(_slice(moving, moving.values.size // 3, None), rough.frequency, 3)
-    onset, uncertainty = find_onset(samples, first, rough)
+    settled_part = _slice(moving, moving.values.size // 3, None)
+    left = settled_part.values - rough.waveform(settled_part.time)
+    low_pass = None
+    if (
+        float(np.std(left)) > _NOISE_FLOOR * rough.amplitude
+    ):  # a computed signal has no noise that a filter shapes
+        low_pass = find_low_pass(left, samples.sampling_frequency, rough.frequency)
+    crosstalk = _crosstalk(samples, first, rough)
+    onset, uncertainty = find_onset(
+        without_lines(samples, [crosstalk]) if crosstalk is not None else samples, first, rough
+    )
+    if low_pass is not None:
+        uncertainty = math.hypot(uncertainty, low_pass.delay)
     start = float(samples.time[0]) if onset is None else onset
     period = 1.0 / rough.frequency
     stop = float(moving.time[-1]) + 1.0 / samples.sampling_frequency
@@ -736,6 +760,13 @@ def measure_drive(
     everywhere = [Flaw(flaw.first + shift, flaw.last + shift) for flaw in flaws]
     steady, wander = with_wander(steady, times, cycles, everywhere, samples, begin)
     steady = beside_lines(steady, lines)
+    lost = 0.0 if clipping.found else saturation_loss(steady)
+    steady = with_loss(steady, lost)
+    if low_pass is not None:
+        steady = with_loss(steady, low_pass.loss(steady.frequency))
+    if crosstalk is not None:
+        steady = beside_lines(steady, DriveLines((), (crosstalk,)))
+    mean_moves = one_sided(samples, _rest_end(samples, first, rough), first, last, rough)
     startup = None
     amplitudes = np.abs(cycles)
     broken: list[Flaw] = []
@@ -748,6 +779,9 @@ def measure_drive(
         *_doubts(steady, limit, wander, stray, frequency, stated),
         *_start_diagnostics(startup, period),
         *_line_diagnostics(lines, steady),
+        *_sensor_diagnostics(steady, low_pass, crosstalk, lost, mean_moves),
+        *_not_there(samples, steady, frequency),
+        *beyond_shakers(steady, str(signal.attrs["units"])),
         *(
             [KINDS_VIBROMETER["interrupted"].found(outside_ms=1e3 * outside)]
             if outside > 3.0 * period
@@ -864,6 +898,47 @@ def _line_diagnostics(lines: DriveLines, steady: SineFit) -> list[Diagnostic]:
             share = 100.0 * line.amplitude / steady.amplitude
             told.append(KINDS_VIBROMETER[name].found(frequency=line.frequency, share_percent=share))
     return told
+
+
+def _rest_end(samples: SignalSamples, first: int, rough: SineFit) -> int:
+    """Samples of the rest before the motion, a cycle left out before it rises out of the noise."""
+    width = round(samples.sampling_frequency / rough.frequency)
+    return max(_quiet_end(samples, first, rough, width) - width, 0) if first > width else 0
+
+
+def _crosstalk(samples: SignalSamples, first: int, rough: SineFit) -> Line | None:
+    return find_crosstalk(samples, _rest_end(samples, first, rough), rough)
+
+
+def _sensor_diagnostics(
+    steady: SineFit, low_pass: LowPass | None, crosstalk: Line | None, lost: float, mean_moves: float
+) -> list[Diagnostic]:
+    told = []
+    if low_pass is not None:
+        told.append(
+            KINDS_VIBROMETER["low_pass"].found(
+                corner=low_pass.corner,
+                loss_percent=100.0 * low_pass.loss(steady.frequency),
+                delay_ms=1e3 * low_pass.delay,
+                wanted=20.0 * steady.frequency,
+            )
+        )
+    if crosstalk is not None:
+        share = 100.0 * crosstalk.amplitude / steady.amplitude
+        told.append(KINDS_VIBROMETER["crosstalk"].found(share_percent=share))
+    if lost > 0.0:
+        third = 100.0 * float(steady.harmonic_amplitude[2]) / steady.amplitude
+        told.append(KINDS_VIBROMETER["saturated"].found(third_percent=third, loss_percent=100.0 * lost))
+    if mean_moves > 0.0:
+        told.append(KINDS_VIBROMETER["one_sided"].found(share=mean_moves))
+    return told
+
+
+def _not_there(samples: SignalSamples, steady: SineFit, frequency: float | None) -> list[Diagnostic]:
+    """Whether the motion is at another frequency than the one that was set."""
+    if frequency is None or steady.sinad > 0.0:
+        return []
+    return [KINDS_VIBROMETER["not_there"].found(stated=frequency, found=spectral_peak(samples))]
 
 
 def _start_diagnostics(startup: StartUp | None, period: float) -> list[Diagnostic]:

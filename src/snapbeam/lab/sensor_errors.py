@@ -1,0 +1,209 @@
+"""Errors of a vibrometer and its electronics that a sine fits without a trace: filters, crosstalk, saturation, units."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.lab.decay.poles import Line
+from snapbeam.lab.diagnostics import KINDS_VIBROMETER
+from snapbeam.lab.signals import SignalSamples
+from snapbeam.lab.sine_fit import SineFit
+from snapbeam.util.diagnostics import Diagnostic
+
+__all__ = [
+    "LowPass",
+    "beyond_shakers",
+    "find_crosstalk",
+    "find_low_pass",
+    "noise_colour",
+    "one_sided",
+    "saturation_loss",
+    "with_loss",
+]
+
+
+_Array = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Noise that is not white: a low-pass filter in the chain, and noise that drifts.
+
+
+_LINES = 16  # lines of a spectrum in a band, at least
+_STEEP = 10.0  # dB over two octaves; 1/f noise falls by 6, a filter of first order by 12
+_FAR = 10.0  # times the drive's frequency; a filter above that changes the amplitude by less than 0.5 %
+
+
+class LowPass(NamedTuple):
+    """A low-pass filter seen in the noise: its ``corner`` [Hz] and its ``order``, at least."""
+
+    corner: float
+    order: int
+
+    def loss(self, frequency: float) -> float:
+        """Share of the amplitude at *frequency* [Hz] that the filter takes away."""
+        return 1.0 - 1.0 / math.sqrt(1.0 + (frequency / self.corner) ** (2 * self.order))
+
+    @property
+    def delay(self) -> float:
+        """Delay [s] of what passes."""
+        return self.order / (2.0 * math.pi * self.corner)
+
+
+def find_low_pass(residual: _Array, rate: float, frequency: float) -> LowPass | None:
+    """A low-pass filter that is near enough to change the amplitude, or None.
+
+    The noise of a laser, an amplifier or a converter is white or falls slowly with the frequency.  A filter behind
+    it makes it fall steeply.
+
+    Parameters
+    ----------
+    residual
+        What the sine leaves of the steady motion.
+    rate
+        Samples per second [Hz].
+    frequency
+        Frequency of the drive [Hz].
+    """
+    n = residual.size
+    power = np.abs(np.fft.rfft(residual * np.hanning(n))) ** 2
+    freq = np.fft.rfftfreq(n, 1.0 / rate)
+    centres, levels = [], []
+    low = 0.5 * frequency
+    while 2.0 * low < 0.4 * rate:
+        band = (freq >= low) & (freq < 2.0 * low)
+        if band.sum() >= _LINES:
+            centres.append(math.sqrt(2.0) * low)
+            levels.append(10.0 * math.log10(max(float(np.median(power[band])), 1e-300)))
+        low *= 2.0
+    falls = np.array(levels)
+    if falls.size < 3 or not (falls[:-2] - falls[2:] > _STEEP).any():
+        return None
+    steepest = float((falls[:-1] - falls[1:]).max())
+    below = np.flatnonzero(falls < falls[0] - 3.0)
+    k = int(below[0])
+    share = (falls[k - 1] - (falls[0] - 3.0)) / (falls[k - 1] - falls[k])
+    corner = centres[k - 1] * (centres[k] / centres[k - 1]) ** share
+    return LowPass(corner, max(1, round(steepest / 6.0) - 1)) if corner < _FAR * frequency else None
+
+
+def noise_colour(quiet: _Array, rate: float, frequency: float) -> float:
+    """Noise about *frequency* [Hz] over the noise at all frequencies, at least 1; more for noise that drifts.
+
+    An instant is found in the noise near the frequency of the motion, so it is that noise which limits it.
+    """
+    n = quiet.size
+    power = np.abs(np.fft.rfft((quiet - quiet.mean()) * np.hanning(n))) ** 2
+    freq = np.fft.rfftfreq(n, 1.0 / rate)
+    near = (freq > 0.0) & (freq <= 3.0 * frequency)
+    if near.sum() < 4 or not power[1:].mean() > 0.0:
+        return 1.0
+    ratio = float(power[near].mean() / power[1:].mean())
+    return math.sqrt(ratio) if ratio > 1.0 + 4.0 / math.sqrt(near.sum()) else 1.0
+
+
+# ----------------------------------------------------------------------------------------------------
+# What is there at rest at the drive's own frequency: crosstalk of the amplifier, or a floor that moves.
+
+
+_SURE = 6.0  # standard errors
+_LEAST = 0.003  # of the drive's amplitude
+_ALIKE = 0.4  # of its amplitude by which it may differ between the halves of the rest
+
+
+def find_crosstalk(samples: SignalSamples, rest: int, fit: SineFit) -> Line | None:
+    """A line at the drive's own frequency over the first *rest* samples, of the same amplitude and phase throughout."""
+    period = samples.sampling_frequency / fit.frequency
+    if rest < 4.0 * period:
+        return None
+    halves = []
+    for part in (slice(0, rest // 2), slice(rest // 2, rest), slice(0, rest)):
+        time, values = samples.time[part], samples.values[part]
+        turn = 2.0 * math.pi * fit.frequency * time
+        design = np.column_stack([np.ones_like(time), time - time.mean(), np.cos(turn), np.sin(turn)])
+        solution = np.linalg.lstsq(design, values, rcond=None)[0]
+        noise = float(np.std(values - design @ solution))
+        noise *= noise_colour(values - design @ solution, samples.sampling_frequency, fit.frequency)
+        halves.append((solution[2] - 1j * solution[3], noise * math.sqrt(2.0 / time.size)))
+    (one, _), (other, error), (whole, sure) = halves
+    size = abs(whole)
+    if size < max(_SURE * sure, _LEAST * fit.amplitude):
+        return None
+    if abs(one - other) > max(_ALIKE * size, 3.0 * error):
+        return None
+    return Line(fit.frequency, float(size), float(np.angle(whole)))
+
+
+# ----------------------------------------------------------------------------------------------------
+# A signal that is no velocity: rectified or squared, or bent by an amplifier near its limit.
+
+
+_ONE_SIDED = 0.6  # of the amplitude by which the mean may move
+_THIRD = 0.004  # of the amplitude
+_IN_LINE = 0.35  # rad
+_TIMES = 3.0  # times the third harmonic that saturation takes from the first
+
+
+def one_sided(samples: SignalSamples, rest: int, first: int, last: int, fit: SineFit) -> float:
+    """By what share of its amplitude a record's mean moves when the motion starts; 0 if it may.
+
+    A shaker comes back, so the mean of its velocity is that at rest.  The mean of a rectified or squared one is not.
+    """
+    if rest < 8:
+        return 0.0
+    still = float(np.median(samples.values[:rest]))
+    moved = float(samples.values[first + (last - first) // 3 : last].mean()) - still
+    share = abs(moved) / fit.amplitude
+    return share if share > _ONE_SIDED else 0.0
+
+
+def saturation_loss(fit: SineFit) -> float:
+    """Share of the amplitude that a saturating amplifier takes, as far as the third harmonic tells; 0 if it does not.
+
+    To lowest order a symmetric saturation y - c y^3 takes three times as much from the first harmonic as it makes of
+    the third, whose crests are then opposite to those of the first.
+    """
+    amplitude, phase = fit.harmonic_amplitude, fit.harmonic_phase
+    if amplitude.size < 3 or not amplitude[0] > 0.0:
+        return 0.0
+    third = float(amplitude[2] / amplitude[0])
+    others = max(float(amplitude[k] / amplitude[0]) for k in range(1, amplitude.size) if k != 2)
+    noise = fit.noise_rms * math.sqrt(2.0 / fit.samples) / fit.amplitude
+    turned = math.remainder(float(phase[2]) - 3.0 * float(phase[0]) - math.pi, 2.0 * math.pi)
+    told = third > max(_THIRD, 6.0 * noise, 2.0 * others) and abs(turned) < _IN_LINE
+    return _TIMES * third if told else 0.0
+
+
+def with_loss(fit: SineFit, share: float) -> SineFit:
+    """A sine whose amplitude is uncertain by *share* of it."""
+    if share == 0.0:
+        return fit
+    return dataclasses.replace(fit, amplitude_se=math.hypot(fit.amplitude_se, share * fit.amplitude))
+
+
+# ----------------------------------------------------------------------------------------------------
+# Motions that no shaker makes, as of numbers in another unit.
+
+
+_FASTEST = 3.0  # m/s
+_HARDEST = 1500.0  # m/s^2
+_FARTHEST = 0.05  # m
+_G = 9.80665
+
+
+def beyond_shakers(fit: SineFit, units: str) -> list[Diagnostic]:
+    """Whether a sine is faster, harder or wider than electrodynamic shakers can move."""
+    omega = 2.0 * math.pi * fit.frequency
+    speed = fit.amplitude if units == "m/s" else omega * fit.amplitude
+    if speed <= _FASTEST and speed * omega <= _HARDEST and speed / omega <= _FARTHEST:
+        return []
+    return [
+        KINDS_VIBROMETER["beyond_shakers"].found(
+            speed=speed, acceleration_g=speed * omega / _G, travel_mm=1e3 * speed / omega
+        )
+    ]
