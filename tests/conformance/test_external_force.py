@@ -47,6 +47,7 @@ def held_against(system: sb.System, row, force, bound: float, cycles: int = 6) -
     assert abs(run.dataset.attrs["energy_error"]) < 1e-6
 
 
+@pytest.mark.slow
 def test_harmonic_force_with_a_mean():
     w = 2.0 * math.pi * model().reference_frequency
     force = sb.HarmonicForce(frequency_ratio=1.3, amplitude=2.0, mean=0.5, phase=0.7)

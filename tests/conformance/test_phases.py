@@ -138,6 +138,7 @@ def test_sections_orbits_and_diagrams_begin_at_the_phase() -> None:
     assert np.abs(np.diff(found, axis=0)).max(axis=1).min() > 1e-3
 
 
+@pytest.mark.slow
 def test_the_phase_of_a_start_counts() -> None:
     start = sb.State(amplitude=0.9 * MODEL.mirrored.well_amplitude, phase=0.4)
     system = system_of(("base",)).replace(initial_state=start)

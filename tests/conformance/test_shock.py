@@ -67,6 +67,7 @@ def test_in_a_parameter_file(tmp_path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_response_spectrum_of_a_half_sine() -> None:
     """Greatest relative displacement of a linear structure over A/omega^2, during the pulse and after it."""
     frequency = 40.0

@@ -46,8 +46,9 @@ def compare(modes, striker, tip, period, cycles, at_standard, at_reference) -> s
 
 @pytest.mark.parametrize(
     ("modes", "cycles"),
-    [pytest.param(1, 4, marks=pytest.mark.slow), (3, 2), pytest.param(8, 1, marks=pytest.mark.slow)],
+    [(1, 4), (3, 2), (8, 1)],
 )
+@pytest.mark.slow
 def test_body_on_a_suspension(modes, cycles) -> None:
     """The physical body: m x'' + c x' + k x = F(t) - f, with the force that would move it alone as the drive says."""
     mass, frequency, zeta = 0.02, 30.0, 0.1

@@ -26,6 +26,7 @@ def shaken():
     return sb.System(model, base_excitation=sb.BaseExcitation(motion=motion), harvester=layers)
 
 
+@pytest.mark.slow
 def test_each_run_begins_with_the_last_state_of_the_run_before(shaken):
     found = sb.dynamics.hysteresis(shaken, NAME, [0.02, 0.06], STEPS)
     assert found["harvested_power"].dims == ("sweep", "base_excitation_acceleration_amplitude")

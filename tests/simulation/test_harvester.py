@@ -107,7 +107,7 @@ def test_the_figure_shows_voltage_and_power(run):
     legend = figure.legends[0]
     assert [text.get_text() for text in legend.get_texts()] == ["beam, centre"]
     for words in ("base 75.5 Hz", "0.521 $g$", "$R$ = 10 kΩ"):
-        assert words in legend.get_title().get_text()
+        assert words in figure.axes[0].get_title(loc="left").replace("\n", " ")
     mean = figure.axes[2].lines[-1]
     assert mean.get_ydata()[0] == pytest.approx(1e6 * late_means(run)[0], rel=1e-9)
     assert mean.get_xdata()[0] == pytest.approx(30.0, abs=0.02)
@@ -122,7 +122,7 @@ def test_a_statistic_from_the_command_line(tmp_path, monkeypatch, synthetic_map)
         {"units": "W"},
     )
     synthetic_map.to_netcdf("map.nc", engine="h5netcdf")
-    command = ["plot", "map.nc", "-o", "power.png", "--statistic"]
+    command = ["plot", "map.nc", "-o", "power.png", "--variable"]
     answer = CliRunner().invoke(app, [*command, "harvested_power_last_quarter"], catch_exceptions=False)
     assert answer.exit_code == 0, answer.output
     assert (tmp_path / "power.png").stat().st_size > 5_000

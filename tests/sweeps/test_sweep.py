@@ -216,6 +216,7 @@ def test_an_axis_over(name: str, system) -> None:
             assert_point_is_run(ds.isel({dim: i}), system.replace(**{name: value}))
 
 
+@pytest.mark.slow
 def test_restitution(system) -> None:
     one = system.replace(**{"model.modes": 1}).replace(contact=sb.Restitution(0.5))
     ds = sb.sweep(one, {"restitution_coefficient": [0.0, 0.4, 0.9], "damping_ratio": [0.001, 0.01]}, ASKED)
