@@ -227,23 +227,31 @@ def measured(scene, folder, rng):
 
 def judged(scene, folder, rng):
     """The outcome of a scene."""
+    return outcome(lambda: measured(scene, folder, rng))
+
+
+def outcome(measure):
+    """The outcome of what *measure* tracks, beside the truth that it returns too."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
         try:
-            tracked, recording = measured(scene, folder, rng)
+            tracked, recording = measure()
         except InputError as error:
             return Outcome(0.0, 0.0, (), str(error))
     worst, far, lost = 0.0, 0.0, 0.0
     pixel = recording.camera.pixel_size * 1e3
+    count = min(tracked.sizes["time"], len(recording))
     for name, error in (
         ("displacement_mm", "displacement_stderr_mm"),
         ("shaker_displacement_mm", "shaker_stderr_mm"),
     ):
         if name not in tracked:
             continue
-        miss = tracked[name].values - recording.truth[name].values
+        miss = tracked[name].values[:count] - recording.truth[name].values[:count]
         known = np.isfinite(miss)
-        ratio = np.abs(miss[known]) / tracked[error].values[known]
+        if not known.any():
+            continue
+        ratio = np.abs(miss[known]) / tracked[error].values[:count][known]
         worst, far = max(worst, float(ratio.max())), max(far, float(np.abs(miss[known]).max() / pixel))
         lost = max(lost, 1.0 - float(known.mean()))
     return Outcome(worst, far, tuple(one.code for one in doubtful(diagnostics_of(tracked))), "", lost)

@@ -298,3 +298,28 @@ def test_dropouts_and_noise_leave_the_class_open():
         measure_response(run_of([-1] * 40))
     with pytest.raises(InputError, match="valid sample"):
         measure_response(run_of([-1] * 40), 100.0, start=1e3)
+
+
+@pytest.mark.parametrize(
+    ("code", "change"),
+    [
+        ("decay.one_sided", lambda v, u: np.abs(v)),
+        ("decay.one_sided", lambda v, u: -(v**2)),
+        ("decay.fade", lambda v, u: v * (1.0 - u)),
+        ("decay.fade", lambda v, u: v * np.clip(2.0 - 2.0 * u, 0.0, 1.0)),
+    ],
+)
+def test_a_rectified_decay_and_a_fade_out_are_told(code, change):
+    decay = noisy(chirp(0.1, 1.0), 5, decibel=30.0)
+    values = change(decay.values, np.arange(decay.size) / decay.size)
+    fit = identify_decay(make_signal(values, "m", RATE))
+    assert code in [one.code for one in fit.diagnostics]
+    if code == "decay.fade":
+        assert abs(fit.modes[0].damping_ratio - ZETA) < 5.0 * fit.modes[0].damping_ratio_se
+
+
+def test_a_decay_on_a_drifting_zero_is_not_taken_for_a_rectified_one():
+    decay = noisy(chirp(0.1, 1.0), 6)
+    drift = 0.15 * np.exp(-decay["time"].values / 0.3)
+    fit = identify_decay(make_signal(decay.values + drift, "m", RATE))
+    assert "decay.one_sided" not in [one.code for one in fit.diagnostics]

@@ -7,6 +7,7 @@ import pytest
 import scipy.signal
 
 from snapbeam.lab.drive_alignment import align, recorded_drive
+from snapbeam.lab.sensor_errors import beyond_shakers, find_low_pass, saturation_loss
 from snapbeam.lab.signals import SignalSamples, make_signal
 from snapbeam.lab.sine_fit import fit_sine, spectral_peak
 from snapbeam.lab.vibrometer import displacement_from_velocity, measure_drive
@@ -268,3 +269,41 @@ def test_the_amplitude_behind_a_filter_and_a_saturated_amplifier_is_covered():
     ):
         steady = measure_drive(_of_the_sensor(change), 100.0).steady
         assert abs(steady.amplitude - V) < 2.0 * steady.amplitude_se
+
+
+def test_integrated_noise_is_no_filter_and_noise_that_rises_first_no_crash():
+    rate, rng = 2e4, np.random.default_rng(3)
+    quiet = 0
+    for _ in range(40):
+        drifting = np.cumsum(rng.standard_normal(12_000))
+        quiet += find_low_pass(drifting - np.linspace(drifting[0], drifting[-1], 12_000), rate, 100.0) is None
+    assert quiet >= 38
+    rising = scipy.signal.lfilter(*scipy.signal.butter(2, [800.0, 1600.0], "band", fs=rate), rng.standard_normal(12_000))
+    found = find_low_pass(rising + 0.03 * rng.standard_normal(12_000), rate, 100.0)
+    assert found is None or found.corner > 800.0
+    first = scipy.signal.lfilter(*scipy.signal.butter(1, 300.0, fs=rate), rng.standard_normal(12_000))
+    assert find_low_pass(first, rate, 100.0).corner == pytest.approx(300.0, rel=0.4)
+
+
+def test_a_third_harmonic_of_the_shaker_itself_is_no_saturation():
+    rng = np.random.default_rng(4)
+    told = []
+    for third in (0.03, 0.06, 0.11, 0.11, 0.15):
+        turn = np.pi + (0.05 if third == 0.11 else rng.uniform(-0.3, 0.3))
+        time = np.arange(12_000) / 2e4
+        values = V * (np.cos(2e2 * np.pi * time) + third * np.cos(6e2 * np.pi * time + turn))
+        signal = SignalSamples(values + 3e-4 * rng.standard_normal(time.size), time, 2e4)
+        told.append(saturation_loss(fit_sine(signal, 100.0)) > 0.0)
+    assert not any(told[1:])
+
+
+def test_a_motion_that_no_shaker_makes_says_which_limit_it_passes():
+    fast = beyond_shakers(fit_sine(SignalSamples(*_tone(4.0, 20.0), 2e4), 20.0), "m/s")
+    assert [one.code for one in fast] == ["vibrometer.beyond_shakers"]
+    assert fast[0].message.startswith("4 m/s are above 3 m/s, more than")
+    assert beyond_shakers(fit_sine(SignalSamples(*_tone(1.0, 100.0), 2e4), 100.0), "m/s") == []
+
+
+def _tone(amplitude, frequency):
+    time = np.arange(20_000) / 2e4
+    return amplitude * np.cos(2.0 * np.pi * frequency * time), time

@@ -312,6 +312,20 @@ KINDS_DECAY = table(
         ("exponential_window",),
     ),
     Kind(
+        "decay.fade", WARNING,
+        "the noise of the sensor in each eighth of the record, which does not decay",
+        "the noise falls faster and faster, {factor:.1f} times over the record, as under a fade-out: it adds about "
+        "{added_percent:.3g} % to the damping ratio, which is in its standard error; save the record without a window "
+        "or fade-out, or end it before that (stop, --stop)",
+        ("stop",),
+    ),
+    Kind(
+        "decay.one_sided", ERROR,
+        "the least values of the first cycles and of the last, while the greatest ones fall",
+        "the tops fall towards bottoms that stay level: the signal was rectified or squared, and the mode has half the "
+        "frequency, {half_hz:.5g} Hz; record the signal itself",
+    ),
+    Kind(
         "decay.hardening", WARNING,
         "the sign of the change of the frequency with amplitude",
         "the frequency rises with amplitude, by {rise_percent:.2g} % at the start ({certain:.0f} standard errors); "
@@ -547,8 +561,9 @@ KINDS_VIBROMETER = table(
     Kind(
         "vibrometer.beyond_shakers", ERROR,
         "velocity, acceleration and travel against those of electrodynamic shakers",
-        "no shaker moves at {speed:.3g} m/s, {acceleration_g:.3g} g and {travel_mm:.3g} mm at once: check the unit "
-        "(units, --units; mm/s may have been read as m/s) and sensitivity (--sensitivity)",
+        "{told}, more than electrodynamic shakers can do (the motion has {speed:.3g} m/s, {acceleration_g:.3g} g, "
+        "{travel_mm:.3g} mm): check the unit (units, --units; mm/s may have been read as m/s) and sensitivity "
+        "(--sensitivity)",
         ("units", "sensitivity"),
     ),
     Kind(

@@ -34,8 +34,10 @@ _Array = NDArray[np.float64]
 # Noise that is not white: a low-pass filter in the chain, and noise that drifts.
 
 
-_LINES = 16  # lines of a spectrum in a band, at least
-_STEEP = 10.0  # dB over two octaves; 1/f noise falls by 6, a filter of first order by 12
+_LINES = 32  # lines of a spectrum in a band, at least
+_STEEP = 10.0  # dB over two octaves; 1/f noise falls by 6, a filter of first order and integrated noise by 12
+_STEEPER = 16.0  # dB over two octaves that only a filter of second order takes
+_FLAT = 3.5  # dB an octave that noise before a filter of first order may fall; integrated noise falls by 6
 _FAR = 10.0  # times the drive's frequency; a filter above that changes the amplitude by less than 0.5 %
 
 
@@ -59,7 +61,8 @@ def find_low_pass(residual: _Array, rate: float, frequency: float) -> LowPass | 
     """A low-pass filter that is near enough to change the amplitude, or None.
 
     The noise of a laser, an amplifier or a converter is white or falls slowly with the frequency.  A filter behind
-    it makes it fall steeply.
+    it makes it fall steeply.  Noise that was integrated falls as behind a filter of first order, but at all
+    frequencies: such a filter is told only where the noise below it is flat.
 
     Parameters
     ----------
@@ -74,7 +77,7 @@ def find_low_pass(residual: _Array, rate: float, frequency: float) -> LowPass | 
     power = np.abs(np.fft.rfft(residual * np.hanning(n))) ** 2
     freq = np.fft.rfftfreq(n, 1.0 / rate)
     centres, levels = [], []
-    low = 0.5 * frequency
+    low = min(0.5 * frequency, _LINES * rate / n)
     while 2.0 * low < 0.4 * rate:
         band = (freq >= low) & (freq < 2.0 * low)
         if band.sum() >= _LINES:
@@ -82,12 +85,18 @@ def find_low_pass(residual: _Array, rate: float, frequency: float) -> LowPass | 
             levels.append(10.0 * math.log10(max(float(np.median(power[band])), 1e-300)))
         low *= 2.0
     falls = np.array(levels)
-    if falls.size < 3 or not (falls[:-2] - falls[2:] > _STEEP).any():
+    steep = np.flatnonzero(falls[:-2] - falls[2:] > _STEEP)
+    if not steep.size:
         return None
+    start = int(steep[0])
+    if (falls[:-2] - falls[2:]).max() < _STEEPER and (
+        start == 0 or (falls[0] - falls[start]) / start > _FLAT
+    ):
+        return None  # as white noise that was integrated
+    top = int(np.argmax(falls[: start + 1]))
     steepest = float((falls[:-1] - falls[1:]).max())
-    below = np.flatnonzero(falls < falls[0] - 3.0)
-    k = int(below[0])
-    share = (falls[k - 1] - (falls[0] - 3.0)) / (falls[k - 1] - falls[k])
+    k = top + int(np.flatnonzero(falls[top:] < falls[top] - 3.0)[0])
+    share = (falls[k - 1] - (falls[top] - 3.0)) / (falls[k - 1] - falls[k])
     corner = centres[k - 1] * (centres[k] / centres[k - 1]) ** share
     return LowPass(corner, max(1, round(steepest / 6.0) - 1)) if corner < _FAR * frequency else None
 
@@ -143,9 +152,11 @@ def find_crosstalk(samples: SignalSamples, rest: int, fit: SineFit) -> Line | No
 # A signal that is no velocity: rectified or squared, or bent by an amplifier near its limit.
 
 
-_ONE_SIDED = 0.6  # of the amplitude by which the mean may move
+_ONE_SIDED = 0.8  # of the amplitude by which the mean may move
 _THIRD = 0.004  # of the amplitude
-_IN_LINE = 0.35  # rad
+_IN_LINE = 0.1  # rad
+_STRONG = 0.03  # of the amplitude, third harmonic beside which saturation makes a fifth
+_FIFTH = (0.3, 3.0)  # times the square of the third harmonic; a hyperbolic tangent makes 1.2, an arc tangent 1.8
 _TIMES = 3.0  # times the third harmonic that saturation takes from the first
 
 
@@ -166,7 +177,8 @@ def saturation_loss(fit: SineFit) -> float:
     """Share of the amplitude that a saturating amplifier takes, as far as the third harmonic tells; 0 if it does not.
 
     To lowest order a symmetric saturation y - c y^3 takes three times as much from the first harmonic as it makes of
-    the third, whose crests are then opposite to those of the first.
+    the third, whose crests are then opposite to those of the first.  A strong third harmonic comes with a fifth of
+    about its square; one without is the shaker's own.
     """
     amplitude, phase = fit.harmonic_amplitude, fit.harmonic_phase
     if amplitude.size < 3 or not amplitude[0] > 0.0:
@@ -175,7 +187,10 @@ def saturation_loss(fit: SineFit) -> float:
     others = max(float(amplitude[k] / amplitude[0]) for k in range(1, amplitude.size) if k != 2)
     noise = fit.noise_rms * math.sqrt(2.0 / fit.samples) / fit.amplitude
     turned = math.remainder(float(phase[2]) - 3.0 * float(phase[0]) - math.pi, 2.0 * math.pi)
-    told = third > max(_THIRD, 6.0 * noise, 2.0 * others) and abs(turned) < _IN_LINE
+    told = third > max(_THIRD, 6.0 * noise, 2.0 * others) and abs(turned) < _IN_LINE + 3.0 * noise / third
+    if third > _STRONG and third**2 > 6.0 * noise and amplitude.size > 4:  # else a shaker's own third harmonic
+        fifth = float(amplitude[4] / amplitude[0]) * math.cos(float(phase[4]) - 5.0 * float(phase[0]))
+        told = told and _FIFTH[0] * third**2 < fifth < _FIFTH[1] * third**2
     return _TIMES * third if told else 0.0
 
 
@@ -200,10 +215,21 @@ def beyond_shakers(fit: SineFit, units: str) -> list[Diagnostic]:
     """Whether a sine is faster, harder or wider than electrodynamic shakers can move."""
     omega = 2.0 * math.pi * fit.frequency
     speed = fit.amplitude if units == "m/s" else omega * fit.amplitude
-    if speed <= _FASTEST and speed * omega <= _HARDEST and speed / omega <= _FARTHEST:
+    hard, far = speed * omega, speed / omega
+    beyond = [
+        words
+        for words, value, limit in (
+            (f"{speed:.3g} m/s are above {_FASTEST:g} m/s", speed, _FASTEST),
+            (f"{hard / _G:.3g} g are above {_HARDEST / _G:.3g} g", hard, _HARDEST),
+            (f"{1e3 * far:.3g} mm are above {1e3 * _FARTHEST:g} mm", far, _FARTHEST),
+        )
+        if value > limit
+    ]
+    if not beyond:
         return []
+    told = ", ".join(beyond)
     return [
         KINDS_VIBROMETER["beyond_shakers"].found(
-            speed=speed, acceleration_g=speed * omega / _G, travel_mm=1e3 * speed / omega
+            told=told, speed=speed, acceleration_g=hard / _G, travel_mm=1e3 * far
         )
     ]

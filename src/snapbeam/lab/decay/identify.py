@@ -145,11 +145,14 @@ def identify_decay(
     doubts += diagnostics_about(samples, wanted, result.noise_near, soften)
     doubts += sampled_diagnostics(wanted, decay.samples.sampling_frequency)
     left = SignalSamples(result.residual, samples.time, samples.sampling_frequency)
-    falls = noise_fall(left, wanted[0].natural_frequency)
+    omega = 2.0 * math.pi * wanted[0].natural_frequency
+    falls = noise_fall(left, wanted[0].natural_frequency, omega * wanted[0].damping_ratio)
     if falls is not None:
-        added = 100.0 * falls.rate / (2.0 * math.pi * wanted[0].natural_frequency)
+        added = 100.0 * falls.rate / omega
         doubts.append(
             KINDS_DECAY["window"].found(factor=falls.factor, constant=1.0 / falls.rate, added_percent=added)
+            if falls.even
+            else KINDS_DECAY["fade"].found(factor=falls.factor, added_percent=added)
         )
     wanted = widened(wanted, decay.drift, falls.rate if falls is not None else 0.0)
     free = [mode.natural_frequency for mode in wanted]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import median_filter, uniform_filter1d
+from scipy.optimize import isotonic_regression
 
 from snapbeam.lab.decay.model import Cycles, hilbert_cycles, noise_level, regress
 from snapbeam.lab.decay.poles import (
@@ -43,6 +44,7 @@ __all__ = [
     "find_release",
     "frequency_drift",
     "noise_fall",
+    "one_sided",
     "prepared",
     "steadied",
     "undone",
@@ -175,6 +177,26 @@ def find_jump(cycles: Cycles) -> AmplitudeJump | None:
     if size[at] < max(8.0 * errors[at], 0.08, 6.0 * usual):
         return None
     return AmplitudeJump(float(cycles.time[at]), float(size[at]))
+
+
+_SPAN = 4  # cycles whose least and greatest values are taken together
+_FALLS = 0.4  # of the first tops by which the tops must fall
+_LEVEL = 0.08  # of that by which the bottoms may change
+
+
+def one_sided(samples: SignalSamples, frequency: float) -> bool:
+    """Whether the tops of a decay fall towards bottoms that stay level, as of a rectified or squared signal."""
+    width = round(_SPAN * samples.sampling_frequency / frequency)
+    count = samples.values.size // width
+    if count < 3:
+        return False
+    parts = samples.values[: count * width].reshape(count, width)
+    tops, bottoms = parts.max(1), parts.min(1)
+    for high, low in ((tops, bottoms), (-bottoms, -tops)):
+        falls = float(high[0] - high[-1])
+        if falls > _FALLS * float(high[0] - low[0]) and abs(float(low[0] - low[-1])) < _LEVEL * falls:
+            return bool(float(np.ptp(low)) < 2.0 * _LEVEL * falls)
+    return False
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -316,6 +338,8 @@ def prepared(samples: SignalSamples, start: float | None, stop: float | None) ->
             diagnostics.append(KINDS_DECAY["release"].found(start=float(part.time[0])))
             frequency = dominant(part)
     _enough(part, frequency)
+    if one_sided(part, frequency):
+        diagnostics.append(KINDS_DECAY["one_sided"].found(half_hz=0.5 * frequency))
     part, told = _below_ceiling(part, frequency)
     diagnostics += told
     rate = _decay_rate(part, frequency)
@@ -541,17 +565,19 @@ _FALL = 0.2  # of the logarithm of the noise over the record
 
 
 class NoiseFall(NamedTuple):
-    """The noise falls as exp(-``rate`` t) [1/s], by a ``factor`` over the record."""
+    """The noise falls at a ``rate`` [1/s], by a ``factor`` over the record, ``even``ly or as a fade-out does."""
 
     rate: float
     factor: float
+    even: bool
 
 
-def noise_fall(rest: SignalSamples, frequency: float) -> NoiseFall | None:
-    """At which rate the noise of a record falls; None if it does not, or not as an exponential does.
+def noise_fall(rest: SignalSamples, frequency: float, decay_rate: float) -> NoiseFall | None:
+    """At which rate the noise of a record falls; None if it does not, or not in every part.
 
     The level of the noise in each eighth of the record is that of the lower quartile of its spectrum, which modes
-    left in it do not reach; a straight line must describe its logarithm, and fall by more than five standard errors.
+    left in it do not reach; its logarithm must fall by more than five standard errors, and nowhere rise.  Where it
+    falls along no straight line, the rate is the mean one while the mode is seen.
 
     Parameters
     ----------
@@ -559,6 +585,8 @@ def noise_fall(rest: SignalSamples, frequency: float) -> NoiseFall | None:
         What a fit leaves of a decay.
     frequency
         Of the first mode [Hz]; noise is sought above one and a half times it.
+    decay_rate
+        Of the first mode [1/s].
     """
     size = rest.values.size // _PARTS
     freq = np.fft.rfftfreq(size, 1.0 / rest.sampling_frequency)
@@ -584,7 +612,17 @@ def noise_fall(rest: SignalSamples, frequency: float) -> NoiseFall | None:
         float(((t - t.mean()) ** 2).sum())
     )
     straight = off < max(2.5 * error, 0.08 * fall)
-    return NoiseFall(-float(slope), math.exp(fall)) if certain and straight and fall > _FALL else None
+    if certain and straight and fall > _FALL:
+        return NoiseFall(-float(slope), math.exp(fall), True)
+    fall = float(y[0] - y[-1])
+    off = float(np.sqrt(np.mean((y - isotonic_regression(y, increasing=False).x) ** 2)))
+    # noise under a fade-out falls faster and faster; what is left of other modes falls slower and slower
+    late = float(y[_PARTS // 2] - y[-1]) > float(y[0] - y[_PARTS // 2])
+    if fall < max(_FALL, _CERTAIN_NOISE_FALL * 1.5 * error) or off > 2.0 * error or not late:
+        return None
+    seen = np.exp(-decay_rate * t)
+    rate = float(np.polyfit(t, y, 1, w=seen)[0])
+    return NoiseFall(max(-rate, 0.0), math.exp(fall), False)
 
 
 def undone(samples: SignalSamples, constant: float) -> SignalSamples:

@@ -1,0 +1,170 @@
+"""Scenes whose frames are changed after they are drawn: errors of camera, file and settings, and harmless oddities."""
+
+from __future__ import annotations
+
+import numpy as np
+import random_scenes
+from random_scenes import LEVEL, good_scene, motion
+
+from snapbeam.lab import Defects, SyntheticCamera, SyntheticStage, open_recording, render_recording, track
+from snapbeam.lab.camera import write_photron
+from snapbeam.lab.tracking.settings import Orientation
+
+ERRORS = (
+    "white bar at the edge", "sticker near a black tip", "curved edge", "striker seldom seen", "one repeated frame",
+    "every tenth lost", "every seventh a copy", "frames lost now and then", "rest in motion", "pixel size in inches",
+    "pixel size ten percent off", "image lag",
+)  # fmt: skip
+FAIR = ("gauge", "noise of rows", "fixed rows", "uneven light", "dark rod", "colour filters", "lossless")
+
+
+def _rows(recording, frames):
+    """Rows of the beam's near edge and of the sticker's lower end, in turned frames."""
+    attrs = recording.truth.attrs
+    size = recording.camera.pixel_size * 1e3
+    sign = 1.0 if recording.stage.side in ("below", "left") else -1.0
+    half = 0.5 * recording.stage.beam_thickness * 1e3 / size
+    beam = attrs["zero_row"] - sign * recording.truth["displacement_mm"].values / size
+    tip = attrs["zero_row"] - sign * recording.truth["shaker_displacement_mm"].values / size
+    return beam + half, tip + half
+
+
+def changed(kind, frames, recording, rng):
+    """Turned *frames* with one thing done to them, and the numbers of the frames that they show."""
+    count, height, width = frames.shape
+    full = float(2**recording.camera.bit_depth - 1)
+    stage = recording.stage
+    shown = np.arange(count)
+    noise = max(frames[:, :6].std(0).mean(), 0.3)
+    rest = 30
+    if kind == "white bar at the edge":
+        level = full * stage.beam
+        frames[:, : int(rng.integers(3, 9))] = level
+        frames[:, :9] += noise * rng.standard_normal((count, 9, width))
+    elif kind == "curved edge":
+        bend = float(rng.choice([-1.0, 1.0])) * rng.uniform(0.001, 0.004)
+        columns = np.arange(width)
+        rows = np.arange(height)
+        down = 0.5 * bend * (columns - (width - 1) / 2.0) ** 2
+        near, _ = _rows(recording, frames)
+        for k in range(count):
+            share = np.clip(near[k] + 1.0 - rows, 0.0, 1.0)  # the beam bends, the shaker does not
+            for c in columns:
+                frames[k, :, c] = np.interp(rows - down[c] * share, rows, frames[k, :, c])
+    elif kind == "striker seldom seen":
+        near, _ = _rows(recording, frames)
+        hidden = rng.random(count) < 0.9
+        hidden[:rest] = False
+        for k in np.flatnonzero(hidden):
+            top = int(near[k]) + 3
+            frames[k, top:] = full * stage.shaker + noise * rng.standard_normal((height - top, width))
+    elif kind == "one repeated frame":
+        at = int(rng.integers(rest, count - 5))
+        shown[at] = at - 1
+    elif kind == "every seventh a copy":
+        shown[rest::7] -= 1
+    elif kind == "every tenth lost":
+        shown = np.delete(shown, np.arange(rest, count, 10))
+    elif kind == "frames lost now and then":
+        shown = np.delete(shown, rng.choice(np.arange(rest, count - 5), 3, replace=False))
+    elif kind == "image lag":
+        share = rng.uniform(0.1, 0.3)
+        grain = noise * rng.standard_normal(frames.shape)
+        for k in range(1, count):
+            frames[k] = (1.0 - share) * frames[k] + share * frames[k - 1]
+        frames += grain
+    elif kind == "noise of rows":
+        frames += rng.uniform(0.003, 0.008) * full * rng.standard_normal((count, height, 1))
+    elif kind == "fixed rows":
+        frames += 0.006 * full * rng.standard_normal((height, 1))
+    if kind in ("one repeated frame", "every seventh a copy"):  # the copy is encoded by itself
+        frames = frames[shown] + 0.3 * noise * (shown != np.arange(count))[:, None, None] * rng.standard_normal(
+            frames.shape
+        )
+        shown = np.arange(count)
+    elif shown.size < count:
+        frames = frames[shown]
+    return np.clip(np.rint(frames), 0, full).astype(np.uint16)
+
+
+def prepared(kind, rng):
+    """A good scene in which *kind* can be seen, and by how much the pixel size is off."""
+    scene, scale = good_scene(rng), 1.0
+    dark = scene.stage["background"] > scene.stage["beam"]
+    if kind == "sticker near a black tip":
+        scene.stage |= {
+            "shaker": scene.stage["background"], "marker": scene.stage["beam"], "shaker_width": 0.7e-3,
+            "marker_thickness": 0.25e-3, "tip_radius": 2.5e-3,
+            "marker_distance": rng.uniform(1.5, 6.0) * scene.camera["pixel_size"],
+        }  # fmt: skip
+    elif kind == "rest in motion":
+        scene.rest_frames, scene.skip = 0, int(rng.integers(25, 60))
+        first = int(rng.integers(0, 20))
+        scene.settings["rest_frames"] = int(rng.integers(1, 4)) if rng.random() < 0.6 else (first, first + 2)
+    elif kind in ("pixel size in inches", "pixel size ten percent off", "gauge"):
+        scene.settings["beam_thickness"] = 0.4e-3 * (1.0 + 0.01 * rng.standard_normal())
+        if kind == "pixel size in inches":
+            scale = float(rng.choice([25.4, 1.0 / 25.4]))
+        elif kind == "pixel size ten percent off":
+            scale = float(rng.choice([1.1, 1.0 / 1.1]))
+    elif kind == "uneven light":
+        scene.camera["light"] = (rng.uniform(0.3, 0.6), rng.uniform(-0.5, 0.5))
+    elif kind == "dark rod" and not dark:
+        scene.stage["shaker"] = 0.5 * (scene.stage["background"] + scene.stage["beam"])
+    if kind == "lossless":
+        scene.camera["bit_depth"] = 8
+    return scene, scale
+
+
+def _lossless(path, frames):
+    import imageio_ffmpeg
+
+    height, width = frames.shape[1:]
+    writer = imageio_ffmpeg.write_frames(
+        str(path), (width, height), fps=25, codec="libx264", output_params=["-qp", "0", "-pix_fmt", "gray"],
+        macro_block_size=2, pix_fmt_in="gray", ffmpeg_log_level="error",
+    )  # fmt: skip
+    writer.send(None)
+    for frame in frames:
+        writer.send(np.ascontiguousarray(frame.astype(np.uint8)))
+    writer.close()
+
+
+def measured(kind, rng, folder):
+    """Draw, change, write, read and track a scene; the tracked dataset and the truth."""
+    scene, scale = prepared(kind, rng)
+    camera, stage = SyntheticCamera(**scene.camera), SyntheticStage(**scene.stage)
+    sign = 1.0 if stage.side in ("below", "left") else -1.0
+    time, beam, shaker = motion(rng, camera.pixel_size, camera.frame_rate)
+    first = int(scene.skip * 40)
+    recording = render_recording(
+        time[first:] - time[first], sign * beam[first:], sign * shaker[first:], camera=camera, stage=stage,
+        defects=Defects(**scene.defects), rest_frames=scene.rest_frames, seed=int(rng.integers(2**31)),
+    )  # fmt: skip
+    turn = Orientation(stage.side, camera.shape)
+    frames = turn.turn(np.stack(list(recording)).astype(np.float64)).copy()
+    frames = changed(kind, frames, recording, rng)
+    if stage.side in ("above", "left"):
+        frames = frames[:, ::-1]
+    if stage.side in ("left", "right"):
+        frames = frames.transpose(0, 2, 1)
+    if kind == "lossless":
+        path = folder / "scene.mp4"
+        _lossless(path, frames)
+    else:
+        stored = 8 if camera.bit_depth == 8 else 12 if camera.bit_depth <= 12 else 16
+        path = write_photron(
+            folder / "scene.cihx", list(np.ascontiguousarray(frames)), frame_rate=camera.frame_rate,
+            pixel_size=camera.pixel_size * scale, exposure=camera.exposure, bit_depth=stored,
+            effective_bits=camera.bit_depth,
+        )  # fmt: skip
+    settings = {"rest_displacement": -sign * LEVEL, "side": stage.side, **scene.settings}
+    with open_recording(
+        path, frame_rate=camera.frame_rate, pixel_size=camera.pixel_size * scale
+    ) as opened:
+        return track(opened, **settings), recording
+
+
+def judged(kind, rng, folder):
+    """The outcome of a scene."""
+    return random_scenes.outcome(lambda: measured(kind, rng, folder))
