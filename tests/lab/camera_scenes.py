@@ -15,7 +15,7 @@ ERRORS = (
     "every tenth lost", "every seventh a copy", "frames lost now and then", "rest in motion", "pixel size in inches",
     "pixel size ten percent off", "image lag",
 )  # fmt: skip
-FAIR = ("gauge", "noise of rows", "fixed rows", "uneven light", "dark rod", "colour filters", "lossless")
+FAIR = ("gauge", "noise of rows", "fixed rows", "uneven light", "dark rod", "lossless")
 
 
 def _rows(recording, frames):
@@ -56,8 +56,10 @@ def changed(kind, frames, recording, rng):
         hidden = rng.random(count) < 0.9
         hidden[:rest] = False
         for k in np.flatnonzero(hidden):
-            top = int(near[k]) + 3
-            frames[k, top:] = full * stage.shaker + noise * rng.standard_normal((height - top, width))
+            top, half = int(near[k]), 0.5 * stage.shaker_width / recording.camera.pixel_size
+            rod = np.abs(np.arange(width) - (width - 1) / 2.0) < half  # oil hides the sticker and fills the gap
+            level = full * (stage.beam if stage.marker_thickness == 0.0 else stage.shaker)
+            frames[k, top:, rod] = level + noise * rng.standard_normal((rod.sum(), height - top))
     elif kind == "one repeated frame":
         at = int(rng.integers(rest, count - 5))
         shown[at] = at - 1

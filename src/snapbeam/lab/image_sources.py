@@ -564,6 +564,12 @@ LOSSLESS = (
 """Names of the codecs that give back the pictures that went in."""
 
 
+def _lossless_h264(context: Any) -> bool:
+    """Whether H.264 keeps all: only then does it take this profile for pictures without full colour."""
+    profile = str(context.profile or "")
+    return profile == "High 4:4:4 Predictive" and "444" not in (context.pix_fmt or "444")
+
+
 class VideoSource(FrameSource):
     """A video file, decoded by PyAV.
 
@@ -592,7 +598,7 @@ class VideoSource(FrameSource):
                     playback = stream.average_rate
                     rate = None if playback is None else float(playback)
                     self.metadata = {"format": f"video ({codec})", "playback_rate": rate}
-                if codec not in LOSSLESS:
+                if codec not in LOSSLESS and not _lossless_h264(stream.codec_context):
                     self.diagnostics += (KINDS_RECORDING["lossy"].found(error_px=LOSSY_ERROR),)
                     self.edge_error = LOSSY_ERROR
                 name = stream.codec_context.pix_fmt or ""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from snapbeam.lab.diagnostics import Kind, table
+from snapbeam.lab.tracking.frame_order import FrameOrder
 from snapbeam.lab.tracking.measure import Rest, Touch, TrackedRows
 from snapbeam.lab.tracking.settings import (
     BeamView,
@@ -63,7 +64,8 @@ KINDS = table(
     Kind(
         "camera.rest_moves", WARNING,
         "drift of the beam within the frames given as rest",
-        "the beam moves by {drift:.0f} standard errors within the rest_frames (--rest-frames) given",
+        "the beam moves by {drift:.0f} standard errors within the rest_frames (--rest-frames) given, or right beside "
+        "them, so all displacements may be shifted by up to {shift_mm:.3g} mm, which is in their standard errors",
         ("rest_frames",),
     ),
     Kind(
@@ -167,6 +169,38 @@ KINDS = table(
         "only {share_percent:.0f} % of the frames were measured; see the flags for the reasons",
     ),
     Kind(
+        "camera.striker_lost", WARNING,
+        "share of the frames with a position of the striker",
+        "the striker was found in only {share_percent:.0f} % of the frames; see the flags for the reasons, narrow region "
+        "(--region), or track the beam alone with shaker=False (--no-shaker)",
+        ("region", "shaker"),
+    ),
+    Kind(
+        "camera.frames_lost", ERROR,
+        "the motion of striker and beam over ten frames, with and without a jump of the time between them",
+        "{frames:.0f} frame(s) are missing at {places:.0f} place(s), the first before frame {first:.0f}: times after it "
+        "are up to {short_ms:.3g} ms too small; copy the recording again, or keep the frames before",
+    ),
+    Kind(
+        "camera.frames_repeated", WARNING,
+        "the motion of striker and beam over ten frames, with and without a frame in which both stand still",
+        "{frames:.0f} frame(s) show the frame before again, the first is frame {first:.0f}: left out; keep the frames as "
+        "they were taken",
+    ),
+    Kind(
+        "camera.curved", WARNING,
+        "the beam's edge in its columns, against a straight line",
+        "the beam's edge is curved: at the contact it lies {hollow_px:.2f} px off the line through its columns, which is "
+        "in the shaker's standard errors; give fewer columns (--columns) or check the lens",
+        ("columns",),
+    ),
+    Kind(
+        "camera.beyond", ERROR,
+        "displacement in buckling levels, and velocities, against what a beam and a shaker can do",
+        "{told}: check pixel_size (--pixel-size), frame_rate (--frame-rate) and buckling_level (--buckling-level)",
+        ("pixel_size", "frame_rate", "buckling_level"),
+    ),
+    Kind(
         "camera.striker_in_view", INFO,
         "something beyond the beam in most frames though no shaker is followed",
         "a shaker is in view though shaker=False (--no-shaker): its columns are kept out of the search for the beam",
@@ -179,7 +213,13 @@ KINDS = table(
     ),
 )  # fmt: skip
 
-_OFF = 0.1  # share by which the thickness may be off the known one
+_OFF = 0.05  # share by which the thickness may be off the known one
+_OFF_PX = 0.3  # and pixels
+_WELLS = 3.0  # buckling levels; a beam that snaps through does not go further
+_FASTEST = (30.0, 3.0)  # m/s of beam and shaker
+_CLOSE = 3.0  # px of gap that is no contact, of a tip that merges with the beam
+_NEAR = 1.2  # px of gap that is no contact, of another one
+_STRIKER = 0.5  # share of the frames in which the striker must be found
 _CONTACT = 6  # stretches of frames in contact from which an offset is told
 _LEVELS = 16.0  # grey levels of contrast
 _EVENED = 0.4  # grey levels of noise that even out their rounding
@@ -191,7 +231,7 @@ class SeenMotion:
     """What the diagnostics of a tracked recording are drawn from, beside the scene.
 
     ``penetration`` [px] of the tip into the beam, NaN where unknown, and that while they ``touch``; ``scale``
-    [mm/px]; ``drift`` [px] of the camera, the largest; ``fields`` of interlaced video.
+    [mm/px]; ``drift`` [px] of the camera, the largest; ``fields`` of interlaced video; ``order`` of the frames.
     """
 
     rows: TrackedRows
@@ -201,13 +241,20 @@ class SeenMotion:
     scale: float
     drift: float
     fields: VideoFields
+    order: FrameOrder
 
 
 def tracking_diagnostics(
-    scene: Scene, seen: SeenMotion, settings: TrackingSettings, offset_mm: float
+    scene: Scene, seen: SeenMotion, settings: TrackingSettings, offset_mm: float, rate: float
 ) -> tuple[Diagnostic, ...]:
-    """What a tracked recording says against itself; *offset_mm* is the error of the rest position."""
+    """What a tracked recording says against itself.
+
+    *offset_mm* is the error of the rest position, *rate* that of the frames [Hz].
+    """
     told = [*_of_the_beam(scene, seen, settings), *_of_the_rest(seen, settings, offset_mm)]
+    told += [*_of_the_motion(seen, settings, rate), *_of_the_order(seen.order, rate)]
+    if seen.rows.hollow > 0.0:
+        told.append(KINDS["curved"].found(hollow_px=seen.rows.hollow))
     told += _of_the_edges(scene.shape, settings)
     told += _of_the_pixels(scene, seen.fields)
     told += _of_the_frames(seen.rows)
@@ -237,13 +284,15 @@ def rounding_shift(beam: BeamView) -> float:
     return 1.5 * max(beam.edge_width, 0.5) / beam.contrast
 
 
-def never_touching(penetration: np.ndarray, row: np.ndarray) -> float:
+def never_touching(penetration: np.ndarray, rows: TrackedRows) -> float:
     """Least gap [px] between tip and beam if the beam moves without ever being touched; else 0."""
+    row = rows.row
     known, seen = np.isfinite(penetration), np.isfinite(row)
     if not known.any() or not seen.any() or np.ptp(np.percentile(row[seen], (0.5, 99.5))) <= 2.0:
         return 0.0
     closest = -float(np.percentile(penetration[known], 99.5))
-    return closest if closest > 3.0 else 0.0
+    least = _CLOSE if rows.flagged(FrameFlag.MERGED) else _NEAR  # a tip that merges with the beam is not seen closer
+    return closest if closest > least else 0.0
 
 
 def _of_the_beam(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> list[Diagnostic]:
@@ -261,8 +310,40 @@ def _of_the_beam(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> 
         told.append(KINDS["scale"].found(found_mm=found))
     if settings.beam_thickness is not None:
         known = settings.beam_thickness * 1e3
-        if abs(found / known - 1.0) > _OFF + 0.5 * seen.scale / known:
+        if abs(found / known - 1.0) > _OFF + _OFF_PX * seen.scale / known:
             told.append(KINDS["thickness"].found(found_mm=found, known_mm=known))
+    return told
+
+
+def _of_the_motion(seen: SeenMotion, settings: TrackingSettings, rate: float) -> list[Diagnostic]:
+    """Whether beam or shaker go further or faster than they can."""
+    told = []
+    if settings.buckling_level is not None:
+        sign = 1.0 if settings.side in ("below", "left") else -1.0
+        far = np.abs(settings.rest - sign * 1e-3 * seen.scale * (seen.rows.row - seen.rest.row))
+        most = float(np.nanpercentile(far, 99.5)) / settings.buckling_level
+        if most > _WELLS:
+            told.append(f"the beam moves to {most:.3g} buckling levels, more than {_WELLS:g}")
+    for name, row, limit in zip(("beam", "shaker"), (seen.rows.row, seen.rows.shaker), _FASTEST, strict=True):
+        steps = np.abs(np.diff(row))
+        if np.isfinite(steps).any():
+            speed = float(np.nanpercentile(steps, 99.0)) * 1e-3 * seen.scale * rate
+            if speed > limit:
+                told.append(f"the {name} moves at {speed:.3g} m/s, above {limit:g} m/s")
+    return [KINDS["beyond"].found(told=", ".join(told))] if told else []
+
+
+def _of_the_order(order: FrameOrder, rate: float) -> list[Diagnostic]:
+    told = []
+    if order.missing:
+        frames = sum(order.many)
+        told.append(
+            KINDS["frames_lost"].found(
+                frames=frames, places=len(order.missing), first=order.missing[0], short_ms=1e3 * frames / rate
+            )
+        )
+    if order.repeated:
+        told.append(KINDS["frames_repeated"].found(frames=len(order.repeated), first=order.repeated[0]))
     return told
 
 
@@ -270,7 +351,7 @@ def _of_the_rest(seen: SeenMotion, settings: TrackingSettings, offset_mm: float)
     if seen.rest.found:
         return []
     if settings.rest_frames is not None:
-        return [KINDS["rest_moves"].found(drift=seen.rest.drift)]
+        return [KINDS["rest_moves"].found(drift=min(seen.rest.drift, 1e6), shift_mm=offset_mm)]
     return [KINDS["no_rest"].found(quiet=2 * seen.rest.indices.size, shift_mm=offset_mm)]
 
 
@@ -327,6 +408,9 @@ def _of_the_tip(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
     told: list[Diagnostic] = []
     gap = -seen.penetration
     known = np.isfinite(gap)
+    share = float(np.isfinite(seen.rows.shaker).mean())
+    if share < _STRIKER:
+        told.append(KINDS["striker_lost"].found(share_percent=100.0 * share))
     if not known.any():
         return told
     error = np.hypot(seen.rows.error, seen.rows.shaker_error)
@@ -335,7 +419,7 @@ def _of_the_tip(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
         # the sticker's own upper edge over the beam
         nearest = float(np.nanmin(gap)) - shaker.tip_offset - 0.5 * shaker.sticker.thickness
         told.append(KINDS["sticker_alone"].found(height_px=shaker.sticker.thickness, gap_px=nearest))
-    closest = never_touching(seen.penetration, seen.rows.row)
+    closest = never_touching(seen.penetration, seen.rows)
     if closest > 0.0:
         told.append(KINDS["never_touches"].found(gap_px=closest))
     if contact_shift(seen.touch, scene.placed_error) > 0.0:

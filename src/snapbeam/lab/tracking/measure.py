@@ -269,6 +269,7 @@ def find_rest(row: Floats, error: Floats, shaker: Floats, given: tuple[int, int]
             return Rest(used, math.nan, math.nan, False, math.nan)
         noise = max(float(np.sqrt(np.mean(error[used] ** 2))), _STEADY)
         drift = float(np.ptp(_thirds(row[used]))) / (noise / math.sqrt(max(used.size / 3.0, 1.0)))
+        drift = max(drift, _beside(row[known], np.flatnonzero(np.isin(known, used)), noise))
         return Rest(used, float(row[used].mean()), _mean_error(row[used], noise), drift < 8.0, drift)
     if not known.size:
         return Rest(known, math.nan, math.nan, False, math.nan)
@@ -289,6 +290,21 @@ def find_rest(row: Floats, error: Floats, shaker: Floats, given: tuple[int, int]
             still &= _still(shaker[known][quiet:], length, noise)
         found = int(np.count_nonzero(np.diff(np.concatenate([[0], still.astype(np.int8)])) == 1)) < _OFTEN
     return Rest(used, mean, _mean_error(row[used], noise), found, 0.0)
+
+
+def _beside(values: Floats, used: NDArray[np.intp], noise: float) -> float:
+    """By how many standard errors the row strays from few frames at rest over the frames before or behind them.
+
+    A few frames say nothing of motion themselves; at rest those of one side are at the same place.
+    """
+    short = _QUIET - used.size
+    if short <= 0:
+        return 0.0
+    middle = float(values[used].mean())
+    sides = [values[max(used[0] - short, 0) : used[-1] + 1], values[used[0] : used[-1] + 1 + short]]
+    return min(
+        (float(np.abs(side - middle).max()) / noise for side in sides if side.size == _QUIET), default=math.inf
+    )
 
 
 def _still(values: Floats, length: int, noise: float) -> NDArray[np.bool_]:
@@ -323,7 +339,8 @@ class BeamRows(NamedTuple):
     """The far edge at the contact column of each frame, and what was seen on the way.
 
     ``row`` and ``slope`` are NaN where it was not found.  ``thickness`` [px] is measured across the beam in
-    columns free of the shaker (NaN without such columns), ``residual`` what the fitted steps leave of their
+    columns free of the shaker (NaN without such columns), ``hollow`` [px] by how much a parabola through the columns
+    lies off the line at the contact, ``residual`` what the fitted steps leave of their
     windows, share of the contrast.  ``level_range`` is the range of grey levels along the columns over the
     usual contrast, ``touches`` whether an object reached the far border there.
     """
@@ -340,6 +357,7 @@ class BeamRows(NamedTuple):
     level_range: Floats
     touches: NDArray[np.bool_]
     outside: NDArray[np.bool_]
+    hollow: Floats
 
 
 def measure_beam(view: BeamView, frames: NDArray[np.floating]) -> BeamRows:
@@ -390,7 +408,18 @@ def measure_beam(view: BeamView, frames: NDArray[np.floating]) -> BeamRows:
         level_range=ranges,
         touches=touches,
         outside=np.isfinite(anchor) & ~inside.any(1),
+        hollow=_hollow(view.columns - view.contact_column, edges - row[:, None], slope, kept),
     )
+
+
+def _hollow(x: Floats, edges: Floats, slope: Floats, kept: NDArray[np.bool_]) -> Floats:
+    """Rows at x = 0 of a parabola through *edges*, which are counted from the line through them."""
+    line = np.polyfit(x, x * x, 1)
+    bend = x * x - np.polyval(line, x)
+    left = np.where(kept, edges - slope[:, None] * x, 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        curve: Floats = (left * bend).sum(1) / np.where(kept, bend * bend, 0.0).sum(1)
+    return -curve * float(line[1])
 
 
 def _anchor(guesses: Floats, middles: list[float]) -> tuple[Floats, Floats]:
@@ -566,6 +595,7 @@ def _locate(sticker: Sticker, profiles: Floats, first: Floats, least: float) -> 
 # Collecting the measurements of all frames, with every frame's trouble on record.
 
 
+_HOLLOW = 0.06  # px
 _SMEARED = 0.25  # error over what edges are wider than explained
 
 BORDER = 14.0  # rows from the border within which a vanished object is taken to have left the region
@@ -577,7 +607,8 @@ class TrackedRows:
     """Rows [px, turned picture] of the whole recording, one entry a frame number.
 
     ``shaker`` is the row of its reference; ``width`` that of the beam's edge; NaN and a flag where nothing
-    was measured.  Errors are standard errors.
+    was measured.  Errors are standard errors.  ``hollow`` [px] is by how much the beam's curved edge lies off the
+    line through its columns at the contact; 0 where by no more than its columns scatter.
     """
 
     row: Floats
@@ -588,6 +619,7 @@ class TrackedRows:
     shaker_error: Floats
     confidence: Floats
     flags: NDArray[np.uint16]
+    hollow: float = 0.0
 
     def flagged(self, flag: FrameFlag) -> int:
         """How many frames carry a flag."""
@@ -664,6 +696,7 @@ class Follower:
                     lost, np.nan, np.hypot(_with_blur(beam, view.edge_width, self.blur_limit), shift_error)
                 ),
                 "slope": np.where(lost, np.nan, beam.slope),
+                "hollow": np.where(lost, np.nan, beam.hollow),
                 "width": beam.width,
                 "thickness": np.where(lost, np.nan, beam.thickness),
                 "residual": np.where(lost, np.nan, beam.residual),
@@ -707,6 +740,7 @@ class Follower:
             shaker_error=np.where(np.isfinite(shaker), shaker_error, np.nan),
             confidence=np.where(gone, 0.0, found["confidence"]),
             flags=flags,
+            hollow=_lasting_hollow(found["hollow"]),
         )
 
     def _repeats(self, strip: NDArray[np.floating]) -> NDArray[np.bool_]:
@@ -725,6 +759,13 @@ class Follower:
         out = np.where(last >= 0, near[last], self._border[name])
         self._border[name] = bool(out[-1])
         return out
+
+
+def _lasting_hollow(hollow: Floats) -> float:
+    """By how much the edge is hollow in all frames [px]; 0 where that is less than what surfaces do."""
+    known = hollow[np.isfinite(hollow)]
+    middle = float(np.median(known)) if known.size else 0.0
+    return abs(middle) if abs(middle) > _HOLLOW else 0.0
 
 
 def _with_blur(beam: BeamRows, usual: float, limit: float) -> Floats:

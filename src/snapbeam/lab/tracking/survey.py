@@ -53,6 +53,7 @@ __all__ = [
     "Wanted",
     "beam_light",
     "beam_view",
+    "border_bar",
     "column_objects",
     "edge_shape",
     "find_apex",
@@ -79,6 +80,7 @@ __all__ = [
 
 _STILL = 0.7  # share of the sample in which both edges of a bar must stand still
 _ACROSS = 0.6  # share of the columns that a bar or a beam crosses
+_BORDER = 0.25  # share of the rows that a bar along the border may cover
 _MOVES = 2.0  # rows by which a beam must move to be told from a bar
 
 
@@ -145,6 +147,22 @@ def fixed_bars(mask: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
             bars.append(bar)
             left = rest
     return tuple(bars)
+
+
+def border_bar(side: NDArray[np.bool_]) -> int:
+    """Rows of a bar that never moves along the far border, beside a beam that does; 0 if there is none.
+
+    *side* holds the pixels that are as bright or as dark as the border.
+    """
+    exits = np.where(side.all(1), side.shape[1], (~side).argmax(1))
+    usual = np.median(exits, axis=0)
+    still = (np.abs(exits - usual) <= 1).mean(0) >= _STILL
+    if still.mean() < _ACROSS or not 1.0 <= np.median(usual[still]) <= _BORDER * side.shape[1]:
+        return 0
+    rows = int(np.percentile(usual[still], 90)) + 1
+    rest = side.copy()
+    rest[:, : rows + 1] = False
+    return rows if _moving_beam(rest) else 0
 
 
 def _still_bands(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -1000,8 +1018,14 @@ def survey(
     level = otsu(smooth) if settings.threshold is None else settings.threshold
     far = float(np.median(smooth[:, :3]))
     bright = far < level if settings.objects == "auto" else settings.objects == "bright"
+    side = smooth > level if far > level else smooth < level
+    border = border_bar(side)
+    if border and settings.objects == "auto":
+        bright = far > level
     mask = smooth > level if bright else smooth < level
-    fixtures = fixed_bars(mask)
+    if border:
+        mask[:, : border + 1] = False
+    fixtures = ((0, border), *fixed_bars(mask)) if border and bright == (far > level) else fixed_bars(mask)
     for first, last in fixtures:
         mask[:, max(first - 1, 0) : last + 1] = False
     bands = find_bands(column_objects(mask), height, level, bright)

@@ -19,6 +19,7 @@ from snapbeam.lab.tracking.diagnostics import (
     tracking_diagnostics,
 )
 from snapbeam.lab.tracking.edges import Floats
+from snapbeam.lab.tracking.frame_order import FrameOrder, find_order, without_repeats
 from snapbeam.lab.tracking.measure import (
     Drift,
     Follower,
@@ -77,6 +78,11 @@ def tracked_dataset(
     turn = Orientation(settings.side, recording.shape)
     scale = recording.pixel_size * 1e3
     beam, shaker = scene.beam, scene.shaker
+    order = FrameOrder((), (), ())
+    if not (fields.shift or fields.apart or scene.noise.lag):
+        depth = rows.row + beam.thickness - rows.shaker - (shaker.tip_offset if shaker is not None else np.nan)
+        order = find_order(rows.row, rows.shaker, depth)
+        rows = without_repeats(rows, order)
     beam_mm = settings.rest * 1e3 - turn.sign * scale * (rows.row - rest.row)
     tip = rows.shaker + (shaker.tip_offset if shaker is not None else np.nan)
     shaker_mm = settings.rest * 1e3 - turn.sign * scale * (tip - beam.thickness - rest.row)
@@ -84,12 +90,12 @@ def tracked_dataset(
     offset = _offset_error(rows.row, rest)
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
-    seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields)
-    diagnostics = (*recording.diagnostics, *tracking_diagnostics(scene, seen, settings, scale * offset))
+    seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields, order)
+    diagnostics = (*recording.diagnostics, *tracking_diagnostics(scene, seen, settings, scale * offset, recording.frame_rate))
     # a shift of the edges by the camera's curve moves the shaker against the beam, not the beam against itself
     placed = scene.placed_error
     bent = math.hypot(2.0 * scene.shape.shift, contact_shift(touch, placed), placed)
-    bent = math.hypot(bent, never_touching(penetration, rows.row), rounding_shift(scene.beam))
+    bent = math.hypot(bent, never_touching(penetration, rows), rounding_shift(scene.beam), 2.0 * rows.hollow)
     # an edge that is no blurred step is found a little off, by where in its pixel it lies
     misfit = 0.7 * float(np.nan_to_num(scene.shape.misfit))
     if scene.shape.clipped > CLIPPED:
