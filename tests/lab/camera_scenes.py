@@ -123,7 +123,7 @@ def _lossless(path, frames):
 
     height, width = frames.shape[1:]
     writer = imageio_ffmpeg.write_frames(
-        str(path), (width, height), fps=25, codec="libx264", output_params=["-qp", "0", "-pix_fmt", "gray"],
+        str(path), (width, height), fps=25, quality=None, codec="libx264", output_params=["-qp", "0", "-pix_fmt", "gray"],
         macro_block_size=2, pix_fmt_in="gray", ffmpeg_log_level="error",
     )  # fmt: skip
     writer.send(None)

@@ -97,6 +97,13 @@ KINDS = table(
         "frame(s), which is in their standard errors; keep the frames as they were taken",
     ),
     Kind(
+        "camera.lag", WARNING,
+        "how the blur of the edge grows with its speed, against what the exposure explains",
+        "a frame still shows about {share_percent:.0f} % of the one before (image lag of the sensor, an afterglow of the "
+        "lamp, or a longer exposure than the file says): positions lag by that share of a frame, which is in their "
+        "standard errors; more light and a shorter exposure, or give the frames as they were taken",
+    ),
+    Kind(
         "camera.smoothed", WARNING,
         "noise of pixels, against that of their neighbours",
         "noise of neighbouring pixels is alike (correlation {correlation:.2f}): pictures were enlarged, smoothed, "
@@ -231,7 +238,8 @@ class SeenMotion:
     """What the diagnostics of a tracked recording are drawn from, beside the scene.
 
     ``penetration`` [px] of the tip into the beam, NaN where unknown, and that while they ``touch``; ``scale``
-    [mm/px]; ``drift`` [px] of the camera, the largest; ``fields`` of interlaced video; ``order`` of the frames.
+    [mm/px]; ``drift`` [px] of the camera, the largest; ``fields`` of interlaced video; ``order`` of the
+    frames; ``trail``, the share of the frame before that a frame still shows.
     """
 
     rows: TrackedRows
@@ -242,6 +250,7 @@ class SeenMotion:
     drift: float
     fields: VideoFields
     order: FrameOrder
+    trail: float
 
 
 def tracking_diagnostics(
@@ -253,6 +262,8 @@ def tracking_diagnostics(
     """
     told = [*_of_the_beam(scene, seen, settings), *_of_the_rest(seen, settings, offset_mm)]
     told += [*_of_the_motion(seen, settings, rate), *_of_the_order(seen.order, rate)]
+    if seen.trail > 0.0:
+        told.append(KINDS["lag"].found(share_percent=100.0 * seen.trail))
     if seen.rows.hollow > 0.0:
         told.append(KINDS["curved"].found(hollow_px=seen.rows.hollow))
     told += _of_the_edges(scene.shape, settings)

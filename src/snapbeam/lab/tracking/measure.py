@@ -39,6 +39,7 @@ __all__ = [
     "distortion",
     "fields_apart",
     "find_rest",
+    "image_lag",
     "jumps",
     "measure_beam",
     "measure_shaker",
@@ -888,6 +889,39 @@ def _within_windows(windows: Floats, position: Floats, width: float, centre: Flo
     solved = np.linalg.solve(gram, np.einsum("...ri,...r->...i", basis, windows)[..., None])[..., 0]
     out: Floats = solved[..., 3] / np.where(np.abs(solved[..., 1]) > 0.0, solved[..., 1], np.nan)
     return out
+
+
+_SURE_LAG = 4.0  # standard errors
+_LAG = 0.04  # of the square of the speed by which the square of the blur must exceed what the exposure explains
+
+
+def image_lag(row: Floats, width: Floats, exposure: float) -> float:
+    """Share of the light of the frame before that a frame still shows; 0 where none is told.
+
+    Motion at a speed v a frame adds v^2 s^2/12 to the square of an edge's blur, s the exposure over the time between
+    frames; a share a of the frame before adds v^2 a (1 - a).
+
+    Parameters
+    ----------
+    row, width
+        Of the beam's edge, over the frames [px].
+    exposure
+        Over the time between frames; 1 where it is not known.
+    """
+    speed = np.full(row.size, np.nan)
+    speed[1:-1] = 0.5 * (row[2:] - row[:-2])
+    bend = np.full(row.size, np.nan)
+    bend[1:-1] = np.abs(row[2:] - 2.0 * row[1:-1] + row[:-2])
+    with np.errstate(invalid="ignore"):
+        used = np.isfinite(width) & (bend < 0.3 * np.abs(speed) + _MOVES)  # not where the beam is struck
+    if np.count_nonzero(used & (np.abs(np.nan_to_num(speed)) > 3.0 * _MOVES)) < _LEAST:
+        return 0.0
+    x, y = speed[used] ** 2, width[used] ** 2
+    (slope, _), cover = np.polyfit(x, y, 1, cov=True)
+    more = float(slope) - min(exposure, 1.0) ** 2 / 12.0
+    if more < max(_LAG, _SURE_LAG * math.sqrt(float(cover[0, 0]))):
+        return 0.0
+    return 0.5 - math.sqrt(max(0.25 - more, 0.0))
 
 
 def alternation(row: Floats) -> float:

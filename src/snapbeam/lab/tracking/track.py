@@ -26,6 +26,7 @@ from snapbeam.lab.tracking.measure import (
     Rest,
     TrackedRows,
     find_rest,
+    image_lag,
     measure_beam,
     measure_shaker,
     seen_fields,
@@ -69,7 +70,11 @@ def tracked_dataset(
 
     *drift* [px] is the largest shift of the camera that was taken out, *fields* what is seen of interlaced video.
     """
-    rows = _as_filtered(rows, scene.noise, fields)
+    trail = 0.0
+    if not (fields.shift or fields.apart or scene.noise.lag):
+        opened = 1.0 if recording.exposure is None else recording.exposure * recording.frame_rate
+        trail = image_lag(rows.row, rows.width, opened)
+    rows = _as_filtered(rows, scene.noise, fields, trail)
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
     if not rest.indices.size:
         raise InputError(
@@ -90,7 +95,7 @@ def tracked_dataset(
     offset = _offset_error(rows.row, rest)
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
-    seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields, order)
+    seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields, order, trail)
     diagnostics = (*recording.diagnostics, *tracking_diagnostics(scene, seen, settings, scale * offset, recording.frame_rate))
     # a shift of the edges by the camera's curve moves the shaker against the beam, not the beam against itself
     placed = scene.placed_error
@@ -140,9 +145,12 @@ def tracked_dataset(
     return dataset
 
 
-def _as_filtered(rows: TrackedRows, noise: NoiseShape, fields: VideoFields) -> TrackedRows:
-    """The rows with errors of pictures that were averaged over frames, smoothed or interlaced, where that is seen."""
-    lag = noise.lag + fields.lag
+def _as_filtered(rows: TrackedRows, noise: NoiseShape, fields: VideoFields, trail: float) -> TrackedRows:
+    """The rows with errors of pictures that were averaged over frames, smoothed or interlaced, where that is seen.
+
+    *trail* is the share of the frame before that a frame still shows.
+    """
+    lag = noise.lag + fields.lag + trail
 
     def widened(row: Floats, error: Floats) -> Floats:
         step = np.abs(np.diff(row, prepend=np.nan, append=np.nan))
