@@ -132,7 +132,7 @@ def _lossless(path, frames):
     writer.close()
 
 
-def measured(kind, rng, folder):
+def measured(kind, rng, folder, **asked):
     """Draw, change, write, read and track a scene; the tracked dataset and the truth."""
     scene, scale = prepared(kind, rng)
     camera, stage = SyntheticCamera(**scene.camera), SyntheticStage(**scene.stage)
@@ -160,7 +160,7 @@ def measured(kind, rng, folder):
             pixel_size=camera.pixel_size * scale, exposure=camera.exposure, bit_depth=stored,
             effective_bits=camera.bit_depth,
         )  # fmt: skip
-    settings = {"rest_displacement": -sign * LEVEL, "side": stage.side, **scene.settings}
+    settings = {"rest_displacement": -sign * LEVEL, "side": stage.side, **scene.settings, **asked}
     with open_recording(
         path, frame_rate=camera.frame_rate, pixel_size=camera.pixel_size * scale
     ) as opened:

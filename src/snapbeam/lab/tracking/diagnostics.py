@@ -185,13 +185,13 @@ KINDS = table(
     Kind(
         "camera.frames_lost", ERROR,
         "the motion of striker and beam over ten frames, with and without a jump of the time between them",
-        "{frames:.0f} frame(s) are missing at {places:.0f} place(s), the first before frame {first:.0f}: times after it "
-        "are up to {short_ms:.3g} ms too small; copy the recording again, or keep the frames before",
+        "at least {frames:.0f} frame(s) are missing at {places:.0f} place(s), the first before frame {first:.0f}: times after it "
+        "are {short_ms:.3g} ms or more too small; copy the recording again, or keep the frames before",
     ),
     Kind(
         "camera.frames_repeated", WARNING,
         "the motion of striker and beam over ten frames, with and without a frame in which both stand still",
-        "{frames:.0f} frame(s) show the frame before again, the first is frame {first:.0f}: left out; keep the frames as "
+        "at least {frames:.0f} frame(s) show the frame before again, the first is frame {first:.0f}: left out; keep the frames as "
         "they were taken",
     ),
     Kind(

@@ -1,8 +1,8 @@
 """Frames that are lost, or shown twice, located by the motion of striker and beam.
 
-A frame that is lost makes both move two steps in one; a frame shown twice makes both stand still for one.  Five
-frames before a place and five after it are fitted with one cubic over time, whose clock runs on evenly, jumps by
-the frames that were lost, or stops for a frame.
+A frame that is lost makes both move two steps in one; a frame shown twice makes both stand still for one.  Some
+frames before a place and as many after it are fitted with one cubic over time, whose clock runs on evenly, jumps by
+the frames that were lost, or stops for a frame.  The striker moves smoothly, so more frames tell more of it.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from snapbeam.lab.tracking.settings import FrameFlag
 __all__ = ["FrameOrder", "find_order", "without_repeats"]
 
 
-_HALF = 5  # frames on either side of a place
+_HALVES = (5, 8, 12)  # frames on either side of a place; of the beam the first
 _DEGREE = 3
 _MOST = 3  # frames lost at one place
-_BETTER = 36.0  # chi-square by which a clock must be better than one that runs on evenly
+_BETTER = 30.0  # chi-square by which a clock must be better than one that runs on evenly
 _TOUCHING = 3.0  # times as much, where the tip may touch the beam
-_FITS = 25.0  # chi-square, of six degrees of freedom, that a fit may leave
+_SPREADS = 5.5  # standard deviations of chi-square that a fit may leave beyond its degrees of freedom
 _APART = 2.0  # px of gap at which beam and tip move on their own
 _LEAST_NOISE = 0.005  # px
 
@@ -48,37 +48,25 @@ def find_order(row: Floats, shaker: Floats, penetration: Floats) -> FrameOrder:
     penetration
         Of the tip into the beam [px].
     """
-    length = 2 * _HALF
-    if row.size < 4 * length:
+    if row.size < 4 * _HALVES[-1]:
         return FrameOrder((), (), ())
-    views = np.lib.stride_tricks.sliding_window_view
-    with np.errstate(invalid="ignore"):
-        flying = (views(penetration, length) < -_APART).all(1)
-    clocks = _clocks()
-    gain = np.zeros((clocks.shape[0] - 1, row.size - length + 1))
-    followed = np.isfinite(shaker).any()
-    for values, own in ((shaker, False), (row, True)):
-        noise = _noise(values)
-        if not math.isfinite(noise):
-            continue
-        windows = views(values, length)
-        left = np.stack([_left(windows, clock) for clock in clocks]) / noise**2
-        better = np.where((left[0] > _FITS) & (left[1:] > _FITS), 0.0, left[0] - left[1:])
-        better = np.where(np.isfinite(better), better, 0.0)
-        # a beam that may be struck changes its velocity; without a shaker nothing tells when
-        better[:, ~flying] = better[:, ~flying] / _TOUCHING if not own or not followed else 0.0
-        gain += better
+    followed = bool(np.isfinite(shaker).any())
+    # a beam that may be struck changes its velocity; without a shaker nothing tells when
+    beam = _better(row, penetration, _HALVES[0], 0.0 if followed else 1.0 / _TOUCHING)
+    gain = np.max(
+        [beam + _better(shaker, penetration, half, 1.0 / _TOUCHING) for half in _HALVES], axis=0
+    )
     best = gain.argmax(0)
     size = gain.max(0)
     repeated, missing, many = [], [], []
     while size.max() > _BETTER:
         at = int(size.argmax())
         if best[at] == 0:
-            repeated.append(at + _HALF)
+            repeated.append(at)
         else:
-            missing.append(at + _HALF)
+            missing.append(at)
             many.append(int(best[at]))
-        size[max(at - _HALF + 1, 0) : at + _HALF] = 0.0
+        size[max(at - _HALVES[0] + 1, 0) : at + _HALVES[0]] = 0.0
     order = np.argsort(missing)
     return FrameOrder(
         tuple(sorted(repeated)), tuple(missing[k] for k in order), tuple(many[k] for k in order)
@@ -100,18 +88,41 @@ def without_repeats(rows: TrackedRows, order: FrameOrder) -> TrackedRows:
     return dataclasses.replace(rows, flags=flags, confidence=confidence, **changed)
 
 
-def _clocks() -> Floats:
-    """Times of the ten frames: even, with the sixth as the fifth, and with up to three lost before the sixth."""
-    even = np.arange(2.0 * _HALF) - _HALF + 0.5
+def _better(values: Floats, penetration: Floats, half: int, touching: float) -> Floats:
+    """Chi-square by which each clock is better than an even one, before each frame.
+
+    *touching* is the share of it that counts where the tip may touch the beam.
+    """
+    out = np.zeros((_MOST + 1, values.size))
+    noise = _noise(values)
+    if not math.isfinite(noise):
+        return out
+    views = np.lib.stride_tricks.sliding_window_view
+    windows = views(values, 2 * half)
+    left = np.stack([_left(windows, clock) for clock in _clocks(half)]) / noise**2
+    freedom = 2.0 * half - _DEGREE - 1.0
+    fits = freedom + _SPREADS * math.sqrt(2.0 * freedom)
+    better = np.where((left[0] > fits) & (left[1:] > fits), 0.0, left[0] - left[1:])
+    with np.errstate(invalid="ignore"):
+        flying = (views(penetration, 2 * half) < -_APART).all(1)
+    better *= np.where(flying, 1.0, touching)
+    out[:, half : half + better.shape[1]] = np.where(np.isfinite(better), better, 0.0)
+    return out
+
+
+def _clocks(half: int) -> Floats:
+    """Times of the frames: even, with the first after the middle as the one before, with up to three lost there."""
+    even = np.arange(2.0 * half) - half + 0.5
     twice = even.copy()
-    twice[_HALF] = even[_HALF - 1]
-    late = [even + count * (np.arange(2 * _HALF) >= _HALF) for count in range(1, _MOST + 1)]
+    twice[half] = even[half - 1]
+    late = [even + count * (np.arange(2 * half) >= half) for count in range(1, _MOST + 1)]
     return np.stack([even, twice, *late])
 
 
 def _left(windows: Floats, clock: Floats) -> Floats:
     """Sum of squares that a cubic over *clock* leaves of each window."""
-    basis = np.linalg.qr(np.vander(clock - clock.mean(), _DEGREE + 1))[0]
+    middle = (clock - clock.mean()) / clock.size
+    basis = np.linalg.qr(np.vander(middle, _DEGREE + 1))[0]
     left: Floats = ((windows - (windows @ basis) @ basis.T) ** 2).sum(1)
     return left
 
@@ -120,6 +131,6 @@ def _noise(values: Floats) -> float:
     """Standard deviation of a row about a smooth motion, from its fourth differences."""
     bends = np.diff(values, 4)
     bends = bends[np.isfinite(bends)]
-    if bends.size < 4 * _HALF:
+    if bends.size < 4 * _HALVES[0]:
         return math.nan
     return max(1.4826 * float(np.median(np.abs(bends))) / math.sqrt(70.0), _LEAST_NOISE)

@@ -1,0 +1,142 @@
+"""Errors of camera, file and settings that leave every frame as it should look; each is told or right."""
+
+import types
+
+import camera_scenes
+import imageio_ffmpeg
+import numpy as np
+import pytest
+
+from snapbeam.lab import open_recording
+from snapbeam.lab.tracking.diagnostics import never_touching
+from snapbeam.lab.tracking.frame_order import find_order
+from snapbeam.lab.tracking.measure import find_rest, image_lag
+from snapbeam.lab.tracking.survey import border_bar
+from snapbeam.util.diagnostics import diagnostics_of
+
+
+def motion(count=240, noise=0.03, seed=0):
+    """Rows of a beam that is struck again and again and of a striker, and the penetration [px]."""
+    frame = np.arange(count)
+    rng = np.random.default_rng(seed)
+    striker = 60.0 + 5.0 * np.sin(2.0 * np.pi * frame / 120.0)
+    share = np.clip((np.mod(frame, 50) - 7.0) / 43.0, 0.0, 1.0)
+    gap = 40.0 * share * (1.0 - share)
+    rows = striker - gap + noise * rng.standard_normal(count)
+    return rows, striker + noise * rng.standard_normal(count), -gap
+
+
+@pytest.mark.parametrize("at", [75, 128, 170])
+def test_frames_lost_and_shown_twice_are_located(at):
+    whole = motion()
+    assert find_order(*whole) == ((), (), ())
+    for count in (1, 2):
+        order = find_order(*(np.delete(one, np.arange(at, at + count)) for one in whole))
+        assert order.missing == (at,) and order.many == (count,) and not order.repeated
+    shown = np.arange(240)
+    shown[at] = at - 1
+    order = find_order(*(one[shown] for one in whole))
+    assert order.repeated == (at,) and not order.missing
+
+
+def test_every_tenth_frame_lost_and_every_seventh_a_copy():
+    whole = motion()
+    keep = np.delete(np.arange(240), np.arange(30, 240, 10))
+    order = find_order(*(one[keep] for one in whole))
+    assert len(order.missing) >= 3 and not order.repeated
+    shown = np.arange(240)
+    shown[30::7] -= 1
+    order = find_order(*(one[shown] for one in whole))
+    assert len(order.repeated) >= 3 and not order.missing
+
+
+def test_no_frame_of_a_good_recording_is_taken_for_lost():
+    assert all(find_order(*motion(seed=seed)) == ((), (), ()) for seed in range(60))
+    beam, _, gap = motion()
+    assert find_order(beam, np.full(240, np.nan), np.full(240, np.nan)) == ((), (), ())
+
+
+def test_few_frames_are_at_rest_only_beside_others_at_rest():
+    beam, striker, _ = motion()
+    error = np.full(240, 0.03)
+    for given in ((0, 1), (100, 102), (60, 63)):
+        assert not find_rest(beam[10:], error[10:], striker[10:], given).found
+    still = np.concatenate([np.full(20, beam[0]) + 0.03 * np.random.default_rng(1).standard_normal(20), beam])
+    error = np.full(260, 0.03)
+    for given in ((0, 1), (0, 3), (17, 20)):
+        assert find_rest(still, error, np.full(260, np.nan), given).found
+
+
+def test_image_lag_is_told_by_the_blur_of_fast_frames():
+    beam = motion(noise=0.0)[0]
+    step = np.abs(np.gradient(beam))
+    rng = np.random.default_rng(2)
+    for share, told in ((0.0, False), (0.15, True), (0.3, True)):
+        more = step**2 * (0.5**2 / 12.0 + share * (1.0 - share))
+        width = np.sqrt(1.0 + more) + 0.01 * rng.standard_normal(beam.size)
+        assert (image_lag(beam, width, 0.5) > 0.0) == told
+    assert image_lag(beam, width, 0.5) == pytest.approx(0.3, abs=0.08)
+
+
+def test_a_bar_along_the_border_is_told_from_the_background():
+    beam = np.rint(20.0 + 4.0 * np.sin(np.arange(30))).astype(int)
+    light = np.zeros((30, 60, 24), dtype=bool)
+    for frame, row in zip(light, beam, strict=True):
+        frame[row : row + 12] = True
+    assert border_bar(~light) == 0  # the background ends at a beam that moves
+    light[:, :5] = True
+    assert border_bar(light) == 6
+
+
+def test_a_gap_of_two_pixels_is_no_contact_unless_the_tip_merges():
+    beam, _, depth = motion()
+    for merged, told in ((0, True), (5, False)):
+        rows = types.SimpleNamespace(row=beam, flagged=lambda flag, merged=merged: merged)
+        assert (never_touching(depth - 2.0, rows) > 0.0) == told
+        assert never_touching(depth, rows) == 0.0
+
+
+def test_lossless_h264_is_not_called_lossy(tmp_path):
+    frames = np.random.default_rng(0).integers(0, 255, (4, 32, 48)).astype(np.uint8)
+    for name, option, lossy in (("whole.mp4", "-qp 0", False), ("lossy.mp4", "-crf 10", True)):
+        writer = imageio_ffmpeg.write_frames(
+            str(tmp_path / name), (48, 32), fps=25, quality=None, codec="libx264", macro_block_size=2,
+            output_params=option.split(), pix_fmt_in="gray", pix_fmt_out="gray", ffmpeg_log_level="error",
+        )  # fmt: skip
+        writer.send(None)
+        for frame in frames:
+            writer.send(np.ascontiguousarray(frame))
+        writer.close()
+        with open_recording(tmp_path / name, frame_rate=1000.0, pixel_size=1e-5) as recording:
+            assert ("recording.lossy" in [one.code for one in recording.diagnostics]) == lossy
+
+
+EXPECTED = {
+    "curved edge": "camera.curved",
+    "striker seldom seen": "camera.striker_lost",
+    "one repeated frame": "camera.frames_repeated",
+    "every tenth lost": "camera.frames_lost",
+    "every seventh a copy": "camera.frames_repeated",
+    "frames lost now and then": "camera.frames_lost",
+    "rest in motion": "camera.rest_moves",
+    "pixel size in inches": "camera.thickness",
+    "pixel size ten percent off": "camera.thickness",
+    "image lag": "camera.lag",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [*EXPECTED, "white bar at the edge", "gauge", ""])
+def test_a_rendered_scene_is_told_or_right(kind, tmp_path):
+    outcome = camera_scenes.judged(kind, np.random.default_rng((31, 1, sum(map(ord, kind)))), tmp_path)
+    if kind in EXPECTED:
+        assert EXPECTED[kind] in outcome.codes
+    else:
+        assert not outcome.flagged and outcome.ratio < 5.0
+
+
+def test_a_pixel_size_ten_percent_off_beside_a_gauge_and_impossible_motions_are_told(tmp_path):
+    rng = np.random.default_rng((31, 4, sum(map(ord, "pixel size ten percent off"))))
+    tracked, _ = camera_scenes.measured("pixel size ten percent off", rng, tmp_path, buckling_level=20e-6)
+    codes = [one.code for one in diagnostics_of(tracked)]
+    assert "camera.thickness" in codes and "camera.beyond" in codes
