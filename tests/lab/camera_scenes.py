@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import random_scenes
 from random_scenes import LEVEL, good_scene, motion
@@ -57,7 +59,9 @@ def changed(kind, frames, recording, rng):
         hidden[:rest] = False
         for k in np.flatnonzero(hidden):
             top, half = int(near[k]), 0.5 * stage.shaker_width / recording.camera.pixel_size
-            rod = np.abs(np.arange(width) - (width - 1) / 2.0) < half  # oil hides the sticker and fills the gap
+            rod = (
+                np.abs(np.arange(width) - (width - 1) / 2.0) < half
+            )  # oil hides the sticker and fills the gap
             level = full * (stage.beam if stage.marker_thickness == 0.0 else stage.shaker)
             frames[k, top:, rod] = level + noise * rng.standard_normal((rod.sum(), height - top))
     elif kind == "one repeated frame":
@@ -80,9 +84,9 @@ def changed(kind, frames, recording, rng):
     elif kind == "fixed rows":
         frames += 0.006 * full * rng.standard_normal((height, 1))
     if kind in ("one repeated frame", "every seventh a copy"):  # the copy is encoded by itself
-        frames = frames[shown] + 0.3 * noise * (shown != np.arange(count))[:, None, None] * rng.standard_normal(
-            frames.shape
-        )
+        frames = frames[shown] + 0.3 * noise * (shown != np.arange(count))[
+            :, None, None
+        ] * rng.standard_normal(frames.shape)
         shown = np.arange(count)
     elif shown.size < count:
         frames = frames[shown]
@@ -151,19 +155,17 @@ def measured(kind, rng, folder, **asked):
     if stage.side in ("left", "right"):
         frames = frames.transpose(0, 2, 1)
     if kind == "lossless":
-        path = folder / "scene.mp4"
+        path = Path(folder) / "scene.mp4"
         _lossless(path, frames)
     else:
         stored = 8 if camera.bit_depth == 8 else 12 if camera.bit_depth <= 12 else 16
         path = write_photron(
-            folder / "scene.cihx", list(np.ascontiguousarray(frames)), frame_rate=camera.frame_rate,
+            Path(folder) / "scene.cihx", list(np.ascontiguousarray(frames)), frame_rate=camera.frame_rate,
             pixel_size=camera.pixel_size * scale, exposure=camera.exposure, bit_depth=stored,
             effective_bits=camera.bit_depth,
         )  # fmt: skip
     settings = {"rest_displacement": -sign * LEVEL, "side": stage.side, **scene.settings, **asked}
-    with open_recording(
-        path, frame_rate=camera.frame_rate, pixel_size=camera.pixel_size * scale
-    ) as opened:
+    with open_recording(path, frame_rate=camera.frame_rate, pixel_size=camera.pixel_size * scale) as opened:
         return track(opened, **settings), recording
 
 

@@ -10,6 +10,7 @@ import tempfile
 from pathlib import Path
 from types import SimpleNamespace
 
+import camera_scenes
 import numpy as np
 import pytest
 import random_scenes
@@ -18,8 +19,13 @@ import random_signals
 SURE = 5.0
 SEED = 22
 FALSE = 0.02
-HUNDREDS = {"scene": (200, 200), "drive": (200, 200), "decay": (200, 200)}
-WORDS = {"scene": "scenes", "drive": "vibrometer records", "decay": "free decays"}
+HUNDREDS = {"scene": (200, 200), "camera": (120, 120), "drive": (200, 200), "decay": (200, 200)}
+WORDS = {
+    "scene": "scenes",
+    "camera": "scenes with errors of the series of frames",
+    "drive": "vibrometer records",
+    "decay": "free decays",
+}
 FILE = Path(__file__).parents[2] / "docs" / "data" / "random_defects.md"
 HEAD = (
     "| | good | of these doubted | largest error of good ones, in standard errors | with a defect | of these flagged "
@@ -32,6 +38,7 @@ MAKERS = {
             random_scenes.spoiled_scene(rng, kind) if kind else random_scenes.good_scene(rng), folder, rng
         ),
     ),
+    "camera": (camera_scenes.ERRORS, camera_scenes.judged),
     "drive": (random_signals.DRIVE_DEFECTS, lambda kind, rng, folder: random_signals.judged_drive(rng, kind)),
     "decay": (random_signals.DECAY_DEFECTS, lambda kind, rng, folder: random_signals.judged_decay(rng, kind)),
 }

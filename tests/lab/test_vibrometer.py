@@ -278,7 +278,9 @@ def test_integrated_noise_is_no_filter_and_noise_that_rises_first_no_crash():
         drifting = np.cumsum(rng.standard_normal(12_000))
         quiet += find_low_pass(drifting - np.linspace(drifting[0], drifting[-1], 12_000), rate, 100.0) is None
     assert quiet >= 38
-    rising = scipy.signal.lfilter(*scipy.signal.butter(2, [800.0, 1600.0], "band", fs=rate), rng.standard_normal(12_000))
+    rising = scipy.signal.lfilter(
+        *scipy.signal.butter(2, [800.0, 1600.0], "band", fs=rate), rng.standard_normal(12_000)
+    )
     found = find_low_pass(rising + 0.03 * rng.standard_normal(12_000), rate, 100.0)
     assert found is None or found.corner > 800.0
     first = scipy.signal.lfilter(*scipy.signal.butter(1, 300.0, fs=rate), rng.standard_normal(12_000))

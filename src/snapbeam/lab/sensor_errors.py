@@ -156,7 +156,10 @@ _ONE_SIDED = 0.8  # of the amplitude by which the mean may move
 _THIRD = 0.004  # of the amplitude
 _IN_LINE = 0.1  # rad
 _STRONG = 0.03  # of the amplitude, third harmonic beside which saturation makes a fifth
-_FIFTH = (0.3, 3.0)  # times the square of the third harmonic; a hyperbolic tangent makes 1.2, an arc tangent 1.8
+_FIFTH = (
+    0.3,
+    3.0,
+)  # times the square of the third harmonic; a hyperbolic tangent makes 1.2, an arc tangent 1.8
 _TIMES = 3.0  # times the third harmonic that saturation takes from the first
 
 
@@ -188,7 +191,9 @@ def saturation_loss(fit: SineFit) -> float:
     noise = fit.noise_rms * math.sqrt(2.0 / fit.samples) / fit.amplitude
     turned = math.remainder(float(phase[2]) - 3.0 * float(phase[0]) - math.pi, 2.0 * math.pi)
     told = third > max(_THIRD, 6.0 * noise, 2.0 * others) and abs(turned) < _IN_LINE + 3.0 * noise / third
-    if third > _STRONG and third**2 > 6.0 * noise and amplitude.size > 4:  # else a shaker's own third harmonic
+    if (
+        third > _STRONG and third**2 > 6.0 * noise and amplitude.size > 4
+    ):  # else a shaker's own third harmonic
         fifth = float(amplitude[4] / amplitude[0]) * math.cos(float(phase[4]) - 5.0 * float(phase[0]))
         told = told and _FIFTH[0] * third**2 < fifth < _FIFTH[1] * third**2
     return _TIMES * third if told else 0.0

@@ -302,7 +302,9 @@ def never_touching(penetration: np.ndarray, rows: TrackedRows) -> float:
     if not known.any() or not seen.any() or np.ptp(np.percentile(row[seen], (0.5, 99.5))) <= 2.0:
         return 0.0
     closest = -float(np.percentile(penetration[known], 99.5))
-    least = _CLOSE if rows.flagged(FrameFlag.MERGED) else _NEAR  # a tip that merges with the beam is not seen closer
+    least = (
+        _CLOSE if rows.flagged(FrameFlag.MERGED) else _NEAR
+    )  # a tip that merges with the beam is not seen closer
     return closest if closest > least else 0.0
 
 

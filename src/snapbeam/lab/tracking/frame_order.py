@@ -53,9 +53,7 @@ def find_order(row: Floats, shaker: Floats, penetration: Floats) -> FrameOrder:
     followed = bool(np.isfinite(shaker).any())
     # a beam that may be struck changes its velocity; without a shaker nothing tells when
     beam = _better(row, penetration, _HALVES[0], 0.0 if followed else 1.0 / _TOUCHING)
-    gain = np.max(
-        [beam + _better(shaker, penetration, half, 1.0 / _TOUCHING) for half in _HALVES], axis=0
-    )
+    gain = np.max([beam + _better(shaker, penetration, half, 1.0 / _TOUCHING) for half in _HALVES], axis=0)
     best = gain.argmax(0)
     size = gain.max(0)
     repeated, missing, many = [], [], []

@@ -304,7 +304,8 @@ def _beside(values: Floats, used: NDArray[np.intp], noise: float) -> float:
     middle = float(values[used].mean())
     sides = [values[max(used[0] - short, 0) : used[-1] + 1], values[used[0] : used[-1] + 1 + short]]
     return min(
-        (float(np.abs(side - middle).max()) / noise for side in sides if side.size == _QUIET), default=math.inf
+        (float(np.abs(side - middle).max()) / noise for side in sides if side.size == _QUIET),
+        default=math.inf,
     )
 
 
@@ -892,7 +893,9 @@ def _within_windows(windows: Floats, position: Floats, width: float, centre: Flo
 
 
 _SURE_LAG = 4.0  # standard errors
-_LAG = 0.04  # of the square of the speed by which the square of the blur must exceed what the exposure explains
+_LAG = (
+    0.04  # of the square of the speed by which the square of the blur must exceed what the exposure explains
+)
 
 
 def image_lag(row: Floats, width: Floats, exposure: float) -> float:

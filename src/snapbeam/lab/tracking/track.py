@@ -85,7 +85,9 @@ def tracked_dataset(
     beam, shaker = scene.beam, scene.shaker
     order = FrameOrder((), (), ())
     if not (fields.shift or fields.apart or scene.noise.lag):
-        depth = rows.row + beam.thickness - rows.shaker - (shaker.tip_offset if shaker is not None else np.nan)
+        depth = (
+            rows.row + beam.thickness - rows.shaker - (shaker.tip_offset if shaker is not None else np.nan)
+        )
         order = find_order(rows.row, rows.shaker, depth)
         rows = without_repeats(rows, order)
     beam_mm = settings.rest * 1e3 - turn.sign * scale * (rows.row - rest.row)
@@ -96,7 +98,10 @@ def tracked_dataset(
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
     seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields, order, trail)
-    diagnostics = (*recording.diagnostics, *tracking_diagnostics(scene, seen, settings, scale * offset, recording.frame_rate))
+    diagnostics = (
+        *recording.diagnostics,
+        *tracking_diagnostics(scene, seen, settings, scale * offset, recording.frame_rate),
+    )
     # a shift of the edges by the camera's curve moves the shaker against the beam, not the beam against itself
     placed = scene.placed_error
     bent = math.hypot(2.0 * scene.shape.shift, contact_shift(touch, placed), placed)
