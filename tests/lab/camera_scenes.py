@@ -13,10 +13,12 @@ from snapbeam.lab.camera import write_photron
 from snapbeam.lab.tracking.settings import Orientation
 
 ERRORS = (
-    "white bar at the edge", "sticker near a black tip", "curved edge", "striker seldom seen", "one repeated frame",
+    "white bar at the edge", "curved edge", "striker seldom seen", "one repeated frame",
     "every tenth lost", "every seventh a copy", "frames lost now and then", "rest in motion", "pixel size in inches",
     "pixel size ten percent off", "image lag",
 )  # fmt: skip
+UNTOLD = ("sticker near a black tip",)
+"""A sticker within some four pixels of a tip that is not seen may be taken for the tip without a message."""
 FAIR = ("gauge", "noise of rows", "fixed rows", "uneven light", "dark rod", "lossless")
 
 
