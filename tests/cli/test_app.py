@@ -131,7 +131,7 @@ def test_map_writes_what_it_says(cli, tmp_path):
 
 def test_file_and_options_together(cli, tmp_path):
     (tmp_path / "beam.toml").write_text(
-        "[model]\nmodes = 2\n[integration]\ncycles = 4\n"
+        "extends = 'paper'\n[model]\nmodes = 2\n[integration]\ncycles = 4\n"
         "[sweep]\nfrequency_ratio = [0.5, 1.0]\n[drive]\nvelocity_amplitude = 0.3\n"
         "[contact]\nstiffness = 1e8\n",
         encoding="utf-8",
