@@ -370,6 +370,7 @@ def test_physical_units_are_ratios_of_the_system():
     np.testing.assert_allclose(axes["drive.frequency_ratio"] * freq, [50.0, 75.0, 100.0], rtol=1e-14)
     np.testing.assert_allclose(axes["striker.location"] * 0.161, [0.02, 0.04, 0.06, 0.08], rtol=1e-14)
     for name in PHYSICAL:
+        assert [row.parameter for row in PHYSICAL.values()].count(PHYSICAL[name].parameter) == 1
         np.testing.assert_allclose(
             to_physical(system, name, from_physical(system, name, [0.1, 2.0])), [0.1, 2.0], rtol=1e-14
         )
@@ -383,6 +384,33 @@ def test_physical_units_are_ratios_of_the_system():
         }
     )
     assert fixed.system.get("drive.frequency_ratio") == 1.25
+
+
+def test_a_base_in_hz_and_g():
+    """35 Hz and 0.3 g of a base, and an axis in Hz that alone gives its frequency."""
+    base = {"type": "acceleration_sine", "frequency_hz": 35.0, "amplitude_g": 0.3}
+    config = config_from_mapping({"extends": "paper", "base_excitation": base})
+    system = config.system
+    motion, freq = system.base_excitation.motion, system.model.reference_frequency
+    assert motion.frequency_ratio * freq == pytest.approx(35.0, rel=1e-14)
+    peak = motion.acceleration_amplitude * BEAM.buckling_level * (2.0 * np.pi * freq) ** 2
+    assert peak == pytest.approx(0.3 * 9.80665, rel=1e-14)
+    del base["frequency_hz"]
+    for extends in ({"extends": "paper"}, _given("beam", "model")):
+        config = config_from_mapping(
+            extends | {"base_excitation": base, "sweep": {"base_excitation.frequency_hz": [30.0, 40.0]}}
+        )
+        hertz = config.axes()["base_excitation.frequency_ratio"] * config.system.model.reference_frequency
+        np.testing.assert_allclose(hertz, [30.0, 40.0], rtol=1e-14)
+    both = {"type": "acceleration_sine", "frequency_hz": 35.0, "frequency_ratio": 0.4, "amplitude_g": 0.3}
+    with pytest.raises(InputError, match="give frequency_ratio or frequency_hz, not both"):
+        config_from_mapping({"extends": "paper", "base_excitation": both})
+
+
+def _given(*sections):
+    import tomllib
+
+    return {name: tomllib.loads(OWN)[name] for name in sections}
 
 
 def test_a_start_by_name():

@@ -395,9 +395,10 @@ _CONVERTED = {"radius", *WANTED, *(name.partition(".")[2] for name in PHYSICAL)}
 _RIVALS: dict[str, list[tuple[set[str], set[str]]]] = {
     "beam": [({"buckling_level"}, {"axial_load"})],
     "contact": contact_rivals(),
-    "drive": [({"frequency_ratio"}, {"frequency_hz"}), ({"velocity_amplitude"}, {"velocity_m_s"})],
-    "striker": [({"location"}, {"location_m"})],
 }
+for _name, _row in PHYSICAL.items():
+    _section, _, _own = _name.partition(".")
+    _RIVALS.setdefault(_section, []).append(({_row.parameter.partition(".")[2]}, {_own}))
 
 
 @dataclass(frozen=True)
@@ -434,7 +435,8 @@ class Config:
             if section != name or key in found:
                 continue
             if axis in PHYSICAL:
-                if not self.extends_paper and axis.partition(".")[2] not in found:
+                own = axis.partition(".")[2] in found or (self.extends_paper and name in _STRIKING)
+                if not own:
                     found[key] = _stand_in(key, 0.0)
                 continue
             row = known.get(f"{numbered(name)[0]}.{key}")
@@ -566,15 +568,15 @@ class Config:
         if self._is_unstruck:
             for name in _STRIKING:
                 del sections[name]
-            return self._started(System.from_mapping(sections))
-        sections["contact"] = contact_of(sections["contact"])
-        if self._stands_still:
-            sections["drive"] = {"type": "fixed"}
-        sections["drive"].setdefault("type", "sine")
+        else:
+            sections["contact"] = contact_of(sections["contact"])
+            if self._stands_still:
+                sections["drive"] = {"type": "fixed"}
+            sections["drive"].setdefault("type", "sine")
         later = {
             f"{section}.{name}": sections[section].pop(name)
-            for section in ("drive", "striker")
-            for name in [key for key in sections[section] if f"{section}.{key}" in PHYSICAL]
+            for section in ("drive", "striker", "base_excitation")
+            for name in [key for key in sections.get(section, {}) if f"{section}.{key}" in PHYSICAL]
         }
         for physical, value in later.items():
             own = PHYSICAL[physical].parameter.partition(".")[2]
@@ -693,7 +695,8 @@ class Config:
                 if any(abs(unit_of(each, name) / unit_of(self.system, name) - 1.0) > 1e-9 for each in there):
                     ratio = PHYSICAL[name].parameter
                     raise InputError(
-                        f"{name}: is made into {ratio}, whose unit changes along {axis}; give {ratio}"
+                        f"{name}: is made into {ratio}, whose unit changes along {axis}; give {ratio}, or use sb.sweep "
+                        f"with an axis {name}"
                     )
 
     def to_mapping(self) -> dict[str, dict[str, Any]]:
@@ -703,7 +706,7 @@ class Config:
 
 def _stand_in(name: str, value: Any) -> float:
     """A value that lets the system be made before the physical one is known."""
-    return 1.0 if name == "frequency_ratio" else 0.0 if name == "velocity_amplitude" else 0.5
+    return 1.0 if name == "frequency_ratio" else 0.5 if name == "location" else 0.0
 
 
 def config_from_mapping(sections: Mapping[str, Any], source: str = "", *, complete: bool = True) -> Config:
