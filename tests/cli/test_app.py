@@ -125,6 +125,16 @@ def test_map_writes_what_it_says(cli, tmp_path):
 
     again = cli("plot", "map.nc", "-o", "map.pdf", "--quasi-static-line")
     assert again.exit_code == 0 and (tmp_path / "map.pdf").read_bytes().startswith(b"%PDF")
+    other = cli(*MAP, "-o", "b.nc", "--plot", "b.png", "--variable", "peak_force")
+    assert other.exit_code == 0, other.output
+    assert (tmp_path / "b.png").read_bytes() != (tmp_path / "map.png").read_bytes()
+    for wrong, words in (
+        (("--plot", "c.png", "--variable", "peak_forc"), "variable = 'peak_forc': must be one of"),
+        (("--variable", "peak_force"), "give --plot FILE"),
+        (("--plot", "c.png", "--variable", "peak_force", "--quasi-static-line"), "leave them out"),
+    ):
+        refused = cli(*MAP, "-o", "c.nc", *wrong)
+        assert refused.exit_code == 2 and words in " ".join(refused.stderr.split())
     refused = cli("plot", "map.nc", "-o", "b.png", "--location", "0.3")
     assert refused.exit_code == 2 and "location: is not an axis of this map" in refused.stderr
 

@@ -129,6 +129,15 @@ class Physical:
     unit: str
     words: str
 
+    def unit_of(self, length: float, omega: float) -> float:
+        """What a ratio of 1 is, from the length scale (m) and omega_1 (rad/s); not of a location."""
+        return {
+            "frequency_ratio": omega / (2.0 * math.pi),
+            "velocity_amplitude": length * omega,
+            "displacement_amplitude": 1e6 * length,
+            "acceleration_amplitude": length * omega**2 / GRAVITY,
+        }[self.parameter.partition(".")[2]]
+
 
 PHYSICAL: dict[str, Physical] = {
     "drive.frequency_hz": Physical("drive.frequency_ratio", "Hz", "excitation frequency"),
@@ -159,15 +168,9 @@ def physical_name(name: str) -> str | None:
 
 def unit_of(system: System, name: str) -> float:
     """What a ratio of 1 is in the physical unit of *name*."""
-    scale, parameter = system.scale, PHYSICAL[name].parameter
-    units = {
-        "frequency_ratio": scale.omega / (2.0 * math.pi),
-        "velocity_amplitude": scale.length * scale.omega,
-        "displacement_amplitude": 1e6 * scale.length,
-        "acceleration_amplitude": scale.length * scale.omega**2 / GRAVITY,
-    }
-    if parameter != "striker.location":
-        return units[parameter.partition(".")[2]]
+    scale, row = system.scale, PHYSICAL[name]
+    if row.parameter != "striker.location":
+        return row.unit_of(scale.length, scale.omega)
     if system.model.beam is None:
         raise InputError("striker.location_m: a structure given by matrices has no length; give location")
     return system.model.beam.length

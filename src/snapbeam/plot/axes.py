@@ -10,6 +10,7 @@ from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
+from snapbeam.model.parameter_axes import PHYSICAL, Physical
 from snapbeam.model.parameters import Parameter, lookup
 from snapbeam.plot.style import cell_edges
 from snapbeam.util.validation import InputError
@@ -48,7 +49,11 @@ def axis_label(dataset: xr.Dataset, name: str) -> str:
     if name in AXIS_LABELS:
         return AXIS_LABELS[name]
     row = _parameter(dataset, name)
-    if row is not None:
+    physical = _physical(dataset, name)
+    if physical is not None:
+        words = physical[1]
+        text = f"{words.words[:1].upper()}{words.words[1:]} ({words.unit})"
+    elif row is not None:
         text = row.label
     else:
         labels = dataset[name].attrs if name in dataset.coords else {}
@@ -67,6 +72,7 @@ def _power(dataset: xr.Dataset, name: str) -> tuple[int, str]:
     if (
         words is not None
         or name in AXIS_LABELS
+        or _physical(dataset, name) is not None
         or is_geometric(points)
         or most == 0.0
         or _SMALL <= most < _LARGE
@@ -96,11 +102,29 @@ def _parameter(dataset: xr.Dataset, name: str) -> Parameter | None:
         return None
 
 
+def _physical(dataset: xr.Dataset, name: str) -> tuple[float, Physical] | None:
+    """What a ratio of 1 is in the physical unit that the motion of a base is drawn in; None of other axes."""
+    row = _parameter(dataset, name)
+    frequency, length = (dataset.attrs.get(each) for each in ("reference_frequency", "length_scale"))
+    if row is None or row.section != "base_excitation" or frequency is None or length is None:
+        return None
+    omega = 2.0 * np.pi * float(frequency)
+    return next(
+        (
+            (each.unit_of(float(length), omega), each)
+            for each in PHYSICAL.values()
+            if each.parameter == row.name
+        ),
+        None,
+    )
+
+
 def positions(dataset: xr.Dataset, name: str) -> tuple[_Array, list[str] | None]:
     """Where the points of an axis are drawn; words and whole numbers stand side by side, with their names."""
     values = np.asarray(dataset[name].values)
     if values.dtype.kind in "fc":
-        return values.astype(np.float64), None
+        physical = _physical(dataset, name)
+        return values.astype(np.float64) * (1.0 if physical is None else physical[0]), None
     return np.arange(values.size, dtype=np.float64), [str(value) for value in values]
 
 
