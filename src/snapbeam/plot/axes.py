@@ -10,7 +10,7 @@ from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
-from snapbeam.model.parameter_axes import PHYSICAL, Physical
+from snapbeam.model.parameter_axes import PHYSICAL
 from snapbeam.model.parameters import Parameter, lookup
 from snapbeam.plot.style import cell_edges
 from snapbeam.util.validation import InputError
@@ -18,7 +18,16 @@ from snapbeam.util.validation import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["AXIS_LABELS", "axis_label", "dress", "edges_of", "is_geometric", "positions", "symbol_of"]
+__all__ = [
+    "AXIS_LABELS",
+    "axis_label",
+    "dress",
+    "edges_of",
+    "in_units",
+    "is_geometric",
+    "positions",
+    "symbol_of",
+]
 
 
 _Array = NDArray[np.float64]
@@ -49,11 +58,7 @@ def axis_label(dataset: xr.Dataset, name: str) -> str:
     if name in AXIS_LABELS:
         return AXIS_LABELS[name]
     row = _parameter(dataset, name)
-    physical = _physical(dataset, name)
-    if physical is not None:
-        words = physical[1]
-        text = f"{words.words[:1].upper()}{words.words[1:]} ({words.unit})"
-    elif row is not None:
+    if row is not None:
         text = row.label
     else:
         labels = dataset[name].attrs if name in dataset.coords else {}
@@ -65,6 +70,29 @@ def axis_label(dataset: xr.Dataset, name: str) -> str:
     return textwrap.fill(text, _LONGEST, break_long_words=False)
 
 
+def in_units(dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset with axes of a base's motion in Hz, m/s and g, where one reference frequency holds for all points."""
+    frequency, length = (dataset.attrs.get(each) for each in ("reference_frequency", "length_scale"))
+    if frequency is None or length is None:
+        return dataset
+    rows = {
+        row.parameter: (name, row) for name, row in PHYSICAL.items() if name.startswith("base_excitation.")
+    }
+    for dim in map(str, dataset.dims):
+        found = (
+            rows.get(dataset[dim].attrs.get("parameter", ""))
+            if dim in dataset.coords and dataset.sizes[dim] > 1
+            else None
+        )
+        if found is not None:
+            name, row = found
+            unit = row.unit_of(float(length), 2.0 * np.pi * float(frequency))
+            words = f"{row.words[:1].upper()}{row.words[1:]}"
+            attrs = {"units": row.unit, "long_name": words, "parameter": name}
+            dataset = dataset.assign_coords({dim: (dim, dataset[dim].values * unit, attrs)})
+    return dataset
+
+
 def _power(dataset: xr.Dataset, name: str) -> tuple[int, str]:
     """The power of ten that numbers along an axis are counted in, so that ticks are short, and the unit that makes."""
     points, words = positions(dataset, name)
@@ -72,7 +100,6 @@ def _power(dataset: xr.Dataset, name: str) -> tuple[int, str]:
     if (
         words is not None
         or name in AXIS_LABELS
-        or _physical(dataset, name) is not None
         or is_geometric(points)
         or most == 0.0
         or _SMALL <= most < _LARGE
@@ -102,29 +129,11 @@ def _parameter(dataset: xr.Dataset, name: str) -> Parameter | None:
         return None
 
 
-def _physical(dataset: xr.Dataset, name: str) -> tuple[float, Physical] | None:
-    """What a ratio of 1 is in the physical unit that the motion of a base is drawn in; None of other axes."""
-    row = _parameter(dataset, name)
-    frequency, length = (dataset.attrs.get(each) for each in ("reference_frequency", "length_scale"))
-    if row is None or row.section != "base_excitation" or frequency is None or length is None:
-        return None
-    omega = 2.0 * np.pi * float(frequency)
-    return next(
-        (
-            (each.unit_of(float(length), omega), each)
-            for each in PHYSICAL.values()
-            if each.parameter == row.name
-        ),
-        None,
-    )
-
-
 def positions(dataset: xr.Dataset, name: str) -> tuple[_Array, list[str] | None]:
     """Where the points of an axis are drawn; words and whole numbers stand side by side, with their names."""
     values = np.asarray(dataset[name].values)
     if values.dtype.kind in "fc":
-        physical = _physical(dataset, name)
-        return values.astype(np.float64) * (1.0 if physical is None else physical[0]), None
+        return values.astype(np.float64), None
     return np.arange(values.size, dtype=np.float64), [str(value) for value in values]
 
 
