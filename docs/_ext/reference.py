@@ -33,9 +33,10 @@ _SECTIONS = {
     "sphere (m), `young_modulus` (Pa) and `poisson_ratio`, the last two as lists of two numbers, of sphere and beam. You can "
     "give `restitution` and `speed` (m/s) instead of `damping_factor`.",
     "striker": "The striker. `location_m` (m) can replace `location`.",
-    "drive": "The motion of the striker, selected by `type`: {drives}. `frequency_hz` (Hz) and `velocity_m_s` (m/s) can "
-    "replace the ratios. A recorded motion is available from Python and with `--recorded-drive` only.",
-    "base_excitation": "The motion of the base, selected by `type` as in `[drive]`; without this section the base is at rest.",
+    "drive": "The motion of the striker, selected by `type`: {drives}. `frequency_hz` (Hz), `velocity_m_s` (m/s) and "
+    "`displacement_um` (µm) can replace the ratios. A recorded motion is available from Python and with `--recorded-drive` only.",
+    "base_excitation": "The motion of the base, selected by `type` as in `[drive]`; without this section the base is at rest. "
+    "`frequency_hz` (Hz), `velocity_m_s` (m/s) and `amplitude_g` (g) can replace the ratios.",
     "axial_load": "The change of the axial load in time, selected by `type`: {loads}; without this section the load is "
     "constant.",
     "external_force": "A force on the structure as a function of time, selected by `type`: {forces}.",

@@ -125,13 +125,23 @@ def test_map_writes_what_it_says(cli, tmp_path):
 
     again = cli("plot", "map.nc", "-o", "map.pdf", "--quasi-static-line")
     assert again.exit_code == 0 and (tmp_path / "map.pdf").read_bytes().startswith(b"%PDF")
+    other = cli(*MAP, "-o", "b.nc", "--plot", "b.png", "--variable", "peak_force")
+    assert other.exit_code == 0, other.output
+    assert (tmp_path / "b.png").read_bytes() != (tmp_path / "map.png").read_bytes()
+    for wrong, words in (
+        (("--plot", "c.png", "--variable", "peak_forc"), "variable = 'peak_forc': must be one of"),
+        (("--variable", "peak_force"), "give --plot FILE"),
+        (("--plot", "c.png", "--variable", "peak_force", "--quasi-static-line"), "leave them out"),
+    ):
+        refused = cli(*MAP, "-o", "c.nc", *wrong)
+        assert refused.exit_code == 2 and words in " ".join(refused.stderr.split())
     refused = cli("plot", "map.nc", "-o", "b.png", "--location", "0.3")
     assert refused.exit_code == 2 and "location: is not an axis of this map" in refused.stderr
 
 
 def test_file_and_options_together(cli, tmp_path):
     (tmp_path / "beam.toml").write_text(
-        "[model]\nmodes = 2\n[integration]\ncycles = 4\n"
+        "extends = 'paper'\n[model]\nmodes = 2\n[integration]\ncycles = 4\n"
         "[sweep]\nfrequency_ratio = [0.5, 1.0]\n[drive]\nvelocity_amplitude = 0.3\n"
         "[contact]\nstiffness = 1e8\n",
         encoding="utf-8",

@@ -161,16 +161,20 @@ def test_printed_config_is_the_same_system(words, tmp_path):
 
 def test_what_the_paper_lent_is_told(tmp_path):
     file = tmp_path / "beam.toml"
-    file.write_text("[beam]\nlength = 0.2\n[model]\nmodes = 1\n[integration]\ncycles = 4\n", encoding="utf-8")
+    text = "[beam]\nlength = 0.2\n[model]\nmodes = 1\n[integration]\ncycles = 4\n"
+    file.write_text('extends = "paper"\n' + text, encoding="utf-8")
     told = RUNNER.invoke(app, ["simulate", "--config", str(file)]).stderr
-    for text in (
+    for value in (
         "beam.thickness = 0.0004 m",
         "beam.density = 7800 kg/m^3",
         "contact.stiffness = 4e+08 N/m^1.5",
     ):
-        assert text in told
+        assert value in told
     assert "beam.length" not in told
     assert "taken from" not in RUNNER.invoke(app, ["simulate", *SMALL]).stderr
+    file.write_text(text, encoding="utf-8")
+    refused = RUNNER.invoke(app, ["simulate", "--config", str(file)]).stderr
+    assert "[beam] thickness, width, density" in " ".join(refused.split())
 
 
 def test_damping_of_each_mode_and_samples(tmp_path):
@@ -252,7 +256,7 @@ def test_options_complete_a_file(tmp_path):
 
     path = tmp_path / "harvester.toml"
     path.write_text(
-        '[base_excitation]\ntype = "acceleration_sine"\nfrequency_ratio = 0.5\n'
+        'extends = "paper"\n[base_excitation]\ntype = "acceleration_sine"\nfrequency_ratio = 0.5\n'
         '[harvester]\ntype = "coil"\nforce_factor = 0.1\n'
     )
     swept = configured(
@@ -290,7 +294,8 @@ def test_no_striker_is_added_to_a_base(tmp_path, capsys):
     ):
         with pytest.raises(InputError, match="there is no striker to drive, base_excitation moves the beam"):
             configured({"config": path} | given)
-    both = configured({"config": path, "drive.frequency_ratio": 1.0, "striker.location": 0.5})
+    own = {"striker.location": 0.5, "contact.stiffness": 1e8}
+    both = configured({"config": path, "drive.frequency_ratio": 1.0} | own)
     assert both.system.striker is not None
 
 

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from snapbeam.cli.app import app
 
 SYSTEM = """
+extends = "paper"
 [model]
 modes = 1
 [drive]

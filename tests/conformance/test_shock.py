@@ -57,7 +57,7 @@ def test_in_a_parameter_file(tmp_path) -> None:
     """The shock of a file moves the base, and its level may be an axis in g."""
     path = tmp_path / "arch.toml"
     path.write_text(
-        "[base_excitation]\ntype = 'shock'\nacceleration_g = 5000\nduration_ms = 0.2\nshape = 'haversine'\n"
+        "extends = 'paper'\n[base_excitation]\ntype = 'shock'\nacceleration_g = 5000\nduration_ms = 0.2\nshape = 'haversine'\n"
     )
     system = load_config(path).system
     assert system.striker is None

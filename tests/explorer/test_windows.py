@@ -98,7 +98,9 @@ def test_zooming_computes_what_is_seen_and_a_click_runs_its_points(tab, served):
 
 @pytest.mark.slow
 def test_the_papers_beam_is_mapped_while_one_looks(tab, serve, folder):
-    (folder / "quick.toml").write_text("[model]\nmodes = 1\n[integration]\ncycles = 5\n", encoding="utf-8")
+    (folder / "quick.toml").write_text(
+        "extends = 'paper'\n[model]\nmodes = 1\n[integration]\ncycles = 5\n", encoding="utf-8"
+    )
     page = tab(serve("--config", "quick.toml").url)
     page.wait(lambda: len(page.data("map-windows", "image")) == 1, "a map out of nothing")
     finer = ("blocks of 9", "blocks of 3", "blocks of 1 ", "all ")

@@ -236,10 +236,11 @@ def test_by_dotted_name_and_in_files(tmp_path) -> None:
         system.replace(**{"imperfection.tilt": 1.0})
     config = config_from_mapping(
         {
+            "extends": "paper",
             "imperfection": {
                 "midspan_amplitude": 1e-5,
                 "profile": [[0.0, 0.3, 0.7, 1.0], [0.0, 1e-6, 2e-6, 0.0]],
-            }
+            },
         }
     )
     assert config.system.model.is_bistable

@@ -16,6 +16,7 @@ from snapbeam.model.parameter_file import (
     load_config,
     override,
 )
+from snapbeam.model.system import System
 from snapbeam.util.validation import InputError
 
 
@@ -192,7 +193,7 @@ REFUSALS = [
 @pytest.mark.parametrize(("sections", "message"), REFUSALS, ids=[str(case[0]) for case in REFUSALS])
 def test_refusal(sections, message):
     with pytest.raises(InputError) as refusal:
-        config_from_mapping(sections, "beam.toml")
+        config_from_mapping({"extends": "paper"} | sections, "beam.toml")
     assert message in str(refusal.value)
     assert str(refusal.value).startswith("beam.toml: ")
     assert "\n" not in str(refusal.value)
@@ -204,9 +205,17 @@ def test_every_fault_is_named():
     assert len(str(refusal.value).splitlines()) == 3
 
 
+OWN = (
+    "[beam]\nlength = 0.1\nwidth = 0.01\nthickness = 3e-4\ndensity = 7850\nyoung_modulus = 2e11\n"
+    "buckling_level = 5e-4\n[model]\nmodes = 2\ndamping_ratio = 0.01\n[contact]\nstiffness = 1e8\n"
+    "[striker]\nlocation = 0.4\n[drive]\nfrequency_hz = 20\nvelocity_amplitude = 0.1\n"
+)
+
+
 def test_round_trip(tmp_path):
     config = config_from_mapping(
         {
+            "extends": "paper",
             "beam": {"axial_load": 30.0, "length": 0.2},
             "model": {"modes": 8},
             "contact": {"radius": 0.005, "young_modulus": [3.5e9, 2e11], "poisson_ratio": [0.36, 0.3]},
@@ -217,14 +226,15 @@ def test_round_trip(tmp_path):
     path = tmp_path / "beam.toml"
     dump_config(config, path, comment="fitted to a sweep\nof four frequencies")
     text = path.read_text(encoding="utf-8")
-    assert text.startswith("# fitted to a sweep\n# of four frequencies\n\n[beam]\n")
+    start = "# fitted to a sweep\n# of four frequencies\n# what this file leaves out is as in the paper\n"
+    assert text.startswith(start + 'extends = "paper"\n\n[beam]\n')
     assert "# distance between the clamps, m\nlength = 0.2\n" in text
     assert load_config(path) == config
     assert [file.name for file in tmp_path.iterdir()] == ["beam.toml"]
 
 
 def test_override_replaces_what_it_contradicts():
-    config = config_from_mapping({"beam": {"axial_load": 30.0, "length": 0.2}})
+    config = config_from_mapping({"extends": "paper", "beam": {"axial_load": 30.0, "length": 0.2}})
     changed = override(
         config, {"beam": {"buckling_level": 3e-4, "length": None}, "contact": {"stiffness": 1e8}}
     )
@@ -240,6 +250,7 @@ def test_an_option_takes_a_contradicting_value_or_axis_away():
     """Given in a file, overridden on a command line: never both, and never the file's in silence."""
     config = config_from_mapping(
         {
+            "extends": "paper",
             "sweep": {"frequency_ratio": "0.1:2:3", "modes": [1, 2]},
             "drive": {"velocity_m_s": 0.05},
             "striker": {"location_m": 0.05},
@@ -270,22 +281,23 @@ def test_an_axis_gives_a_required_parameter():
     base = {"type": "acceleration_sine", "acceleration_amplitude": 0.5}
     patch = {"type": "piezo", "moment_per_volt": 1e-5, "capacitance": 2e-8}
     axes = {"harvester.resistance": [1e3, 1e6], "base_excitation.frequency_ratio": "0.2:0.5:4"}
-    config = config_from_mapping({"base_excitation": base, "harvester": patch, "sweep": axes})
+    paper = {"extends": "paper"}
+    config = config_from_mapping(paper | {"base_excitation": base, "harvester": patch, "sweep": axes})
     assert config.system.get("harvester.resistance") == 1e3
     assert config.system.get("base_excitation.frequency_ratio") == 0.2
     assert config.axes()["harvester.resistance"].tolist() == [1e3, 1e6]
     assert config_from_mapping(config.whole().to_mapping()).system == config.system
     burst = {"type": "burst", "frequency_ratio": 1.2, "velocity_amplitude": 0.2}
-    config = config_from_mapping({"drive": burst, "sweep": {"drive.duration_cycles": [10.0, 20.0]}})
+    config = config_from_mapping(paper | {"drive": burst, "sweep": {"drive.duration_cycles": [10.0, 20.0]}})
     assert config.system.get("drive.duration_cycles") == 10.0
     with pytest.raises(InputError, match="resistance: missing"):
-        config_from_mapping({"base_excitation": base | {"frequency_ratio": 1.0}, "harvester": patch})
+        config_from_mapping(paper | {"base_excitation": base | {"frequency_ratio": 1.0}, "harvester": patch})
 
 
 def test_one_file_for_every_command(tmp_path):
     """Sections that only other commands read are left to them; a misspelt section is still refused."""
     path = tmp_path / "switch.toml"
-    text = "[model]\nmodes = 2\n[uncertainty.of.'beam.thickness']\nuniform = 0.05\n[probability]\nruns = 8\n[design]\nx = 1\n"
+    text = "extends = 'paper'\n[model]\nmodes = 2\n[uncertainty.of.'beam.thickness']\nuniform = 0.05\n[probability]\nruns = 8\n[design]\nx = 1\n"
     path.write_text(text)
     assert load_config(path).to_mapping() == {"model": {"modes": 2}}
     path.write_text(text.replace("[design]", "[desing]"))
@@ -293,10 +305,56 @@ def test_one_file_for_every_command(tmp_path):
         load_config(path)
 
 
+def test_any_command_reads_the_file_of_another(tmp_path):
+    """System.load converts units and leaves out runs, axes and questions; an unknown section gets a suggestion."""
+    path = tmp_path / "own.toml"
+    path.write_text(
+        OWN + "[sweep]\nlocation = [0.3, 0.4]\n[integration]\ncycles = 3\n[probability]\nruns = 8\n"
+    )
+    system = System.load(path)
+    assert system == load_config(path).system
+    assert system.get("drive.frequency_ratio") == pytest.approx(20.0 / system.model.reference_frequency)
+    system.save(tmp_path / "saved.toml")
+    assert System.load(tmp_path / "saved.toml") == system
+    path.write_text(OWN + "[integraton]\ncycles = 3\n")
+    with pytest.raises(
+        InputError, match=r"own.toml: \[integraton\]: unknown section; did you mean 'integration'"
+    ):
+        System.load(path)
+
+
+def test_nothing_of_the_paper_is_added_unasked(tmp_path):
+    """A file of another beam is complete, or says that the paper completes it; one without a system is the paper's."""
+    path = tmp_path / "own.toml"
+    path.write_text(OWN)
+    assert load_config(path).system.model.beam.length == 0.1
+    for line, words in (("density = 7850\n", "density"), ("damping_ratio = 0.01\n", "damping_ratio"),
+                        ("stiffness = 1e8\n", "stiffness")):  # fmt: skip
+        path.write_text(OWN.replace(line, ""))
+        with pytest.raises(InputError, match=rf"{words}: missing; .*extends = \"paper\""):
+            load_config(path)
+        path.write_text('extends = "paper"\n' + OWN.replace(line, ""))
+        assert load_config(path).system.model.beam.length == 0.1
+    beam = OWN.partition("[contact]")[0]
+    path.write_text(beam)
+    assert load_config(path).system.striker is None
+    path.write_text(beam.replace("damping_ratio = 0.01\n", ""))
+    assert load_config(path).model.beam.length == 0.1  # statics need no damping
+    path.write_text("[integration]\ncycles = 3\n")
+    assert load_config(path).system == Config().system
+    path.write_text('extends = "mine"\n' + OWN)
+    with pytest.raises(InputError, match="extends = 'mine': must be"):
+        load_config(path)
+
+
 def test_physical_units_are_ratios_of_the_system():
     """100 Hz and 31 mm/s at 40 mm from the clamp, given as values and as axes."""
     config = config_from_mapping(
-        {"drive": {"frequency_hz": 100.0, "velocity_m_s": 0.031}, "striker": {"location_m": 0.04}}
+        {
+            "extends": "paper",
+            "drive": {"frequency_hz": 100.0, "velocity_m_s": 0.031},
+            "striker": {"location_m": 0.04},
+        }
     )
     system = config.system
     freq, level = system.model.reference_frequency, BEAM.buckling_level
@@ -312,19 +370,53 @@ def test_physical_units_are_ratios_of_the_system():
     np.testing.assert_allclose(axes["drive.frequency_ratio"] * freq, [50.0, 75.0, 100.0], rtol=1e-14)
     np.testing.assert_allclose(axes["striker.location"] * 0.161, [0.02, 0.04, 0.06, 0.08], rtol=1e-14)
     for name in PHYSICAL:
+        assert [row.parameter for row in PHYSICAL.values()].count(PHYSICAL[name].parameter) == 1
         np.testing.assert_allclose(
             to_physical(system, name, from_physical(system, name, [0.1, 2.0])), [0.1, 2.0], rtol=1e-14
         )
     # the frequency that is normalised by is given, so that no number of modes changes it
     fixed = config_from_mapping(
-        {"sweep": {"modes": [1, 8]}, "drive": {"frequency_hz": 100.0}, "model": {"reference_frequency": 80.0}}
+        {
+            "extends": "paper",
+            "sweep": {"modes": [1, 8]},
+            "drive": {"frequency_hz": 100.0},
+            "model": {"reference_frequency": 80.0},
+        }
     )
     assert fixed.system.get("drive.frequency_ratio") == 1.25
+
+
+def test_a_base_in_hz_and_g():
+    """35 Hz and 0.3 g of a base, and an axis in Hz that alone gives its frequency."""
+    base = {"type": "acceleration_sine", "frequency_hz": 35.0, "amplitude_g": 0.3}
+    config = config_from_mapping({"extends": "paper", "base_excitation": base})
+    system = config.system
+    motion, freq = system.base_excitation.motion, system.model.reference_frequency
+    assert motion.frequency_ratio * freq == pytest.approx(35.0, rel=1e-14)
+    peak = motion.acceleration_amplitude * BEAM.buckling_level * (2.0 * np.pi * freq) ** 2
+    assert peak == pytest.approx(0.3 * 9.80665, rel=1e-14)
+    del base["frequency_hz"]
+    for extends in ({"extends": "paper"}, _given("beam", "model")):
+        config = config_from_mapping(
+            extends | {"base_excitation": base, "sweep": {"base_excitation.frequency_hz": [30.0, 40.0]}}
+        )
+        hertz = config.axes()["base_excitation.frequency_ratio"] * config.system.model.reference_frequency
+        np.testing.assert_allclose(hertz, [30.0, 40.0], rtol=1e-14)
+    both = {"type": "acceleration_sine", "frequency_hz": 35.0, "frequency_ratio": 0.4, "amplitude_g": 0.3}
+    with pytest.raises(InputError, match="give frequency_ratio or frequency_hz, not both"):
+        config_from_mapping({"extends": "paper", "base_excitation": both})
+
+
+def _given(*sections):
+    import tomllib
+
+    return {name: tomllib.loads(OWN)[name] for name in sections}
 
 
 def test_a_start_by_name():
     config = config_from_mapping(
         {
+            "extends": "paper",
             "model": {"modes": 3},
             "initial_state": {"amplitude[1]": -1.0, "velocity[2]": 0.1, "striker_position": 1e-3},
         }

@@ -103,7 +103,7 @@ def test_what_is_read_back_runs_alike(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[bam]\n", r"\[bam\]: unknown section; must be one of beam, model"),
+        ("[bam]\n", r"\[bam\]: unknown section; did you mean 'beam'"),
         ("beam = 3\n", r"beam = 3: must be a section \[beam\]"),
         ("[beam]\n", r"\[beam\] length, thickness, width, density, young_modulus: missing"),
         ("[model]\nmodes = 3\n", r"\[model\] modes: unknown key; must be one of mass"),

@@ -150,3 +150,24 @@ def test_in_axes_of_ones_own(synthetic_map):
 def test_classes_without_runs_are_not_in_the_legend():
     labels = [handle.get_label() for handle in class_handles(np.array([0, 0, 3, 0], dtype=np.int8))]
     assert labels == ["intrawell, 75.0 %", "continuous interwell, 25.0 %"]
+
+
+def test_a_base_is_drawn_in_hz_and_g(synthetic_map):
+    """Axes of ratios of a base become axes in Hz and g: with 50 Hz and 1 mm, a ratio of 0.1 is 5 Hz and 1.006 g."""
+    names = {"frequency_ratio": "frequency_ratio", "velocity_amplitude": "acceleration_amplitude"}
+    dataset = synthetic_map.rename({old: f"base_excitation_{new}" for old, new in names.items()})
+    for new in names.values():
+        dataset[f"base_excitation_{new}"].attrs["parameter"] = f"base_excitation.{new}"
+    dataset.attrs |= {"reference_frequency": 50.0, "length_scale": 1e-3}
+    ax = plot_response_map(dataset)
+    assert {ax.get_xlabel(), ax.get_ylabel()} == {
+        "Frequency of the base (Hz)",
+        "Acceleration amplitude of the base (g)",
+    }
+    frequency = dataset["base_excitation_frequency_ratio"].values * 50.0
+    level = dataset["base_excitation_acceleration_amplitude"].values * 1e-3 * (100.0 * np.pi) ** 2 / 9.80665
+    corners = ax.collections[0].get_coordinates()
+    along = {"Frequency of the base (Hz)": frequency, "Acceleration amplitude of the base (g)": level}
+    x, y = along[ax.get_xlabel()], along[ax.get_ylabel()]
+    np.testing.assert_allclose(corners[0, 1:-1, 0], 0.5 * (x[1:] + x[:-1]))
+    np.testing.assert_allclose(corners[1:-1, 0, 1], 0.5 * (y[1:] + y[:-1]))

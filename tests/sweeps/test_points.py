@@ -9,7 +9,8 @@ import pandas as pd
 import pytest
 import xarray as xr
 
-from snapbeam.sweeps.points import Grid, PointList, points_of
+from snapbeam.model.parameter_file import Config
+from snapbeam.sweeps.points import Grid, PointList, physical_points, points_of
 from snapbeam.util.validation import InputError
 
 MIXED = {
@@ -192,3 +193,21 @@ def frame(**columns) -> pd.DataFrame:
 def test_refusals(given, message: str) -> None:
     with pytest.raises(InputError, match=message):
         points_of(given)
+
+
+def test_axes_in_hz_keep_their_hz() -> None:
+    """Axes in Hz and m are a grid of ratios; beside an axis that changes the frequency, each point has its own ratio."""
+    system = Config().system.replace(**{"model.modes": 1})
+    freq = system.model.reference_frequency
+    grid = physical_points(system, {"frequency_hz": [50.0, 100.0], "striker.location_m": [0.04, 0.06]})
+    assert isinstance(grid, Grid)
+    np.testing.assert_allclose(grid.axes["drive.frequency_ratio"] * freq, [50.0, 100.0], rtol=1e-14)
+    np.testing.assert_allclose(grid.axes["striker.location"] * 0.161, [0.04, 0.06], rtol=1e-14)
+    made = physical_points(system, {"beam.length": [0.1, 0.161], "drive.frequency_hz": [50.0, 100.0]})
+    assert isinstance(made, PointList)
+    assert made.labels["frequency_hz"].tolist() == [50.0, 100.0, 50.0, 100.0]
+    own = [system.replace(**{"beam.length": length}).model.reference_frequency for length in (0.1, 0.161)]
+    ratios = made.columns["drive.frequency_ratio"]
+    np.testing.assert_allclose(ratios * np.repeat(own, 2), [50.0, 100.0, 50.0, 100.0], rtol=1e-12)
+    with pytest.raises(InputError, match="given twice"):
+        physical_points(system, {"frequency_hz": [50.0], "frequency_ratio": [1.0]})

@@ -43,6 +43,14 @@ def compute_map(
         ),
     ] = Path("map.nc"),
     plot: opt.Plot = None,
+    variable: Annotated[
+        str | None,
+        typer.Option(
+            help="Statistic that --plot draws, such as peak_force; the response class by default.",
+            rich_help_panel="Output",
+            metavar="NAME",
+        ),
+    ] = None,
     measurements: opt.Measurements = None,
     quasi_static_line: opt.QuasiStaticLine = False,
     threads: opt.Threads = None,
@@ -65,6 +73,7 @@ def compute_map(
     check_pictures(("plot", plot))
     if plot is not None:
         _check_two_axes(plot, axes)
+    _check_variable(variable, plot, overlaid=measurements is not None or quasi_static_line)
     system = settings.system
     system.model.require_bistable("a map")
     beam = system.model.beam
@@ -102,8 +111,11 @@ def compute_map(
         write_map(dataset, output)
     files = [output]
     if plot is not None:
+        overlays = {"measurements": overlay, "quasi_static_line": quasi_static_line}
         files.append(
-            draw(dataset, plot, "response_class", measurements=overlay, quasi_static_line=quasi_static_line)
+            draw(dataset, plot, variable)
+            if variable not in (None, "response_class")
+            else draw(dataset, plot, "response_class", **overlays)
         )
     add_json(**map_facts(dataset), seconds=elapsed, files=files)
     out().print(map_summary(dataset, files, None if opt.is_long(keeping) else elapsed))
@@ -145,6 +157,23 @@ def _default(name: str, text: str) -> dict[str, Any]:
     from snapbeam.model.parameter_axes import parse_axis
 
     return {name: parse_axis(name, text)}
+
+
+def _check_variable(variable: str | None, plot: Path | None, *, overlaid: bool) -> None:
+    """Refuse, before any run, a variable that the map will not have or that --plot cannot draw."""
+    from snapbeam.solver.statistics import STATISTICS
+    from snapbeam.util.validation import InputError, choice
+
+    if variable is None:
+        return
+    choice("variable", variable, tuple(STATISTICS))
+    if plot is None:
+        raise InputError(f"variable = {variable!r}: names what --plot draws; give --plot FILE")
+    if overlaid and variable != "response_class":
+        raise InputError(
+            f"variable = {variable!r}: measured responses and the quasi-static line are drawn over response classes; "
+            "leave them out"
+        )
 
 
 def _check_two_axes(path: Path, axes: dict[str, Any]) -> None:

@@ -333,13 +333,19 @@ def configured(
         out().print(config_text(printed), markup=False, end="")
         add_json(**printed.to_mapping())
         raise typer.Exit
-    if config.defaulted:
+    if config.defaulted and (config.extends_paper or _needs_drive(given)):
         whole = config.whole().to_mapping()
         taken = [name for name in config.defaulted if name.partition(".")[0] in whole]
         values = ", ".join(f"{name} = {_shown(whole, name)}" for name in taken)
+        source = "taken from the paper's beam" if config.extends_paper else "not in the file, by default"
         if taken:
-            notes().print(f"[bold yellow]note:[/] taken from the paper's beam: {escape(values)}")
+            notes().print(f"[bold yellow]note:[/] {source}: {escape(values)}")
     return config
+
+
+def _needs_drive(given: Mapping[str, Any]) -> bool:
+    """Whether a command runs one drive, and has no axes of its own."""
+    return "drive.frequency_ratio" in given and "sweep" not in given
 
 
 def _require_striker(config: Config, sections: Mapping[str, Any], axes: Mapping[str, Any]) -> None:
@@ -634,7 +640,7 @@ def kept_config(settings: Config, keeping: Mapping[str, Any]) -> dict[str, Any]:
         }
         for section, values in settings.to_mapping().items()
     }
-    return {"parameters": plain, "options": options}
+    return {"parameters": plain | settings.extension, "options": options}
 
 
 class LongReport:

@@ -83,10 +83,8 @@ def read(file: Path, section: str) -> tuple[Config, ParameterUncertainty, dict[s
         raise InputError(
             f"{file.name}: has no section [uncertainty]; add one, or use snapbeam map for a system without uncertainty"
         )
-    uncertainty = uncertainty_from_mapping(sections.pop("uncertainty"), "uncertainty")
-    question = sections.pop(section, {})
-    for other in ("probability", "design"):
-        sections.pop(other, None)
+    uncertainty = uncertainty_from_mapping(sections["uncertainty"], "uncertainty")
+    question = sections.get(section, {})
     if not isinstance(question, dict):
         raise InputError(f"{file.name}: [{section}] must be a section")
     return config_from_mapping(sections, file.name), uncertainty, question

@@ -789,7 +789,7 @@ class SystemCard:
 
     def _chosen(self, name: str) -> None:
         if name:
-            config = config_from_mapping(_PRESETS[name])
+            config = config_from_mapping(_PRESETS[name] | {"extends": "paper"})
             self.take(config.system, config.integration)
 
     def _given(self, content: bytes | None) -> None:

@@ -518,7 +518,7 @@ class Calibration:
         told = [f"{name} = {with_error(self, name)}" for name in self.values]
         comment = ["Calibrated from measurements.", *told, *self.remarks]
         comment += [f"Warning: {text}" for text in self.warnings]
-        dump_config(config_from_mapping(self.sections()), path, "\n".join(comment))
+        dump_config(config_from_mapping(self.sections() | {"extends": "paper"}), path, "\n".join(comment))
 
 
 def calibrate(

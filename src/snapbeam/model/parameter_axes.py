@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from snapbeam.model.drive.shock import GRAVITY
 from snapbeam.model.parameters import lookup
 from snapbeam.model.system import System
 from snapbeam.util.validation import (
@@ -128,13 +129,34 @@ class Physical:
     unit: str
     words: str
 
+    def unit_of(self, length: float, omega: float) -> float:
+        """What a ratio of 1 is, from the length scale (m) and omega_1 (rad/s); not of a location."""
+        return {
+            "frequency_ratio": omega / (2.0 * math.pi),
+            "velocity_amplitude": length * omega,
+            "displacement_amplitude": 1e6 * length,
+            "acceleration_amplitude": length * omega**2 / GRAVITY,
+        }[self.parameter.partition(".")[2]]
+
 
 PHYSICAL: dict[str, Physical] = {
     "drive.frequency_hz": Physical("drive.frequency_ratio", "Hz", "excitation frequency"),
     "drive.velocity_m_s": Physical("drive.velocity_amplitude", "m/s", "velocity amplitude of the striker"),
+    "drive.displacement_um": Physical(
+        "drive.displacement_amplitude", "um", "displacement amplitude of the striker"
+    ),
     "striker.location_m": Physical("striker.location", "m", "distance of the striker from the left clamp"),
+    "base_excitation.frequency_hz": Physical(
+        "base_excitation.frequency_ratio", "Hz", "frequency of the base"
+    ),
+    "base_excitation.velocity_m_s": Physical(
+        "base_excitation.velocity_amplitude", "m/s", "velocity amplitude of the base"
+    ),
+    "base_excitation.amplitude_g": Physical(
+        "base_excitation.acceleration_amplitude", "g", "acceleration amplitude of the base"
+    ),
 }
-"""What may be given instead of a ratio, by dotted name."""
+"""What may be given instead of a ratio, by dotted name; one unit for each ratio."""
 
 
 def physical_name(name: str) -> str | None:
@@ -146,11 +168,9 @@ def physical_name(name: str) -> str | None:
 
 def unit_of(system: System, name: str) -> float:
     """What a ratio of 1 is in the physical unit of *name*."""
-    scale, parameter = system.scale, PHYSICAL[name].parameter
-    if parameter == "drive.frequency_ratio":
-        return scale.omega / (2.0 * math.pi)
-    if parameter == "drive.velocity_amplitude":
-        return scale.length * scale.omega
+    scale, row = system.scale, PHYSICAL[name]
+    if row.parameter != "striker.location":
+        return row.unit_of(scale.length, scale.omega)
     if system.model.beam is None:
         raise InputError("striker.location_m: a structure given by matrices has no length; give location")
     return system.model.beam.length

@@ -24,6 +24,7 @@ from snapbeam.model.external_force import FORCES
 from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.local_force import LOCAL_FORCES
+from snapbeam.model.mapping import SECTIONS as SYSTEM_SECTIONS
 from snapbeam.model.mapping import parts_from_mapping
 from snapbeam.model.parameter_axes import PHYSICAL, checked_physical, parse_axis, physical_name, unit_of
 from snapbeam.model.parameters import Parameter, lookup, parameters, row_of
@@ -54,6 +55,7 @@ __all__ = [
     "override",
     "parsed_axis",
     "same_axis",
+    "system_of_file",
     "with_section",
 ]
 
@@ -140,6 +142,8 @@ SECTIONS = (
 )  # fmt: skip
 _OF_OTHER_COMMANDS = ("uncertainty", "probability", "design")
 """Sections that a file may contain for other commands, which check them."""
+_OF_RUNS = ("sweep", "integration")
+"""Sections that describe no system."""
 _KINDS: dict[str, Mapping[str, type]] = {
     "drive": DRIVES,
     "base_excitation": {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()},
@@ -162,8 +166,16 @@ def checked_sections(sections: Mapping[str, Any]) -> tuple[dict[str, dict[str, A
     lines: list[str] = []
     found: dict[str, dict[str, Any]] = {}
     for section, values in mapping("sections", sections).items():
-        if numbered(str(section))[0] not in SECTIONS:
-            lines.append(f"[{section}]: unknown section{_nearest(str(section), list(SECTIONS))}")
+        if section == "extends":
+            if values != "paper":
+                lines.append(
+                    f'extends = {shown(values)}: must be "paper"; leave it out for a beam of your own'
+                )
+        elif section in _OF_OTHER_COMMANDS and isinstance(values, Mapping):
+            continue
+        elif numbered(str(section))[0] not in SECTIONS:
+            known = [*SECTIONS, *_OF_OTHER_COMMANDS]
+            lines.append(f"[{section}]: unknown section{_nearest(str(section), known)}")
         elif not isinstance(values, Mapping):
             lines.append(f"{section} = {shown(values)}: must be a section [{section}]")
         else:
@@ -377,26 +389,37 @@ _AROUND, _STRIKING = (
     ("base_excitation", "axial_load", "external_force", "local_force", "harvester"),
     ("contact", "striker", "drive"),
 )
+_CONVERTED = {"radius", *WANTED, *(name.partition(".")[2] for name in PHYSICAL)}
+"""Names of a parameter file that a system does not have."""
 # What stands for the same thing in a section: giving one set takes the other away.
 _RIVALS: dict[str, list[tuple[set[str], set[str]]]] = {
     "beam": [({"buckling_level"}, {"axial_load"})],
     "contact": contact_rivals(),
-    "drive": [({"frequency_ratio"}, {"frequency_hz"}), ({"velocity_amplitude"}, {"velocity_m_s"})],
-    "striker": [({"location"}, {"location_m"})],
 }
+for _name, _row in PHYSICAL.items():
+    _section, _, _own = _name.partition(".")
+    _RIVALS.setdefault(_section, []).append(({_row.parameter.partition(".")[2]}, {_own}))
 
 
 @dataclass(frozen=True)
 class Config:
-    """Parameters that were given, by section; the paper's stand where nothing is given.
+    """Parameters that were given, by section.
 
     Attributes
     ----------
     given : mapping of str to mapping
         Checked values by section and name.
+    extends_paper : bool
+        Whether the paper's values complete what is not given.  If not, a missing value is refused.
     """
 
     given: Sections = field(default_factory=dict)
+    extends_paper: bool = True
+
+    @property
+    def extension(self) -> dict[str, Any]:
+        """The line ``extends = "paper"`` of a file, if the paper's values complete these."""
+        return {"extends": "paper"} if self.extends_paper else {}
 
     def section(self, name: str) -> dict[str, Any]:
         """What was given of a section."""
@@ -407,8 +430,14 @@ class Config:
         found, known = self.section(name), parameters()
         kind = law_of(found) if numbered(name)[0] == "contact" else found.get("type", "sine")
         for axis, values in self.section("sweep").items():
-            section, _, key = (axis if axis in PHYSICAL else lookup(axis).name).partition(".")
-            if section != name or key in found or axis in PHYSICAL:
+            ratio = PHYSICAL[axis].parameter if axis in PHYSICAL else lookup(axis).name
+            section, _, key = ratio.partition(".")
+            if section != name or key in found:
+                continue
+            if axis in PHYSICAL:
+                own = axis.partition(".")[2] in found or (self.extends_paper and name in _STRIKING)
+                if not own:
+                    found[key] = _stand_in(key, 0.0)
                 continue
             row = known.get(f"{numbered(name)[0]}.{key}")
             if row is None or (row.default is None and (not row.kinds or kind in row.kinds)):
@@ -417,13 +446,14 @@ class Config:
 
     @cached_property
     def defaulted(self) -> tuple[str, ...]:
-        """Names of what takes the value of the paper's beam although another beam was spoken of."""
+        """Names of what was not given: the values of the paper's beam beside another beam, and else the default drive."""
         if not self.section("beam"):
             return ()
         found, swept = self._defaults(), self.axes() if self.section("sweep") else {}
+        sections = ("beam", "model", "contact") if self.extends_paper else ("drive",)
         return tuple(
             f"{section}.{name}"
-            for section in ("beam", "model", "contact")
+            for section in sections
             for name in found[section]
             if name not in self.section(section) and name != "modes" and f"{section}.{name}" not in swept
         )
@@ -467,10 +497,39 @@ class Config:
         return config_from_mapping(sections)
 
     def _defaults(self) -> dict[str, dict[str, Any]]:
+        """Values by section of what need not be given."""
+        found = self._of_paper()
+        if self.extends_paper:
+            return found
+        own = {"model": {"modes": MODES}, "drive": found["drive"]}
+        return {section: own.get(section, {}) for section in found}
+
+    def _require(self, *sections: str) -> None:
+        """Refuse values of *sections* that only the paper's beam has.
+
+        Raises
+        ------
+        InputError
+        """
+        if self.extends_paper:
+            return
+        lines, of_paper = [], self._of_paper()
+        for section in sections:
+            given = self._with_axes(section).keys()
+            missing = [name for name in of_paper[section] if name not in given and name != "modes"]
+            if missing:
+                lines.append(f"[{section}] {', '.join(missing)}: missing")
+        if lines:
+            raise InputError(
+                f'{"; ".join(lines)}; give what is missing, or write extends = "paper" at the top of the file to '
+                "take the values of the paper"
+            )
+
+    def _of_paper(self) -> dict[str, dict[str, Any]]:
         beam = {
             name: getattr(BEAM, name) for name in ("length", "thickness", "width", "density", "young_modulus")
         }
-        own = self.section("beam")
+        own = self.section("beam") if self.extends_paper else self._with_axes("beam")
         if not {"buckling_level", "axial_load"} & own.keys():
             beam["buckling_level"] = BEAM.buckling_level
         contact: dict[str, Any] = {}
@@ -498,8 +557,9 @@ class Config:
     @cached_property
     def system(self) -> System:
         """The system; what is not given is the paper's.  Refused (InputError) if values do not go together."""
+        self._require("beam", "model", *(() if self._is_unstruck else ("contact", "striker")))
         sections: dict[str, Any] = {
-            name: values | (self._with_axes(name) if name in _STRIKING else self.section(name))
+            name: values | (self._with_axes(name) if self._may_be_axis(name) else self.section(name))
             for name, values in self._defaults().items()
         }
         sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
@@ -508,15 +568,15 @@ class Config:
         if self._is_unstruck:
             for name in _STRIKING:
                 del sections[name]
-            return self._started(System.from_mapping(sections))
-        sections["contact"] = contact_of(sections["contact"])
-        if self._stands_still:
-            sections["drive"] = {"type": "fixed"}
-        sections["drive"].setdefault("type", "sine")
+        else:
+            sections["contact"] = contact_of(sections["contact"])
+            if self._stands_still:
+                sections["drive"] = {"type": "fixed"}
+            sections["drive"].setdefault("type", "sine")
         later = {
             f"{section}.{name}": sections[section].pop(name)
-            for section in ("drive", "striker")
-            for name in [key for key in sections[section] if f"{section}.{key}" in PHYSICAL]
+            for section in ("drive", "striker", "base_excitation")
+            for name in [key for key in sections.get(section, {}) if f"{section}.{key}" in PHYSICAL]
         }
         for physical, value in later.items():
             own = PHYSICAL[physical].parameter.partition(".")[2]
@@ -528,6 +588,10 @@ class Config:
                 for name, value in later.items()
             })  # fmt: skip
         return self._started(system)
+
+    def _may_be_axis(self, section: str) -> bool:
+        """Whether a required value of a section may be given by an axis only."""
+        return section in _STRIKING or not self.extends_paper
 
     @property
     def _further(self) -> dict[str, dict[str, Any]]:
@@ -544,8 +608,9 @@ class Config:
 
     @property
     def _is_unstruck(self) -> bool:
-        """Whether a base, an axial load or a force moves the beam, and nothing was said of a striker."""
-        return self._is_moved and not any(self.section(name) for name in _STRIKING)
+        """Whether there is no striker: none was given, and the paper's is not added."""
+        added = self.extends_paper and not self._is_moved
+        return not added and not any(self._with_axes(name) for name in _STRIKING)
 
     @property
     def _stands_still(self) -> bool:
@@ -555,6 +620,19 @@ class Config:
     @property
     def _is_moved(self) -> bool:
         return any(self.section(name) for name in ("base_excitation", "axial_load", "external_force"))
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the same values describe the same system without the paper's."""
+        try:
+            return bool(Config(self.given, extends_paper=False).system == self.system)
+        except InputError:
+            return False
+
+    @property
+    def is_static(self) -> bool:
+        """Whether only a beam is described, with nothing that moves it."""
+        return not self.extends_paper and not set(self.given) - {"beam", "model", "boundary", "imperfection"}
 
     def _started(self, system: System) -> System:
         """The system with the start that was given."""
@@ -568,7 +646,13 @@ class Config:
     @property
     def model(self) -> ReducedModel:
         """The reduced model alone, of a beam that need not be buckled."""
-        sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
+        self._require("beam")
+        own = {
+            name: self._with_axes(name) if self._may_be_axis(name) else self.section(name)
+            for name in ("beam", "model")
+        }
+        sections = {name: self._defaults()[name] | own[name] for name in own}
+        sections["model"].setdefault("damping_ratio", DAMPING_RATIO)  # has no effect without motion
         sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
         found: ReducedModel = parts_from_mapping(sections)["model"]
         return found
@@ -611,7 +695,8 @@ class Config:
                 if any(abs(unit_of(each, name) / unit_of(self.system, name) - 1.0) > 1e-9 for each in there):
                     ratio = PHYSICAL[name].parameter
                     raise InputError(
-                        f"{name}: is made into {ratio}, whose unit changes along {axis}; give {ratio}"
+                        f"{name}: is made into {ratio}, whose unit changes along {axis}; give {ratio}, or use sb.sweep "
+                        f"with an axis {name}"
                     )
 
     def to_mapping(self) -> dict[str, dict[str, Any]]:
@@ -621,7 +706,7 @@ class Config:
 
 def _stand_in(name: str, value: Any) -> float:
     """A value that lets the system be made before the physical one is known."""
-    return 1.0 if name == "frequency_ratio" else 0.0 if name == "velocity_amplitude" else 0.5
+    return 1.0 if name == "frequency_ratio" else 0.5 if name == "location" else 0.0
 
 
 def config_from_mapping(sections: Mapping[str, Any], source: str = "", *, complete: bool = True) -> Config:
@@ -630,7 +715,8 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "", *, comple
     Parameters
     ----------
     sections : mapping of mapping
-        Values by section and name.
+        Values by section and name.  The paper's values complete them if they contain ``extends = "paper"`` or no section
+        of a system.  Sections of commands such as ``probability`` are left out.
     source : str
         Where they come from, to stand before each refusal.
     complete : bool
@@ -643,12 +729,12 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "", *, comple
     """
     instance("source", source, str, "text")
     found, lines = checked_sections(sections)
-    config = Config(found)
+    config = Config(found, "extends" in sections or not set(found) - set(_OF_RUNS))
     lines = lines or contradictions(found)
     if not lines and complete:
         try:
             config.model  # noqa: B018
-            if config.model.length_scale is not None:
+            if config.model.length_scale is not None and not config.is_static:
                 config.system  # noqa: B018
                 config.axes()
             config.integration  # noqa: B018
@@ -684,7 +770,7 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]], source: 
             for name in own:
                 for same in same_axis(f"{section}.{name}"):
                     merged.get("sweep", {}).pop(same, None)
-    return config_from_mapping(merged, source)
+    return config_from_mapping(merged | config.extension, source)
 
 
 def same_axis(name: str) -> set[str]:
@@ -710,10 +796,30 @@ def load_config(path: str | os.PathLike[str], *, complete: bool = True) -> Confi
         If it cannot be read or is no TOML, and for anything :func:`config_from_mapping` refuses.
     """
     file = file_path("config", path)
-    sections = {
-        name: values for name, values in read_toml("config", file).items() if name not in _OF_OTHER_COMMANDS
-    }
-    return config_from_mapping(sections, file.name, complete=complete)
+    return config_from_mapping(read_toml("config", file), file.name, complete=complete)
+
+
+def system_of_file(path: str | os.PathLike[str]) -> System:
+    """The system of a parameter file, or of a file that :meth:`~snapbeam.System.save` wrote.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or is no TOML, and for anything :func:`config_from_mapping` refuses.
+    """
+    sections = read_toml("path", path)
+    if _is_saved_system(sections):
+        return System.from_mapping(sections)
+    return config_from_mapping(sections, file_path("path", path).name).system
+
+
+def _is_saved_system(sections: Mapping[str, Any]) -> bool:
+    """Whether these are the sections of a system alone, with the names that :meth:`~snapbeam.System.save` writes."""
+    contacts = [name for name in sections if numbered(name)[0] == "contact"]
+    return all(
+        numbered(section)[0] in SYSTEM_SECTIONS and isinstance(values, Mapping) and not values.keys() & _CONVERTED
+        for section, values in sections.items()
+    ) and all("type" in sections[name] for name in contacts)  # fmt: skip
 
 
 def dump_config(config: Config, path: str | os.PathLike[str], comment: str = "") -> None:
@@ -737,6 +843,8 @@ def config_text(config: Config, comment: str = "") -> str:
     instance("config", config, Config, "a Config")
     instance("comment", comment, str, "text")
     lines = [f"# {line}" for line in comment.splitlines()]
+    if config.extends_paper and config.given and not config.is_complete:
+        lines += ["# what this file leaves out is as in the paper", 'extends = "paper"']
     for section, values in config.to_mapping().items():
         lines += [""] if lines else []
         lines.append(f"[{section}]")

@@ -29,7 +29,6 @@ from snapbeam.model.state import State
 from snapbeam.model.striker import ContactPair, Shaker, Striker, check_others, parted
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.files import atomic_path, check_writable
-from snapbeam.util.input_files import read_toml
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.validation import InputError, InputTypeError, instance, shown
 
@@ -361,14 +360,18 @@ class System:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> System:
-        """Read a system that :meth:`save` wrote.
+        """Read a parameter file, or a file that :meth:`save` wrote.
+
+        Sections of commands, such as ``integration`` and ``probability``, are left out.
 
         Raises
         ------
         InputError
             If the file cannot be read, is no TOML or describes no system.
         """
-        return cls.from_mapping(read_toml("path", path))
+        from snapbeam.model.parameter_file import system_of_file
+
+        return system_of_file(path)
 
     def describe(self) -> str:
         """The system in a few lines, for a person to read."""

@@ -10,6 +10,7 @@ from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
+from snapbeam.model.parameter_axes import PHYSICAL
 from snapbeam.model.parameters import Parameter, lookup
 from snapbeam.plot.style import cell_edges
 from snapbeam.util.validation import InputError
@@ -17,7 +18,16 @@ from snapbeam.util.validation import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["AXIS_LABELS", "axis_label", "dress", "edges_of", "is_geometric", "positions", "symbol_of"]
+__all__ = [
+    "AXIS_LABELS",
+    "axis_label",
+    "dress",
+    "edges_of",
+    "in_units",
+    "is_geometric",
+    "positions",
+    "symbol_of",
+]
 
 
 _Array = NDArray[np.float64]
@@ -58,6 +68,29 @@ def axis_label(dataset: xr.Dataset, name: str) -> str:
     if power:
         text = f"{text.rpartition(' (')[0] or text} ({unit})"
     return textwrap.fill(text, _LONGEST, break_long_words=False)
+
+
+def in_units(dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset with axes of a base's motion in Hz, m/s and g, where one reference frequency holds for all points."""
+    frequency, length = (dataset.attrs.get(each) for each in ("reference_frequency", "length_scale"))
+    if frequency is None or length is None:
+        return dataset
+    rows = {
+        row.parameter: (name, row) for name, row in PHYSICAL.items() if name.startswith("base_excitation.")
+    }
+    for dim in map(str, dataset.dims):
+        found = (
+            rows.get(dataset[dim].attrs.get("parameter", ""))
+            if dim in dataset.coords and dataset.sizes[dim] > 1
+            else None
+        )
+        if found is not None:
+            name, row = found
+            unit = row.unit_of(float(length), 2.0 * np.pi * float(frequency))
+            words = f"{row.words[:1].upper()}{row.words[1:]}"
+            attrs = {"units": row.unit, "long_name": words, "parameter": name}
+            dataset = dataset.assign_coords({dim: (dim, dataset[dim].values * unit, attrs)})
+    return dataset
 
 
 def _power(dataset: xr.Dataset, name: str) -> tuple[int, str]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.quasi_static import quasi_static_threshold
 from snapbeam.plot.agreement import draw_agreement
-from snapbeam.plot.axes import axis_label, dress, edges_of, positions, symbol_of
+from snapbeam.plot.axes import axis_label, dress, edges_of, in_units, positions, symbol_of
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CLASS_COLORS,
@@ -127,6 +127,7 @@ def plot_response_map(
             quasi_static_line=quasi_static_line,
             legend=legend,
         )
+    dataset = in_units(dataset)
     if "response_class" in dataset and _is_line(dataset):
         return _line(dataset, ax, measurements is not None or quasi_static_line, legend)
     across, upward, kinds = _two_axes(dataset)
@@ -398,6 +399,7 @@ def plot_statistic(
         raise InputError(f"variable = {shown(name)}: the map has {', '.join(map(str, dataset.data_vars))}")
     if dataset[name].dims == ("point",):
         return plot_points(dataset, name, ax)
+    dataset = in_units(dataset)
     values = dataset[name].squeeze(
         [each for each, size in dataset[name].sizes.items() if size == 1 and each != "sweep"]
     )

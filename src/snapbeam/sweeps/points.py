@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.parameter_axes import PHYSICAL, physical_name
+from snapbeam.model.parameter_axes import PHYSICAL, physical_name, unit_of
 from snapbeam.model.parameters import Parameter, lookup, parameters, short_names
 from snapbeam.util.provenance import array_hash
 from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, shown
@@ -20,7 +20,18 @@ from snapbeam.util.validation import InputError, InputTypeError, axis, finite_ar
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Columns", "Grid", "PointList", "Points", "labels_of", "points_of", "require_memory"]
+    from snapbeam.model.system import System
+
+__all__ = [
+    "Columns",
+    "Grid",
+    "PointList",
+    "Points",
+    "labels_of",
+    "physical_points",
+    "points_of",
+    "require_memory",
+]
 
 
 Columns = dict[str, NDArray[Any]]
@@ -200,6 +211,42 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:
             raise InputError(f"{name}: is given twice among the axes; give it once")
         axes[row.name] = _axis(row, str(name), values)
     return Grid(axes)
+
+
+def physical_points(system: System, axes: Mapping[str, Any]) -> Points:
+    """Return the points of axes in Hz, m/s, g, um or m.
+
+    They are a grid of ratios.  If an axis changes the structure, and with it the unit of a ratio, they are a list of all
+    combinations instead, each with the ratio of its own structure.
+    """
+    physical = {full: name for name in axes if (full := physical_name(str(name))) is not None}
+    if not physical:
+        return points_of(axes)
+    grid = points_of({
+        PHYSICAL[each].parameter if (each := physical_name(str(name))) is not None else name: values
+        for name, values in axes.items()
+    })  # fmt: skip
+    columns = grid.take(np.arange(grid.size))
+    structural = [name for name in columns if not lookup(name).is_run]
+    units: dict[tuple[Any, ...], list[float]] = {}
+    rows = list(zip(*(columns[name].tolist() for name in structural), strict=True)) or [()] * grid.size
+    for row in rows:
+        if row not in units:
+            own = system.replace(**dict(zip(structural, row, strict=True)))
+            units[row] = [unit_of(own, full) for full in physical]
+    table = np.array([units[row] for row in rows])
+    labels = {}
+    for full, unit in zip(physical, table.T, strict=True):
+        ratio = PHYSICAL[full].parameter
+        labels[full.removeprefix("drive.").replace(".", "_")] = columns[ratio]
+        columns[ratio] = columns[ratio] / unit
+    if np.allclose(table, table[0], rtol=1e-9, atol=0.0):
+        own_axes = {PHYSICAL[full].parameter: unit for full, unit in zip(physical, table[0], strict=True)}
+        return points_of({
+            name: values / own_axes[name] if name in own_axes else values for name, values in grid.axes.items()
+        })  # fmt: skip
+    made = _list_of(columns)
+    return PointList(made.columns, labels)
 
 
 def _swept(name: str) -> Parameter:

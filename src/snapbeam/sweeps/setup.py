@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -22,7 +22,7 @@ from snapbeam.solver.assemble import cycles_of, make_ensemble, plans_of, run_col
 from snapbeam.solver.registry import resolve
 from snapbeam.solver.statistics import STATISTICS, statistics_of
 from snapbeam.solver.step_size import Plan, require_resolved
-from snapbeam.sweeps.points import Columns, Grid, Points, labels_of, points_of
+from snapbeam.sweeps.points import Columns, Grid, Points, labels_of, physical_points, points_of
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, shown
@@ -373,7 +373,10 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         raise InputError(
             f"tolerance = {integration.tolerance:g}: applies to single runs; for a sweep give step, or accuracy = 'reference'"
         )
-    points = axes if isinstance(axes, Points) else points_of(axes)
+    if isinstance(axes, Mapping) and not hasattr(axes, "dims"):
+        points: Points = physical_points(system, axes)
+    else:
+        points = axes if isinstance(axes, Points) else points_of(axes)
     require_parameters(system, points)
     law = type(system.contact) if system.contact is not None else None
     resolved = resolve(

@@ -165,7 +165,7 @@ def calibrate(
     if measurements is not None:
         from_file, sections = load_measurements(measurements)
         given = {name: getattr(from_file, name) for name in from_file.__dataclass_fields__}
-        config_from_mapping(sections, str(measurements))
+        config_from_mapping(sections | {"extends": "paper"}, str(measurements))
         settings = override(settings, sections)
     for name, text in (
         ("straight_frequencies", straight), ("lower_well_frequencies", lower_well), ("upper_well_frequencies", upper_well),
