@@ -37,6 +37,7 @@ from snapbeam.explorer.maps import (
     Window,
     compute,
     integration_mapping,
+    known_cells,
     map_command,
     plain,
     planned,
@@ -75,6 +76,8 @@ _PUSH = 0.2
 """Seconds between two pictures of a window that fills."""
 _COARSE = 9.0
 """Pixels of a cell above which a view is worth computing again."""
+_WAIT = 10.0
+"""Seconds of a window that are computed without a question."""
 
 
 class WindowControl:
@@ -93,7 +96,12 @@ class WindowControl:
         self.view_moved()
 
     def view_moved(self) -> None:
-        """Another part is seen; it is looked at once it rests."""
+        """Another part is seen: the computation of the previous one stops, and this one is computed once it rests."""
+        self.cancel("stopped, because the view moved" if self._token is not None else "")
+        self.resized()
+
+    def resized(self) -> None:
+        """The figure has another size, or another part is seen."""
         if not self._awake:
             return
         self._moved += 1
@@ -120,8 +128,11 @@ class WindowControl:
         ]
         return not self.card.view.is_whole and max(wide / inside[0], tall / inside[1]) > _COARSE
 
-    def compute_view(self, force: bool = False) -> None:
-        """Compute what is seen, from coarse to fine, in place of what was being computed."""
+    def compute_view(self, force: bool = False, seconds: float = _WAIT) -> None:
+        """Compute what is seen where it becomes finer, from coarse to fine, in place of what was being computed.
+
+        It asks before a level that would end later than *seconds* after the beginning.
+        """
         if self.card.system is None or not self.card.plane.can_zoom:
             self.card.tell("a window needs two axes of numbers, and a system" if force else "")
             return
@@ -143,15 +154,22 @@ class WindowControl:
             system, integration, self.card.plane.names, bounds, log, self.card.view.pixels, key=key
         )
         window = self.card.shared.window(made)
-        if window.finished:  # by this page before, or by another
+        if window is made:
+            others = [each for each in self.card.windows() if each is not made]
+            strides = [each.stride.copy() for each in others]
+            made.known = known_cells(made, self.card.shown_plane, list(zip(others, strides, strict=True)))
+        if window.finished or not window.wanted:  # by this page before, or by another
             self.card.show_windows()
+            self.card.tell("" if window.finished or not force else "the map is as fine as the screen shows")
             return
         self._token = token = Token(WINDOW_SECONDS)
-        self.card.stop.visible = True
-        self.card.tell("computing what is seen")
+        self.card.stop.visible, self.card.more.visible = True, False
+        self.card.tell("computing this view")
         self._waiting.begin(0, self._still)
         self.card.shared.jobs.window(
-            lambda _: compute(window, self.card.shared.jobs, token, lambda w: self._grew(w, token)),
+            lambda _: compute(
+                window, self.card.shared.jobs, token, lambda w: self._grew(w, token), seconds
+            ),
             lambda _, words: self.card.post(lambda: self._ended(window, token, words)),
             token,
         )
@@ -182,18 +200,15 @@ class WindowControl:
 
     def _still(self, seconds: float, why: str) -> None:
         if self._token is not None:
-            self.card.tell(f"computing what is seen, {seconds:.0f} s" + (f"; {why}" if why else ""))
+            self.card.tell(f"computing this view, {seconds:.0f} s" + (f"; {why}" if why else ""))
 
     def _draw_growing(self, window: Window, token: Token) -> None:
         if token is not self._token:
             return
         self._waiting.end(0)
         self.card.show_windows()
-        left = (window.size - window.done) * window.seconds
         finest = int(window.stride[window.stride > 0].min()) if (window.stride > 0).any() else 27
-        self.card.tell(
-            f"window: {window.done} of {window.size} points, {left:.0f} s to the finest; blocks of {finest} cells now"
-        )
+        self.card.tell(f"window: {window.done} of {window.wanted} points; blocks of {finest} cells now")
 
     def _ended(self, window: Window, token: Token, words: str) -> None:
         if token is self._token:
@@ -201,7 +216,19 @@ class WindowControl:
             self.card.stop.visible = False
             self._token = None
             self.card.show_windows()
-            self.card.tell(words or f"window: all {window.size} points computed")
+            if not words and window.asks is not None:
+                points, seconds = window.asks
+                self.card.more.name = f"Compute {points} finer points (about {_duration(seconds)})"
+                self.card.more.visible = True
+                words = f"window: {window.done} of {window.wanted} points computed; finer cells wait for your answer"
+            self.card.tell(words or f"window: all {window.wanted} points computed")
+
+    def more(self) -> None:
+        """Compute the level that was asked about."""
+        window = next((w for w in reversed(self.card.windows()) if w.asks is not None), None)
+        self.card.more.visible = False
+        asked = 0.0 if window is None or window.asks is None else window.asks[1]
+        self.compute_view(force=True, seconds=_WAIT + 1.5 * asked)
 
     def cancel(self, words: str) -> None:
         """Compute no window any more."""
@@ -210,8 +237,13 @@ class WindowControl:
             self._token = None
             self._waiting.end(0, computed=False)
             self.card.stop.visible = False
+        self.card.more.visible = False
         if words:
             self.card.tell(f"{words}; what was computed is kept")
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -290,6 +322,7 @@ class MapCard:
         self.stop = pn.widgets.Button(
             name="Stop", button_type="warning", width=70, visible=False, align="center"
         )
+        self.more = pn.widgets.Button(name="Finer", button_type="primary", visible=False, align="center")
         self.again = pn.widgets.Button(name="Compute view", button_type="default", width=110, align="center")
         self.layers = pn.widgets.CheckButtonGroup(
             options={"threshold": "threshold", "V_QS1": "quasi", "measured": "dots", "windows": "windows"},
@@ -303,6 +336,7 @@ class MapCard:
         self.show.param.watch(lambda _: self.post(self.redraw), "value")
         self.layers.param.watch(lambda _: self.post(self.redraw), "value")
         self.stop.on_click(lambda _: self.post(lambda: self.control.cancel("stopped")))
+        self.more.on_click(lambda _: self.post(self.control.more))
         self.again.on_click(lambda _: self.post(lambda: self.control.compute_view(force=True)))
         for slider in self.sliders.values():
             slider.param.watch(lambda _: self.post(self._cut_changed), "value")
@@ -369,7 +403,7 @@ class MapCard:
         self.view.on_hover(self._hovered)
         self.view.on_view(self.control.view_moved)
         for edge in ("inner_width", "inner_height"):
-            self.view.plot.on_change(edge, lambda attr, old, new: self.control.view_moved())
+            self.view.plot.on_change(edge, lambda attr, old, new: self.control.resized())
         self.slider_box.objects = [
             slider for name, slider in self.sliders.items() if name not in (self.x.value, self.y.value)
         ]  # fmt: skip
@@ -382,7 +416,7 @@ class MapCard:
         """The card."""
         return pn.Column(
             pn.FlexBox(self.x, self.y, self.show, margin=0), self.slider_box, self.holder, self.key, self.hover,
-            pn.FlexBox(self.auto, self.again, self.stop, self.layers, align_items="center", margin=0), self.state,
+            pn.FlexBox(self.auto, self.again, self.stop, self.more, self.layers, align_items="center", margin=0), self.state,
             sizing_mode="stretch_width", css_classes=["card"],
         )  # fmt: skip
 
@@ -445,7 +479,13 @@ class MapCard:
             self.view.mapper.update(
                 low=self.view.limits[0], high=max(self.view.limits[1], self.view.limits[0] + 1e-300)
             )
-        self._drawn = self.view.show_windows(shown, self.show.value)
+        self._drawn = self.view.show_windows(shown, self.show.value, self.shown_plane)
+
+    @property
+    def shown_plane(self) -> Plane | None:
+        """The cut through the map; None if it has no numbers, or those of another system."""
+        held = bool(self.source.skeleton.data_vars) and not self.changed and not self.source.is_list
+        return self.plane if held else None
 
     def _limits(self, name: str, values: NDArray[Any] | None) -> tuple[float, float]:
         return (0.0, 1.0) if values is None or name == "response_class" else _span(values)
@@ -860,7 +900,7 @@ def changed_parameters(
     for name, value in other.items():
         cycles = name == "cycles" and before[1].cycles_or_default == after[1].cycles_or_default
         if one[name] != value and name not in ("engine",) and not cycles:
-            found[f"run.{name}"] = value
+            found[f"integration.{name}"] = value
     return found
 
 

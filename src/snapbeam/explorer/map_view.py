@@ -18,7 +18,7 @@ from bokeh.models import (
 from numpy.typing import NDArray
 
 from snapbeam import ResponseClass
-from snapbeam.explorer.maps import Axis, Window, picture
+from snapbeam.explorer.maps import Axis, Plane, Window, picture, visible_strides
 from snapbeam.explorer.style import Look, colors_of, columns, figure, inner_size, sequential
 from snapbeam.model import quasi_static_threshold
 from snapbeam.plot.style import CLASS_COLORS
@@ -202,16 +202,21 @@ class MapView:
         """Show the map pale, if it is of another system than what is computed."""
         self.whole.glyph.global_alpha = 0.3 if old else 1.0
 
-    def show_windows(self, windows: list[Window], name: str) -> list[tuple[Window, NDArray[np.int8]]]:
-        """Lay windows over the map, the finest uppermost; returns them with their strides as they are drawn."""
+    def show_windows(
+        self, windows: list[Window], name: str, plane: Plane | None
+    ) -> list[tuple[Window, NDArray[np.int8]]]:
+        """Draw windows over the map where they are finer; returns them with their strides as they are drawn.
+
+        *plane* is the cut through the map; None if it has no numbers, or those of another system.
+        """
         data: dict[str, list[Any]] = {"image": [], "x": [], "y": [], "dw": [], "dh": []}
         borders: dict[str, list[float]] = {"left": [], "right": [], "bottom": [], "top": []}
         drawn = []
-        for window in windows:
-            if name not in window.values:
+        known = [window for window in windows if name in window.values]
+        for window, stride in zip(known, visible_strides(known, plane), strict=True):
+            if not stride.any():
                 continue
             with window.writing:
-                stride = window.stride.copy()
                 image = colors_of(name, window.values[name], self.limits).copy()
             drawn.append((window, stride))
             image[stride == 0] = 0

@@ -247,9 +247,9 @@ class Page:
         if self.address.changes and self.shared.system is not None:
             try:
                 of_run = {
-                    key[4:]: item for key, item in self.address.changes.items() if key.startswith("run.")
+                    key.partition(".")[2]: item for key, item in self.address.changes.items() if key.startswith("integration.")
                 }
-                own = {key: item for key, item in self.address.changes.items() if not key.startswith("run.")}
+                own = {key: item for key, item in self.address.changes.items() if not key.startswith("integration.")}
                 first, how = self.shared.system, self.shared.integration
                 check_run(first.replace(**own), how.replace(**of_run))
                 self.system_card().take(first.replace(**own), how.replace(**of_run))
