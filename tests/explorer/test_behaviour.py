@@ -90,7 +90,6 @@ def test_what_one_tab_computes_is_not_laid_over_the_map_of_another(tab, served, 
     second.wait(lambda: "bit for bit" in second.notes(), "the map's own point")
     assert f"frequency ratio {x:.6g}, velocity amplitude {y:.6g}" in second.head()
     assert second.data("map-windows", "image") == []
-    first.page.get_by_role("button", name="Stop").click()
 
 
 def test_a_list_of_points_is_clicked_point_by_point(tab, serve, system, tmp_path):
@@ -115,7 +114,7 @@ def test_a_list_of_points_is_clicked_point_by_point(tab, serve, system, tmp_path
 
 def test_a_file_that_is_too_large_is_refused_in_words(tab, served):
     page = tab(served.url)
-    _turn(page, "Take away")
+    _turn(page, "Export")
     page.wait(lambda: page.page.locator("input[type=file]").count() > 0, "where a file can be given")
     large = {"name": "large.csv", "mimeType": "text/csv", "buffer": b"1,2,3\n" * (3 * 2**19)}
     page.page.locator("input[type=file]").first.set_input_files(large)
@@ -258,7 +257,7 @@ def test_what_is_taken_away_is_what_is_shown(tab, served, small_map, folder, tmp
     x, y = float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][13])
     page.click(x, y)
     page.wait(lambda: "bit for bit" in page.notes(), "the run")
-    _turn(page, "Take away")
+    _turn(page, "Export")
     page.wait(lambda: "snapbeam simulate" in page.text("take-text"), "the command")
     assert _saved(page, "Map", tmp_path).read_bytes().startswith(b"\x89PNG")
     assert _saved(page, "Run", tmp_path).read_bytes().startswith(b"\x89PNG")
@@ -293,7 +292,7 @@ def test_the_beam_moving_is_exported(tab, served, small_map, tmp_path):
     page = tab(served.url)
     page.click(float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][13]))
     page.wait(lambda: "bit for bit" in page.notes(), "the run")
-    _turn(page, "Take away")
+    _turn(page, "Export")
     page.page.get_by_label("length of the animation (s)").fill("1")
     page.page.get_by_label("slow motion at the hardest impact (s)").fill("1")
     assert _saved(page, "GIF", tmp_path).read_bytes().startswith(b"GIF89a")

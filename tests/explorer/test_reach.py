@@ -113,7 +113,7 @@ def test_a_page_is_used_without_a_mouse(tab, served, small_map):
     page.page.locator('.bk-tab:has-text("Phase")').first.focus()
     press("Enter")
     page.wait(lambda: len(page.data("section", "w")) > 0, "the section")
-    page.page.locator('.bk-tab:has-text("Take away")').first.focus()
+    page.page.locator('.bk-tab:has-text("Export")').first.focus()
     press("Enter")
     page.wait(lambda: "snapbeam simulate" in page.text("take-text"), "the command")
     page.page.get_by_role("button", name="Map as NetCDF").focus()
@@ -130,7 +130,7 @@ def test_nothing_is_cut_off_or_covered(tab, served, small_map, width, height):
     page.wait(lambda: "neighbour" in page.notes(), "the run")
     page.page.wait_for_timeout(300)
     assert page.js(_LAID_OUT) == [], "Waveform"
-    for title in ("Phase", "Beam", "Impacts", "Numbers", "System", "Take away"):
+    for title in ("Phase", "Beam", "Impacts", "Numbers", "System", "Export"):
         _turn(page, title)
         page.page.wait_for_timeout(1200)
         assert page.js(_LAID_OUT) == [], title
@@ -179,7 +179,7 @@ def test_pictures_of_a_list_are_taken_away(tab, serve, system, tmp_path):
     found = sb.sweep(system, table, sb.Integration(cycles=10))
     found.to_netcdf(tmp_path / "list.nc", engine="h5netcdf")
     page = tab(serve("list.nc", where=tmp_path).url)
-    _turn(page, "Take away")
+    _turn(page, "Export")
     files = {}
     for kind in ("png", "pdf", "svg"):
         page.page.get_by_role("button", name=kind, exact=True).click()

@@ -286,6 +286,7 @@ class MapCard:
         self._drawn: list[tuple[Window, NDArray[np.int8]]] = []
         self._picked: tuple[float, float] | None = None
         self._words = list(address.words)
+        self._restoring = False
         self._make_controls(address)
         self.control = WindowControl(self)
         self.holder = pn.Column(sizing_mode="stretch_width", margin=0)
@@ -363,7 +364,30 @@ class MapCard:
         options = {str(escape(label)): at for label, at in labels.items()}
         return pn.widgets.DiscreteSlider(name=str(escape(title)), options=options, value=value, width=240)
 
+    def restore(self, address: Address) -> None:
+        """Show the axes, the variable, the cut and the part of the map of an address of this page."""
+        self._restoring = True
+        for widget, name in ((self.x, address.x), (self.y, address.y), (self.show, address.show)):
+            if name in widget.options.values():
+                widget.value = name
+        for name, slider in self.sliders.items():
+            wanted = address.at.get(str(self.source.skeleton[name].attrs.get("parameter", name)))
+            if isinstance(wanted, float):
+                slider.value = int(np.argmin(np.abs(self.source.coordinate(name) - wanted)))
+        self._restoring = False
+        if (self.x.value, self.y.value) != (self.plane.x.name, self.plane.y.name):
+            self.rebuild(address.view)
+            return
+        if address.view is None:
+            self.view.view = (*self.plane.x.span, *self.plane.y.span)
+        elif len(address.view) == 4:
+            self.view.view = (address.view[0], address.view[1], address.view[2], address.view[3])
+        self.redraw()
+        self.control.view_moved()
+
     def _axes_changed(self, event: Any) -> None:
+        if self._restoring:
+            return
         if self.x.value == self.y.value:  # the two change places
             other = self.y if event.obj is self.x else self.x
             other.value = event.old
@@ -501,7 +525,7 @@ class MapCard:
         if not wanted or dots is None:
             self.view.show_dots(empty, empty, empty)
             if wanted:
-                words.append("no measured points yet: give a table of them under Take away")
+                words.append("no measured points yet: give a table of them under Export")
             return
         names = (self.plane.x.name, self.plane.y.name)
         if not all(hasattr(dots, name) for name in names):

@@ -30,7 +30,12 @@ def explore(
             "--config", help="TOML file of the system to begin with, where no map is given.", metavar="FILE"
         ),
     ] = None,
-    port: Annotated[int, typer.Option(help="Port; a free one by default.", min=0, max=65535)] = 0,
+    port: Annotated[
+        int | None,
+        typer.Option(
+            help="Port; by default 8760 or the next free one; 0 for any free one.", min=0, max=65535
+        ),
+    ] = None,
     address: Annotated[str, typer.Option(help="Address to serve on.")] = "127.0.0.1",
     allow_remote: Annotated[
         bool,
@@ -38,7 +43,7 @@ def explore(
     ] = False,
     token: Annotated[
         str | None,
-        typer.Option(help="Token in the address of the page; a random one by default."),
+        typer.Option(help="Token in the address of the page; by default one that is kept for this user, and a random one for an address that others can reach."),
     ] = None,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")

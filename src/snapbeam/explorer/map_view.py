@@ -136,8 +136,9 @@ class MapView:
     # ------------------------------------------------------------------ what was asked for
 
     def on_tap(self, tell: Callable[[float, float], None]) -> None:
-        """Say where the map was clicked."""
-        self.plot.on_event("tap", lambda event: tell(float(event.x), float(event.y)))
+        """Say where the map was clicked; Bokeh reports a click within 300 ms of another one as a double one."""
+        for kind in ("tap", "doubletap"):
+            self.plot.on_event(kind, lambda event: tell(float(event.x), float(event.y)))
 
     def on_hover(self, tell: Callable[[float, float], None]) -> None:
         """Say where the pointer is."""

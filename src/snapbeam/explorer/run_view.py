@@ -863,6 +863,8 @@ _SETTLE = 60
 _BUSY = Markup('<span class="busy">{}</span>')
 _BAD = Markup('<span class="bad">{}</span>')
 _FAINT = Markup('<span class="faint">{}</span>')
+FIRST = "Click on the map, use the arrow keys, or type numbers, to see the run of a point."
+"""Words of a run that is not asked for yet."""
 
 
 class RunView:
@@ -892,7 +894,9 @@ class RunView:
             Modal(look, self.cursor), Energy(look, self.cursor), Impacts(look, self.cursor, self._closer),
             BeamPanel(look, self.cursor), Numbers(look, self.cursor),
         ]  # fmt: skip
-        self.head = Html("", sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-head"])
+        self.head = Html(
+            _FAINT.format(FIRST), sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-head"]
+        )
         self.note = Html("", sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-note"])
         self.tabs = pn.Tabs(
             *((part.title, part.place) for part in self.parts), dynamic=True, sizing_mode="stretch_width", margin=0
@@ -906,6 +910,7 @@ class RunView:
             self.head, self.note, self.tabs, sizing_mode="stretch_width", css_classes=["card", "run"]
         )
         self.notes: dict[str, str] = {}
+        self.turned: Callable[[], None] = lambda: None
 
     @property
     def active(self) -> Any:
@@ -924,10 +929,18 @@ class RunView:
         self._head(_BUSY.format(f"computing, {seconds:.0f} s"), words, _FAINT.format(why) if why else "")
 
     def fail(self, words: str) -> None:
-        """Say why there is no run."""
+        """Say why there is no run; the pictures of the run before are greyed."""
         self.notes = {}
         self._write_notes()
+        self.tabs.css_classes = ["stale"]
         self._head(_BAD.format("no run"), words)
+
+    def forget(self) -> None:
+        """Show no run; the pictures of the run before are greyed."""
+        self.notes = {}
+        self._write_notes()
+        self.tabs.css_classes = ["stale"] if self.run is not None else []
+        self.head.object = _FAINT.format(FIRST)
 
     def _head(self, kind: str, words: str, below: str = "") -> None:
         line = Markup("<br>{}").format(below) if below else ""
@@ -938,6 +951,7 @@ class RunView:
     def show(self, run: Run, words: str, fresh: bool) -> None:
         """Show a run; *fresh* if it is not the one before with more samples."""
         self.run = run
+        self.tabs.css_classes = []
         self._write_notes()
         answer = run.summary
         if answer.status in (RunStatus.OK, RunStatus.EARLY_STOP):
@@ -985,6 +999,7 @@ class RunView:
             self.later(self.complete, _PAUSE)
 
     def _activated(self) -> None:
+        self.turned()
         self.active.activate()
         self.later(self._draw, _SETTLE)  # once the browser has what it is to be drawn in
 

@@ -310,7 +310,6 @@ class Cursor:
 # How a page is laid out, and the few scripts that it runs in the browser.
 
 
-_FIRST = "Click on the map, use the arrow keys, or type numbers, to see the run of a point."
 _GONE = """
 if (!document.getElementById('gone')) {
   const note = document.createElement('div');
@@ -324,7 +323,15 @@ _ADDRESS = """
 const search = bar.data.search[0];
 const kept = new URLSearchParams(window.location.search).get('token');
 const full = (kept ? 'token=' + encodeURIComponent(kept) + (search ? '&' : '') : '') + search;
-window.history.replaceState(null, '', window.location.pathname + (full ? '?' + full : ''));
+const wanted = window.location.pathname + (full ? '?' + full : '');
+if (wanted !== window.location.pathname + window.location.search) {
+  if (bar.data.step[0]) { window.history.pushState(null, '', wanted); } else { window.history.replaceState(null, '', wanted); }
+}
+"""
+_HISTORY = """
+window.addEventListener('popstate', () => {
+  back.data = {search: [window.location.search], count: [back.data.count[0] + 1]};
+});
 """
 _KEYS = """
 document.documentElement.lang = 'en';
@@ -407,10 +414,11 @@ def framed(page: Page) -> Any:
             made = list(others.values())[at - 1]()
             styled(made, look)
             left[at].objects = [made]
+        page.write_address()
 
     left.param.watch(lambda _: page.post(turned), "active")
+    page.cards, page.card_names = left, ["Map", *others]
     runs = pn.FlexBox(page.runs[0].layout, margin=0, css_classes=["right"])
-    page.runs[0].head.object = Markup('<span class="faint">{}</span>').format(_FIRST)
     body = pn.FlexBox(
         left,
         runs,
@@ -432,12 +440,14 @@ def framed(page: Page) -> Any:
     if doc is not None:
         doc.js_on_event(DocumentReady, CustomJS(args={"keys": page.keys}, code=_KEYS))
         doc.js_on_event(DocumentReady, CustomJS(code=_TABS))
+        doc.js_on_event(DocumentReady, CustomJS(args={"back": page.back}, code=_HISTORY))
         doc.js_on_event(DocumentReady, CustomJS(code=_FOCUS))
         large = CustomJS(args={"refused": page.refused}, code=_TOO_LARGE % UPLOAD)
         doc.js_on_event(DocumentReady, large)
         doc.js_on_event(ConnectionLost, CustomJS(code=_GONE))
         doc.add_root(page.bar)
         doc.add_root(page.keys)
+        doc.add_root(page.back)
         doc.add_root(page.refused)
         doc.add_root(page.downloads.source)
     return whole
@@ -448,4 +458,4 @@ def page_tabs(page: Page) -> dict[str, Callable[[], Any]]:
     found: dict[str, Callable[[], Any]] = {}
     if page.shared.system is not None:
         found["System"] = lambda: page.system_card().layout
-    return found | {"Take away": lambda: page.take_card().layout}
+    return found | {"Export": lambda: page.take_card().layout}
