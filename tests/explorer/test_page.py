@@ -23,7 +23,7 @@ def test_twenty_points_are_the_maps_bit_for_bit(tab, served, small_map):
         page.click(x, y)
         words = f"frequency ratio {x:.6g}, velocity amplitude {y:.6g}"
         page.wait(lambda words=words: words in page.head() and "crossings" in page.head(), words)
-        page.wait(lambda: "bit for bit" in page.notes(), "the comparison")
+        page.wait(lambda: "bitwise identical" in page.notes(), "the comparison")
         assert _label(small_map, row, column) in page.head()
         seen.add(_label(small_map, row, column))
         crossings = int(small_map["zero_crossings"].values[column, row])
@@ -39,7 +39,7 @@ def test_keys_go_from_point_to_point(tab, served, small_map):
     page = tab(served.url)
     ratio, velocity = small_map["frequency_ratio"].values, small_map["velocity_amplitude"].values
     page.click(float(ratio[5]), float(velocity[5]))
-    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run")
     for key, column, row in (
         ("ArrowRight", 6, 5),
         ("ArrowUp", 6, 6),
@@ -68,7 +68,9 @@ def test_numbers_are_typed_in_full(tab, served, system):
     run = sb.simulate(exact, sb.Integration(cycles=30))
     assert run.summary.response_class.label in page.head()
     assert f"{run.summary.zero_crossings} crossings, {run.summary.impacts} impacts" in page.head()
-    greyed = "() => Bokeh.documents[0]._all_models.values().some((m) => (m.css_classes || []).includes('stale'))"
+    greyed = (
+        "() => Bokeh.documents[0]._all_models.values().some((m) => (m.css_classes || []).includes('stale'))"
+    )
     assert not page.js(greyed)
     page.page.get_by_label("frequency ratio").fill("one")
     page.page.get_by_label("frequency ratio").press("Enter")
@@ -98,7 +100,10 @@ def test_back_and_forward_are_undo_and_redo(tab, served, small_map):
     page.wait(lambda: "show=" in page.page.url, "the state to which Back returns")
     for column in (5, 15):
         page.click(float(ratio[column]), float(velocity[5]))
-        page.wait(lambda column=column: f"{ratio[column]:.6g}" in page.head() and "crossings" in page.head(), "a run")
+        page.wait(
+            lambda column=column: f"{ratio[column]:.6g}" in page.head() and "crossings" in page.head(),
+            "a run",
+        )
     page.page.locator('.bk-tab:has-text("Phase")').first.click()
     page.wait(lambda: "tab=Phase" in page.page.url, "the view in the address")
     zoomed = "() => Bokeh.documents[0].get_model_by_name('map').x_range.start"
@@ -116,7 +121,9 @@ def test_back_and_forward_are_undo_and_redo(tab, served, small_map):
     page.wait(lambda: "Click on the map" in page.head() and page.data("map-mark", "x") == [], "no run")
     for _ in range(2):
         page.page.go_forward()
-    page.wait(lambda: f"{ratio[15]:.6g}" in page.head() and "crossings" in page.head(), "the second run again")
+    page.wait(
+        lambda: f"{ratio[15]:.6g}" in page.head() and "crossings" in page.head(), "the second run again"
+    )
     assert page.page.get_by_label("frequency ratio").input_value() == repr(float(ratio[15]))
 
 
@@ -124,7 +131,10 @@ def test_links_survive_a_restart_of_the_server(serve, tmp_path):
     """The token is kept for the user, the port is fixed; a second server takes the next one."""
     servers = [serve("map.nc", "--port", "0", state=tmp_path) for _ in range(2)]
     assert servers[0].token == servers[1].token
-    assert servers[0].url.rpartition(":")[2].partition("/")[2] == servers[1].url.rpartition(":")[2].partition("/")[2]
+    assert (
+        servers[0].url.rpartition(":")[2].partition("/")[2]
+        == servers[1].url.rpartition(":")[2].partition("/")[2]
+    )
     kept = tmp_path / "snapbeam" / "explorer-token"
     assert kept.stat().st_mode & 0o077 == 0
 

@@ -99,7 +99,7 @@ def test_a_page_is_used_without_a_mouse(tab, served, small_map):
     press = page.page.keyboard.press
     ratio, velocity = small_map["frequency_ratio"].values, small_map["velocity_amplitude"].values
     press("ArrowRight")  # the middle of what is seen, to begin with
-    page.wait(lambda: "bit for bit" in page.notes(), "a first run")
+    page.wait(lambda: "bitwise identical" in page.notes(), "a first run")
     page.page.get_by_label("frequency ratio").focus()
     press("Control+A")
     page.page.keyboard.type(repr(float(ratio[9])))
@@ -109,7 +109,7 @@ def test_a_page_is_used_without_a_mouse(tab, served, small_map):
     press("Tab")
     press("Enter")  # Run
     words = f"frequency ratio {ratio[9]:.6g}, velocity amplitude {velocity[12]:.6g}"
-    page.wait(lambda: words in page.head() and "bit for bit" in page.notes(), "what was typed")
+    page.wait(lambda: words in page.head() and "bitwise identical" in page.notes(), "what was typed")
     page.page.locator('.bk-tab:has-text("Phase")').first.focus()
     press("Enter")
     page.wait(lambda: len(page.data("section", "w")) > 0, "the section")
@@ -144,7 +144,7 @@ def test_nothing_is_cut_off_or_covered(tab, served, small_map, width, height):
 def test_the_table_of_impacts_is_readable_in_the_dark(tab, served, small_map):
     page = tab(served.url + "?theme=dark")
     page.click(float(small_map["frequency_ratio"][9]), float(small_map["velocity_amplitude"][12]))
-    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run")
     _turn(page, "Impacts")
     page.wait(lambda: page.page.locator(".slick-cell").count() > 4, "the table")
     found = page.page.locator(".slick-cell").evaluate_all(

@@ -18,7 +18,7 @@ def opened(tab, served, small_map, system):
     page = tab(served.url)
     x, y = float(small_map["frequency_ratio"][9]), float(small_map["velocity_amplitude"][12])
     page.click(x, y)
-    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run")
     exact = system.replace(**{"drive.frequency_ratio": x, "drive.velocity_amplitude": y})
     return page, sb.simulate(exact, sb.Integration(cycles=30))
 
@@ -88,7 +88,7 @@ def test_the_force_of_a_link_has_all_samples(tab, served, small_map, system):
     """The first look of 4000 samples is replaced although the page is still being loaded when it is computed."""
     x, y = float(small_map["frequency_ratio"][9]), float(small_map["velocity_amplitude"][12])
     page = tab(f"{served.url}?at=drive.frequency_ratio:{x!r},drive.velocity_amplitude:{y!r}&theme=dark")
-    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run")
     exact = system.replace(**{"drive.frequency_ratio": x, "drive.velocity_amplitude": y})
     peak = sb.simulate(exact, sb.Integration(cycles=30)).summary.peak_force
     page.wait(lambda: max(page.data("force", "y"), default=0.0) == pytest.approx(peak, rel=1e-6), "the peak")

@@ -156,7 +156,7 @@ def test_zooming_computes_what_is_seen_and_a_click_runs_its_points(tab, served):
     page.page.get_by_role("button", name="Stop").click()
     page.wait(lambda: "stopped" in page.state(), "the end of it")
     page.click(1.151, 0.152)
-    page.wait(lambda: "bit for bit" in page.notes(), "the run of a point between those of the map")
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run of a point between those of the map")
 
 
 @pytest.mark.slow
@@ -167,7 +167,7 @@ def test_the_papers_beam_is_mapped_while_one_looks(tab, serve, folder):
     finer = ("blocks of 9", "blocks of 3", "blocks of 1 ", "all ")
     page.wait(lambda: any(words in page.state() for words in finer), "the coarsest level")
     page.click(1.2, 0.3)
-    page.wait(lambda: "crossings" in page.head() and "bit for bit" in page.notes(), "a run")
+    page.wait(lambda: "crossings" in page.head() and "bitwise identical" in page.notes(), "a run")
 
 
 @pytest.mark.slow

@@ -46,7 +46,7 @@ from snapbeam.explorer.maps import (
     system_toml,
 )
 from snapbeam.explorer.shared import Shared
-from snapbeam.explorer.style import Html, Look, styled
+from snapbeam.explorer.style import Html, Look, framed_plot, styled
 from snapbeam.model.parameter_file import Config, config_from_mapping
 from snapbeam.model.parameters import Parameter, lookup, parameters
 from snapbeam.plot.style import CLASS_COLORS
@@ -111,6 +111,7 @@ class WindowControl:
     def _rested(self) -> None:
         if self.card.source.skeleton.data_vars and not (self.card.plane.x.even and self.card.plane.y.even):
             self.card.redraw()
+        self.card._legend()
         self.card.moved()
         if self.card.auto.value and self._worth_computing():
             self.compute_view()
@@ -167,9 +168,7 @@ class WindowControl:
         self.card.tell("computing this view")
         self._waiting.begin(0, self._still)
         self.card.shared.jobs.window(
-            lambda _: compute(
-                window, self.card.shared.jobs, token, lambda w: self._grew(w, token), seconds
-            ),
+            lambda _: compute(window, self.card.shared.jobs, token, lambda w: self._grew(w, token), seconds),
             lambda _, words: self.card.post(lambda: self._ended(window, token, words)),
             token,
         )
@@ -319,19 +318,23 @@ class MapCard:
         )  # fmt: skip
         grid = [name for name in dims if not source.is_list and source.skeleton[name].size > 1]
         self.sliders = {name: self._slider(name, address) for name in grid}
-        self.auto = pn.widgets.Checkbox(name="compute what is seen", value=True, align="center")
+        self.auto = pn.widgets.Checkbox(name="compute the view automatically", value=True, align="center")
         self.stop = pn.widgets.Button(
             name="Stop", button_type="warning", width=70, visible=False, align="center"
         )
         self.more = pn.widgets.Button(name="Finer", button_type="primary", visible=False, align="center")
         self.again = pn.widgets.Button(name="Compute view", button_type="default", width=110, align="center")
         self.layers = pn.widgets.CheckButtonGroup(
-            options={"threshold": "threshold", "V_QS1": "quasi", "measured": "dots", "windows": "windows"},
+            options={
+                "interwell threshold": "threshold", "quasi-static threshold": "quasi",
+                "measured points": "dots", "computed windows": "windows",
+            },
             value=["windows"], button_type="default",
         )  # fmt: skip
         self.hover = Html("\xa0", sizing_mode="stretch_width", css_classes=["hover"], margin=(0, 0, 0, 4))
+        self._selected: Markup = Markup("&nbsp;")
         self.state = Html("", sizing_mode="stretch_width", css_classes=["map-state"], margin=(0, 0, 0, 4))
-        self.key = Html("", sizing_mode="stretch_width", margin=(0, 0, 0, 4))
+        self.key = Html("", sizing_mode="stretch_width", margin=(0, 0, 0, 4), css_classes=["key-box"])
         for widget in (self.x, self.y):
             widget.param.watch(self._axes_changed, "value")
         self.show.param.watch(lambda _: self.post(self.redraw), "value")
@@ -343,6 +346,8 @@ class MapCard:
             slider.param.watch(lambda _: self.post(self._cut_changed), "value")
         self.auto.visible = self.again.visible = not source.is_list
         self.slider_box = pn.FlexBox(margin=0)
+        self.typed = pn.FlexBox(margin=0)
+        """Fields of a point."""
 
     def _slider(self, name: str, address: Address) -> Any:
         points = self.source.coordinate(name)
@@ -431,7 +436,7 @@ class MapCard:
         self.slider_box.objects = [
             slider for name, slider in self.sliders.items() if name not in (self.x.value, self.y.value)
         ]  # fmt: skip
-        self.holder.objects = [pn.pane.Bokeh(self.view.plot, sizing_mode="stretch_width", margin=0)]
+        self.holder.objects = [framed_plot(self.view.plot, margin=0)]
         self.redraw()
         self.control.view_moved()
 
@@ -440,7 +445,8 @@ class MapCard:
         """The card."""
         return pn.Column(
             pn.FlexBox(self.x, self.y, self.show, margin=0), self.slider_box, self.holder, self.key, self.hover,
-            pn.FlexBox(self.auto, self.again, self.stop, self.more, self.layers, align_items="center", margin=0), self.state,
+            self.typed, pn.FlexBox(self.auto, self.again, self.stop, self.more, self.layers, align_items="center", margin=0),
+            self.state,
             sizing_mode="stretch_width", css_classes=["card"],
         )  # fmt: skip
 
@@ -488,7 +494,7 @@ class MapCard:
         self.view.show_threshold(kinds)
         self._draw_dots("dots" in layers, words)
         self._draw_marks()
-        self._legend(values if name == "response_class" else None)
+        self._legend()
         if any(words):
             self._words = [each for each in words if each]
         self.tell()
@@ -539,7 +545,9 @@ class MapCard:
         places = [(self.plane.place(values), text) for values, text in self.marks]
         self.view.show_marks([(*place, text) for place, text in places if place is not None])
 
-    def _legend(self, kinds: NDArray[Any] | None) -> None:
+    def _legend(self) -> None:
+        """Name the classes, with the share of the cells in view that each has."""
+        kinds = self._kinds_in_view() if self.show.value == "response_class" else None
         items = []
         for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
             share = (
@@ -551,8 +559,26 @@ class MapCard:
                 continue
             swatch = Markup('<span class="swatch" style="background:{}"></span>{}{}')
             items.append(swatch.format(CLASS_COLORS[kind], kind.label, share))
+        if kinds is not None and kinds.size:
+            part = "the map" if self.view.is_whole else "the view"
+            items.append(Markup('<span class="faint">shares of {}</span>').format(part))
         shown = Markup('<div class="key">{}</div>').format(Markup(" &nbsp; ").join(items))
         self.key.object = shown if self.show.value == "response_class" else ""
+
+    def _kinds_in_view(self) -> NDArray[Any] | None:
+        """Classes of the cells of the map in view, or of all points of a list."""
+        try:
+            kinds = self.plane.values("response_class")
+        except InputError:
+            return None
+        if kinds is None or self.source.is_list:
+            return kinds
+        left, right, low, high = self.view.view
+        columns, rows = (
+            (axis.edges[1:] > first) & (axis.edges[:-1] < last)
+            for axis, first, last in ((self.plane.x, left, right), (self.plane.y, low, high))
+        )
+        return kinds[np.ix_(rows, columns)]
 
     def say(self, words: str) -> None:
         """Add a line to what is wrong."""
@@ -609,30 +635,50 @@ class MapCard:
             return self.plane.at(*beside)
         return self.point(float(self.plane.x.at[beside[1]]), float(self.plane.y.at[beside[0]]))
 
-    def _hovered(self, x: float, y: float) -> None:
+    def select(self, point: Point | None) -> None:
+        """Let the readout show a point whenever the pointer is not over the map."""
+        self._selected = Markup("&nbsp;")
+        if point is not None:
+            place = self.plane.place(point.values)
+            held = {} if place is None else self._held(point, *place)
+            self._selected = Markup("Selected: {}").format(self._readout(point, held))
+        self.hover.object = self._selected
+
+    def _hovered(self, x: float | None, y: float | None) -> None:
+        if x is None or y is None:
+            self.hover.object = self._selected
+            return
         point = self.point(x, y)
-        name = self.show.value
+        self.hover.object = self._readout(point, self._held(point, x, y))
+
+    def _held(self, point: Point, x: float, y: float) -> dict[str, Any]:
+        """The class, the shown variable and two more of the cell at a location."""
         held = point.expected
-        if not held and not self.changed:
-            place = self.plane.index(x, y)
-            held = {}
-            for each in {"response_class", "zero_crossings", "peak_force", name} & set(
-                self.source.variables()
-            ):
-                try:
-                    values = self.plane.values(each)
-                except InputError:
-                    values = None
-                if values is not None:
-                    held[each] = values[place].item()
+        if held or self.changed:
+            return held
+        place, found = self.plane.index(x, y), {}
+        if not self.plane.at(*place).values == point.values:
+            return {}
+        for each in {"response_class", "zero_crossings", "peak_force", self.show.value} & set(
+            self.source.variables()
+        ):
+            try:
+                values = self.plane.values(each)
+            except InputError:
+                values = None
+            if values is not None:
+                found[each] = values[place].item()
+        return found
+
+    def _readout(self, point: Point, held: dict[str, Any]) -> Markup:
         parts = [point.words()]
         if "response_class" in held:
             parts.append(Markup("<b>{}</b>").format(ResponseClass(int(held["response_class"])).label))
-        for each in dict.fromkeys((name, "zero_crossings", "peak_force")):
+        for each in dict.fromkeys((self.show.value, "zero_crossings", "peak_force")):
             if each in held and each != "response_class":
                 unit = self.source.label(each)[1]
                 parts.append(f"{each.replace('_', ' ')} {held[each]:.5g}{'' if unit == '1' else f' {unit}'}")
-        self.hover.object = Markup(" &nbsp;·&nbsp; ").join(parts)
+        return Markup(" &nbsp;·&nbsp; ").join(parts)
 
     def use(self, system: System, integration: Integration, changed: bool) -> None:
         """Compute points and windows of another system from now on."""
@@ -660,6 +706,10 @@ _INTEGRATION = (
     "integration.step",
     "integration.early_termination",
 )
+_LAWS = {
+    "hertz": "Hertz", "hunt_crossley": "Hunt and Crossley", "kelvin_voigt": "Kelvin and Voigt", "layer": "elastic layer",
+    "power": "power law", "restitution": "coefficient of restitution",
+}  # fmt: skip
 _PRESETS: dict[str, dict[str, dict[str, Any]]] = {
     "the paper's beam": {},
     "the paper's, one mode": {"model": {"modes": 1}},
@@ -712,7 +762,8 @@ class SystemCard:
         save.on_click(lambda _: post(self._save))
         self.preset = pn.widgets.Select(name="Preset", options=["", *_PRESETS], width=210)
         self.preset.param.watch(lambda event: post(lambda: self._chosen(event.new)), "value")
-        self.law = pn.widgets.Select(name="Law of contact", options=_kinds("contact"), width=160)
+        laws = {_LAWS.get(kind, kind.replace("_", " ")): kind for kind in _kinds("contact")}
+        self.law = pn.widgets.Select(name="Contact law", options=laws, width=160)
         self.law.param.watch(lambda _: post(self._law_changed), "value")
         self.file = pn.widgets.FileInput(accept=".toml", multiple=False, width=220)
         self.file.param.watch(lambda event: post(lambda: self._given(event.new)), "value")
@@ -750,7 +801,7 @@ class SystemCard:
     def _fill(self) -> None:
         """Make the fields of the system that is held."""
         law = str(self.system.parameters.get("contact.type", "hertz"))
-        if self.law.value != law and law in self.law.options:
+        if self.law.value != law and law in self.law.options.values():
             self.law.value = law
         self._make_fields()
         self._show_facts()
@@ -941,8 +992,16 @@ def _text(value: Any) -> str:
 
 
 _EXPORT_SECONDS = 300.0
-_LONGEST = 20.0
+_LONGEST = 5.0
 """Cycles of an animation, if more are seen."""
+_PROGRESS = 0.3
+"""Seconds between two reports of the progress of an animation."""
+_COPY = """
+const say = (words) => { button.label = words; setTimeout(() => { button.label = 'Copy the link'; }, 3000); };
+const failed = () => say('Not copied');
+if (!navigator.clipboard) { failed(); }
+else { navigator.clipboard.writeText(window.location.href).then(() => say('Copied'), failed); }
+"""
 
 
 class TakeCard:
@@ -960,10 +1019,10 @@ class TakeCard:
         self.text = Html("", sizing_mode="stretch_width", css_classes=["take-text"])
         self.kind = pn.widgets.RadioButtonGroup(options=["png", "pdf", "svg"], value="png")
         self.slow = pn.widgets.FloatInput(
-            name="slow motion at the hardest impact (s)", value=4.0, start=0.0, end=30.0, width=260
+            name="slow motion at the hardest impact (s)", value=2.0, start=0.0, end=30.0, width=260
         )
         self.length = pn.widgets.FloatInput(
-            name="length of the animation (s)", value=8.0, start=1.0, end=60.0, width=210
+            name="length of the animation (s)", value=4.0, start=1.0, end=60.0, width=210
         )
         self.dots = pn.widgets.FileInput(accept=".csv", multiple=False, width=220)
         self.dots.param.watch(lambda event: page.post(lambda: self._dots(event.new)), "value")
@@ -976,9 +1035,12 @@ class TakeCard:
         for name, work in buttons.items():
             self.buttons[name].on_click(_posted(page, work))
         self.link = pn.widgets.Button(name="Copy the link", width=145)
-        self.link.js_on_click(
-            args={"holder": self.page.bar}, code="navigator.clipboard.writeText(window.location.href);"
+        self.link.js_on_click(args={"button": self.link}, code=_COPY)
+        self.cancel = pn.widgets.Button(
+            name="Cancel the animation", button_type="warning", width=180, visible=False
         )
+        self.cancel.on_click(_posted(page, self._cancelled))
+        self._animating: Token | None = None
 
     @property
     def layout(self) -> Any:
@@ -987,12 +1049,12 @@ class TakeCard:
         return pn.Column(
             Html(_HEADING.format("Pictures in the style of the journal"), margin=0),
             pn.FlexBox(make["Map"], make["Run"], self.kind, margin=0, align_items="center"),
-            Html(_HEADING.format("The beam moving, of the cycles that are seen"), margin=0),
+            Html(_HEADING.format(f"Animation of the beam, of at most {_LONGEST:g} of the visible cycles"), margin=0),
             pn.FlexBox(make["MP4"], make["GIF"], self.length, self.slow, margin=0, align_items="center"),
             Html(_HEADING.format("Data"), margin=0),
             pn.FlexBox(make["Run as NetCDF"], make["Map as NetCDF"], make["Window as NetCDF"], self.link, margin=0),
             Html(_HEADING.format("Measured points to lay over the map (CSV)"), margin=0), self.dots,
-            self.words, self.text, sizing_mode="stretch_width", css_classes=["card", "take"],
+            pn.FlexBox(self.words, self.cancel, margin=0), self.text, sizing_mode="stretch_width", css_classes=["card", "take"],
         )  # fmt: skip
 
     # ------------------------------------------------------------------ text
@@ -1046,12 +1108,18 @@ class TakeCard:
 
     def _make(self, name: str, suffix: str, write: Callable[[Any, Token], object]) -> None:
         """Make a file beside the page and hand it to the browser."""
+        token = Token(_EXPORT_SECONDS)
+        self.page.shared.jobs.export(*self._job(name, suffix, write, token), token)
+
+    def _job(self, name: str, suffix: str, write: Callable[[Any, Token], object], token: Token) -> Any:
+        """What makes a file, and what is done with it."""
         page = self.page
         self.words.object = Markup('<p class="busy">making {}{}</p>').format(name, suffix)
-        token = Token(_EXPORT_SECONDS)
 
         def done(content: bytes | None, error: str) -> None:
             def tell() -> None:
+                if token is self._animating:
+                    self._animating, self.cancel.visible = None, False
                 if content is None:
                     self.words.object = _BAD.format(error)
                 else:
@@ -1060,7 +1128,13 @@ class TakeCard:
 
             page.post(tell)
 
-        page.shared.jobs.export(lambda t: file_bytes(suffix, lambda path: write(path, t)), done, token)
+        return lambda t: file_bytes(suffix, lambda path: write(path, t)), done
+
+    def _cancelled(self) -> None:
+        if self._animating is not None:
+            self._animating.cancel()
+        self._animating, self.cancel.visible = None, False
+        self.words.object = _NOTE.format("the animation was cancelled")
 
     def _run(self) -> Run | None:
         run = self.page.runs[self.page.which].run
@@ -1115,21 +1189,36 @@ class TakeCard:
         first, last = self.page.runs[self.page.which].window
         window = (first, min(last, first + _LONGEST))
         length, slow = float(self.length.value), float(self.slow.value)
+        if self._animating is not None:
+            self._animating.cancel()
+        self._animating = token = Token(_EXPORT_SECONDS)
+        self.cancel.visible = True
+        told = 0.0
 
-        def write(path: Any, token: Token) -> None:
+        def progress(done: int, total: int) -> None:
+            nonlocal told
+            token.check(done)
+            drawing.release()  # between two frames another picture may be drawn
+            try:
+                time.sleep(0.002)
+                if time.monotonic() - told > _PROGRESS:
+                    told = time.monotonic()
+                    words = f"making run{suffix}: {100 * done / total:.0f} %"
+                    self.page.post(lambda: self._report(words, token))
+            finally:
+                drawing.acquire()
+
+        def write(path: Any, _: Token) -> None:
             from snapbeam.plot.animation import animate_run
 
             with drawing:
-                animate_run(
-                    run.dataset,
-                    path,
-                    window,
-                    duration=length,
-                    slow_motion=slow,
-                    progress=lambda done, total: token.check(),
-                )
+                animate_run(run.dataset, path, window, duration=length, slow_motion=slow, progress=progress)
 
-        self._make("run", suffix, write)
+        self.page.shared.jobs.animation(*self._job("run", suffix, write, token), token)
+
+    def _report(self, words: str, token: Token) -> None:
+        if token is self._animating:
+            self.words.object = Markup('<p class="busy">{}</p>').format(words)
 
     def _run_data(self) -> None:
         run = self._run()

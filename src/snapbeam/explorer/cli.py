@@ -43,7 +43,9 @@ def explore(
     ] = False,
     token: Annotated[
         str | None,
-        typer.Option(help="Token in the address of the page; by default one that is kept for this user, and a random one for an address that others can reach."),
+        typer.Option(
+            help="Token in the address of the page; by default one that is kept for this user, and a random one for an address that others can reach."
+        ),
     ] = None,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")

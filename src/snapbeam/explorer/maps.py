@@ -555,8 +555,14 @@ class Point:
 
     def system(self, base: System, integration: Integration) -> tuple[System, Integration]:
         """What is run at this point."""
-        of_run = {name.partition(".")[2]: value for name, value in self.values.items() if name.startswith("integration.")}
-        of_system = {name: value for name, value in self.values.items() if not name.startswith("integration.")}
+        of_run = {
+            name.partition(".")[2]: value
+            for name, value in self.values.items()
+            if name.startswith("integration.")
+        }
+        of_system = {
+            name: value for name, value in self.values.items() if not name.startswith("integration.")
+        }
         return base.replace(**of_system), integration.replace(**of_run) if of_run else integration
 
     def words(self) -> str:
@@ -627,7 +633,7 @@ def compared(expected: Mapping[str, Any], outcome: RunSummary, engine: str) -> t
         if not same and name not in ("steps",):
             differing.append(name)
     if not differing:
-        return True, f"bit for bit what the map holds ({len(expected)} numbers)"
+        return True, f"bitwise identical to the map ({len(expected)} results)"
     if "response_class" in differing:
         return False, "another class than the map's" + _why(expected, engine)
     return True, f"the map's class; differs in {', '.join(differing[:4])}" + _why(expected, engine)

@@ -141,7 +141,6 @@ class Page:
         self.downloads = Downloads()
         self.fields: dict[str, Any] = {}
         self.errors: dict[str, Any] = {}
-        self.typed = pn.FlexBox(margin=0)
         self.old = Html("", sizing_mode="stretch_width", margin=0, css_classes=["old-words"])
         self.go = pn.widgets.Button(name="Run", button_type="primary", width=70, align="end")
         self.go.on_click(lambda _: self.post(self._ask_typed))
@@ -260,7 +259,7 @@ class Page:
         parts = [pn.Column(self.fields[name], self.errors[name], margin=0) for name in self.fields]
         for part in parts:
             styled(part, self.look)
-        self.typed.objects = [*parts, self.go]
+        self.card.typed.objects = [*parts, self.go]
 
     def _begin(self) -> None:
         """Take the system that the address names."""
@@ -383,6 +382,7 @@ class Page:
         self.later(lambda: view.begin(words) if self.waiting.waits(which, mark) else None, _PATIENT)
         with self._together():
             self._fill_fields(point)
+            self.card.select(point)
             self._mark()
             self.write_address()
 
@@ -472,6 +472,7 @@ class Page:
     def _follow(self) -> None:
         """Let the fields hold the point of the run that the next click replaces."""
         point = self.points[self.which]
+        self.card.select(point)
         if point is not None:
             self._fill_fields(point)
 
@@ -531,7 +532,10 @@ class Page:
         """Write what is shown into the address: a step in the history of the browser."""
         search = "" if self._quiet else self._search()
         if search and search != self._written:
-            self.bar.data = {"search": [search], "step": [self.bar.data["step"][0] + 1 if self._written else 0]}
+            self.bar.data = {
+                "search": [search],
+                "step": [self.bar.data["step"][0] + 1 if self._written else 0],
+            }
             self._written = search
 
     def _search(self) -> str:

@@ -35,6 +35,7 @@ from snapbeam.explorer.style import (
     columns,
     figure,
     fit,
+    framed_plot,
     inner_size,
     legend,
     sheet,
@@ -112,7 +113,7 @@ class RunPanel:
 
     def wrap(self, plot: Any) -> Any:
         """A figure in the page."""
-        return pn.pane.Bokeh(plot, sizing_mode="stretch_width", margin=(0, 0, 4, 0))
+        return framed_plot(plot, margin=(0, 0, 4, 0))
 
 
 def across(run: Run) -> tuple[NDArray[np.float64], str]:
@@ -421,7 +422,7 @@ class Energy(RunPanel):
         self.sources = {name: columns(x=[], y=[]) for name in _CURVES}
         self.sources["striker_work"].name = self.named("energy")
         self.plot = figure(
-            look, height=360, x_range=self.cursor.range, y_axis_label="energy (µJ)", y_range=(0.0, 1.0),
+            look, height=360, used=260, x_range=self.cursor.range, y_axis_label="energy (µJ)", y_range=(0.0, 1.0),
             tools="xpan,xbox_zoom,xwheel_zoom,reset", active_drag="xbox_zoom", active_scroll="xwheel_zoom",
         )  # fmt: skip
         for (name, label), color in zip(_CURVES.items(), colors, strict=True):
@@ -454,7 +455,7 @@ class Energy(RunPanel):
             scale = max(abs(parts["striker_work"]), parts["energy_dissipated"], 1e-300)
             barrier = run.system.model.saddle_energy - run.system.model.well_energy
             words = (
-                f"At the end the books balance to {left:.2g} J, {abs(left) / scale:.1g} of the work. "
+                f"At the end the energy balance has an error of {left:.2g} J, {abs(left) / scale:.1g} of the work. "
                 f"The barrier between the wells is {1e6 * barrier:.4g} µJ."
             )
             self.words.object = Markup('<p class="note">{}</p>').format(words)
@@ -547,8 +548,17 @@ class Numbers(RunPanel):
     def show(self, run: Run, low: float, high: float) -> None:
         """Show a run between two cycles."""
         rows = []
+        system = run.system
+        circuit = system.harvester is not None
+        parts = {
+            "base_": system.base_excitation is not None, "load_work": system.axial_load is not None,
+            "local_force_": system.local_force is not None, "energy_harvested": circuit, "harvested_": circuit,
+            "rms_voltage": circuit, "peak_voltage": circuit,
+        }  # fmt: skip
         for name, value in run.summary.items():
             row = STATISTICS.get(name)
+            if any(name.startswith(start) and not has for start, has in parts.items()):
+                continue
             shown = getattr(value, "label", None) or getattr(value, "name", None) or value
             text = f"{shown:.8g}" if isinstance(shown, float) else str(shown)
             text = "–" if isinstance(shown, float) and np.isnan(shown) else text
@@ -576,7 +586,7 @@ class Modal(RunPanel):
         """Return the models of this view."""
         look = self.look
         plot = figure(
-            look, height=260, x_range=self.cursor.range, y_axis_label="αᵢ over α₁ of the well", y_range=(-1.5, 1.5),
+            look, height=260, used=215, share=0.6, x_range=self.cursor.range, y_axis_label="αᵢ over α₁ of the well", y_range=(-1.5, 1.5),
             tools="xpan,xbox_zoom,xwheel_zoom,reset", active_drag="xbox_zoom", active_scroll="xwheel_zoom",
         )  # fmt: skip
         self.lines = [columns(x=[], y=[]) for _ in range(_SHOWN)]
@@ -588,7 +598,7 @@ class Modal(RunPanel):
         self.bars = columns(mode=[], rms=[], top=[])
         self.bars.name = self.named("modal")
         low = figure(
-            look, height=170, y_axis_type="log", x_axis_label="buckling mode i", y_axis_label="rms αᵢ / α₁",
+            look, height=170, used=215, share=0.4, y_axis_type="log", x_axis_label="buckling mode i", y_axis_label="rms αᵢ / α₁",
             tools="reset", x_range=(0.4, 32.6), y_range=(1e-8, 1.0),
         )  # fmt: skip
         low.segment("mode", 1e-16, "mode", "rms", source=self.bars, color=look.center, line_width=2)
@@ -662,7 +672,7 @@ class Phase(RunPanel):
         self.dots.name = self.named("section")
         dot = ColumnDataSource({"w": [], "v": []}, syncable=False)
         plots = [
-            figure(look, height=370, tools="pan,box_zoom,wheel_zoom,reset", x_range=(-1.6, 1.6), y_range=(-1.6, 1.6),
+            figure(look, height=370, used=280, tools="pan,box_zoom,wheel_zoom,reset", x_range=(-1.6, 1.6), y_range=(-1.6, 1.6),
                    title=title, x_axis_label="displacement w (b)", y_axis_label="velocity (b ω₁)", min_border_left=50)
             for title in ("Phase portrait", "Stroboscopic section")
         ]  # fmt: skip
@@ -745,7 +755,7 @@ class Spectrum(RunPanel):
         }
         self.sources["midspan_displacement"].name = self.named("spectrum")
         plot = figure(
-            look, height=420, title=" ", y_axis_type="log", y_axis_label="amplitude (b)",
+            look, height=420, used=230, title=" ", y_axis_type="log", y_axis_label="amplitude (b)",
             x_axis_label="frequency over f₁", x_range=(0.0, 12.0), y_range=(1e-7, 1.0),
             tools="pan,box_zoom,wheel_zoom,reset", active_drag="box_zoom",
         )  # fmt: skip
@@ -809,18 +819,35 @@ class WaveformPanel(RunPanel):
             look,
             name=self.named("waveform-plot"),
             height=265,
+            used=215,
+            share=0.6,
             y_axis_label="displacement w (b)",
             y_range=(-1.5, 1.5),
             **common,
         )
         words = ("beam, centre", "beam, at the striker", "striker")
-        colors, widths = (look.center, look.beam, look.striker), (2.0, 1.0, 1.3)
-        for name, label, color, width in zip(_CURVES_WAVEFORM, words, colors, widths, strict=True):
-            top.line("x", "y", source=self.sources[name], color=color, line_width=width, legend_label=label)
+        colors, widths = (look.center, look.beam, look.striker), (2.6, 1.2, 1.3)
+        dashes = ("solid", "dashed", "solid")
+        rows = list(zip(_CURVES_WAVEFORM, words, colors, widths, dashes, strict=True))
+        for name, label, color, width, dash in (
+            rows[2],
+            *rows[:2],
+        ):  # the striker below, so that it hides nothing
+            top.line(
+                "x",
+                "y",
+                source=self.sources[name],
+                color=color,
+                line_width=width,
+                line_dash=dash,
+                legend_label=label,
+            )
         legend(top, look)
         low = figure(
             look,
             height=165,
+            used=215,
+            share=0.4,
             y_axis_label="contact force f (N)",
             y_range=(0.0, 1.0),
             x_axis_label="cycles of excitation τ",
@@ -865,6 +892,10 @@ _BAD = Markup('<span class="bad">{}</span>')
 _FAINT = Markup('<span class="faint">{}</span>')
 FIRST = "Click on the map, use the arrow keys, or type numbers, to see the run of a point."
 """Words of a run that is not asked for yet."""
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 class RunView:
@@ -957,9 +988,11 @@ class RunView:
         if answer.status in (RunStatus.OK, RunStatus.EARLY_STOP):
             well = "upper" if answer.final_well > 0 else "lower"
             final = ", for good" if answer.final_well_proven else ""
-            counts = (
-                f"{answer.zero_crossings} crossings, {answer.impacts} impacts, ends in the {well} well{final}"
+            crossings, impacts = (
+                _counted(answer.zero_crossings, "crossing"),
+                _counted(answer.impacts, "impact"),
             )
+            counts = f"{crossings}, {impacts}, ends in the {well} well{final}"
             self._head(class_chip(answer.response_class), words, _FAINT.format(counts))
         else:
             why = _BAD.format(f"{answer.status.name}: {answer.status.advice}")

@@ -39,6 +39,7 @@ __all__ = [
     "fit",
     "focused",
     "framed",
+    "framed_plot",
     "inner_size",
     "legend",
     "look_of",
@@ -124,8 +125,16 @@ def styled(item: Any, look: Look) -> None:
             each.stylesheets = [*each.stylesheets, style]
 
 
-def figure(look: Look, **options: Any) -> Any:
-    """An empty Bokeh figure in the style of the page."""
+def figure(look: Look, *, used: int = 0, share: float = 1.0, **options: Any) -> Any:
+    """An empty Bokeh figure in the style of the page.
+
+    Parameters
+    ----------
+    used : int
+        Pixels of the window's height that other parts of the page need.  The figure takes *share* of the rest, and at
+        least its own height; 0 for a figure of fixed height.
+    share : float
+    """
     settings: dict[str, Any] = {
         "sizing_mode": "stretch_width",
         "toolbar_location": "right",
@@ -148,12 +157,23 @@ def figure(look: Look, **options: Any) -> Any:
         axis.minor_tick_line_color = None
     plot.grid.grid_line_color = look.grid
     plot.stylesheets = plot.toolbar.stylesheets = [focused(look)]
+    if used:
+        tall = f"max({plot.height}px, calc({share:g} * (100vh - {used}px)))"
+        plot.stylesheets = [
+            *plot.stylesheets,
+            f"@media (min-width: 1000px) {{ :host {{ height: {tall} !important; }} }}",
+        ]
     plot.toolbar.logo = None
     plot.toolbar.autohide = False
     plot.title.text_color = look.text
     plot.title.text_font_size = "12px"
     plot.title.text_font_style = "normal"
     return plot
+
+
+def framed_plot(plot: Any, **options: Any) -> Any:
+    """A figure in the page; Panel gives it the style sheets of its frame."""
+    return pn.pane.Bokeh(plot, sizing_mode="stretch_width", stylesheets=list(plot.stylesheets), **options)
 
 
 def fit(plot: Any, *curves: NDArray[Any]) -> None:
@@ -180,6 +200,7 @@ def legend(plot: Any, look: Look) -> None:
         item.border_line_color = None
         item.padding, item.spacing, item.margin = 3, 8, 4
         item.glyph_height = item.label_height = 14
+        item.glyph_width = 34
         item.click_policy = "hide"
 
 
@@ -397,8 +418,7 @@ def framed(page: Page) -> Any:
     top = pn.Row(
         title, page.target, page.compare, dark, sizing_mode="stretch_width", css_classes=["top"], margin=0
     )
-    map_tab = pn.Column(page.card.layout, page.typed, sizing_mode="stretch_width", margin=0)
-    map_tab.insert(0, page.old)
+    map_tab = pn.Column(page.old, page.card.layout, sizing_mode="stretch_width", margin=0)
     others = page_tabs(page)
     left = pn.Tabs(
         ("Map", map_tab),
