@@ -301,6 +301,24 @@ def test_the_beam_moving_is_exported(tab, served, small_map, tmp_path):
     assert _saved(page, "MP4", tmp_path).read_bytes()[4:8] == b"ftyp"
 
 
+def test_an_animation_reports_its_progress_is_cancelled_and_keeps_nobody_waiting(
+    tab, served, small_map, tmp_path
+):
+    pytest.importorskip("imageio_ffmpeg")
+    page = tab(served.url)
+    page.click(float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][13]))
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run")
+    _turn(page, "Export")
+    page.page.get_by_label("length of the animation (s)").fill("60")
+    page.page.get_by_role("button", name="GIF", exact=True).click()
+    page.wait(lambda: " %" in page.text("take-words"), "the progress")
+    assert _saved(page, "Map", tmp_path).read_bytes().startswith(b"\x89PNG"), "while the animation is made"
+    page.page.get_by_role("button", name="Cancel the animation").click()
+    page.wait(lambda: "was cancelled" in page.text("take-words"), "the end of it")
+    page.page.get_by_role("button", name="Copy the link").click()
+    page.wait(lambda: page.page.get_by_role("button", name="opied").count() == 1, "a confirmation")
+
+
 # ---------------------------------------------------------------------- bad guests
 
 

@@ -198,3 +198,30 @@ def test_pictures_of_a_list_are_taken_away(tab, serve, system, tmp_path):
 
     for kind in classes:
         assert tuple(bytes.fromhex(CLASS_COLORS[kind][1:])) in colors, f"no dot of {kind.label}"
+
+
+def test_the_page_uses_the_height_of_the_window_and_the_width_of_a_phone(tab, served, small_map):
+    page = tab(served.url)
+    page.page.set_viewport_size({"width": 1920, "height": 1080})
+    height = """([name]) => Bokeh.index.find_one(Bokeh.documents[0].get_model_by_name(name)).el
+        .getBoundingClientRect().height"""
+    page.wait(lambda: page.js(height, ["map"]) > 600, "a tall map")
+    assert page.js(height, ["waveform-plot"]) > 450
+    assert page.js("() => document.scrollingElement.scrollHeight <= window.innerHeight")
+    page.page.set_viewport_size({"width": 390, "height": 844})
+    page.wait(lambda: page.js("() => document.scrollingElement.scrollWidth") <= 390, "no horizontal scroll")
+    assert page.page.locator('meta[name="viewport"]').count() == 1
+
+
+def test_the_readout_has_a_fixed_height_and_shows_the_selected_point(tab, served, small_map):
+    page = tab(served.url)
+    x, y = float(small_map["frequency_ratio"][9]), float(small_map["velocity_amplitude"][12])
+    below = page.page.get_by_role("button", name="Compute view")
+    before = below.bounding_box()["y"]
+    page.click(x, y)
+    page.wait(lambda: f"{x:.6g}" in page.text("hover"), "the point below the pointer")
+    page.page.mouse.move(5, 5)
+    page.wait(
+        lambda: "Selected: " in page.text("hover") and f"{x:.6g}" in page.text("hover"), "the selection"
+    )
+    assert below.bounding_box()["y"] == before

@@ -179,10 +179,10 @@ const step = (now) => {
   const F = frames.data, n = F.t.length;
   if (n > 1) {
     let t = place.data.t[0], a = 0, b = n - 1;
-    if (!(t >= F.t[0] && t < F.t[b])) { t = F.t[0]; }
+    if (!(t > F.t[0] && t < F.t[b])) { t = Math.max(F.t[0], meta.data.begin[0]); }
     while (b - a > 1) { const c = (a + b) >> 1; if (F.t[c] <= t) { a = c; } else { b = c; } }
     const slow = (linger.active && F.force[a] > 0) ? 0.04 : 1.0;
-    t += Math.pow(10, speed.value) * slow * Math.min(now - last, 100) / 1000;
+    t += parseFloat(speed.value) * slow * Math.min(now - last, 100) / 1000;
     last = now;
     place.data = {t: [t]};
     scrub.value = Math.min(Math.max((t - F.t[0]) / (F.t[n - 1] - F.t[0]), 0), 1);
@@ -218,6 +218,8 @@ class BeamPanel(RunPanel):
         """Return the models of this view."""
         look = self.look
         self.run: Run | None = None
+        self.begin = 0.0
+        """Where playing begins: half a cycle before the first snap-through."""
         self.fresh = True
         self.count = 0
         empty: list[float] = []
@@ -226,20 +228,27 @@ class BeamPanel(RunPanel):
         )
         self.amplitudes = ColumnDataSource({"q": empty})
         self.modes, self.shapes = ColumnDataSource({"phi": empty}), ColumnDataSource({"x": empty})
-        self.meta = ColumnDataSource({"modes": [0]})
+        self.meta = ColumnDataSource({"modes": [0]}, name=self.named("beam-meta"))
         beam = ColumnDataSource(
             {"x": empty, "top": empty, "low": empty}, syncable=False, name=self.named("beam")
         )
         striker = ColumnDataSource({"x": empty, "y": empty, "color": empty}, syncable=False)
         self.plot = figure(
-            look, name=self.named("beam-plot"), height=330, title=" ",
+            look, name=self.named("beam-plot"), height=330, used=330, title=" ",
             x_axis_label="position (mm)", y_axis_label="displacement (mm)",
             x_range=Range1d(0.0, 1.0), y_range=Range1d(-1.0, 1.0), tools="pan,wheel_zoom,reset",
         )  # fmt: skip
         self.plot.patches("x", "y", source=striker, fill_color="color", line_color=None)
         self.plot.varea("x", "low", "top", source=beam, fill_color=look.beam)
         for edge in ("top", "low"):
-            self.plot.line("x", edge, source=beam, line_color=look.beam, line_width=1.5)
+            self.plot.line("x", edge, source=beam, line_color=look.beam, line_width=2.5)
+        self.supports = ColumnDataSource(
+            {"left": empty, "right": empty, "low": empty, "top": empty}, name=self.named("supports")
+        )
+        self.plot.quad(
+            "left", "right", "low", "top", source=self.supports, fill_color=look.grid, line_color=look.faint,
+            hatch_pattern="/", hatch_color=look.faint,
+        )  # fmt: skip
         words = Label(
             x=10,
             y=8,
@@ -257,16 +266,14 @@ class BeamPanel(RunPanel):
         )  # fmt: skip
         sheets = [sheet(look), _CONTROLS]
         toggle = Toggle(label="► Play", name=self.named("play"), width=90, stylesheets=sheets)
-        speed = Slider(
-            title="speed (log₁₀ cycles/s)",
-            start=-2.0,
-            end=1.5,
-            value=-0.3,
-            step=0.1,
-            width=210,
+        speed = Select(
+            title="cycles per second",
+            options=["0.02", "0.1", "0.3", "1", "3", "10"],
+            value="1",
+            width=120,
             stylesheets=sheets,
         )
-        linger = Toggle(label="slow at impacts", active=True, width=120, stylesheets=sheets)
+        linger = Toggle(label="slow at impacts", active=False, width=120, stylesheets=sheets)
         scrub = Slider(
             title="",
             show_value=False,
@@ -281,7 +288,11 @@ class BeamPanel(RunPanel):
         )
         shared = {"toggle": toggle, "frames": self.frames, "place": self.cursor.place}
         toggle.js_on_change(
-            "active", CustomJS(args=shared | {"speed": speed, "linger": linger, "scrub": scrub}, code=_PLAY)
+            "active",
+            CustomJS(
+                args=shared | {"speed": speed, "linger": linger, "scrub": scrub, "meta": self.meta},
+                code=_PLAY,
+            ),
         )
         scrub.js_on_change("value", CustomJS(args=shared, code=_SCRUB))
         self.scale = Select(
@@ -338,6 +349,11 @@ class BeamPanel(RunPanel):
         ):  # the browser draws when it is told of a change, which what comes with the figure is not
             self.fresh = False
             self.cursor.later(self._rescale, 300)
+        w = dataset["midspan_displacement"].values[inside]
+        snaps = np.flatnonzero(w[:-1] * w[1:] < 0.0)
+        self.begin = (
+            max(float(x[inside][snaps[0]]) - 0.5, float(x[inside][0])) if snaps.size else float(x[inside][0])
+        )
         self.plot.x_range.update(start=-0.02 * along[-1], end=1.02 * along[-1])
         self._rescale()
 
@@ -352,13 +368,19 @@ class BeamPanel(RunPanel):
             self.scale.value, self.reach
         )
         self.plot.y_range.update(start=-half, end=half)
-        self.plot.title.text = f"Displacements {fit / half:.3g} times as large as lengths"
+        true = self.scale.value == "true proportions"
+        drawn = "thickness to scale" if true else "the beam as a line, without its thickness"
+        self.plot.title.text = f"Displacements {fit / half:.3g} times as large as lengths; {drawn}"
+        tall = 0.12 * half
+        self.supports.data = {
+            "left": [-0.02 * length, length], "right": [0.0, 1.02 * length], "low": [-tall] * 2, "top": [tall] * 2
+        }  # fmt: skip
         self.count += 1
         striker = run.system.striker
         location = 0.5 if striker is None else striker.location
         side = 1 if striker is None or striker.side == "below" else -1
         self.meta.data = {
-            "modes": [min(run.system.model.modes, _MODES)], "half": [0.5e3 * beam.thickness], "at": [location * length],
+            "modes": [min(run.system.model.modes, _MODES)], "half": [0.5e3 * beam.thickness if true else 0.0], "begin": [self.begin], "at": [location * length],
             "side": [side], "reach": [1e3 * half], "tip": [0.008 * length], "taper": [0.05 * half],
             "hot": [self.look.second], "cold": [self.look.striker], "count": [self.count],
         }  # fmt: skip

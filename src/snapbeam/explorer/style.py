@@ -76,7 +76,7 @@ LIGHT = Look(
     "#000000",
     "#2a87c8",
     "#b03a27",
-    "#1f6feb",
+    "#1a62d2",
     "#8250df",
 )
 DARK = Look(
@@ -161,7 +161,7 @@ def figure(look: Look, *, used: int = 0, share: float = 1.0, **options: Any) -> 
         tall = f"max({plot.height}px, calc({share:g} * (100vh - {used}px)))"
         plot.stylesheets = [
             *plot.stylesheets,
-            f"@media (min-width: 1000px) {{ :host {{ height: {tall} !important; }} }}",
+            f"@media (min-width: 1000px) {{ :host {{ min-height: {tall} !important; }} }}",
         ]
     plot.toolbar.logo = None
     plot.toolbar.autohide = False
@@ -279,7 +279,11 @@ class Html(pn.pane.HTML):
 
 def class_chip(kind: ResponseClass) -> Markup:
     """The name of a class on its colour."""
-    ink = "#111" if kind in (ResponseClass.TRANSIENT_2, ResponseClass.CONTINUOUS) else "#fff"
+    ink = (
+        "#111"
+        if kind in (ResponseClass.TRANSIENT_2, ResponseClass.CONTINUOUS, ResponseClass.UNKNOWN)
+        else "#fff"
+    )
     return Markup('<span class="chip" style="background:{};color:{}">{}</span>').format(
         CLASS_COLORS[kind], ink, kind.label
     )
