@@ -23,7 +23,7 @@ pytest.importorskip("panel", reason="the explorer's extra is not installed: make
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
 TOKENS: dict[str, str] = {}
 """Token of each server by its address; a page opened without a token gets it here."""
-PATIENCE = 30_000
+PATIENCE = 180_000
 """Milliseconds that a page may take on a busy machine; a test of what a page does is no test of how fast."""
 
 

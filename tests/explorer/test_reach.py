@@ -203,10 +203,11 @@ def test_pictures_of_a_list_are_taken_away(tab, serve, system, tmp_path):
 def test_the_page_uses_the_height_of_the_window_and_the_width_of_a_phone(tab, served, small_map):
     page = tab(served.url)
     page.page.set_viewport_size({"width": 1920, "height": 1080})
-    height = """([name]) => Bokeh.index.find_one(Bokeh.documents[0].get_model_by_name(name)).el
-        .getBoundingClientRect().height"""
+    height = """([name]) => { const model = Bokeh.documents[0].get_model_by_name(name);
+        const view = model && Bokeh.index.find_one(model);
+        return view ? view.el.getBoundingClientRect().height : 0; }"""
     page.wait(lambda: page.js(height, ["map"]) > 600, "a tall map")
-    assert page.js(height, ["waveform-plot"]) > 450
+    page.wait(lambda: page.js(height, ["waveform-plot"]) > 450, "a tall waveform")
     assert page.js("() => document.scrollingElement.scrollHeight <= window.innerHeight")
     page.page.set_viewport_size({"width": 390, "height": 844})
     page.wait(lambda: page.js("() => document.scrollingElement.scrollWidth") <= 390, "no horizontal scroll")

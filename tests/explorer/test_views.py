@@ -7,6 +7,11 @@ import pytest
 
 import snapbeam as sb
 
+pytest.importorskip("panel")
+
+from snapbeam.explorer.run_view import WaveformPanel
+from snapbeam.explorer.style import LIGHT, Cursor
+
 
 def _turn(page, title):
     page.page.locator(f'.bk-tab:has-text("{title}")').first.click()
@@ -99,11 +104,14 @@ def test_the_force_of_a_link_has_all_samples(tab, served, small_map, system):
     page.wait(lambda: max(page.data("force", "y"), default=0.0) == pytest.approx(peak, rel=1e-6), "the peak")
 
 
-def test_no_curve_of_the_waveform_hides_another_and_impacts_are_curves(opened):
-    page, run = opened
-    styles = page.js("""() => Bokeh.documents[0].get_model_by_name('waveform-plot').renderers.map(
-        (r) => [r.glyph.line_dash.length, r.glyph.line_width])""")
-    assert styles[2][0] > 0 and styles[2][1] < styles[1][1], "the dashed thin line lies on the wide one"
+def test_no_curve_of_the_waveform_hides_another_and_impacts_are_curves(system):
+    panel = WaveformPanel(LIGHT, Cursor(LIGHT, "", lambda work, milliseconds: None))
+    panel.activate()
+    _, center, striker = (each.glyph for each in panel.top.renderers)
+    assert striker.line_dash and not center.line_dash, "the dashed thin line lies on the wide one"
+    assert striker.line_width < center.line_width
+    point = {"drive.frequency_ratio": 1.14, "drive.velocity_amplitude": 0.4}
+    run = sb.simulate(system.replace(**point), sb.Integration(cycles=30))
     time, impacts = run.dataset["time"].values, run.impacts
     for onset, duration in zip(impacts["onset"].values, impacts["duration"].values, strict=True):
         assert ((time >= onset) & (time <= onset + duration)).sum() >= 10
