@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from urllib.parse import quote
@@ -152,6 +153,15 @@ def test_the_server_ends_and_the_page_says_so(tab, serve):
     page.wait(lambda: page.page.locator("#gone").count() == 1, "words")
     assert "has stopped" in page.page.locator("#gone").inner_text()
     page.errors.clear()  # the browser itself says that it cannot connect
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Ctrl+C is a signal of POSIX")
+def test_ctrl_c_ends_the_server_in_words(serve):
+    server = serve("map.nc")
+    server.process.send_signal(signal.SIGINT)
+    assert server.process.wait(60) == 130
+    server.listener.join()
+    assert server.text.splitlines()[-1] == "stopped" and "Traceback" not in server.text
 
 
 @pytest.mark.slow

@@ -1109,9 +1109,12 @@ class TakeCard:
     def _make(self, name: str, suffix: str, write: Callable[[Any, Token], object]) -> None:
         """Make a file beside the page and hand it to the browser."""
         token = Token(_EXPORT_SECONDS)
-        self.page.shared.jobs.export(*self._job(name, suffix, write, token), token)
+        work, done = self._job(name, suffix, write, token)
+        self.page.shared.jobs.export(work, done, token)
 
-    def _job(self, name: str, suffix: str, write: Callable[[Any, Token], object], token: Token) -> Any:
+    def _job(
+        self, name: str, suffix: str, write: Callable[[Any, Token], object], token: Token
+    ) -> tuple[Any, Any]:
         """What makes a file, and what is done with it."""
         page = self.page
         self.words.object = Markup('<p class="busy">making {}{}</p>').format(name, suffix)
@@ -1214,7 +1217,8 @@ class TakeCard:
             with drawing:
                 animate_run(run.dataset, path, window, duration=length, slow_motion=slow, progress=progress)
 
-        self.page.shared.jobs.animation(*self._job("run", suffix, write, token), token)
+        work, done = self._job("run", suffix, write, token)
+        self.page.shared.jobs.animation(work, done, token)
 
     def _report(self, words: str, token: Token) -> None:
         if token is self._animating:
