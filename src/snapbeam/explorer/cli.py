@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Annotated
 
@@ -79,11 +80,10 @@ def explore(
 
     from snapbeam.explorer.server import serve
 
-    try:
+    with contextlib.suppress(KeyboardInterrupt):  # the server may also end by itself at Ctrl+C
         serve(
             file, address=address, port=port, allow_remote=allow_remote, token=token, system=system,
             integration=integration, ready=ready,
         )  # fmt: skip
-    except KeyboardInterrupt:
-        out().print("stopped")
-        raise typer.Exit(INTERRUPTED) from None
+    out().print("stopped")
+    raise typer.Exit(INTERRUPTED)
