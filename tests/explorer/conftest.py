@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -63,12 +64,12 @@ def folder(tmp_path_factory, small_map):
 class Served:
     """A server in a process of its own, as a person starts it."""
 
-    def __init__(self, folder: Path, *arguments: str) -> None:
+    def __init__(self, folder: Path, *arguments: str, state: Path | None = None) -> None:
         code = "from snapbeam.cli import main; main()"
         self.process = subprocess.Popen(
-            [sys.executable, "-u", "-c", code, "explore", *arguments, "--no-browser"],
+            [sys.executable, "-u", "-c", code, "explore", "--port", "0", *arguments, "--no-browser"],
             cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            env=dict(os.environ, COLUMNS="400"),
+            env=dict(os.environ, COLUMNS="400", XDG_STATE_HOME=str(state or tempfile.mkdtemp(dir=folder))),
         )  # fmt: skip
         self.lines: list[str] = []
         self.url = ""
@@ -109,8 +110,8 @@ def serve(folder):
     """Start servers; all are ended in the end."""
     started = []
 
-    def start(*arguments: str, where: Path = folder) -> Served:
-        started.append(Served(where, *arguments))
+    def start(*arguments: str, where: Path = folder, state: Path | None = None) -> Served:
+        started.append(Served(where, *arguments, state=state))
         return started[-1]
 
     yield start

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from urllib.parse import quote
@@ -23,7 +24,7 @@ def test_a_changed_system_says_what_is_old(tab, served, small_map, system):
     page = tab(served.url)
     x, y = float(small_map["frequency_ratio"][9]), float(small_map["velocity_amplitude"][12])
     page.click(x, y)
-    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run")
     _turn(page, "System")
     page.page.get_by_label("thickness (m)").fill("-1")
     page.page.get_by_role("button", name="Use this system").click()
@@ -52,11 +53,11 @@ def test_a_link_shows_the_same_again(tab, served, small_map):
     page = tab(served.url)
     x, y = float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][13])
     page.click(x, y)
-    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run")
     page.wait(lambda: f"drive.frequency_ratio:{x!r}" in page.page.url, "the address")
     head = page.head()
     other = tab(page.page.url)
-    other.wait(lambda: "bit for bit" in other.notes(), "the same run")
+    other.wait(lambda: "bitwise identical" in other.notes(), "the same run")
     assert other.head() == head
 
 
@@ -69,12 +70,12 @@ def test_two_tabs_do_not_disturb_each_other(tab, served, small_map):
     for page, at in ((first, (3, 3)), (second, (18, 14))):
         words = f"frequency ratio {ratio[at[0]]:.6g}, velocity amplitude {velocity[at[1]]:.6g}"
         page.wait(
-            lambda page=page, words=words: words in page.head() and "bit for bit" in page.notes(), words
+            lambda page=page, words=words: words in page.head() and "bitwise identical" in page.notes(), words
         )
     second.close()
     first.click(float(ratio[4]), float(velocity[3]))
     first.wait(
-        lambda: f"{ratio[4]:.6g}" in first.head() and "bit for bit" in first.notes(),
+        lambda: f"{ratio[4]:.6g}" in first.head() and "bitwise identical" in first.notes(),
         "a run after a tab was closed",
     )
 
@@ -87,10 +88,9 @@ def test_what_one_tab_computes_is_not_laid_over_the_map_of_another(tab, served, 
     first.wait(lambda: len(first.data("map-windows", "image")) == 1, "a window")
     x, y = float(small_map["frequency_ratio"][12]), float(small_map["velocity_amplitude"][9])
     second.click(x, y)
-    second.wait(lambda: "bit for bit" in second.notes(), "the map's own point")
+    second.wait(lambda: "bitwise identical" in second.notes(), "the map's own point")
     assert f"frequency ratio {x:.6g}, velocity amplitude {y:.6g}" in second.head()
     assert second.data("map-windows", "image") == []
-    first.page.get_by_role("button", name="Stop").click()
 
 
 def test_a_list_of_points_is_clicked_point_by_point(tab, serve, system, tmp_path):
@@ -106,16 +106,18 @@ def test_a_list_of_points_is_clicked_point_by_point(tab, serve, system, tmp_path
     ratio, velocity = found["frequency_ratio"].values, found["velocity_amplitude"].values
     assert len(page.data("map-list", "x")) == 12
     page.click(float(ratio[4]), float(velocity[4]))
-    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run")
     assert f"beam thickness {float(found['beam_thickness'][4]):.6g}" in page.head()
     assert sb.ResponseClass(int(found["response_class"][4])).label in page.head()
     page.page.keyboard.press("ArrowRight")
-    page.wait(lambda: "bit for bit" in page.notes() and f"{ratio[4]:.6g}" not in page.head(), "another point")
+    page.wait(
+        lambda: "bitwise identical" in page.notes() and f"{ratio[4]:.6g}" not in page.head(), "another point"
+    )
 
 
 def test_a_file_that_is_too_large_is_refused_in_words(tab, served):
     page = tab(served.url)
-    _turn(page, "Take away")
+    _turn(page, "Export")
     page.wait(lambda: page.page.locator("input[type=file]").count() > 0, "where a file can be given")
     large = {"name": "large.csv", "mimeType": "text/csv", "buffer": b"1,2,3\n" * (3 * 2**19)}
     page.page.locator("input[type=file]").first.set_input_files(large)
@@ -128,7 +130,7 @@ def test_two_points_side_by_side(tab, served, small_map):
     page = tab(served.url)
     ratio, velocity = small_map["frequency_ratio"].values, small_map["velocity_amplitude"].values
     page.click(float(ratio[3]), float(velocity[3]))
-    page.wait(lambda: "bit for bit" in page.notes(), "A")
+    page.wait(lambda: "bitwise identical" in page.notes(), "A")
     page.page.get_by_role("button", name="Two points").click()
     page.wait(
         lambda: (
@@ -151,6 +153,15 @@ def test_the_server_ends_and_the_page_says_so(tab, serve):
     page.wait(lambda: page.page.locator("#gone").count() == 1, "words")
     assert "has stopped" in page.page.locator("#gone").inner_text()
     page.errors.clear()  # the browser itself says that it cannot connect
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Ctrl+C is a signal of POSIX")
+def test_ctrl_c_ends_the_server_in_words(serve):
+    server = serve("map.nc")
+    server.process.send_signal(signal.SIGINT)
+    assert server.process.wait(60) == 130
+    server.listener.join()
+    assert server.text.splitlines()[-1] == "stopped" and "Traceback" not in server.text
 
 
 @pytest.mark.slow
@@ -257,8 +268,8 @@ def test_what_is_taken_away_is_what_is_shown(tab, served, small_map, folder, tmp
     page = tab(served.url)
     x, y = float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][13])
     page.click(x, y)
-    page.wait(lambda: "bit for bit" in page.notes(), "the run")
-    _turn(page, "Take away")
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run")
+    _turn(page, "Export")
     page.wait(lambda: "snapbeam simulate" in page.text("take-text"), "the command")
     assert _saved(page, "Map", tmp_path).read_bytes().startswith(b"\x89PNG")
     assert _saved(page, "Run", tmp_path).read_bytes().startswith(b"\x89PNG")
@@ -292,12 +303,30 @@ def test_the_beam_moving_is_exported(tab, served, small_map, tmp_path):
     pytest.importorskip("imageio_ffmpeg")
     page = tab(served.url)
     page.click(float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][13]))
-    page.wait(lambda: "bit for bit" in page.notes(), "the run")
-    _turn(page, "Take away")
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run")
+    _turn(page, "Export")
     page.page.get_by_label("length of the animation (s)").fill("1")
     page.page.get_by_label("slow motion at the hardest impact (s)").fill("1")
     assert _saved(page, "GIF", tmp_path).read_bytes().startswith(b"GIF89a")
     assert _saved(page, "MP4", tmp_path).read_bytes()[4:8] == b"ftyp"
+
+
+def test_an_animation_reports_its_progress_is_cancelled_and_keeps_nobody_waiting(
+    tab, served, small_map, tmp_path
+):
+    pytest.importorskip("imageio_ffmpeg")
+    page = tab(served.url)
+    page.click(float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][13]))
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run")
+    _turn(page, "Export")
+    page.page.get_by_label("length of the animation (s)").fill("60")
+    page.page.get_by_role("button", name="GIF", exact=True).click()
+    page.wait(lambda: " %" in page.text("take-words"), "the progress")
+    assert _saved(page, "Map", tmp_path).read_bytes().startswith(b"\x89PNG"), "while the animation is made"
+    page.page.get_by_role("button", name="Cancel the animation").click()
+    page.wait(lambda: "was cancelled" in page.text("take-words"), "the end of it")
+    page.page.get_by_role("button", name="Copy the link").click()
+    page.wait(lambda: page.page.get_by_role("button", name="opied").count() == 1, "a confirmation")
 
 
 # ---------------------------------------------------------------------- bad guests
@@ -319,4 +348,4 @@ def test_a_hostile_address_counts_for_nothing_and_is_told(tab, served, state):
     page.wait(lambda: "address" in page.state(), "words")
     assert page.page.locator("script:has-text('alert(1)')").count() == 0
     page.click(1.2, 0.3)
-    page.wait(lambda: "bit for bit" in page.notes(), "a run none the less")
+    page.wait(lambda: "bitwise identical" in page.notes(), "a run none the less")

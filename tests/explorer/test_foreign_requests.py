@@ -190,7 +190,7 @@ def test_the_same_in_a_notebook(browser, small_map):
             frame.get_by_label("frequency ratio").fill(repr(float(small_map["frequency_ratio"][4])))
             frame.get_by_label("velocity amplitude").fill(repr(float(small_map["velocity_amplitude"][4])))
             frame.get_by_role("button", name="Run", exact=True).click()
-            frame.get_by_text("bit for bit").wait_for()
+            frame.get_by_text("bitwise identical").wait_for()
     finally:
         context.close()
         shown.stop()

@@ -45,7 +45,7 @@ def test_a_point_of_a_list_is_run_bit_for_bit(points):
         assert point.values["beam.thickness"] == float(points["beam_thickness"][number])
         outcome = sb.simulate(*point.system(base, how)).summary
         same, words = compared(source.point(scatter.indexers(number)), outcome, "cpu")
-        assert same and "bit for bit" in words
+        assert same and "bitwise identical" in words
     assert scatter.find(point.values | {"beam.thickness": 4.0e-4}) is None
 
 

@@ -61,7 +61,7 @@ def test_markup_in_a_foreign_map_does_not_run(tab, serve, hostile):
         page.page.mouse.move(where[0] - 40, where[1])
         page.page.mouse.move(*where)
         page.page.wait_for_timeout(200)
-    for title in ("System", "Take away"):
+    for title in ("System", "Export"):
         page.page.get_by_text(title, exact=True).first.click()
         page.page.wait_for_timeout(500)
     for field in page.page.locator("input[type=file]").all():

@@ -99,7 +99,7 @@ def test_a_page_is_used_without_a_mouse(tab, served, small_map):
     press = page.page.keyboard.press
     ratio, velocity = small_map["frequency_ratio"].values, small_map["velocity_amplitude"].values
     press("ArrowRight")  # the middle of what is seen, to begin with
-    page.wait(lambda: "bit for bit" in page.notes(), "a first run")
+    page.wait(lambda: "bitwise identical" in page.notes(), "a first run")
     page.page.get_by_label("frequency ratio").focus()
     press("Control+A")
     page.page.keyboard.type(repr(float(ratio[9])))
@@ -109,11 +109,11 @@ def test_a_page_is_used_without_a_mouse(tab, served, small_map):
     press("Tab")
     press("Enter")  # Run
     words = f"frequency ratio {ratio[9]:.6g}, velocity amplitude {velocity[12]:.6g}"
-    page.wait(lambda: words in page.head() and "bit for bit" in page.notes(), "what was typed")
+    page.wait(lambda: words in page.head() and "bitwise identical" in page.notes(), "what was typed")
     page.page.locator('.bk-tab:has-text("Phase")').first.focus()
     press("Enter")
     page.wait(lambda: len(page.data("section", "w")) > 0, "the section")
-    page.page.locator('.bk-tab:has-text("Take away")').first.focus()
+    page.page.locator('.bk-tab:has-text("Export")').first.focus()
     press("Enter")
     page.wait(lambda: "snapbeam simulate" in page.text("take-text"), "the command")
     page.page.get_by_role("button", name="Map as NetCDF").focus()
@@ -130,7 +130,7 @@ def test_nothing_is_cut_off_or_covered(tab, served, small_map, width, height):
     page.wait(lambda: "neighbour" in page.notes(), "the run")
     page.page.wait_for_timeout(300)
     assert page.js(_LAID_OUT) == [], "Waveform"
-    for title in ("Phase", "Beam", "Impacts", "Numbers", "System", "Take away"):
+    for title in ("Phase", "Beam", "Impacts", "Numbers", "System", "Export"):
         _turn(page, title)
         page.page.wait_for_timeout(1200)
         assert page.js(_LAID_OUT) == [], title
@@ -144,7 +144,7 @@ def test_nothing_is_cut_off_or_covered(tab, served, small_map, width, height):
 def test_the_table_of_impacts_is_readable_in_the_dark(tab, served, small_map):
     page = tab(served.url + "?theme=dark")
     page.click(float(small_map["frequency_ratio"][9]), float(small_map["velocity_amplitude"][12]))
-    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run")
     _turn(page, "Impacts")
     page.wait(lambda: page.page.locator(".slick-cell").count() > 4, "the table")
     found = page.page.locator(".slick-cell").evaluate_all(
@@ -179,7 +179,7 @@ def test_pictures_of_a_list_are_taken_away(tab, serve, system, tmp_path):
     found = sb.sweep(system, table, sb.Integration(cycles=10))
     found.to_netcdf(tmp_path / "list.nc", engine="h5netcdf")
     page = tab(serve("list.nc", where=tmp_path).url)
-    _turn(page, "Take away")
+    _turn(page, "Export")
     files = {}
     for kind in ("png", "pdf", "svg"):
         page.page.get_by_role("button", name=kind, exact=True).click()
@@ -198,3 +198,31 @@ def test_pictures_of_a_list_are_taken_away(tab, serve, system, tmp_path):
 
     for kind in classes:
         assert tuple(bytes.fromhex(CLASS_COLORS[kind][1:])) in colors, f"no dot of {kind.label}"
+
+
+def test_the_page_uses_the_height_of_the_window_and_the_width_of_a_phone(tab, served, small_map):
+    page = tab(served.url)
+    page.page.set_viewport_size({"width": 1920, "height": 1080})
+    height = """([name]) => { const model = Bokeh.documents[0].get_model_by_name(name);
+        const view = model && Bokeh.index.find_one(model);
+        return view ? view.el.getBoundingClientRect().height : 0; }"""
+    page.wait(lambda: page.js(height, ["map"]) > 600, "a tall map")
+    page.wait(lambda: page.js(height, ["waveform-plot"]) > 450, "a tall waveform")
+    assert page.js("() => document.scrollingElement.scrollHeight <= window.innerHeight")
+    page.page.set_viewport_size({"width": 390, "height": 844})
+    page.wait(lambda: page.js("() => document.scrollingElement.scrollWidth") <= 390, "no horizontal scroll")
+    assert page.page.locator('meta[name="viewport"]').count() == 1
+
+
+def test_the_readout_has_a_fixed_height_and_shows_the_selected_point(tab, served, small_map):
+    page = tab(served.url)
+    x, y = float(small_map["frequency_ratio"][9]), float(small_map["velocity_amplitude"][12])
+    below = page.page.get_by_role("button", name="Compute view")
+    before = below.bounding_box()["y"]
+    page.click(x, y)
+    page.wait(lambda: f"{x:.6g}" in page.text("hover"), "the point below the pointer")
+    page.page.mouse.move(5, 5)
+    page.wait(
+        lambda: "Selected: " in page.text("hover") and f"{x:.6g}" in page.text("hover"), "the selection"
+    )
+    assert below.bounding_box()["y"] == before

@@ -74,5 +74,5 @@ def test_the_first_run_of_a_machine_says_that_it_compiles(tab, serve, small_map,
     page = tab(serve("map.nc").url)
     page.click(float(small_map.frequency_ratio[5]), float(small_map.velocity_amplitude[9]))
     page.wait(lambda: "compiling" in page.head() and " s " in page.head(), "words for the compile")
-    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run")
     assert "compiling" not in page.head()

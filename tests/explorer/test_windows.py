@@ -10,7 +10,7 @@ import snapbeam as sb
 pytest.importorskip("panel")
 
 from snapbeam.explorer.jobs import Cancelled, Jobs, Token
-from snapbeam.explorer.maps import compute, planned
+from snapbeam.explorer.maps import DatasetSource, Plane, compute, known_cells, planned, visible_strides
 
 NAMES = ("drive.frequency_ratio", "drive.velocity_amplitude")
 
@@ -83,6 +83,69 @@ def test_cells_of_axes_of_powers_are_even_in_powers(one_mode):
     assert window.cell(float(window.x[7]), float(window.y[3])) == (3, 7)
 
 
+@pytest.fixture(scope="module")
+def plane(one_mode):
+    """A map of 12 by 8 points over the part that the windows show."""
+    axes = {"velocity_amplitude": np.linspace(0.1, 0.4, 8), "frequency_ratio": np.linspace(0.9, 1.4, 12)}
+    source = DatasetSource(sb.sweep(one_mode, axes, sb.Integration(cycles=4)))
+    return Plane.of(source, "frequency_ratio", "velocity_amplitude", {})
+
+
+def test_a_window_is_computed_and_drawn_only_where_it_is_finer(one_mode, plane, jobs):
+    """The cells of the map are 6.8 by 10 pixels: blocks of 81 and 27 pixels would hide them."""
+    window = _window(one_mode, (81, 81))
+    window.known = known_cells(window, plane, [])
+    assert 2.0 < window.known[0].min() < window.known[0].max() < 3.0
+    told = []
+    compute(window, jobs, Token(), lambda w: told.append(int(w.stride.max())))
+    assert set(told) == {1} and window.done == window.wanted == window.size
+    # a part of it again, in cells of the same size: nothing is finer, nothing is computed or drawn
+    part = planned(one_mode, sb.Integration(cycles=4), NAMES, (1.0, 1.4, 0.1, 0.4), (False, False), (65, 81))
+    part.known = known_cells(part, plane, [(window, window.stride)])
+    compute(part, jobs, Token(), lambda _: None)
+    assert part.wanted == part.done == 0 and part.finished
+    coarse = _window(one_mode, (81, 81))
+    coarse.stride[:] = 3
+    drawn = visible_strides([coarse, window, coarse], plane)
+    assert [int(each.max()) for each in drawn] == [0, 1, 0]
+    assert visible_strides([coarse, window], None)[0].all(), "without a map anything is finer"
+
+
+def test_a_long_level_waits_for_an_answer(one_mode, jobs):
+    window = _window(one_mode)
+    compute(window, jobs, Token(), lambda _: None, seconds=0.0)
+    points, seconds = window.asks
+    assert not window.finished and window.done < 30 and points > 0
+    assert seconds == pytest.approx(points * window.seconds)
+    compute(window, jobs, Token(), lambda _: None)
+    assert window.finished and window.asks is None and window.done == window.size
+
+
+@pytest.mark.slow
+def test_a_window_stops_when_the_view_moves_and_asks_before_a_long_wait(tab, served):
+    page = tab(f"{served.url}?set=integration.cycles:3000")
+    page.wait(lambda: "window: " in page.state(), "points of the changed system")
+    page.page.mouse.move(*page.place(1.2, 0.2))
+    page.page.mouse.wheel(0, -120)
+    page.wait(lambda: "the view moved" in page.state(), "the end of the computation")
+    finer = page.page.get_by_role("button", name="finer points (about")
+    page.wait(lambda: finer.count() == 1 and finer.is_visible(), "a question")
+    assert "wait for your answer" in page.state()
+    before = int(page.state().partition("window: ")[2].split()[0])
+    finer.click()
+    page.wait(lambda: "window: " in page.state() and "answer" not in page.state(), "more points")
+    assert int(page.state().partition("window: ")[2].split()[0]) >= before
+    page.page.get_by_role("button", name="Stop").click()
+
+
+def test_one_notch_of_the_wheel_hides_no_cell_of_the_map(tab, served):
+    page = tab(served.url)
+    page.page.mouse.move(*page.place(1.2, 0.2))
+    page.page.mouse.wheel(0, -120)
+    page.wait(lambda: "window: " in page.state() and page.data("map-windows", "image"), "a window")
+    assert "blocks of 27" not in page.state() and "blocks of 9 " not in page.state()
+
+
 def test_zooming_computes_what_is_seen_and_a_click_runs_its_points(tab, served):
     page = tab(served.url)
     page.js("""() => { const p = Bokeh.documents[0].get_model_by_name('map');
@@ -93,7 +156,7 @@ def test_zooming_computes_what_is_seen_and_a_click_runs_its_points(tab, served):
     page.page.get_by_role("button", name="Stop").click()
     page.wait(lambda: "stopped" in page.state(), "the end of it")
     page.click(1.151, 0.152)
-    page.wait(lambda: "bit for bit" in page.notes(), "the run of a point between those of the map")
+    page.wait(lambda: "bitwise identical" in page.notes(), "the run of a point between those of the map")
 
 
 @pytest.mark.slow
@@ -106,7 +169,7 @@ def test_the_papers_beam_is_mapped_while_one_looks(tab, serve, folder):
     finer = ("blocks of 9", "blocks of 3", "blocks of 1 ", "all ")
     page.wait(lambda: any(words in page.state() for words in finer), "the coarsest level")
     page.click(1.2, 0.3)
-    page.wait(lambda: "crossings" in page.head() and "bit for bit" in page.notes(), "a run")
+    page.wait(lambda: "crossings" in page.head() and "bitwise identical" in page.notes(), "a run")
 
 
 @pytest.mark.slow

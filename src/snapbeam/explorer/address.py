@@ -18,7 +18,7 @@ from snapbeam.model.parameters import lookup
 __all__ = ["Address", "number"]
 
 
-_KEYS = ("x", "y", "show", "at", "view", "set", "theme", "tab")
+_KEYS = ("x", "y", "show", "at", "b", "view", "set", "theme", "tab", "card")
 _MOST = 64
 
 
@@ -30,12 +30,14 @@ class Address:
     ----------
     x, y, show : str
         The two axes and the variable; empty for the default.
-    at : dict
-        The point whose run is shown, by dotted name.
+    at, b : dict
+        The point whose run is shown, and that of the second run, by dotted name.
     view : tuple of 4 floats, optional
         What is seen of the map.
     changes : dict
         Parameters that differ from the map's system, by dotted name.
+    tab, card : str
+        The view of the run, and the card beside it; empty for the first one.
     words : tuple of str
         What was wrong in the address.
     """
@@ -44,9 +46,12 @@ class Address:
     y: str = ""
     show: str = ""
     at: Mapping[str, Any] = field(default_factory=dict)
+    b: Mapping[str, Any] = field(default_factory=dict)
     view: tuple[float, ...] | None = None
     changes: Mapping[str, Any] = field(default_factory=dict)
     theme: str = "default"
+    tab: str = ""
+    card: str = ""
     words: tuple[str, ...] = ()
 
     @classmethod
@@ -68,8 +73,9 @@ class Address:
 
     def write(self) -> str:
         """The part of the address after the question mark."""
-        parts = {"x": self.x, "y": self.y, "show": self.show}
+        parts = {"x": self.x, "y": self.y, "show": self.show, "tab": self.tab, "card": self.card}
         parts["at"] = _pairs_text(self.at)
+        parts["b"] = _pairs_text(self.b)
         parts["set"] = _pairs_text(self.changes)
         if self.view is not None:
             parts["view"] = ",".join(repr(float(value)) for value in self.view)
@@ -79,7 +85,7 @@ class Address:
 
 
 def _with(found: Address, name: str, text: str) -> Address:
-    if name in ("x", "y", "show"):
+    if name in ("x", "y", "show", "tab", "card"):
         if not text.isidentifier() or len(text) > _MOST:
             raise InputError("must be a name")
         return replace(found, **{name: text})  # type: ignore[arg-type]
@@ -92,10 +98,7 @@ def _with(found: Address, name: str, text: str) -> Address:
         if len(view) != 4 or not (view[0] < view[1] and view[2] < view[3]):
             raise InputError("must be left,right,low,high")
         return replace(found, view=view)
-    if name in ("at", "set"):
-        pairs = _pairs(text)
-        return replace(found, at=pairs) if name == "at" else replace(found, changes=pairs)
-    return found
+    return replace(found, **{"changes" if name == "set" else name: _pairs(text)})  # type: ignore[arg-type]
 
 
 def _pairs(text: str) -> dict[str, Any]:

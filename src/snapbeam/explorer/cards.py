@@ -37,6 +37,7 @@ from snapbeam.explorer.maps import (
     Window,
     compute,
     integration_mapping,
+    known_cells,
     map_command,
     plain,
     planned,
@@ -45,7 +46,7 @@ from snapbeam.explorer.maps import (
     system_toml,
 )
 from snapbeam.explorer.shared import Shared
-from snapbeam.explorer.style import Html, Look, styled
+from snapbeam.explorer.style import Html, Look, framed_plot, styled
 from snapbeam.model.parameter_file import Config, config_from_mapping
 from snapbeam.model.parameters import Parameter, lookup, parameters
 from snapbeam.plot.style import CLASS_COLORS
@@ -75,6 +76,8 @@ _PUSH = 0.2
 """Seconds between two pictures of a window that fills."""
 _COARSE = 9.0
 """Pixels of a cell above which a view is worth computing again."""
+_WAIT = 10.0
+"""Seconds of a window that are computed without a question."""
 
 
 class WindowControl:
@@ -93,7 +96,12 @@ class WindowControl:
         self.view_moved()
 
     def view_moved(self) -> None:
-        """Another part is seen; it is looked at once it rests."""
+        """Another part is seen: the computation of the previous one stops, and this one is computed once it rests."""
+        self.cancel("stopped, because the view moved" if self._token is not None else "")
+        self.resized()
+
+    def resized(self) -> None:
+        """The figure has another size, or another part is seen."""
         if not self._awake:
             return
         self._moved += 1
@@ -103,6 +111,7 @@ class WindowControl:
     def _rested(self) -> None:
         if self.card.source.skeleton.data_vars and not (self.card.plane.x.even and self.card.plane.y.even):
             self.card.redraw()
+        self.card._legend()
         self.card.moved()
         if self.card.auto.value and self._worth_computing():
             self.compute_view()
@@ -120,8 +129,11 @@ class WindowControl:
         ]
         return not self.card.view.is_whole and max(wide / inside[0], tall / inside[1]) > _COARSE
 
-    def compute_view(self, force: bool = False) -> None:
-        """Compute what is seen, from coarse to fine, in place of what was being computed."""
+    def compute_view(self, force: bool = False, seconds: float = _WAIT) -> None:
+        """Compute what is seen where it becomes finer, from coarse to fine, in place of what was being computed.
+
+        It asks before a level that would end later than *seconds* after the beginning.
+        """
         if self.card.system is None or not self.card.plane.can_zoom:
             self.card.tell("a window needs two axes of numbers, and a system" if force else "")
             return
@@ -143,15 +155,20 @@ class WindowControl:
             system, integration, self.card.plane.names, bounds, log, self.card.view.pixels, key=key
         )
         window = self.card.shared.window(made)
-        if window.finished:  # by this page before, or by another
+        if window is made:
+            others = [each for each in self.card.windows() if each is not made]
+            strides = [each.stride.copy() for each in others]
+            made.known = known_cells(made, self.card.shown_plane, list(zip(others, strides, strict=True)))
+        if window.finished or not window.wanted:  # by this page before, or by another
             self.card.show_windows()
+            self.card.tell("" if window.finished or not force else "the map is as fine as the screen shows")
             return
         self._token = token = Token(WINDOW_SECONDS)
-        self.card.stop.visible = True
-        self.card.tell("computing what is seen")
+        self.card.stop.visible, self.card.more.visible = True, False
+        self.card.tell("computing this view")
         self._waiting.begin(0, self._still)
         self.card.shared.jobs.window(
-            lambda _: compute(window, self.card.shared.jobs, token, lambda w: self._grew(w, token)),
+            lambda _: compute(window, self.card.shared.jobs, token, lambda w: self._grew(w, token), seconds),
             lambda _, words: self.card.post(lambda: self._ended(window, token, words)),
             token,
         )
@@ -182,18 +199,15 @@ class WindowControl:
 
     def _still(self, seconds: float, why: str) -> None:
         if self._token is not None:
-            self.card.tell(f"computing what is seen, {seconds:.0f} s" + (f"; {why}" if why else ""))
+            self.card.tell(f"computing this view, {seconds:.0f} s" + (f"; {why}" if why else ""))
 
     def _draw_growing(self, window: Window, token: Token) -> None:
         if token is not self._token:
             return
         self._waiting.end(0)
         self.card.show_windows()
-        left = (window.size - window.done) * window.seconds
         finest = int(window.stride[window.stride > 0].min()) if (window.stride > 0).any() else 27
-        self.card.tell(
-            f"window: {window.done} of {window.size} points, {left:.0f} s to the finest; blocks of {finest} cells now"
-        )
+        self.card.tell(f"window: {window.done} of {window.wanted} points; blocks of {finest} cells now")
 
     def _ended(self, window: Window, token: Token, words: str) -> None:
         if token is self._token:
@@ -201,7 +215,19 @@ class WindowControl:
             self.card.stop.visible = False
             self._token = None
             self.card.show_windows()
-            self.card.tell(words or f"window: all {window.size} points computed")
+            if not words and window.asks is not None:
+                points, seconds = window.asks
+                self.card.more.name = f"Compute {points} finer points (about {_duration(seconds)})"
+                self.card.more.visible = True
+                words = f"window: {window.done} of {window.wanted} points computed; finer cells wait for your answer"
+            self.card.tell(words or f"window: all {window.wanted} points computed")
+
+    def more(self) -> None:
+        """Compute the level that was asked about."""
+        window = next((w for w in reversed(self.card.windows()) if w.asks is not None), None)
+        self.card.more.visible = False
+        asked = 0.0 if window is None or window.asks is None else window.asks[1]
+        self.compute_view(force=True, seconds=_WAIT + 1.5 * asked)
 
     def cancel(self, words: str) -> None:
         """Compute no window any more."""
@@ -210,8 +236,13 @@ class WindowControl:
             self._token = None
             self._waiting.end(0, computed=False)
             self.card.stop.visible = False
+        self.card.more.visible = False
         if words:
             self.card.tell(f"{words}; what was computed is kept")
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -254,6 +285,7 @@ class MapCard:
         self._drawn: list[tuple[Window, NDArray[np.int8]]] = []
         self._picked: tuple[float, float] | None = None
         self._words = list(address.words)
+        self._restoring = False
         self._make_controls(address)
         self.control = WindowControl(self)
         self.holder = pn.Column(sizing_mode="stretch_width", margin=0)
@@ -286,28 +318,36 @@ class MapCard:
         )  # fmt: skip
         grid = [name for name in dims if not source.is_list and source.skeleton[name].size > 1]
         self.sliders = {name: self._slider(name, address) for name in grid}
-        self.auto = pn.widgets.Checkbox(name="compute what is seen", value=True, align="center")
+        self.auto = pn.widgets.Checkbox(name="compute the view automatically", value=True, align="center")
         self.stop = pn.widgets.Button(
             name="Stop", button_type="warning", width=70, visible=False, align="center"
         )
+        self.more = pn.widgets.Button(name="Finer", button_type="primary", visible=False, align="center")
         self.again = pn.widgets.Button(name="Compute view", button_type="default", width=110, align="center")
         self.layers = pn.widgets.CheckButtonGroup(
-            options={"threshold": "threshold", "V_QS1": "quasi", "measured": "dots", "windows": "windows"},
+            options={
+                "interwell threshold": "threshold", "quasi-static threshold": "quasi",
+                "measured points": "dots", "computed windows": "windows",
+            },
             value=["windows"], button_type="default",
         )  # fmt: skip
         self.hover = Html("\xa0", sizing_mode="stretch_width", css_classes=["hover"], margin=(0, 0, 0, 4))
+        self._selected: Markup = Markup("&nbsp;")
         self.state = Html("", sizing_mode="stretch_width", css_classes=["map-state"], margin=(0, 0, 0, 4))
-        self.key = Html("", sizing_mode="stretch_width", margin=(0, 0, 0, 4))
+        self.key = Html("", sizing_mode="stretch_width", margin=(0, 0, 0, 4), css_classes=["key-box"])
         for widget in (self.x, self.y):
             widget.param.watch(self._axes_changed, "value")
         self.show.param.watch(lambda _: self.post(self.redraw), "value")
         self.layers.param.watch(lambda _: self.post(self.redraw), "value")
         self.stop.on_click(lambda _: self.post(lambda: self.control.cancel("stopped")))
+        self.more.on_click(lambda _: self.post(self.control.more))
         self.again.on_click(lambda _: self.post(lambda: self.control.compute_view(force=True)))
         for slider in self.sliders.values():
             slider.param.watch(lambda _: self.post(self._cut_changed), "value")
         self.auto.visible = self.again.visible = not source.is_list
         self.slider_box = pn.FlexBox(margin=0)
+        self.typed = pn.FlexBox(margin=0)
+        """Fields of a point."""
 
     def _slider(self, name: str, address: Address) -> Any:
         points = self.source.coordinate(name)
@@ -329,7 +369,30 @@ class MapCard:
         options = {str(escape(label)): at for label, at in labels.items()}
         return pn.widgets.DiscreteSlider(name=str(escape(title)), options=options, value=value, width=240)
 
+    def restore(self, address: Address) -> None:
+        """Show the axes, the variable, the cut and the part of the map of an address of this page."""
+        self._restoring = True
+        for widget, name in ((self.x, address.x), (self.y, address.y), (self.show, address.show)):
+            if name in widget.options.values():
+                widget.value = name
+        for name, slider in self.sliders.items():
+            wanted = address.at.get(str(self.source.skeleton[name].attrs.get("parameter", name)))
+            if isinstance(wanted, float):
+                slider.value = int(np.argmin(np.abs(self.source.coordinate(name) - wanted)))
+        self._restoring = False
+        if (self.x.value, self.y.value) != (self.plane.x.name, self.plane.y.name):
+            self.rebuild(address.view)
+            return
+        if address.view is None:
+            self.view.view = (*self.plane.x.span, *self.plane.y.span)
+        elif len(address.view) == 4:
+            self.view.view = (address.view[0], address.view[1], address.view[2], address.view[3])
+        self.redraw()
+        self.control.view_moved()
+
     def _axes_changed(self, event: Any) -> None:
+        if self._restoring:
+            return
         if self.x.value == self.y.value:  # the two change places
             other = self.y if event.obj is self.x else self.x
             other.value = event.old
@@ -369,11 +432,11 @@ class MapCard:
         self.view.on_hover(self._hovered)
         self.view.on_view(self.control.view_moved)
         for edge in ("inner_width", "inner_height"):
-            self.view.plot.on_change(edge, lambda attr, old, new: self.control.view_moved())
+            self.view.plot.on_change(edge, lambda attr, old, new: self.control.resized())
         self.slider_box.objects = [
             slider for name, slider in self.sliders.items() if name not in (self.x.value, self.y.value)
         ]  # fmt: skip
-        self.holder.objects = [pn.pane.Bokeh(self.view.plot, sizing_mode="stretch_width", margin=0)]
+        self.holder.objects = [framed_plot(self.view.plot, margin=0)]
         self.redraw()
         self.control.view_moved()
 
@@ -382,7 +445,8 @@ class MapCard:
         """The card."""
         return pn.Column(
             pn.FlexBox(self.x, self.y, self.show, margin=0), self.slider_box, self.holder, self.key, self.hover,
-            pn.FlexBox(self.auto, self.again, self.stop, self.layers, align_items="center", margin=0), self.state,
+            self.typed, pn.FlexBox(self.auto, self.again, self.stop, self.more, self.layers, align_items="center", margin=0),
+            self.state,
             sizing_mode="stretch_width", css_classes=["card"],
         )  # fmt: skip
 
@@ -430,7 +494,7 @@ class MapCard:
         self.view.show_threshold(kinds)
         self._draw_dots("dots" in layers, words)
         self._draw_marks()
-        self._legend(values if name == "response_class" else None)
+        self._legend()
         if any(words):
             self._words = [each for each in words if each]
         self.tell()
@@ -445,7 +509,13 @@ class MapCard:
             self.view.mapper.update(
                 low=self.view.limits[0], high=max(self.view.limits[1], self.view.limits[0] + 1e-300)
             )
-        self._drawn = self.view.show_windows(shown, self.show.value)
+        self._drawn = self.view.show_windows(shown, self.show.value, self.shown_plane)
+
+    @property
+    def shown_plane(self) -> Plane | None:
+        """The cut through the map; None if it has no numbers, or those of another system."""
+        held = bool(self.source.skeleton.data_vars) and not self.changed and not self.source.is_list
+        return self.plane if held else None
 
     def _limits(self, name: str, values: NDArray[Any] | None) -> tuple[float, float]:
         return (0.0, 1.0) if values is None or name == "response_class" else _span(values)
@@ -461,7 +531,7 @@ class MapCard:
         if not wanted or dots is None:
             self.view.show_dots(empty, empty, empty)
             if wanted:
-                words.append("no measured points yet: give a table of them under Take away")
+                words.append("no measured points yet: give a table of them under Export")
             return
         names = (self.plane.x.name, self.plane.y.name)
         if not all(hasattr(dots, name) for name in names):
@@ -475,7 +545,9 @@ class MapCard:
         places = [(self.plane.place(values), text) for values, text in self.marks]
         self.view.show_marks([(*place, text) for place, text in places if place is not None])
 
-    def _legend(self, kinds: NDArray[Any] | None) -> None:
+    def _legend(self) -> None:
+        """Name the classes, with the share of the cells in view that each has."""
+        kinds = self._kinds_in_view() if self.show.value == "response_class" else None
         items = []
         for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
             share = (
@@ -487,8 +559,26 @@ class MapCard:
                 continue
             swatch = Markup('<span class="swatch" style="background:{}"></span>{}{}')
             items.append(swatch.format(CLASS_COLORS[kind], kind.label, share))
+        if kinds is not None and kinds.size:
+            part = "the map" if self.view.is_whole else "the view"
+            items.append(Markup('<span class="faint">shares of {}</span>').format(part))
         shown = Markup('<div class="key">{}</div>').format(Markup(" &nbsp; ").join(items))
         self.key.object = shown if self.show.value == "response_class" else ""
+
+    def _kinds_in_view(self) -> NDArray[Any] | None:
+        """Classes of the cells of the map in view, or of all points of a list."""
+        try:
+            kinds = self.plane.values("response_class")
+        except InputError:
+            return None
+        if kinds is None or self.source.is_list:
+            return kinds
+        left, right, low, high = self.view.view
+        columns, rows = (
+            (axis.edges[1:] > first) & (axis.edges[:-1] < last)
+            for axis, first, last in ((self.plane.x, left, right), (self.plane.y, low, high))
+        )
+        return kinds[np.ix_(rows, columns)]
 
     def say(self, words: str) -> None:
         """Add a line to what is wrong."""
@@ -545,30 +635,50 @@ class MapCard:
             return self.plane.at(*beside)
         return self.point(float(self.plane.x.at[beside[1]]), float(self.plane.y.at[beside[0]]))
 
-    def _hovered(self, x: float, y: float) -> None:
+    def select(self, point: Point | None) -> None:
+        """Let the readout show a point whenever the pointer is not over the map."""
+        self._selected = Markup("&nbsp;")
+        if point is not None:
+            place = self.plane.place(point.values)
+            held = {} if place is None else self._held(point, *place)
+            self._selected = Markup("Selected: {}").format(self._readout(point, held))
+        self.hover.object = self._selected
+
+    def _hovered(self, x: float | None, y: float | None) -> None:
+        if x is None or y is None:
+            self.hover.object = self._selected
+            return
         point = self.point(x, y)
-        name = self.show.value
+        self.hover.object = self._readout(point, self._held(point, x, y))
+
+    def _held(self, point: Point, x: float, y: float) -> dict[str, Any]:
+        """The class, the shown variable and two more of the cell at a location."""
         held = point.expected
-        if not held and not self.changed:
-            place = self.plane.index(x, y)
-            held = {}
-            for each in {"response_class", "zero_crossings", "peak_force", name} & set(
-                self.source.variables()
-            ):
-                try:
-                    values = self.plane.values(each)
-                except InputError:
-                    values = None
-                if values is not None:
-                    held[each] = values[place].item()
+        if held or self.changed:
+            return held
+        place, found = self.plane.index(x, y), {}
+        if not self.plane.at(*place).values == point.values:
+            return {}
+        for each in {"response_class", "zero_crossings", "peak_force", self.show.value} & set(
+            self.source.variables()
+        ):
+            try:
+                values = self.plane.values(each)
+            except InputError:
+                values = None
+            if values is not None:
+                found[each] = values[place].item()
+        return found
+
+    def _readout(self, point: Point, held: dict[str, Any]) -> Markup:
         parts = [point.words()]
         if "response_class" in held:
             parts.append(Markup("<b>{}</b>").format(ResponseClass(int(held["response_class"])).label))
-        for each in dict.fromkeys((name, "zero_crossings", "peak_force")):
+        for each in dict.fromkeys((self.show.value, "zero_crossings", "peak_force")):
             if each in held and each != "response_class":
                 unit = self.source.label(each)[1]
                 parts.append(f"{each.replace('_', ' ')} {held[each]:.5g}{'' if unit == '1' else f' {unit}'}")
-        self.hover.object = Markup(" &nbsp;·&nbsp; ").join(parts)
+        return Markup(" &nbsp;·&nbsp; ").join(parts)
 
     def use(self, system: System, integration: Integration, changed: bool) -> None:
         """Compute points and windows of another system from now on."""
@@ -596,6 +706,10 @@ _INTEGRATION = (
     "integration.step",
     "integration.early_termination",
 )
+_LAWS = {
+    "hertz": "Hertz", "hunt_crossley": "Hunt and Crossley", "kelvin_voigt": "Kelvin and Voigt", "layer": "elastic layer",
+    "power": "power law", "restitution": "coefficient of restitution",
+}  # fmt: skip
 _PRESETS: dict[str, dict[str, dict[str, Any]]] = {
     "the paper's beam": {},
     "the paper's, one mode": {"model": {"modes": 1}},
@@ -648,7 +762,8 @@ class SystemCard:
         save.on_click(lambda _: post(self._save))
         self.preset = pn.widgets.Select(name="Preset", options=["", *_PRESETS], width=210)
         self.preset.param.watch(lambda event: post(lambda: self._chosen(event.new)), "value")
-        self.law = pn.widgets.Select(name="Law of contact", options=_kinds("contact"), width=160)
+        laws = {_LAWS.get(kind, kind.replace("_", " ")): kind for kind in _kinds("contact")}
+        self.law = pn.widgets.Select(name="Contact law", options=laws, width=160)
         self.law.param.watch(lambda _: post(self._law_changed), "value")
         self.file = pn.widgets.FileInput(accept=".toml", multiple=False, width=220)
         self.file.param.watch(lambda event: post(lambda: self._given(event.new)), "value")
@@ -686,7 +801,7 @@ class SystemCard:
     def _fill(self) -> None:
         """Make the fields of the system that is held."""
         law = str(self.system.parameters.get("contact.type", "hertz"))
-        if self.law.value != law and law in self.law.options:
+        if self.law.value != law and law in self.law.options.values():
             self.law.value = law
         self._make_fields()
         self._show_facts()
@@ -860,7 +975,7 @@ def changed_parameters(
     for name, value in other.items():
         cycles = name == "cycles" and before[1].cycles_or_default == after[1].cycles_or_default
         if one[name] != value and name not in ("engine",) and not cycles:
-            found[f"run.{name}"] = value
+            found[f"integration.{name}"] = value
     return found
 
 
@@ -877,8 +992,16 @@ def _text(value: Any) -> str:
 
 
 _EXPORT_SECONDS = 300.0
-_LONGEST = 20.0
+_LONGEST = 5.0
 """Cycles of an animation, if more are seen."""
+_PROGRESS = 0.3
+"""Seconds between two reports of the progress of an animation."""
+_COPY = """
+const say = (words) => { button.label = words; setTimeout(() => { button.label = 'Copy the link'; }, 3000); };
+const failed = () => say('Not copied');
+if (!navigator.clipboard) { failed(); }
+else { navigator.clipboard.writeText(window.location.href).then(() => say('Copied'), failed); }
+"""
 
 
 class TakeCard:
@@ -896,10 +1019,10 @@ class TakeCard:
         self.text = Html("", sizing_mode="stretch_width", css_classes=["take-text"])
         self.kind = pn.widgets.RadioButtonGroup(options=["png", "pdf", "svg"], value="png")
         self.slow = pn.widgets.FloatInput(
-            name="slow motion at the hardest impact (s)", value=4.0, start=0.0, end=30.0, width=260
+            name="slow motion at the hardest impact (s)", value=2.0, start=0.0, end=30.0, width=260
         )
         self.length = pn.widgets.FloatInput(
-            name="length of the animation (s)", value=8.0, start=1.0, end=60.0, width=210
+            name="length of the animation (s)", value=4.0, start=1.0, end=60.0, width=210
         )
         self.dots = pn.widgets.FileInput(accept=".csv", multiple=False, width=220)
         self.dots.param.watch(lambda event: page.post(lambda: self._dots(event.new)), "value")
@@ -912,9 +1035,12 @@ class TakeCard:
         for name, work in buttons.items():
             self.buttons[name].on_click(_posted(page, work))
         self.link = pn.widgets.Button(name="Copy the link", width=145)
-        self.link.js_on_click(
-            args={"holder": self.page.bar}, code="navigator.clipboard.writeText(window.location.href);"
+        self.link.js_on_click(args={"button": self.link}, code=_COPY)
+        self.cancel = pn.widgets.Button(
+            name="Cancel the animation", button_type="warning", width=180, visible=False
         )
+        self.cancel.on_click(_posted(page, self._cancelled))
+        self._animating: Token | None = None
 
     @property
     def layout(self) -> Any:
@@ -923,12 +1049,12 @@ class TakeCard:
         return pn.Column(
             Html(_HEADING.format("Pictures in the style of the journal"), margin=0),
             pn.FlexBox(make["Map"], make["Run"], self.kind, margin=0, align_items="center"),
-            Html(_HEADING.format("The beam moving, of the cycles that are seen"), margin=0),
+            Html(_HEADING.format(f"Animation of the beam, of at most {_LONGEST:g} of the visible cycles"), margin=0),
             pn.FlexBox(make["MP4"], make["GIF"], self.length, self.slow, margin=0, align_items="center"),
             Html(_HEADING.format("Data"), margin=0),
             pn.FlexBox(make["Run as NetCDF"], make["Map as NetCDF"], make["Window as NetCDF"], self.link, margin=0),
             Html(_HEADING.format("Measured points to lay over the map (CSV)"), margin=0), self.dots,
-            self.words, self.text, sizing_mode="stretch_width", css_classes=["card", "take"],
+            pn.FlexBox(self.words, self.cancel, margin=0), self.text, sizing_mode="stretch_width", css_classes=["card", "take"],
         )  # fmt: skip
 
     # ------------------------------------------------------------------ text
@@ -982,12 +1108,21 @@ class TakeCard:
 
     def _make(self, name: str, suffix: str, write: Callable[[Any, Token], object]) -> None:
         """Make a file beside the page and hand it to the browser."""
+        token = Token(_EXPORT_SECONDS)
+        work, done = self._job(name, suffix, write, token)
+        self.page.shared.jobs.export(work, done, token)
+
+    def _job(
+        self, name: str, suffix: str, write: Callable[[Any, Token], object], token: Token
+    ) -> tuple[Any, Any]:
+        """What makes a file, and what is done with it."""
         page = self.page
         self.words.object = Markup('<p class="busy">making {}{}</p>').format(name, suffix)
-        token = Token(_EXPORT_SECONDS)
 
         def done(content: bytes | None, error: str) -> None:
             def tell() -> None:
+                if token is self._animating:
+                    self._animating, self.cancel.visible = None, False
                 if content is None:
                     self.words.object = _BAD.format(error)
                 else:
@@ -996,7 +1131,13 @@ class TakeCard:
 
             page.post(tell)
 
-        page.shared.jobs.export(lambda t: file_bytes(suffix, lambda path: write(path, t)), done, token)
+        return lambda t: file_bytes(suffix, lambda path: write(path, t)), done
+
+    def _cancelled(self) -> None:
+        if self._animating is not None:
+            self._animating.cancel()
+        self._animating, self.cancel.visible = None, False
+        self.words.object = _NOTE.format("the animation was cancelled")
 
     def _run(self) -> Run | None:
         run = self.page.runs[self.page.which].run
@@ -1051,21 +1192,37 @@ class TakeCard:
         first, last = self.page.runs[self.page.which].window
         window = (first, min(last, first + _LONGEST))
         length, slow = float(self.length.value), float(self.slow.value)
+        if self._animating is not None:
+            self._animating.cancel()
+        self._animating = token = Token(_EXPORT_SECONDS)
+        self.cancel.visible = True
+        told = 0.0
 
-        def write(path: Any, token: Token) -> None:
+        def progress(done: int, total: int) -> None:
+            nonlocal told
+            token.check(done)
+            drawing.release()  # between two frames another picture may be drawn
+            try:
+                time.sleep(0.002)
+                if time.monotonic() - told > _PROGRESS:
+                    told = time.monotonic()
+                    words = f"making run{suffix}: {100 * done / total:.0f} %"
+                    self.page.post(lambda: self._report(words, token))
+            finally:
+                drawing.acquire()
+
+        def write(path: Any, _: Token) -> None:
             from snapbeam.plot.animation import animate_run
 
             with drawing:
-                animate_run(
-                    run.dataset,
-                    path,
-                    window,
-                    duration=length,
-                    slow_motion=slow,
-                    progress=lambda done, total: token.check(),
-                )
+                animate_run(run.dataset, path, window, duration=length, slow_motion=slow, progress=progress)
 
-        self._make("run", suffix, write)
+        work, done = self._job("run", suffix, write, token)
+        self.page.shared.jobs.animation(work, done, token)
+
+    def _report(self, words: str, token: Token) -> None:
+        if token is self._animating:
+            self.words.object = Markup('<p class="busy">{}</p>').format(words)
 
     def _run_data(self) -> None:
         run = self._run()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Annotated
 
@@ -30,7 +31,12 @@ def explore(
             "--config", help="TOML file of the system to begin with, where no map is given.", metavar="FILE"
         ),
     ] = None,
-    port: Annotated[int, typer.Option(help="Port; a free one by default.", min=0, max=65535)] = 0,
+    port: Annotated[
+        int | None,
+        typer.Option(
+            help="Port; by default 8760 or the next free one; 0 for any free one.", min=0, max=65535
+        ),
+    ] = None,
     address: Annotated[str, typer.Option(help="Address to serve on.")] = "127.0.0.1",
     allow_remote: Annotated[
         bool,
@@ -38,7 +44,9 @@ def explore(
     ] = False,
     token: Annotated[
         str | None,
-        typer.Option(help="Token in the address of the page; a random one by default."),
+        typer.Option(
+            help="Token in the address of the page; by default one that is kept for this user, and a random one for an address that others can reach."
+        ),
     ] = None,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
@@ -72,11 +80,10 @@ def explore(
 
     from snapbeam.explorer.server import serve
 
-    try:
+    with contextlib.suppress(KeyboardInterrupt):  # the server may also end by itself at Ctrl+C
         serve(
             file, address=address, port=port, allow_remote=allow_remote, token=token, system=system,
             integration=integration, ready=ready,
         )  # fmt: skip
-    except KeyboardInterrupt:
-        out().print("stopped")
-        raise typer.Exit(INTERRUPTED) from None
+    out().print("stopped")
+    raise typer.Exit(INTERRUPTED)

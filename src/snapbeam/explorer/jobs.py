@@ -107,6 +107,7 @@ class Jobs:
         self._runs = ThreadPoolExecutor(runs, "snapbeam-run")
         self._windows = ThreadPoolExecutor(windows, "snapbeam-window")
         self._exports = ThreadPoolExecutor(1, "snapbeam-export")
+        self._animations = ThreadPoolExecutor(1, "snapbeam-animation")
         self._waiting = 0
         self._free = threading.Condition()
         self._turns = threading.Condition()
@@ -134,6 +135,10 @@ class Jobs:
     def export(self, work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:
         """Make a file, one at a time."""
         self._exports.submit(_guarded, work, done, token)
+
+    def animation(self, work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:
+        """Make an animation, one at a time; other files do not wait for it."""
+        self._animations.submit(_guarded, work, done, token)
 
     def give_way(self, token: Token) -> None:
         """Wait while a run is computed."""
@@ -170,6 +175,7 @@ class Jobs:
         self._runs.shutdown(wait=False, cancel_futures=True)
         self._windows.shutdown(wait=False, cancel_futures=True)
         self._exports.shutdown(wait=False, cancel_futures=True)
+        self._animations.shutdown(wait=False, cancel_futures=True)
 
 
 def _guarded(work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:

@@ -18,7 +18,7 @@ from bokeh.models import (
 from numpy.typing import NDArray
 
 from snapbeam import ResponseClass
-from snapbeam.explorer.maps import Axis, Window, picture
+from snapbeam.explorer.maps import Axis, Plane, Window, picture, visible_strides
 from snapbeam.explorer.style import Look, colors_of, columns, figure, inner_size, sequential
 from snapbeam.model import quasi_static_threshold
 from snapbeam.plot.style import CLASS_COLORS
@@ -54,7 +54,7 @@ class MapView:
         self.look, self.x, self.y = look, x, y
         self.limits = (0.0, 1.0)
         self.plot = figure(
-            look, name="map", height=height,
+            look, name="map", height=height, used=390,
             x_axis_type="log" if x.log else "linear", y_axis_type="log" if y.log else "linear",
             x_range=Range1d(*x.span, bounds=None), y_range=Range1d(*y.span, bounds=None),
             x_axis_label=x.label, y_axis_label=y.label, title="", tools="pan,box_zoom,wheel_zoom,reset",
@@ -132,19 +132,28 @@ class MapView:
         self.plot.add_layout(self.bar, "right")
         self.probe = ColumnDataSource({"x": [], "y": []}, name="map-probe", tags=[0])
         self.plot.js_on_event("mousemove", CustomJS(args={"probe": self.probe}, code=_HOVER % _THROTTLE))
+        self.plot.js_on_event(
+            "mouseleave", CustomJS(args={"probe": self.probe}, code="probe.data = {x: [], y: []};")
+        )
 
     # ------------------------------------------------------------------ what was asked for
 
     def on_tap(self, tell: Callable[[float, float], None]) -> None:
-        """Say where the map was clicked."""
-        self.plot.on_event("tap", lambda event: tell(float(event.x), float(event.y)))
+        """Say where the map was clicked.
 
-    def on_hover(self, tell: Callable[[float, float], None]) -> None:
-        """Say where the pointer is."""
+        Bokeh has other names for a click within 300 ms of another one, and for one of more than 300 ms.
+        """
+        for kind in ("tap", "doubletap", "pressup"):
+            self.plot.on_event(kind, lambda event: tell(float(event.x), float(event.y)))
+
+    def on_hover(self, tell: Callable[[float | None, float | None], None]) -> None:
+        """Say where the pointer is; None once it has left the map."""
 
         def moved(_: str, __: Any, data: dict[str, Any]) -> None:
             if len(data["x"]) and data["x"][0] is not None:
                 tell(float(data["x"][0]), float(data["y"][0]))
+            else:
+                tell(None, None)
 
         self.probe.on_change("data", moved)
 
@@ -202,16 +211,21 @@ class MapView:
         """Show the map pale, if it is of another system than what is computed."""
         self.whole.glyph.global_alpha = 0.3 if old else 1.0
 
-    def show_windows(self, windows: list[Window], name: str) -> list[tuple[Window, NDArray[np.int8]]]:
-        """Lay windows over the map, the finest uppermost; returns them with their strides as they are drawn."""
+    def show_windows(
+        self, windows: list[Window], name: str, plane: Plane | None
+    ) -> list[tuple[Window, NDArray[np.int8]]]:
+        """Draw windows over the map where they are finer; returns them with their strides as they are drawn.
+
+        *plane* is the cut through the map; None if it has no numbers, or those of another system.
+        """
         data: dict[str, list[Any]] = {"image": [], "x": [], "y": [], "dw": [], "dh": []}
         borders: dict[str, list[float]] = {"left": [], "right": [], "bottom": [], "top": []}
         drawn = []
-        for window in windows:
-            if name not in window.values:
+        known = [window for window in windows if name in window.values]
+        for window, stride in zip(known, visible_strides(known, plane), strict=True):
+            if not stride.any():
                 continue
             with window.writing:
-                stride = window.stride.copy()
                 image = colors_of(name, window.values[name], self.limits).copy()
             drawn.append((window, stride))
             image[stride == 0] = 0
@@ -258,10 +272,10 @@ class MapView:
             return ""
         names = (self.x.name, self.y.name)
         if set(names) - _QUASI_STATIC:
-            return "V_QS1 is drawn over frequency ratio, location and velocity amplitude"
+            return "the quasi-static threshold V_QS1 is drawn over frequency ratio, location and velocity amplitude"
         needed = _QUASI_STATIC - set(names)
         if any(name not in fixed for name in needed):
-            return f"V_QS1 needs {', '.join(sorted(needed))}"
+            return f"the quasi-static threshold needs {', '.join(sorted(needed))}"
         first, last = self.x.span
         across = np.linspace(first, last, 402)[1:-1]
         if "velocity_amplitude" in names:

@@ -55,6 +55,7 @@ __all__ = [
     "compared",
     "compute",
     "integration_of",
+    "known_cells",
     "layers_of",
     "map_command",
     "opened",
@@ -68,6 +69,7 @@ __all__ = [
     "run_command",
     "system_of",
     "system_toml",
+    "visible_strides",
 ]
 
 
@@ -553,8 +555,14 @@ class Point:
 
     def system(self, base: System, integration: Integration) -> tuple[System, Integration]:
         """What is run at this point."""
-        of_run = {name[4:]: value for name, value in self.values.items() if name.startswith("run.")}
-        of_system = {name: value for name, value in self.values.items() if not name.startswith("run.")}
+        of_run = {
+            name.partition(".")[2]: value
+            for name, value in self.values.items()
+            if name.startswith("integration.")
+        }
+        of_system = {
+            name: value for name, value in self.values.items() if not name.startswith("integration.")
+        }
         return base.replace(**of_system), integration.replace(**of_run) if of_run else integration
 
     def words(self) -> str:
@@ -625,7 +633,7 @@ def compared(expected: Mapping[str, Any], outcome: RunSummary, engine: str) -> t
         if not same and name not in ("steps",):
             differing.append(name)
     if not differing:
-        return True, f"bit for bit what the map holds ({len(expected)} numbers)"
+        return True, f"bitwise identical to the map ({len(expected)} results)"
     if "response_class" in differing:
         return False, "another class than the map's" + _why(expected, engine)
     return True, f"the map's class; differs in {', '.join(differing[:4])}" + _why(expected, engine)
@@ -1128,8 +1136,13 @@ class Window:
     key: Any = None
     values: dict[str, NDArray[Any]] = field(default_factory=dict)
     stride: NDArray[np.int8] = field(init=False)
+    known: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    """Width and height of the cells of other data at each cell, in cells of this window; None if there are none."""
     done: int = 0
     seconds: float = 0.0
+    """Seconds that one point takes."""
+    asks: tuple[int, float] | None = None
+    """Points of the next level, and the seconds that they need, if they were not computed because of these."""
     version: int = 0
     finished: bool = False
     lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
@@ -1144,6 +1157,18 @@ class Window:
     def size(self) -> int:
         """Cells."""
         return int(self.x.size * self.y.size)
+
+    @property
+    def wanted(self) -> int:
+        """Cells that are finer than other data at the same location."""
+        return int(self.refines(1).sum())
+
+    def refines(self, stride: int | NDArray[np.int8]) -> NDArray[np.bool_]:
+        """Where blocks of *stride* cells are finer than other data; shape (ny, nx)."""
+        sides = np.broadcast_to(stride, self.stride.shape).astype(np.float64)
+        if self.known is None:
+            return np.ones(self.stride.shape, dtype=bool)
+        return _finer((sides, sides), self.known)
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
         """Row and column of the cell at a place."""
@@ -1184,6 +1209,94 @@ class Window:
         return left <= x <= right and low <= y <= high
 
 
+_GAIN = 0.7
+"""Area of a cell, as a share of the area of the data below, up to which it is worth computing and showing."""
+
+
+def _finer(sides: tuple[_Array, _Array], below: tuple[_Array, _Array]) -> NDArray[np.bool_]:
+    """Where cells are neither wider nor taller than those below, and clearly smaller."""
+    slack = 1.0 + 1e-9
+    found: NDArray[np.bool_] = (
+        (sides[0] <= slack * below[0])
+        & (sides[1] <= slack * below[1])
+        & (sides[0] * sides[1] < _GAIN * below[0] * below[1])
+    )
+    return found
+
+
+def _scaled(values: Any, log: bool) -> _Array:
+    return np.log(values) if log else np.asarray(values, dtype=np.float64)
+
+
+def known_cells(
+    window: Window, plane: Plane | None, others: list[tuple[Window, NDArray[np.int8]]]
+) -> tuple[_Array, _Array]:
+    """Width and height of the cells of a map and of other windows at each cell of a window, in its cells.
+
+    They are infinite where nothing is known.
+
+    Parameters
+    ----------
+    plane : Plane, optional
+        The cut through the map that is shown; None if it has no numbers, or those of another system.
+    others : list of (Window, array of shape (ny, nx))
+        Windows and the strides of their blocks, in the order in which they are drawn.
+    """
+    shape = window.stride.shape
+    units = [
+        (_scaled(high, log) - _scaled(low, log)) / size
+        for (low, high), log, size in zip(
+            (window.bounds[:2], window.bounds[2:]), window.log, (window.x.size, window.y.size), strict=True
+        )
+    ]
+    wide, tall = np.full(shape, np.inf), np.full(shape, np.inf)
+    if plane is not None:
+        sides = []
+        for axis, centers, log, unit in zip(
+            (plane.x, plane.y), (window.x, window.y), window.log, units, strict=True
+        ):
+            edges = _scaled(axis.edges, log)
+            at = np.searchsorted(edges, _scaled(centers, log), side="right") - 1
+            inside = (at >= 0) & (at < edges.size - 1)
+            widths = np.diff(edges)[np.clip(at, 0, edges.size - 2)] / unit
+            sides.append(np.where(inside, widths, np.inf))
+        both = np.isfinite(sides[0])[None, :] & np.isfinite(sides[1])[:, None]
+        wide = np.where(both, sides[0][None, :], np.inf)
+        tall = np.where(both, sides[1][:, None], np.inf)
+    for other, stride in others:
+        index, ratio = [], []
+        for low, high, log, centers, size, unit in (
+            (*other.bounds[:2], window.log[0], window.x, other.x.size, units[0]),
+            (*other.bounds[2:], window.log[1], window.y, other.y.size, units[1]),
+        ):
+            first, last = _scaled(low, log), _scaled(high, log)
+            index.append(np.floor((_scaled(centers, log) - first) / (last - first) * size).astype(np.int64))
+            ratio.append(float((last - first) / size / unit))
+        columns = np.flatnonzero((index[0] >= 0) & (index[0] < other.x.size))
+        rows = np.flatnonzero((index[1] >= 0) & (index[1] < other.y.size))
+        if not columns.size or not rows.size:
+            continue
+        part = np.ix_(rows, columns)
+        found = stride[np.ix_(index[1][rows], index[0][columns])].astype(np.float64)
+        sides = [found * each for each in ratio]
+        better = (found > 0) & _finer((sides[0], sides[1]), (wide[part], tall[part]))
+        wide[part] = np.where(better, sides[0], wide[part])
+        tall[part] = np.where(better, sides[1], tall[part])
+    return wide, tall
+
+
+def visible_strides(windows: list[Window], plane: Plane | None) -> list[NDArray[np.int8]]:
+    """Strides of windows that are drawn one over the other, 0 where a cell would hide finer data below."""
+    drawn: list[tuple[Window, NDArray[np.int8]]] = []
+    for window in windows:
+        with window.writing:
+            stride = window.stride.copy()
+        sides = np.maximum(stride, 1).astype(np.float64)
+        stride[~_finer((sides, sides), known_cells(window, plane, drawn))] = 0
+        drawn.append((window, stride))
+    return [stride for _, stride in drawn]
+
+
 def _middle(at: int, stride: int) -> int:
     return at // stride * stride + stride // 2
 
@@ -1219,8 +1332,17 @@ def _blocks(size: int, stride: int) -> tuple[NDArray[np.int64], NDArray[np.int64
     return first, first + stride // 2
 
 
-def compute(window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], None]) -> Window:
-    """Fill a window; *tell* is called after every batch.
+def compute(
+    window: Window,
+    jobs: Jobs,
+    token: Token,
+    tell: Callable[[Window], None],
+    seconds: float = math.inf,
+) -> Window:
+    """Fill a window where it is finer than other data; *tell* is called after every batch.
+
+    It stops before a level that would end later than *seconds* after the beginning, and ``window.asks`` holds what
+    that level needs.
 
     Raises
     ------
@@ -1232,26 +1354,35 @@ def compute(window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], N
     while not window.lock.acquire(timeout=0.1):  # another page has asked for it, and computes it
         token.check()
     try:
-        return _filled(window, jobs, token, tell)
+        return _filled(window, jobs, token, tell, seconds)
     finally:
         window.lock.release()
 
 
-def _filled(window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], None]) -> Window:
-    pace = None
+def _filled(
+    window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], None], seconds: float
+) -> Window:
+    window.asks = None
     structural = [not _is_run(name) for name in window.names]
+    paced, spent = (2, 0.0) if window.seconds else (0, 0.0)  # the first batch may compile the engine
     for stride in _STRIDES:
         (row0, rows), (column0, columns) = _blocks(window.y.size, stride), _blocks(window.x.size, stride)
+        refines = window.refines(stride)
         todo = [
             (int(a), int(b), int(i), int(j))
             for a, i in zip(row0, rows, strict=True)
             for b, j in zip(column0, columns, strict=True)
-            if not 0 < int(window.stride[a, b]) <= stride
+            if refines[i, j] and not 0 < int(window.stride[a, b]) <= stride
         ]
         order = _structure_order(todo, structural)
         at = 0
         while at < len(order):
-            batch = _FIRST if pace is None else int(np.clip(_BATCH_SECONDS / pace, 1, _MOST_WINDOWS))
+            left = sum(1 for item in order[at:] if not _known(window, item[2], item[3]))
+            if paced >= 2 and spent + left * window.seconds > seconds:
+                window.asks = (left, left * window.seconds)
+                window.version += 1
+                return window
+            batch = _FIRST if paced < 2 else int(np.clip(_BATCH_SECONDS / window.seconds, 1, _MOST_WINDOWS))
             part = order[at : at + batch]
             fresh = [item for item in part if not _known(window, item[2], item[3])]
             found: dict[str, NDArray[Any]] = {}
@@ -1259,10 +1390,11 @@ def _filled(window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], N
                 with jobs.turn(token):
                     begun = time.monotonic()
                     found = _run(window, fresh, token)
-                spent = (time.monotonic() - begun) / len(fresh)
-                first = pace is None
-                pace = spent if first or pace is None else 0.5 * (pace + spent)
-                window.seconds = pace
+                took = time.monotonic() - begun
+                each = took / len(fresh)
+                window.seconds = each if paced < 2 else 0.5 * (window.seconds + each)
+                spent += took if paced else 0.0
+                paced += 1
             with window.writing:
                 for name, values in found.items():
                     held = window.values.setdefault(name, np.zeros(window.stride.shape, dtype=values.dtype))

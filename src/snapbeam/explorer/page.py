@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
+from urllib.parse import parse_qs
 
 import numpy as np
 import panel as pn
@@ -23,7 +24,7 @@ from snapbeam.explorer.maps import Point, compared
 from snapbeam.explorer.maps import chances as chances_of
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
-from snapbeam.explorer.style import Html, Look, framed, look_of
+from snapbeam.explorer.style import Html, Look, framed, look_of, styled
 
 __all__ = ["Answer", "Page", "answer"]
 
@@ -124,9 +125,10 @@ class Page:
         self.look: Look = look_of(self.address.theme)
         self.card = MapCard(self.look, shared, self.address, self.post, self.later)
         self.card.asked = self.ask
-        self.card.moved = self._write_address
+        self.card.moved = self.write_address
         self.waiting = Waiting(shared.compiling, self.later)
         self.runs = [RunView(self.look, "A", self.post, self.later)]
+        self.runs[0].turned = self.write_address
         self.points: list[Point | None] = [None, None]
         self._tokens: list[Token | None] = [None, None]
         self.add_run: Callable[[RunView], None] = lambda view: None
@@ -135,14 +137,22 @@ class Page:
             options=["A", "B"], value="A", visible=False, align="center"
         )
         self.compare.param.watch(lambda _: self.post(self._compared), "value")
+        self.target.param.watch(lambda _: self.post(self._follow), "value")
         self.downloads = Downloads()
         self.fields: dict[str, Any] = {}
-        self.typed = pn.FlexBox(margin=0)
+        self.errors: dict[str, Any] = {}
         self.old = Html("", sizing_mode="stretch_width", margin=0, css_classes=["old-words"])
         self.go = pn.widgets.Button(name="Run", button_type="primary", width=70, align="end")
         self.go.on_click(lambda _: self.post(self._ask_typed))
         self._make_fields()
-        self.bar = ColumnDataSource({"search": [""]}, name="address")
+        self.bar = ColumnDataSource({"search": [""], "step": [0]}, name="address")
+        self._written = ""
+        self.back = ColumnDataSource({"search": [""], "count": [0]}, name="back")
+        self.back.on_change("data", lambda _, __, data: self._went(str(data["search"][0])))
+        self._quiet = True
+        """Whether the address is left as it is: while the page is made, and while it shows what an address says."""
+        self.cards: Any = None
+        self.card_names: list[str] = []
         self.keys = ColumnDataSource({"key": [""], "count": [0]}, name="keys")
         self.keys.on_change("data", lambda _, __, data: self._key(str(data["key"][0])))
         self.refused = ColumnDataSource({"name": [""], "bytes": [0], "count": [0]}, name="refused")
@@ -163,7 +173,9 @@ class Page:
             self.doc.add_periodic_callback(self._look_for_more, _GROWTH)
         with self._together():
             self.runs[0].stand()
-            self._ask_address()
+            self._show_runs(self.address)  # changes made before the browser is connected may be lost
+            self._quiet = False
+            self.write_address()  # the state to which Back returns
         self.later(self._at_rest, _AFTER)
 
     def _at_rest(self) -> None:
@@ -236,32 +248,83 @@ class Page:
         names = self.card.plane.parameters
         from snapbeam.model.parameters import lookup
 
-        self.fields = {
-            name: pn.widgets.TextInput(name=lookup(name).short.replace("_", " "), value="", width=150)
-            for name in dict.fromkeys(names)
-        }
-        self.typed.objects = [*self.fields.values(), self.go]
+        self.fields, self.errors = {}, {}
+        for name in dict.fromkeys(names):
+            row = lookup(name)
+            unit = "" if row.quantity.unit == "1" else f" ({row.quantity.unit})"
+            field = pn.widgets.TextInput(name=row.short.replace("_", " ") + unit, value="", width=170)
+            field.param.watch(lambda _: self.post(self._ask_typed), "enter_pressed")
+            self.fields[name] = field
+            self.errors[name] = Html("", width=180, margin=(0, 0, 0, 10), css_classes=["field-error"])
+        parts = [pn.Column(self.fields[name], self.errors[name], margin=0) for name in self.fields]
+        for part in parts:
+            styled(part, self.look)
+        self.card.typed.objects = [*parts, self.go]
 
     def _begin(self) -> None:
         """Take the system that the address names."""
-        if self.address.changes and self.shared.system is not None:
-            try:
-                of_run = {
-                    key[4:]: item for key, item in self.address.changes.items() if key.startswith("run.")
-                }
-                own = {key: item for key, item in self.address.changes.items() if not key.startswith("run.")}
-                first, how = self.shared.system, self.shared.integration
-                check_run(first.replace(**own), how.replace(**of_run))
-                self.system_card().take(first.replace(**own), how.replace(**of_run))
-            except InputError as error:
-                self.card.say(f"address, set: {error}")
+        if self.address.changes:
+            self._take_changes(self.address.changes)
 
-    def _ask_address(self) -> None:
-        """Compute the point that the address names; changes made before the browser is connected may be lost."""
-        at = self.address.at
+    def _take_changes(self, changes: Mapping[str, Any]) -> None:
+        """Compute with the map's system with some parameters changed."""
+        if self.shared.system is None:
+            return
+        try:
+            settings = {
+                key.partition(".")[2]: item for key, item in changes.items() if key.startswith("integration.")
+            }
+            own = {key: item for key, item in changes.items() if not key.startswith("integration.")}
+            system, how = self.shared.system.replace(**own), self.shared.integration.replace(**settings)
+            check_run(system, how)
+            self.system_card().take(system, how)
+        except InputError as error:
+            self.card.say(f"address, set: {error}")
+
+    def _show_runs(self, address: Address) -> None:
+        """Show the points, the view of the run and the card of an address."""
         names = set(self.card.plane.parameters)
-        if at and names <= at.keys():
-            self.ask(Point({name: at[name] for name in at if name in names}))
+        self.compare.value = bool(address.b)
+        self._compared()
+        for which, at in ((0, address.at), (1, address.b)):
+            values = {name: at[name] for name in at if name in names} if names <= at.keys() else {}
+            point = self.points[which]
+            if values and (point is None or point.values != values):
+                self.target.value = "AB"[which]
+                self.ask(Point(values))
+            elif not values and point is not None:
+                self._forget(which)
+        self.target.value = "B" if address.b else "A"
+        titles = [part.title for part in self.runs[0].parts]
+        self.runs[0].tabs.active = titles.index(address.tab) if address.tab in titles else 0
+        if self.cards is not None:
+            known = address.card in self.card_names
+            self.cards.active = self.card_names.index(address.card) if known else 0
+        self._follow()
+
+    def _went(self, search: str) -> None:
+        """Show the state that the browser went back or forward to."""
+        address = Address.read({
+            name: [value.encode() for value in values]
+            for name, values in parse_qs(search.removeprefix("?")).items()
+        })  # fmt: skip
+        self._quiet = True
+        with self._together():
+            if dict(address.changes) != self.changes:
+                self._take_changes(address.changes)
+            self.card.restore(address)
+            self._show_runs(address)
+        self._quiet, self._written = False, self._search()
+
+    def _forget(self, which: int) -> None:
+        """Show no run any more."""
+        token = self._tokens[which]
+        if token is not None:
+            token.cancel()
+        self.points[which] = None
+        self.waiting.end(which, computed=False)
+        self.runs[which].forget()
+        self._mark()
 
     def _look_for_more(self) -> None:
         """Show what was added to a checkpoint since the last look."""
@@ -319,8 +382,9 @@ class Page:
         self.later(lambda: view.begin(words) if self.waiting.waits(which, mark) else None, _PATIENT)
         with self._together():
             self._fill_fields(point)
+            self.card.select(point)
             self._mark()
-            self._write_address()
+            self.write_address()
 
     def _first(self, which: int, point: Point, token: Token, run: Run) -> None:
         """Show a first look, asked on a thread of the server, and wait until it is on its way to the browser."""
@@ -379,7 +443,7 @@ class Page:
         for view, point in zip(self.runs, self.points, strict=False):
             if view.run is not None and point is not None:
                 view.say("old", "old: of the system before; run it again to see the changed one", bad=True)
-        self._write_address()
+        self.write_address()
 
     def _mark(self) -> None:
         names = ("A", "B") if self.compare.value else ("",)
@@ -392,6 +456,7 @@ class Page:
         self.target.visible = self.compare.value
         if self.compare.value and len(self.runs) == 1:
             self.runs.append(RunView(self.look, "B", self.post, self.later))
+            self.runs[1].tabs.active = self.runs[0].tabs.active
             self.add_run(self.runs[1])
             self.later(self.runs[1].complete, _AFTER)
         if len(self.runs) > 1:
@@ -399,8 +464,17 @@ class Page:
         if self.compare.value:
             self.target.value = "B"
         self._mark()
+        self._follow()
+        self.write_address()
 
     # ------------------------------------------------------------------ typed and keyed
+
+    def _follow(self) -> None:
+        """Let the fields hold the point of the run that the next click replaces."""
+        point = self.points[self.which]
+        self.card.select(point)
+        if point is not None:
+            self._fill_fields(point)
 
     def _fill_fields(self, point: Point) -> None:
         if set(point.values) - set(self.fields):
@@ -408,23 +482,27 @@ class Page:
         for name, value in point.values.items():
             if name in self.fields:
                 self.fields[name].value = repr(value) if isinstance(value, float) else str(value)
+                self.errors[name].object = ""
 
     def _ask_typed(self) -> None:
         from snapbeam.model.parameters import lookup
 
         values: dict[str, Any] = {}
-        try:
-            for name, field in self.fields.items():
-                item = lookup(name).quantity
-                text = str(field.value_input or field.value).strip()
-                value: Any = text if item.kind in (str, bool) else number(lookup(name).short, text)
+        for name, field in self.fields.items():
+            row = lookup(name)
+            item, text = row.quantity, str(field.value_input or field.value).strip()
+            self.errors[name].object = ""
+            try:
+                value: Any = text if item.kind in (str, bool) else number(row.short, text)
                 if item.kind is int and isinstance(value, float) and value == int(value):
                     value = int(value)
                 if item.kind is bool:
                     value = {"True": True, "False": False}.get(text, text)
-                values[name] = item.check(lookup(name).short, value)
-        except InputError as error:
-            self.runs[self.which].fail(str(error))
+                values[name] = item.check(row.short, value)
+            except InputError as error:
+                self.errors[name].object = Markup('<span class="bad" role="alert">{}</span>').format(error)
+        if len(values) < len(self.fields):
+            self.runs[self.which].fail("correct the marked field")
             return
         self.ask(Point(values))
 
@@ -450,16 +528,26 @@ class Page:
 
     # ------------------------------------------------------------------ address
 
-    def _write_address(self) -> None:
-        if not hasattr(self, "changes"):  # it is still being made
-            return
-        card, point = self.card, self.points[self.which]
+    def write_address(self) -> None:
+        """Write what is shown into the address: a step in the history of the browser."""
+        search = "" if self._quiet else self._search()
+        if search and search != self._written:
+            self.bar.data = {
+                "search": [search],
+                "step": [self.bar.data["step"][0] + 1 if self._written else 0],
+            }
+            self._written = search
+
+    def _search(self) -> str:
+        """What is shown, as an address says it."""
+        card = self.card
+        at, b = ({} if point is None else point.values for point in self.points)
         view = None if card.view.is_whole else card.view.view
-        address = Address(
-            card.x.value, card.y.value, card.show.value, {} if point is None else point.values, view,
-            self.changes, self.address.theme,
-        )  # fmt: skip
-        self.bar.data = {"search": [address.write()]}
+        tab, shown = self.runs[0].tabs.active, 0 if self.cards is None else self.cards.active
+        return Address(
+            card.x.value, card.y.value, card.show.value, at, b if self.compare.value else {}, view, self.changes,
+            self.address.theme, self.runs[0].parts[tab].title if tab else "", self.card_names[shown] if shown else "",
+        ).write()  # fmt: skip
 
 
 def _brief(value: Any) -> str:

@@ -35,6 +35,7 @@ from snapbeam.explorer.style import (
     columns,
     figure,
     fit,
+    framed_plot,
     inner_size,
     legend,
     sheet,
@@ -112,7 +113,7 @@ class RunPanel:
 
     def wrap(self, plot: Any) -> Any:
         """A figure in the page."""
-        return pn.pane.Bokeh(plot, sizing_mode="stretch_width", margin=(0, 0, 4, 0))
+        return framed_plot(plot, margin=(0, 0, 4, 0))
 
 
 def across(run: Run) -> tuple[NDArray[np.float64], str]:
@@ -178,10 +179,10 @@ const step = (now) => {
   const F = frames.data, n = F.t.length;
   if (n > 1) {
     let t = place.data.t[0], a = 0, b = n - 1;
-    if (!(t >= F.t[0] && t < F.t[b])) { t = F.t[0]; }
+    if (!(t > F.t[0] && t < F.t[b])) { t = Math.max(F.t[0], meta.data.begin[0]); }
     while (b - a > 1) { const c = (a + b) >> 1; if (F.t[c] <= t) { a = c; } else { b = c; } }
     const slow = (linger.active && F.force[a] > 0) ? 0.04 : 1.0;
-    t += Math.pow(10, speed.value) * slow * Math.min(now - last, 100) / 1000;
+    t += parseFloat(speed.value) * slow * Math.min(now - last, 100) / 1000;
     last = now;
     place.data = {t: [t]};
     scrub.value = Math.min(Math.max((t - F.t[0]) / (F.t[n - 1] - F.t[0]), 0), 1);
@@ -217,6 +218,8 @@ class BeamPanel(RunPanel):
         """Return the models of this view."""
         look = self.look
         self.run: Run | None = None
+        self.begin = 0.0
+        """Where playing begins: half a cycle before the first snap-through."""
         self.fresh = True
         self.count = 0
         empty: list[float] = []
@@ -225,20 +228,27 @@ class BeamPanel(RunPanel):
         )
         self.amplitudes = ColumnDataSource({"q": empty})
         self.modes, self.shapes = ColumnDataSource({"phi": empty}), ColumnDataSource({"x": empty})
-        self.meta = ColumnDataSource({"modes": [0]})
+        self.meta = ColumnDataSource({"modes": [0]}, name=self.named("beam-meta"))
         beam = ColumnDataSource(
             {"x": empty, "top": empty, "low": empty}, syncable=False, name=self.named("beam")
         )
         striker = ColumnDataSource({"x": empty, "y": empty, "color": empty}, syncable=False)
         self.plot = figure(
-            look, name=self.named("beam-plot"), height=330, title=" ",
+            look, name=self.named("beam-plot"), height=330, used=330, title=" ",
             x_axis_label="position (mm)", y_axis_label="displacement (mm)",
             x_range=Range1d(0.0, 1.0), y_range=Range1d(-1.0, 1.0), tools="pan,wheel_zoom,reset",
         )  # fmt: skip
         self.plot.patches("x", "y", source=striker, fill_color="color", line_color=None)
         self.plot.varea("x", "low", "top", source=beam, fill_color=look.beam)
         for edge in ("top", "low"):
-            self.plot.line("x", edge, source=beam, line_color=look.beam, line_width=1.5)
+            self.plot.line("x", edge, source=beam, line_color=look.beam, line_width=2.5)
+        self.supports = ColumnDataSource(
+            {"left": empty, "right": empty, "low": empty, "top": empty}, name=self.named("supports")
+        )
+        self.plot.quad(
+            "left", "right", "low", "top", source=self.supports, fill_color=look.grid, line_color=look.faint,
+            hatch_pattern="/", hatch_color=look.faint,
+        )  # fmt: skip
         words = Label(
             x=10,
             y=8,
@@ -256,16 +266,14 @@ class BeamPanel(RunPanel):
         )  # fmt: skip
         sheets = [sheet(look), _CONTROLS]
         toggle = Toggle(label="► Play", name=self.named("play"), width=90, stylesheets=sheets)
-        speed = Slider(
-            title="speed (log₁₀ cycles/s)",
-            start=-2.0,
-            end=1.5,
-            value=-0.3,
-            step=0.1,
-            width=210,
+        speed = Select(
+            title="cycles per second",
+            options=["0.02", "0.1", "0.3", "1", "3", "10"],
+            value="1",
+            width=120,
             stylesheets=sheets,
         )
-        linger = Toggle(label="slow at impacts", active=True, width=120, stylesheets=sheets)
+        linger = Toggle(label="slow at impacts", active=False, width=120, stylesheets=sheets)
         scrub = Slider(
             title="",
             show_value=False,
@@ -280,7 +288,11 @@ class BeamPanel(RunPanel):
         )
         shared = {"toggle": toggle, "frames": self.frames, "place": self.cursor.place}
         toggle.js_on_change(
-            "active", CustomJS(args=shared | {"speed": speed, "linger": linger, "scrub": scrub}, code=_PLAY)
+            "active",
+            CustomJS(
+                args=shared | {"speed": speed, "linger": linger, "scrub": scrub, "meta": self.meta},
+                code=_PLAY,
+            ),
         )
         scrub.js_on_change("value", CustomJS(args=shared, code=_SCRUB))
         self.scale = Select(
@@ -337,6 +349,11 @@ class BeamPanel(RunPanel):
         ):  # the browser draws when it is told of a change, which what comes with the figure is not
             self.fresh = False
             self.cursor.later(self._rescale, 300)
+        w = dataset["midspan_displacement"].values[inside]
+        snaps = np.flatnonzero(w[:-1] * w[1:] < 0.0)
+        self.begin = (
+            max(float(x[inside][snaps[0]]) - 0.5, float(x[inside][0])) if snaps.size else float(x[inside][0])
+        )
         self.plot.x_range.update(start=-0.02 * along[-1], end=1.02 * along[-1])
         self._rescale()
 
@@ -351,13 +368,19 @@ class BeamPanel(RunPanel):
             self.scale.value, self.reach
         )
         self.plot.y_range.update(start=-half, end=half)
-        self.plot.title.text = f"Displacements {fit / half:.3g} times as large as lengths"
+        true = self.scale.value == "true proportions"
+        drawn = "thickness to scale" if true else "the beam as a line, without its thickness"
+        self.plot.title.text = f"Displacements {fit / half:.3g} times as large as lengths; {drawn}"
+        tall = 0.12 * half
+        self.supports.data = {
+            "left": [-0.02 * length, length], "right": [0.0, 1.02 * length], "low": [-tall] * 2, "top": [tall] * 2
+        }  # fmt: skip
         self.count += 1
         striker = run.system.striker
         location = 0.5 if striker is None else striker.location
         side = 1 if striker is None or striker.side == "below" else -1
         self.meta.data = {
-            "modes": [min(run.system.model.modes, _MODES)], "half": [0.5e3 * beam.thickness], "at": [location * length],
+            "modes": [min(run.system.model.modes, _MODES)], "half": [0.5e3 * beam.thickness if true else 0.0], "begin": [self.begin], "at": [location * length],
             "side": [side], "reach": [1e3 * half], "tip": [0.008 * length], "taper": [0.05 * half],
             "hot": [self.look.second], "cold": [self.look.striker], "count": [self.count],
         }  # fmt: skip
@@ -421,7 +444,7 @@ class Energy(RunPanel):
         self.sources = {name: columns(x=[], y=[]) for name in _CURVES}
         self.sources["striker_work"].name = self.named("energy")
         self.plot = figure(
-            look, height=360, x_range=self.cursor.range, y_axis_label="energy (µJ)", y_range=(0.0, 1.0),
+            look, height=360, used=260, x_range=self.cursor.range, y_axis_label="energy (µJ)", y_range=(0.0, 1.0),
             tools="xpan,xbox_zoom,xwheel_zoom,reset", active_drag="xbox_zoom", active_scroll="xwheel_zoom",
         )  # fmt: skip
         for (name, label), color in zip(_CURVES.items(), colors, strict=True):
@@ -454,7 +477,7 @@ class Energy(RunPanel):
             scale = max(abs(parts["striker_work"]), parts["energy_dissipated"], 1e-300)
             barrier = run.system.model.saddle_energy - run.system.model.well_energy
             words = (
-                f"At the end the books balance to {left:.2g} J, {abs(left) / scale:.1g} of the work. "
+                f"At the end the energy balance has an error of {left:.2g} J, {abs(left) / scale:.1g} of the work. "
                 f"The barrier between the wells is {1e6 * barrier:.4g} µJ."
             )
             self.words.object = Markup('<p class="note">{}</p>').format(words)
@@ -547,8 +570,17 @@ class Numbers(RunPanel):
     def show(self, run: Run, low: float, high: float) -> None:
         """Show a run between two cycles."""
         rows = []
+        system = run.system
+        circuit = system.harvester is not None
+        parts = {
+            "base_": system.base_excitation is not None, "load_work": system.axial_load is not None,
+            "local_force_": system.local_force is not None, "energy_harvested": circuit, "harvested_": circuit,
+            "rms_voltage": circuit, "peak_voltage": circuit,
+        }  # fmt: skip
         for name, value in run.summary.items():
             row = STATISTICS.get(name)
+            if any(name.startswith(start) and not has for start, has in parts.items()):
+                continue
             shown = getattr(value, "label", None) or getattr(value, "name", None) or value
             text = f"{shown:.8g}" if isinstance(shown, float) else str(shown)
             text = "–" if isinstance(shown, float) and np.isnan(shown) else text
@@ -576,7 +608,7 @@ class Modal(RunPanel):
         """Return the models of this view."""
         look = self.look
         plot = figure(
-            look, height=260, x_range=self.cursor.range, y_axis_label="αᵢ over α₁ of the well", y_range=(-1.5, 1.5),
+            look, height=260, used=215, share=0.6, x_range=self.cursor.range, y_axis_label="αᵢ over α₁ of the well", y_range=(-1.5, 1.5),
             tools="xpan,xbox_zoom,xwheel_zoom,reset", active_drag="xbox_zoom", active_scroll="xwheel_zoom",
         )  # fmt: skip
         self.lines = [columns(x=[], y=[]) for _ in range(_SHOWN)]
@@ -588,7 +620,7 @@ class Modal(RunPanel):
         self.bars = columns(mode=[], rms=[], top=[])
         self.bars.name = self.named("modal")
         low = figure(
-            look, height=170, y_axis_type="log", x_axis_label="buckling mode i", y_axis_label="rms αᵢ / α₁",
+            look, height=170, used=215, share=0.4, y_axis_type="log", x_axis_label="buckling mode i", y_axis_label="rms αᵢ / α₁",
             tools="reset", x_range=(0.4, 32.6), y_range=(1e-8, 1.0),
         )  # fmt: skip
         low.segment("mode", 1e-16, "mode", "rms", source=self.bars, color=look.center, line_width=2)
@@ -662,7 +694,7 @@ class Phase(RunPanel):
         self.dots.name = self.named("section")
         dot = ColumnDataSource({"w": [], "v": []}, syncable=False)
         plots = [
-            figure(look, height=370, tools="pan,box_zoom,wheel_zoom,reset", x_range=(-1.6, 1.6), y_range=(-1.6, 1.6),
+            figure(look, height=370, used=280, tools="pan,box_zoom,wheel_zoom,reset", x_range=(-1.6, 1.6), y_range=(-1.6, 1.6),
                    title=title, x_axis_label="displacement w (b)", y_axis_label="velocity (b ω₁)", min_border_left=50)
             for title in ("Phase portrait", "Stroboscopic section")
         ]  # fmt: skip
@@ -745,7 +777,7 @@ class Spectrum(RunPanel):
         }
         self.sources["midspan_displacement"].name = self.named("spectrum")
         plot = figure(
-            look, height=420, title=" ", y_axis_type="log", y_axis_label="amplitude (b)",
+            look, height=420, used=230, title=" ", y_axis_type="log", y_axis_label="amplitude (b)",
             x_axis_label="frequency over f₁", x_range=(0.0, 12.0), y_range=(1e-7, 1.0),
             tools="pan,box_zoom,wheel_zoom,reset", active_drag="box_zoom",
         )  # fmt: skip
@@ -809,18 +841,35 @@ class WaveformPanel(RunPanel):
             look,
             name=self.named("waveform-plot"),
             height=265,
+            used=215,
+            share=0.6,
             y_axis_label="displacement w (b)",
             y_range=(-1.5, 1.5),
             **common,
         )
         words = ("beam, centre", "beam, at the striker", "striker")
-        colors, widths = (look.center, look.beam, look.striker), (2.0, 1.0, 1.3)
-        for name, label, color, width in zip(_CURVES_WAVEFORM, words, colors, widths, strict=True):
-            top.line("x", "y", source=self.sources[name], color=color, line_width=width, legend_label=label)
+        colors, widths = (look.center, look.beam, look.striker), (2.6, 1.2, 1.3)
+        dashes = ("solid", "dashed", "solid")
+        rows = list(zip(_CURVES_WAVEFORM, words, colors, widths, dashes, strict=True))
+        for name, label, color, width, dash in (
+            rows[2],
+            *rows[:2],
+        ):  # the striker below, so that it hides nothing
+            top.line(
+                "x",
+                "y",
+                source=self.sources[name],
+                color=color,
+                line_width=width,
+                line_dash=dash,
+                legend_label=label,
+            )
         legend(top, look)
         low = figure(
             look,
             height=165,
+            used=215,
+            share=0.4,
             y_axis_label="contact force f (N)",
             y_range=(0.0, 1.0),
             x_axis_label="cycles of excitation τ",
@@ -863,6 +912,12 @@ _SETTLE = 60
 _BUSY = Markup('<span class="busy">{}</span>')
 _BAD = Markup('<span class="bad">{}</span>')
 _FAINT = Markup('<span class="faint">{}</span>')
+FIRST = "Click on the map, use the arrow keys, or type numbers, to see the run of a point."
+"""Words of a run that is not asked for yet."""
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 class RunView:
@@ -892,7 +947,9 @@ class RunView:
             Modal(look, self.cursor), Energy(look, self.cursor), Impacts(look, self.cursor, self._closer),
             BeamPanel(look, self.cursor), Numbers(look, self.cursor),
         ]  # fmt: skip
-        self.head = Html("", sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-head"])
+        self.head = Html(
+            _FAINT.format(FIRST), sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-head"]
+        )
         self.note = Html("", sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-note"])
         self.tabs = pn.Tabs(
             *((part.title, part.place) for part in self.parts), dynamic=True, sizing_mode="stretch_width", margin=0
@@ -906,6 +963,7 @@ class RunView:
             self.head, self.note, self.tabs, sizing_mode="stretch_width", css_classes=["card", "run"]
         )
         self.notes: dict[str, str] = {}
+        self.turned: Callable[[], None] = lambda: None
 
     @property
     def active(self) -> Any:
@@ -924,10 +982,18 @@ class RunView:
         self._head(_BUSY.format(f"computing, {seconds:.0f} s"), words, _FAINT.format(why) if why else "")
 
     def fail(self, words: str) -> None:
-        """Say why there is no run."""
+        """Say why there is no run; the pictures of the run before are greyed."""
         self.notes = {}
         self._write_notes()
+        self.tabs.css_classes = ["stale"]
         self._head(_BAD.format("no run"), words)
+
+    def forget(self) -> None:
+        """Show no run; the pictures of the run before are greyed."""
+        self.notes = {}
+        self._write_notes()
+        self.tabs.css_classes = ["stale"] if self.run is not None else []
+        self.head.object = _FAINT.format(FIRST)
 
     def _head(self, kind: str, words: str, below: str = "") -> None:
         line = Markup("<br>{}").format(below) if below else ""
@@ -938,14 +1004,17 @@ class RunView:
     def show(self, run: Run, words: str, fresh: bool) -> None:
         """Show a run; *fresh* if it is not the one before with more samples."""
         self.run = run
+        self.tabs.css_classes = []
         self._write_notes()
         answer = run.summary
         if answer.status in (RunStatus.OK, RunStatus.EARLY_STOP):
             well = "upper" if answer.final_well > 0 else "lower"
             final = ", for good" if answer.final_well_proven else ""
-            counts = (
-                f"{answer.zero_crossings} crossings, {answer.impacts} impacts, ends in the {well} well{final}"
+            crossings, impacts = (
+                _counted(answer.zero_crossings, "crossing"),
+                _counted(answer.impacts, "impact"),
             )
+            counts = f"{crossings}, {impacts}, ends in the {well} well{final}"
             self._head(class_chip(answer.response_class), words, _FAINT.format(counts))
         else:
             why = _BAD.format(f"{answer.status.name}: {answer.status.advice}")
@@ -985,6 +1054,7 @@ class RunView:
             self.later(self.complete, _PAUSE)
 
     def _activated(self) -> None:
+        self.turned()
         self.active.activate()
         self.later(self._draw, _SETTLE)  # once the browser has what it is to be drawn in
 

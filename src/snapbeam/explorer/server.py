@@ -5,6 +5,7 @@ from __future__ import annotations
 import hmac
 import ipaddress
 import logging
+import os
 import secrets
 import threading
 from collections.abc import Callable
@@ -22,12 +23,20 @@ from snapbeam import InputError, InputTypeError, Integration, System
 from snapbeam.explorer.jobs import BODY, SESSIONS
 from snapbeam.explorer.shared import Shared
 
-__all__ = ["Explorer", "Gate", "explore", "is_loopback", "make_server", "serve"]
+__all__ = ["Explorer", "Gate", "explore", "is_loopback", "kept_token", "make_server", "serve"]
 
 
 _LOG = logging.getLogger("snapbeam.explorer")
 _ICON = "/favicon.ico"
+_PORT, _PORTS = 8760, 20
+"""The port by default, and how many are tried."""
 _COOKIE = "snapbeam_token"
+_TEMPLATE = """
+{% block preamble %}
+    <meta name="viewport" content="width=device-width, initial-scale=1">
+    {{ super() }}
+{% endblock %}
+"""
 _OWN = "static/extensions/panel/"
 """Where the server keeps what pages are made of; what Panel is not told it fetches from elsewhere."""
 
@@ -172,14 +181,15 @@ class _Headers(OutputTransform):
 def make_server(
     shared: Shared,
     address: str = "127.0.0.1",
-    port: int = 0,
+    port: int | None = 0,
     *,
     allow_remote: bool = False,
     token: str | None = None,
 ) -> tuple[Any, str]:
     """A server that is not started, and its address for a browser.
 
-    The address contains the token, a random one unless given.
+    The address contains the token, a random one unless given.  Port None is 8760 or, if that is in use, the next
+    free one; 0 is any free port.
 
     Raises
     ------
@@ -198,7 +208,7 @@ def make_server(
         import socket
 
         names = ("127.0.0.1", "localhost", socket.gethostname(), socket.getfqdn(), *_own_addresses())
-    taken = port or _free_port(address)
+    taken = (_next_port(address) if port is None else port) or _free_port(address)
     names = tuple(name.lower() for name in names if ":" not in name)
     hosts = names if taken == 80 else tuple(f"{name}:{taken}" for name in names)
     prefix = (
@@ -225,6 +235,7 @@ def _factory(shared: Shared) -> Callable[[], Any]:
         from snapbeam.explorer.page import Page
 
         shared.pages += 1
+        pn.state.curdoc.template = _TEMPLATE
         pn.state.curdoc.template_variables.update(dist_url=_OWN, app_favicon=_ICON)
         try:
             made = Page(shared, dict(pn.state.session_args))
@@ -240,6 +251,42 @@ def _factory(shared: Shared) -> Callable[[], Any]:
         return made.layout
 
     return page
+
+
+def kept_token() -> str | None:
+    """The token of this user, written to a file when it is first needed; None if there is no such file.
+
+    With it and with the fixed port, links to the page remain valid after a restart.
+    """
+    base = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
+    path = Path(base) / "snapbeam" / "explorer-token"
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if not path.exists():
+            path.touch(mode=0o600)
+            path.write_text(secrets.token_urlsafe(24), encoding="ascii")
+        if os.name == "posix" and path.stat().st_mode & 0o077:
+            return None  # others could read it
+        text = path.read_text(encoding="ascii").strip()
+    except (OSError, UnicodeDecodeError, RuntimeError):
+        return None
+    return text if len(text) >= 16 else None
+
+
+def _next_port(address: str) -> int:
+    """The first free port from the fixed one on; 0 if all of them are in use."""
+    import socket
+
+    for port in range(_PORT, _PORT + _PORTS):
+        with socket.socket() as probe:
+            if os.name == "posix":  # as the server does: a port whose last connections are ending is free
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((address, port))
+            except OSError:
+                continue
+            return port
+    return 0
 
 
 def _free_port(address: str) -> int:
@@ -369,7 +416,7 @@ def serve(
     what: Any,
     *,
     address: str = "127.0.0.1",
-    port: int = 0,
+    port: int | None = None,
     allow_remote: bool = False,
     token: str | None = None,
     system: System | None = None,
@@ -387,7 +434,8 @@ def serve(
 
     matplotlib.use("Agg")  # pictures are drawn beside the page, for files alone
     shared = _shared(what, system, integration)
-
+    if token is None and is_loopback(address):
+        token = kept_token()
     server, url = make_server(shared, address, port, allow_remote=allow_remote, token=token)
     server.start()
     server.io_loop.add_callback(ready, url)

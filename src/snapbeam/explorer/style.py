@@ -39,6 +39,7 @@ __all__ = [
     "fit",
     "focused",
     "framed",
+    "framed_plot",
     "inner_size",
     "legend",
     "look_of",
@@ -75,7 +76,7 @@ LIGHT = Look(
     "#000000",
     "#2a87c8",
     "#b03a27",
-    "#1f6feb",
+    "#1a62d2",
     "#8250df",
 )
 DARK = Look(
@@ -124,8 +125,16 @@ def styled(item: Any, look: Look) -> None:
             each.stylesheets = [*each.stylesheets, style]
 
 
-def figure(look: Look, **options: Any) -> Any:
-    """An empty Bokeh figure in the style of the page."""
+def figure(look: Look, *, used: int = 0, share: float = 1.0, **options: Any) -> Any:
+    """An empty Bokeh figure in the style of the page.
+
+    Parameters
+    ----------
+    used : int
+        Pixels of the window's height that other parts of the page need.  The figure takes *share* of the rest, and at
+        least its own height; 0 for a figure of fixed height.
+    share : float
+    """
     settings: dict[str, Any] = {
         "sizing_mode": "stretch_width",
         "toolbar_location": "right",
@@ -148,12 +157,23 @@ def figure(look: Look, **options: Any) -> Any:
         axis.minor_tick_line_color = None
     plot.grid.grid_line_color = look.grid
     plot.stylesheets = plot.toolbar.stylesheets = [focused(look)]
+    if used:
+        tall = f"max({plot.height}px, calc({share:g} * (100vh - {used}px)))"
+        plot.stylesheets = [
+            *plot.stylesheets,
+            f"@media (min-width: 1000px) {{ :host {{ min-height: {tall} !important; }} }}",
+        ]
     plot.toolbar.logo = None
     plot.toolbar.autohide = False
     plot.title.text_color = look.text
     plot.title.text_font_size = "12px"
     plot.title.text_font_style = "normal"
     return plot
+
+
+def framed_plot(plot: Any, **options: Any) -> Any:
+    """A figure in the page; Panel gives it the style sheets of its frame."""
+    return pn.pane.Bokeh(plot, sizing_mode="stretch_width", stylesheets=list(plot.stylesheets), **options)
 
 
 def fit(plot: Any, *curves: NDArray[Any]) -> None:
@@ -180,6 +200,7 @@ def legend(plot: Any, look: Look) -> None:
         item.border_line_color = None
         item.padding, item.spacing, item.margin = 3, 8, 4
         item.glyph_height = item.label_height = 14
+        item.glyph_width = 34
         item.click_policy = "hide"
 
 
@@ -258,7 +279,11 @@ class Html(pn.pane.HTML):
 
 def class_chip(kind: ResponseClass) -> Markup:
     """The name of a class on its colour."""
-    ink = "#111" if kind in (ResponseClass.TRANSIENT_2, ResponseClass.CONTINUOUS) else "#fff"
+    ink = (
+        "#111"
+        if kind in (ResponseClass.TRANSIENT_2, ResponseClass.CONTINUOUS, ResponseClass.UNKNOWN)
+        else "#fff"
+    )
     return Markup('<span class="chip" style="background:{};color:{}">{}</span>').format(
         CLASS_COLORS[kind], ink, kind.label
     )
@@ -310,7 +335,6 @@ class Cursor:
 # How a page is laid out, and the few scripts that it runs in the browser.
 
 
-_FIRST = "Click on the map, use the arrow keys, or type numbers, to see the run of a point."
 _GONE = """
 if (!document.getElementById('gone')) {
   const note = document.createElement('div');
@@ -324,7 +348,15 @@ _ADDRESS = """
 const search = bar.data.search[0];
 const kept = new URLSearchParams(window.location.search).get('token');
 const full = (kept ? 'token=' + encodeURIComponent(kept) + (search ? '&' : '') : '') + search;
-window.history.replaceState(null, '', window.location.pathname + (full ? '?' + full : ''));
+const wanted = window.location.pathname + (full ? '?' + full : '');
+if (wanted !== window.location.pathname + window.location.search) {
+  if (bar.data.step[0]) { window.history.pushState(null, '', wanted); } else { window.history.replaceState(null, '', wanted); }
+}
+"""
+_HISTORY = """
+window.addEventListener('popstate', () => {
+  back.data = {search: [window.location.search], count: [back.data.count[0] + 1]};
+});
 """
 _KEYS = """
 document.documentElement.lang = 'en';
@@ -390,8 +422,7 @@ def framed(page: Page) -> Any:
     top = pn.Row(
         title, page.target, page.compare, dark, sizing_mode="stretch_width", css_classes=["top"], margin=0
     )
-    map_tab = pn.Column(page.card.layout, page.typed, sizing_mode="stretch_width", margin=0)
-    map_tab.insert(0, page.old)
+    map_tab = pn.Column(page.old, page.card.layout, sizing_mode="stretch_width", margin=0)
     others = page_tabs(page)
     left = pn.Tabs(
         ("Map", map_tab),
@@ -407,10 +438,11 @@ def framed(page: Page) -> Any:
             made = list(others.values())[at - 1]()
             styled(made, look)
             left[at].objects = [made]
+        page.write_address()
 
     left.param.watch(lambda _: page.post(turned), "active")
+    page.cards, page.card_names = left, ["Map", *others]
     runs = pn.FlexBox(page.runs[0].layout, margin=0, css_classes=["right"])
-    page.runs[0].head.object = Markup('<span class="faint">{}</span>').format(_FIRST)
     body = pn.FlexBox(
         left,
         runs,
@@ -432,12 +464,14 @@ def framed(page: Page) -> Any:
     if doc is not None:
         doc.js_on_event(DocumentReady, CustomJS(args={"keys": page.keys}, code=_KEYS))
         doc.js_on_event(DocumentReady, CustomJS(code=_TABS))
+        doc.js_on_event(DocumentReady, CustomJS(args={"back": page.back}, code=_HISTORY))
         doc.js_on_event(DocumentReady, CustomJS(code=_FOCUS))
         large = CustomJS(args={"refused": page.refused}, code=_TOO_LARGE % UPLOAD)
         doc.js_on_event(DocumentReady, large)
         doc.js_on_event(ConnectionLost, CustomJS(code=_GONE))
         doc.add_root(page.bar)
         doc.add_root(page.keys)
+        doc.add_root(page.back)
         doc.add_root(page.refused)
         doc.add_root(page.downloads.source)
     return whole
@@ -448,4 +482,4 @@ def page_tabs(page: Page) -> dict[str, Callable[[], Any]]:
     found: dict[str, Callable[[], Any]] = {}
     if page.shared.system is not None:
         found["System"] = lambda: page.system_card().layout
-    return found | {"Take away": lambda: page.take_card().layout}
+    return found | {"Export": lambda: page.take_card().layout}
