@@ -85,6 +85,7 @@ def test_moving_base():
     held_against(system, -MASS @ BASE, lambda t: -0.3 * w * w * math.sin(0.8 * w * t), 1e-5)
 
 
+@pytest.mark.slow
 def test_force_on_a_beam_beside_a_stop():
     """The force of a row equals the base excitation of the same row."""
     from snapbeam.model import default_values

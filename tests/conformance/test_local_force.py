@@ -98,6 +98,7 @@ FORCES = {
 SLOW = pytest.mark.slow
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "share"),
     [
@@ -138,6 +139,7 @@ def cycle_of(system):
     return 1.0 / (system.striker.drive.frequency_ratio * system.model.reference_frequency)
 
 
+@pytest.mark.slow
 @SLOW
 @pytest.mark.parametrize("side", ["below", "above"])
 @pytest.mark.parametrize("name", ["drag", "spring", "friction"])
@@ -153,6 +155,7 @@ def test_with_impacts(name, side, friction):
     check_against_independent(system, force, start, 2, 1e-5)
 
 
+@pytest.mark.slow
 @SLOW
 @pytest.mark.parametrize("name", ["drag", "rotation"])
 def test_on_a_moving_base(name):
@@ -165,6 +168,7 @@ def test_on_a_moving_base(name):
     check_against_independent(system, force, start, 4, 1e-6)
 
 
+@pytest.mark.slow
 def test_energy_of_quadratic_damping():
     """A free mass: v = v_0/(1 + c v_0 t/m) and the energy lost, both exact."""
     mass, coefficient, speed = 0.01, 2.0, 0.4

@@ -43,6 +43,7 @@ LAWS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "e"), LAWS)
 def test_restitution_of_a_free_mass(name, e) -> None:
     law = (
@@ -59,6 +60,7 @@ def test_restitution_of_a_free_mass(name, e) -> None:
     assert run.dataset.energy_lost_contact.values[-1] == run.summary.energy_lost_contact
 
 
+@pytest.mark.slow
 def test_no_loss_is_hertz() -> None:
     """chi -> 0: Hertz's law, but for the rounding of its kicks."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
@@ -96,6 +98,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "modes", "cycles", "at_standard", "at_reference"), CASES)
 def test_trajectory(name, modes, cycles, at_standard, at_reference) -> None:
     law, force, edge = LOSSY[name]

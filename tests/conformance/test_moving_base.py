@@ -35,7 +35,14 @@ def ledger(run: sb.Run) -> float:
 @pytest.mark.parametrize(
     ("modes", "cycles"), [pytest.param(1, 4, marks=SLOW), (3, 3), pytest.param(8, 2, marks=SLOW)]
 )
-@pytest.mark.parametrize("stop", ["none", "carried", "in space"])
+@pytest.mark.parametrize(
+    "stop",
+    [
+        pytest.param("none", marks=pytest.mark.slow),
+        "carried",
+        pytest.param("in space", marks=pytest.mark.slow),
+    ],
+)
 def test_against_an_independent_solution(modes, cycles, stop) -> None:
     ratio, strength, gap = 0.9, 0.25, 0.05 * LEVEL
     first = float(PaperBeam(modes).omega[0])

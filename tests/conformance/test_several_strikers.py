@@ -85,6 +85,7 @@ def test_against_an_independent_solution(case: str, modes: int, cycles: int) -> 
     assert len(hit) > 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("early", [False, True])
 def test_one_of_two_out_of_reach_is_none(early: bool) -> None:
     """Bit for bit the run with one striker, if the other stands still and far away; no run is decided early."""
@@ -108,6 +109,7 @@ def test_one_of_two_out_of_reach_is_none(early: bool) -> None:
     assert np.isnan(beside.summary.early_stop_time)
 
 
+@pytest.mark.slow
 def test_mirrored() -> None:
     """The mirrored system's mirrored run, bit for bit."""
     below = sb.System(model(3), default_values.CONTACT, [FIRST, stop()])
@@ -190,6 +192,7 @@ def test_swept_by_dotted_names(tmp_path) -> None:
     assert swept.peak_force_striker_2.long_name == "peak contact force, striker 2"
 
 
+@pytest.mark.slow
 def test_statistics_of_each(tmp_path) -> None:
     """Against the list of impacts and the samples of the run; together they are the whole; one striker has none."""
     system = sb.System(model(3), default_values.CONTACT, [FIRST, stop()])

@@ -92,6 +92,7 @@ def test_response_spectrum_of_a_half_sine() -> None:
         assert found * 1e-3 * omega**2 / peak == pytest.approx(exact, rel=1e-5), cycles
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:the lowest mode about the equilibrium")
 @pytest.mark.filterwarnings("ignore:this imperfection leaves one well")
 @pytest.mark.parametrize(("shape", "level"), [("half_sine", 5000.0), ("trapezoid", 2e5)])

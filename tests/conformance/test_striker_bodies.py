@@ -123,6 +123,7 @@ def test_sphere_meets_a_free_mass() -> None:
         assert run.impacts.sizes["impact"] == 1
 
 
+@pytest.mark.slow
 def test_heavy_body_is_the_shaker() -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
     drive = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.15)

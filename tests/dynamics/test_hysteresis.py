@@ -43,6 +43,7 @@ def test_each_run_begins_with_the_last_state_of_the_run_before(shaken):
     plt.close("all")
 
 
+@pytest.mark.slow
 def test_the_runs_after_a_failed_one_are_marked(shaken, monkeypatch):
     """A run without a last state ends the sweeps; the runs that follow are not computed."""
     done = sb.simulate(shaken, STEPS, sample_times=[0.0])
@@ -82,6 +83,7 @@ def test_bad_input_is_refused(shaken):
         sb.dynamics.hysteresis(shaken, NAME, [0.02], sb.Integration(early_termination=True))
 
 
+@pytest.mark.slow
 def test_the_command(shaken, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shaken.save("harvester.toml")

@@ -28,12 +28,13 @@ SHAKEN = {
 
 
 LONG = [
-    pytest.param(name, marks=pytest.mark.slow) for name in ("both", "load", "struck", "struck under a load")
+    pytest.param(name, marks=pytest.mark.slow)
+    for name in ("base", "both", "load", "struck", "struck under a load")
 ]
 """Each has two kernels of its own, twenty seconds to compile."""
 
 
-@pytest.mark.parametrize("name", ["base", *LONG])
+@pytest.mark.parametrize("name", LONG)
 def test_exponents_add_up_to_the_damping(name):
     """-2 sum zeta omega, whatever shakes the beam."""
     found = sb.dynamics.lyapunov_spectrum(SHAKEN[name], periods=20, transient=5, k=4).exponent.values.ravel()

@@ -277,6 +277,7 @@ def test_every_law_and_drive_is_asked() -> None:
     assert {*LAWS, *DRIVES} - {"hertz", "sine"} == set(OF_OTHERS)
 
 
+@pytest.mark.slow
 def test_every_sample_and_the_start_are_hashed() -> None:
     """Two runs with different records or starts do not carry the same parameter hash."""
     one, other = (PLAIN.replace(striker=record(last=shift)) for shift in (0.0, 1e-12))
