@@ -81,7 +81,7 @@ def test_voltage_of_a_coil(shaken, inductance):
 
 def test_the_command_reports_the_harvester_and_no_striker(tmp_path, monkeypatch, run):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "harvester.toml").write_text(FILE)
+    (tmp_path / "harvester.toml").write_text('extends = "paper"\n' + FILE)
     answer = CliRunner().invoke(app, ["simulate", "--config", "harvester.toml"], catch_exceptions=False)
     assert answer.exit_code == 0
     assert f"last quarter          {1e6 * run.summary.harvested_power_last_quarter:.4g} µW" in answer.stdout
@@ -92,7 +92,7 @@ def test_the_command_reports_the_harvester_and_no_striker(tmp_path, monkeypatch,
 def test_a_large_file_is_announced(tmp_path, monkeypatch, run):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("snapbeam.cli.simulate._LARGE_FILE", 1e4)
-    (tmp_path / "harvester.toml").write_text(FILE)
+    (tmp_path / "harvester.toml").write_text('extends = "paper"\n' + FILE)
     answer = CliRunner().invoke(app, ["simulate", "--config", "harvester.toml", "-o", "run.nc"])
     assert f"run.nc: {run.dataset.sizes['time']} samples, about 1 MB" in answer.stderr
 
