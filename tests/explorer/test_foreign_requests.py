@@ -232,3 +232,12 @@ def test_other_addresses_need_a_flag(folder):
     )  # fmt: skip
     assert found.returncode == 2
     assert "--allow-remote" in found.stderr
+
+
+def test_without_a_home_folder_no_token_is_kept(monkeypatch):
+    def no_home():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_STATE_HOME", raising=False)
+    monkeypatch.setattr(server.Path, "home", no_home)
+    assert server.kept_token() is None

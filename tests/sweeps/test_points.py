@@ -211,3 +211,15 @@ def test_axes_in_hz_keep_their_hz() -> None:
     np.testing.assert_allclose(ratios * np.repeat(own, 2), [50.0, 100.0, 50.0, 100.0], rtol=1e-12)
     with pytest.raises(InputError, match="given twice"):
         physical_points(system, {"frequency_hz": [50.0], "frequency_ratio": [1.0]})
+
+
+@pytest.mark.parametrize(
+    "axes",
+    [
+        {"frequency_hz": np.linspace(20.0, 300.0, 200_000), "velocity_m_s": np.linspace(0.01, 0.05, 200_000)},
+        {"frequency_hz": np.linspace(20.0, 300.0, 200_000), "beam.length": np.linspace(0.1, 0.2, 200_000)},
+    ],
+)
+def test_too_many_points_in_hz_are_refused_before_they_are_made(axes) -> None:
+    with pytest.raises(InputError, match="points"):
+        physical_points(Config().system.replace(**{"model.modes": 1}), axes)

@@ -258,9 +258,9 @@ def kept_token() -> str | None:
 
     With it and with the fixed port, links to the page remain valid after a restart.
     """
-    base = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
-    path = Path(base) / "snapbeam" / "explorer-token"
     try:
+        base = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+        path = Path(base) / "snapbeam" / "explorer-token"
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if not path.exists():
             path.touch(mode=0o600)

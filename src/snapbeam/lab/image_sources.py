@@ -565,7 +565,7 @@ LOSSLESS = (
 
 
 def _lossless_h264(context: Any) -> bool:
-    """Whether H.264 keeps all: only then does it take this profile for pictures without full colour."""
+    """Whether H.264 keeps all: x264 takes this profile without full colour only then."""
     profile = str(context.profile or "")
     return profile == "High 4:4:4 Predictive" and "444" not in (context.pix_fmt or "444")
 

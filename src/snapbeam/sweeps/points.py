@@ -226,10 +226,14 @@ def physical_points(system: System, axes: Mapping[str, Any]) -> Points:
         PHYSICAL[each].parameter if (each := physical_name(str(name))) is not None else name: values
         for name, values in axes.items()
     })  # fmt: skip
+    own_axes = {PHYSICAL[full].parameter: full for full in physical}
+    structural = [name for name in grid.axes if not lookup(name).is_run]
+    if not structural:
+        return _in_ratios(grid, {ratio: unit_of(system, full) for ratio, full in own_axes.items()})
+    require_memory(grid.size, "give fewer points, or a frequency ratio in place of Hz")
     columns = grid.take(np.arange(grid.size))
-    structural = [name for name in columns if not lookup(name).is_run]
     units: dict[tuple[Any, ...], list[float]] = {}
-    rows = list(zip(*(columns[name].tolist() for name in structural), strict=True)) or [()] * grid.size
+    rows = list(zip(*(columns[name].tolist() for name in structural), strict=True))
     for row in rows:
         if row not in units:
             own = system.replace(**dict(zip(structural, row, strict=True)))
@@ -241,12 +245,16 @@ def physical_points(system: System, axes: Mapping[str, Any]) -> Points:
         labels[full.removeprefix("drive.").replace(".", "_")] = columns[ratio]
         columns[ratio] = columns[ratio] / unit
     if np.allclose(table, table[0], rtol=1e-9, atol=0.0):
-        own_axes = {PHYSICAL[full].parameter: unit for full, unit in zip(physical, table[0], strict=True)}
-        return points_of({
-            name: values / own_axes[name] if name in own_axes else values for name, values in grid.axes.items()
-        })  # fmt: skip
+        return _in_ratios(grid, dict(zip(own_axes, table[0], strict=True)))
     made = _list_of(columns)
     return PointList(made.columns, labels)
+
+
+def _in_ratios(grid: Points, units: Mapping[str, float]) -> Points:
+    """The grid with the axes of *units* divided by them."""
+    return points_of({
+        name: values / units[name] if name in units else values for name, values in grid.axes.items()
+    })  # fmt: skip
 
 
 def _swept(name: str) -> Parameter:
