@@ -43,7 +43,7 @@ from snapbeam.solver.cpu.terms.further_contact_events import (
 )
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, mirror_further_contacts
 from snapbeam.solver.excitation import seen_from
-from snapbeam.solver.step_control import contact_level, flight_level, ticks_of, time_beyond
+from snapbeam.solver.step_control import contact_level, flight_level, time_beyond
 from snapbeam.solver.terms.interface import has_crossed, update_forces
 from snapbeam.util.status_codes import RunStatus
 
@@ -88,12 +88,12 @@ def propose_step(memory, blocks, workspace, run, now, accumulators):
             change_energy_origin(memory, layout, run, now, accumulators, beyond)
         well_sign = -well_sign
     accumulators.steps += 1
-    level = flight_level(clock, control.low_energy, stretch, layout.stretch)
+    level = flight_level(clock, stretch, layout.stretch)
     if control.touching:
         left = released_at(run.struck.law, seen.d, seen.dv)
         level = max(level, contact_level(clock, (t - accumulators.onset) * clock.tick, left, seen.dv))
     level = further_contacts_step_level(memory, layout.others, clock, t, control.touching, level)
-    ticks, at = ticks_of(clock, level), run.coefficients + (level + 1) * run.slot
+    ticks, at = clock.step >> level, run.coefficients + level * run.slot
     # up to the next state that is handed out, to a jump of the drive's velocity, or to the end
     limit = min((now.landed + 1) * clock.landing, clock.end)
     limit = up_to_discontinuity(run.struck.drive, run.phase, clock.period, t, limit)
@@ -122,7 +122,6 @@ def _with_one_more_step(control, energy_tick):
     """One step more, and where the energy was last looked at."""
     return StepControl(
         control.touching,
-        control.low_energy,
         control.safe_gap,
         control.safe_center,
         energy_tick,

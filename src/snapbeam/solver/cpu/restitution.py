@@ -28,7 +28,6 @@ from snapbeam.solver.step_control import (
     close_impact,
     contact_level,
     count_zero_crossings_in_step,
-    ticks_of,
 )
 from snapbeam.solver.terms.interface import center_from_divide, seen_from_divide
 from snapbeam.util.status_codes import RunStatus
@@ -95,7 +94,7 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
     t, seen, control = now.t, now.seen, now.control
     # however strongly it is stretched, a beam that is carried moves no faster than the tip
     left = min((now.landed + 1) * clock.landing, clock.end) - t
-    ticks = min(ticks_of(clock, contact_level(clock, (t - accumulators.onset) * tick, 0.0, 0.0)), left)
+    ticks = min(clock.step >> contact_level(clock, (t - accumulators.onset) * tick, 0.0, 0.0), left)
     ticks = max(1, ticks // 4)
     length = ticks * tick
     release = _release(memory, blocks, layout, run, tip, step.phase, length)
@@ -149,9 +148,7 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
         seen1 = ContactKinematics(
             about.w + rest_contact, about.wv, d, about.dv, about.c + rest_center, about.cv
         )
-    next_control = StepControl(
-        touching, control.low_energy, t, t, control.energy_tick, control.steps_since_start
-    )
+    next_control = StepControl(touching, t, t, control.energy_tick, control.steps_since_start)
     state = rows.q, rows.p, rows.k, gq, qr
     next_control, status = monitor_energy(
         memory, layout, run, now, t, state, seen1, next_control, released, status, accumulators, kernel_input
@@ -496,7 +493,7 @@ def accept_step_restitution(
         seen1 = ContactKinematics(about.w + rest_contact, about.wv, d, dv, about.c + rest_center, about.cv)
     safe_gap, safe_center = (t, t) if entry >= 0.0 else (contact_event.safe_gap, contact_event.safe_center)
     next_control = StepControl(
-        together, control.low_energy, safe_gap, safe_center, control.energy_tick, control.steps_since_start
+        together, safe_gap, safe_center, control.energy_tick, control.steps_since_start
     )
     state = rows.q, rows.p, rows.k, gq, qr
     next_control, status = monitor_energy(

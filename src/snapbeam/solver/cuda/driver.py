@@ -154,7 +154,7 @@ class _Launch:
 
         threads, blocks = self.structure.threads, self.blocks
         distinct = (COMPOSITIONS[self.ensemble.order].flow.size + 1) // 2
-        flows = (self.finest + 3) * distinct + 2
+        flows = (self.finest + 2) * distinct + 2
         kernel_output = DeviceState(
             cuda.to_device(np.full(blocks, -1, dtype=np.int64)),
             cuda.to_device(np.zeros((blocks, MARKS), dtype=np.int64)),
@@ -163,7 +163,7 @@ class _Launch:
         )
         work = DeviceWorkspace(
             cuda.device_array((blocks, flows, 4, threads), dtype=np.float64),
-            cuda.device_array((blocks, self.finest + 3, 2, TURNS), dtype=np.float64),
+            cuda.device_array((blocks, self.finest + 2, 2, TURNS), dtype=np.float64),
             cuda.device_array((blocks, self.pieces + 1, 4), dtype=np.float64),
         )
         return kernel_output, work

@@ -17,7 +17,7 @@ __all__ = ["shape_of"]
 
 MOST = 16
 """Modes, at most."""
-LEVELS = 24
+LEVELS = 23
 """Lengths of step that are prepared for each run, at most."""
 FLOWS = 6
 """Distinct flows of a composition, at most."""
@@ -76,14 +76,13 @@ def sizes(modes: int, distinct: int, pieces: int) -> tuple[int, int]:
 (
     LIVE,  # hold a run
     TOUCHING,
-    LOW_ENERGY,
     CUTTING,  # take a step that was cut where the contact begins or ends
     EVENT,  # and do so at the end of the step at hand
     LOOKS,  # look once more where they enter
     ASIDE,  # look for the deepest point of a contact, inside the step at hand
     PROBED,  # have done so
     ODD,  # take a step of a length that is not prepared
-) = range(9)
+) = range(8)
 RUNS = 16
 """The run of each lane."""
 
