@@ -415,7 +415,7 @@ def accept_step_restitution(
         status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
         away = 0.0 if together else tip.law.coefficient * seen.dv
         wv = seen.wv + seen.dv + away
-        next_control = StepControl(together, False, t, t, control.energy_tick, control.steps_since_start)
+        next_control = StepControl(together, t, t, control.energy_tick, control.steps_since_start)
         after = ContactKinematics(seen.w, wv, 0.0, -away, seen.c, memory_rate(memory, layout, p))
         return IntegratorState(
             t, now.well_sign, now.stretch, now.rows, after, next_control, now.sample, now.landed, status
