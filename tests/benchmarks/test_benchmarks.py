@@ -39,6 +39,7 @@ def test_every_benchmark_can_be_imported():
     assert set(done.stdout.split()) <= NEEDS, done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no access bits")
 def test_boost_is_not_loaded_from_a_folder_that_others_can_write(tmp_path):
     folder = tmp_path / f"snapbeam-{os.getuid()}"

@@ -30,6 +30,7 @@ main()
 """
 
 
+@pytest.mark.slow
 @ALL
 @pytest.mark.parametrize(
     "name", ["typer", *(pytest.param(name, marks=pytest.mark.slow) for name in LATER), "numba"]
@@ -115,6 +116,7 @@ def test_a_terminal_that_is_closed(tmp_path):
     assert sorted(os.listdir(tmp_path)) in ([], ["store"])
 
 
+@pytest.mark.slow
 def test_a_background_job_ignores_what_its_shell_says(tmp_path):
     """A shell starts background jobs with SIGINT ignored; the program leaves it so."""
     code = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n" + AT_IMPORT.format(
@@ -126,6 +128,7 @@ def test_a_background_job_ignores_what_its_shell_says(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_the_library_leaves_the_signals_alone():
     code = "import signal, snapbeam as sb; sb.simulate; print(signal.getsignal(signal.SIGTERM) is signal.SIG_DFL)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

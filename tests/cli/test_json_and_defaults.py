@@ -52,6 +52,7 @@ def suggested(said: str) -> list[list[str]]:
     return [shlex.split(line) for line in found]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [name if name == "any axes" else pytest.param(name, marks=pytest.mark.slow) for name in MAPS]
 )
@@ -236,6 +237,7 @@ def test_a_point_of_a_list_is_gone_on_from(tmp_path):
     assert refused.exit_code == 2
 
 
+@pytest.mark.slow
 def test_what_is_given_beside_a_store_is_compared_with_the_store(tmp_path, monkeypatch):
     """Not with the paper's beam: only what is asked for otherwise is told to differ."""
     monkeypatch.chdir(tmp_path)

@@ -97,6 +97,7 @@ def test_firm_supports_recede_to_rigid_ones() -> None:
     assert errors[2] < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_no_equilibrium_is_missed(seed) -> None:
     """Uneven and on springs: every minimum that 200 starts of SciPy's minimisation find is listed, and no other."""

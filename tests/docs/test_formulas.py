@@ -22,6 +22,7 @@ def _docstrings():
                 yield f"{path.stem}.{getattr(node, 'name', '')}", ast.get_docstring(node).splitlines()
 
 
+@pytest.mark.slow
 def test_every_displayed_formula_can_be_set():
     parser, seen = MathTextParser("path"), 0
     for name, lines in _docstrings():

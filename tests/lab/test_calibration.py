@@ -90,6 +90,7 @@ def test_two_wells_and_soft_ends_go_into_the_file(tmp_path, kind, value):
         calibrate(one, modes=4, imperfection=kind)
 
 
+@pytest.mark.slow
 @given(
     st.floats(0.2e-3, 1.0e-3),
     st.floats(0.4, 3.0),

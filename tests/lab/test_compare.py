@@ -289,6 +289,7 @@ def program():
     return call
 
 
+@pytest.mark.slow
 def test_commands_of_signals(program, tmp_path):
     rng, time = np.random.default_rng(0), np.arange(8000) / 1e4
     drive = np.where(time > 0.05, 0.03 * np.cos(2.0 * np.pi * 100.0 * (time - 0.05)), 0.0)
@@ -310,6 +311,7 @@ def test_commands_of_signals(program, tmp_path):
     assert program("fit-decay", tmp_path / "none.csv").exit_code == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("polarity", "source"), [(1, "vibrometer"), (1, "camera"), (-1, "camera")])
 def test_a_drive_takes_amplitude_and_sign_from_the_camera(program, tmp_path, polarity, source):
     """A sensitivity set 8 % too low: the drive is the vibrometer's, or, if asked, as large as the camera sees it."""

@@ -82,6 +82,7 @@ def test_the_class_of_forty_runs_at_the_size_of_the_paper(tmp_path):
     assert len(seen) >= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ratio", "velocity"), [(1.21, 0.1), (0.6, 0.2)])
 def test_onsets_of_isolated_impacts_of_a_simulated_run_within_one_frame(tmp_path, ratio, velocity):
     drive = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, location=LOCATION)

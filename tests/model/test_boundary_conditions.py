@@ -110,6 +110,7 @@ def test_pinned_beam_in_closed_form() -> None:
     np.testing.assert_allclose(model.mass, np.diag(model.mass.diagonal()), atol=1e-14 * model.mass.max())
 
 
+@pytest.mark.slow
 def test_static_snap_of_a_pinned_beam() -> None:
     """A force at the centre of a high beam: it gives way sideways, F = P_2 sqrt(8 s/(3 L)), gamma s = P - P_2."""
     euler = math.pi**2 * BEAM.bending_stiffness / LENGTH**2

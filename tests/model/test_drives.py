@@ -78,6 +78,7 @@ def test_burst_comes_and_goes() -> None:
         sb.Burst(frequency_ratio=1.0, velocity_amplitude=0.1, duration_cycles=2.0, ramp_up_cycles=3.0)
 
 
+@pytest.mark.slow
 def test_noise_is_its_seed() -> None:
     long = sb.BandLimitedNoise(low_ratio=1.0, high_ratio=2.0, velocity_rms=0.2, seed=7, ramp_up_cycles=0.01)
     _, moved, speed, _, _ = sampled(long, 5001, 200.0)

@@ -52,6 +52,7 @@ def test_an_uncertainty_is_asked_for():
         found(above(1.0, 0.0), number=Quantity(1.0, float("nan")))
 
 
+@pytest.mark.slow
 def test_half_widths_cover():
     """95 % of intervals hold the truth, for shares from 1 to 99 %, for means and for medians."""
     rng = np.random.default_rng(1)

@@ -33,6 +33,7 @@ def close_figures():
     plt.close("all")
 
 
+@pytest.mark.slow
 def test_written_and_drawn_again(tmp_path, results):
     """PDF, PNG and data; the data give the same picture without computing."""
     files = paper.fig6.write(tmp_path, results=results)
@@ -72,6 +73,7 @@ def test_recipes_of_one_size_share_a_grid(results):
         assert (ds.response_class.values[snapped] > ResponseClass.INTRAWELL).all()
 
 
+@pytest.mark.slow
 def test_points_lie_where_they_were_measured(tmp_path, results):
     table = tmp_path / "dots.csv"
     table.write_text(
@@ -147,6 +149,7 @@ def test_maxima_of_a_curve_known_by_formula():
     assert found == [(pytest.approx(1.8), pytest.approx(1.0)), (pytest.approx(3.6), pytest.approx(0.5))]
 
 
+@pytest.mark.slow
 def test_video_of_added_modes(tmp_path, results):
     from snapbeam.paper.recipes import si5
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
+import pytest
 import study_claims
 import study_table as study
 
 
+@pytest.mark.slow
 def test_shares_agree_with_the_stored_maps() -> None:
     """Within counting error, at 200 and at 1000 cycles, with one mode and with 32."""
     for modes, figure, cycles, _, _, apart in study.figures():

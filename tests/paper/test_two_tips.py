@@ -14,6 +14,7 @@ from snapbeam.paper.studies.two_tips import push
 PAIR = np.array([0.373, 0.513])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [0.3, 0.45, 0.6])
 @pytest.mark.parametrize("level", [0.8375, 3.0])
 def test_one_slow_tip_crosses_the_centre_line(level, place) -> None:

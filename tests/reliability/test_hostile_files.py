@@ -74,6 +74,7 @@ CHUNKS = {
 }
 
 
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize("which", [1, 3])  # the last task is shorter than a chunk
 @pytest.mark.parametrize("name", list(CHUNKS))

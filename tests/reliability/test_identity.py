@@ -120,6 +120,7 @@ def test_parts_that_something_else_computed_are_told(tmp_path, name, value, word
 ROUNDING = "from snapbeam.util.provenance import arithmetic_hash as a; print(a())"
 
 
+@pytest.mark.slow
 def test_another_kernel_of_linear_algebra_is_another_rounding(python, tried):
     """What OpenBLAS is told to take is seen; the number of its threads does not matter."""
 

@@ -74,6 +74,7 @@ def test_a_clock_that_jumps_changes_no_result(tmp_path, small, monkeypatch, trie
     tried("jumps of the clock")
 
 
+@pytest.mark.slow
 def test_no_home_folder(tmp_path, tried):
     hidden = ("HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "MPLCONFIGDIR", "USER", "LOGNAME")
     environment = {name: value for name, value in os.environ.items() if name not in hidden}

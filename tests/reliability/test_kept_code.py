@@ -78,6 +78,7 @@ def test_kept_and_loaded(tmp_path):
     assert started(tmp_path) == (42.0, "loaded")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "harm",
     [
@@ -121,6 +122,7 @@ def test_a_full_disk_keeps_no_code(small, mounted, tried):
     tried("starts with a full disk for compiled code")
 
 
+@pytest.mark.slow
 def test_read_only_package_and_home(small, mounted, read_only, tmp_path, tried):
     """Kept in a private folder of the temporary ones; with none to write to, not at all."""
     disk, other = mounted("disk", "size=64k"), tmp_path / "temporary"

@@ -105,6 +105,7 @@ def test_a_worker_that_never_delivers(tmp_path, work, client, monkeypatch):
     assert all("gave no results within 0.1 s, 3 times" in reason for _, _, reason in report.failed)
 
 
+@pytest.mark.slow
 def test_workers_with_other_code_are_refused(tmp_path, work, client, monkeypatch):
     monkeypatch.setattr("snapbeam.util.provenance.code_hash", lambda: "0123456789abcdef")
     monkeypatch.setattr("snapbeam.sweeps.tasks.code_hash", lambda: "0123456789abcdef")

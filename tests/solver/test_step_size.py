@@ -30,6 +30,7 @@ def test_steps_in_contact_resolve_the_impact_and_the_fastest_mode(modes: int, ac
     assert plan.finest > plan.coarsest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("modes", [64, 128])
 def test_many_modes_are_as_good_as_few(modes: int) -> None:
     """A snap-through within five cycles; with steps that the impact alone decides, 128 modes are off by 3e-2."""

@@ -82,6 +82,7 @@ def computed(path, work, stage, client):
         return results.read(0, stage.size), report, said, store.made_with()
 
 
+@pytest.mark.slow
 def test_nothing_listens_to_the_network(client):
     addresses = [client.scheduler.address, *client.nthreads()]
     assert len(addresses) == 3
@@ -141,6 +142,7 @@ def test_a_poisonous_task_is_set_apart(tmp_path, small, whole, client):
     )
 
 
+@pytest.mark.slow
 def test_workers_that_cannot_compute_at_all(tmp_path, small, client):
     work, stage = trouble(small, tmp_path, always=dict.fromkeys(range(7), "raise"))
     with pytest.raises(

@@ -171,6 +171,7 @@ def test_a_map_that_has_grown_is_refined_as_any_other(tmp_path, small):
     same(swept(**wide, path=path, refine_levels=1), swept(**wide, refine_levels=1))
 
 
+@pytest.mark.slow
 def test_the_command_grows_a_store_by_its_name_and_an_axis(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     common = ["--modes", "1", "--cycles", "3", "--frequency-ratio", "0.6:1.4:5"]

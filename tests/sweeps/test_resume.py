@@ -45,6 +45,7 @@ def kill_loop(folder, kills, seed):
     assert seen["needed"] <= seen["begun"] <= seen["needed"] + seen["kills"]
 
 
+@pytest.mark.slow
 def test_killed_at_random_instants(tmp_path):
     """No finished task lost or changed; none computed twice but the one in flight at a kill."""
     kill_loop(tmp_path, 8, 1)

@@ -313,6 +313,7 @@ def small_disk(tmp_path):
     subprocess.run(["umount", "-l", str(place)], check=True)
 
 
+@pytest.mark.slow
 def test_a_full_file_system(small_disk, tmp_path, monkeypatch):
     """The command says what is wrong, ends with a status, and goes on once there is room."""
     monkeypatch.chdir(tmp_path)

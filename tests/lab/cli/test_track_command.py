@@ -34,6 +34,7 @@ def run(*arguments):
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
+@pytest.mark.slow
 def test_the_whole_command(recorded, tmp_path):
     recording, path = recorded
     out, picture, report = tmp_path / "t.nc", tmp_path / "frame.png", tmp_path / "quality.pdf"

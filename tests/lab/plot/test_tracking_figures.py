@@ -36,6 +36,7 @@ def tracked(request, tmp_path_factory):
         yield read, track(read, buckling_level=BUCKLING_LEVEL, rest_displacement=rest, side=side), recording
 
 
+@pytest.mark.slow
 def test_edges_are_drawn_where_they_are(tracked):
     read, dataset, recording = tracked
     row = recording.truth.attrs["zero_row"]
@@ -78,6 +79,7 @@ def test_the_quality_page_shows_displacement_error_and_flags(tracked):
     plt.close("all")
 
 
+@pytest.mark.slow
 def test_the_video_plays_and_carries_the_edges(tracked, tmp_path):
     pytest.importorskip("imageio_ffmpeg")
     import av
