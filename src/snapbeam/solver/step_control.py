@@ -47,7 +47,7 @@ class Clock(NamedTuple):
     """Flight step."""
     period: int
     """Of the drive's argument."""
-    landing: int
+    output_interval: int
     """Between two output states."""
     end: int
     last_quarter: int
@@ -100,7 +100,7 @@ def clock_of(run, max_steps):
         run.tick,
         run.step,
         run.period,
-        run.landing,
+        run.output_interval,
         run.end,
         run.last_quarter,
         run.coarsest,

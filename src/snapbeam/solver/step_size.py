@@ -386,10 +386,10 @@ def clocked(
         table["period"] = steps * SUBDIVISION
         table["tick"] = turn / table["period"]
         held = drive.duration * drive.frequency
-        table["landing"] = np.rint(table["period"] / held)
+        table["output_interval"] = np.rint(table["period"] / held)
         share = cycles_asked / drive.frequency / drive.duration
         table["end"] = np.rint(
-            share * table["period"] if periods is None else cycles_asked * table["landing"]
+            share * table["period"] if periods is None else cycles_asked * table["output_interval"]
         )
         table["end"] = np.minimum(table["end"], np.rint(left * table["period"]))
         cycles = float(table["end"][0] * table["tick"][0] * drive.frequency)
@@ -401,13 +401,13 @@ def clocked(
         table["end"] = table["period"] * int(cycles)
         if not cycles.is_integer():
             table["end"] = np.rint(table["period"] * cycles).astype(np.int64)
-        table["landing"] = table["period"]
+        table["output_interval"] = table["period"]
         if not repeats:
             _whole_steps(cycle, lengths, float(HORIZON))  # refused if that cannot be counted
             table["period"] *= HORIZON
     require_affordable(integration, system.model.modes, lengths, table["end"] / SUBDIVISION)
     if periods is None:
-        table["landing"] = table["end"]
+        table["output_interval"] = table["end"]
     table["last_quarter"] = table["end"] // 4 * 3
     return Clocked(cycles)
 

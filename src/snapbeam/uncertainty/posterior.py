@@ -23,7 +23,7 @@ from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
 from snapbeam.simulation.simulate import simulate
 from snapbeam.simulation.tolerance import perturbation_growth
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions
+from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.uncertainty.distributions import Distribution, Empirical, ParameterUncertainty
 from snapbeam.uncertainty.measurements import Measurements
 from snapbeam.uncertainty.monte_carlo import reached, trials_of

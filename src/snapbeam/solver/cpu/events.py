@@ -399,7 +399,15 @@ def accept_step(
     if not math.isfinite(about.d + about.dv):
         return (
             IntegratorState(
-                t, now.well_sign, now.stretch, now.rows, seen, now.control, now.sample, now.landed, _DIVERGED
+                t,
+                now.well_sign,
+                now.stretch,
+                now.rows,
+                seen,
+                now.control,
+                now.sample,
+                now.stored_states,
+                _DIVERGED,
             ),
             step,
         )
@@ -432,7 +440,7 @@ def accept_step(
             now.control.steps_since_start,
         )
         return IntegratorState(
-            t, now.well_sign, now.stretch, now.rows, seen, control, now.sample, now.landed, status
+            t, now.well_sign, now.stretch, now.rows, seen, control, now.sample, now.stored_states, status
         ), step
     whole, cut = step.ticks, contact_event.cut
     corrections = 0 if touching or not contact_event.event else _LOCATIONS if jumps(tip.law) else 1
@@ -528,7 +536,7 @@ def accept_step(
     stretch = 2.0 * done.gq + done.qr
     return (
         IntegratorState(
-            t, now.well_sign, stretch, swap_rows(now.rows), seen1, control, sample, now.landed, status
+            t, now.well_sign, stretch, swap_rows(now.rows), seen1, control, sample, now.stored_states, status
         ),
         step,
     )

@@ -255,7 +255,7 @@ def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, acc
 def save_state(now, marks, reals):
     """Where a run stands, written down."""
     rows, seen, control = now.rows, now.seen, now.control
-    marks[0], marks[1], marks[2], marks[3] = now.t, now.sample, now.landed, now.status
+    marks[0], marks[1], marks[2], marks[3] = now.t, now.sample, now.stored_states, now.status
     marks[4], marks[5], marks[6] = rows.q, rows.p, rows.k
     marks[7], marks[8], marks[9] = rows.q1, rows.p1, rows.k1
     marks[10] = int(control.touching)

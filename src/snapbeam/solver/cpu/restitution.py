@@ -93,7 +93,7 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
     rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center
     t, seen, control = now.t, now.seen, now.control
     # however strongly it is stretched, a beam that is carried moves no faster than the tip
-    left = min((now.landed + 1) * clock.landing, clock.end) - t
+    left = min((now.stored_states + 1) * clock.output_interval, clock.end) - t
     ticks = min(clock.step >> contact_level(clock, (t - accumulators.onset) * tick, 0.0, 0.0), left)
     ticks = max(1, ticks // 4)
     length = ticks * tick
@@ -154,7 +154,7 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
         memory, layout, run, now, t, state, seen1, next_control, released, status, accumulators, kernel_input
     )
     return IntegratorState(
-        t, now.well_sign, 2.0 * gq + qr, rows, seen1, next_control, sample, now.landed, status
+        t, now.well_sign, 2.0 * gq + qr, rows, seen1, next_control, sample, now.stored_states, status
     ), step
 
 
@@ -418,14 +418,30 @@ def accept_step_restitution(
         next_control = StepControl(together, t, t, control.energy_tick, control.steps_since_start)
         after = ContactKinematics(seen.w, wv, 0.0, -away, seen.c, memory_rate(memory, layout, p))
         return IntegratorState(
-            t, now.well_sign, now.stretch, now.rows, after, next_control, now.sample, now.landed, status
+            t,
+            now.well_sign,
+            now.stretch,
+            now.rows,
+            after,
+            next_control,
+            now.sample,
+            now.stored_states,
+            status,
         ), step
 
     about = observe(memory, layout, tip, step.phase + tip.drive.omega * step.length, step.q1, step.p1)
     if not math.isfinite(about.d + about.dv):
         return (
             IntegratorState(
-                t, now.well_sign, now.stretch, now.rows, seen, control, now.sample, now.landed, _DIVERGED
+                t,
+                now.well_sign,
+                now.stretch,
+                now.rows,
+                seen,
+                control,
+                now.sample,
+                now.stored_states,
+                _DIVERGED,
             ),
             step,
         )
@@ -500,7 +516,7 @@ def accept_step_restitution(
         memory, layout, run, now, t, state, seen1, next_control, hit, status, accumulators, kernel_input
     )
     return IntegratorState(
-        t, now.well_sign, 2.0 * gq + qr, rows, seen1, next_control, sample, now.landed, status
+        t, now.well_sign, 2.0 * gq + qr, rows, seen1, next_control, sample, now.stored_states, status
     ), step
 
 

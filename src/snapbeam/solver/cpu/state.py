@@ -130,7 +130,7 @@ class StepControl(NamedTuple):
     energy_tick: int
     """Tick at which the energy was last looked at."""
     steps_since_start: int
-    """Steps since the run began or landed."""
+    """Steps since the run began or was stored."""
 
 
 class Run(NamedTuple):
@@ -177,7 +177,7 @@ class IntegratorState(NamedTuple):
     control: StepControl
     sample: int
     """Instants recorded so far."""
-    landed: int
+    stored_states: int
     """States handed out so far."""
     status: int
 
@@ -286,8 +286,8 @@ def change_energy_origin(memory, layout, run, now, accumulators, span):
 
 
 @called
-def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching, landed, sample):
-    """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from a landing."""
+def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching, stored, sample):
+    """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from an output state."""
     q, p, k, r = rows.q, rows.p, rows.k, layout.work + 9 * layout.size
     update_forces(memory, layout.size, layout.terms, run.struck.drive, phase_at(run, t), q)
     evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, phase_at(run, t), q, 0.0, False)
@@ -306,7 +306,7 @@ def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching
     energy = add_potential_energy(memory, layout.size, layout.terms, q, energy)
     status = _RUNNING if t < run.clock.end else _OK
     control = StepControl(touching, t, t, t, 0)
-    return IntegratorState(t, well_sign, 2.0 * gq + qr, rows, seen, control, sample, landed, status), energy
+    return IntegratorState(t, well_sign, 2.0 * gq + qr, rows, seen, control, sample, stored, status), energy
 
 
 @compiled

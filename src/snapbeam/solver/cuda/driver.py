@@ -26,14 +26,14 @@ from snapbeam.solver.cuda.layout import (
 )
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.splitting import COMPOSITIONS, TURNS
-from snapbeam.solver.statistics import Landings, Recorded, empty_accumulators, updated
+from snapbeam.solver.statistics import OutputStates, Recorded, empty_accumulators, updated
 from snapbeam.solver.step_control import PIECES
 from snapbeam.util.validation import InputError
 
 __all__ = [
     "Options",
     "integrate_tangents",
-    "integrate_to_landing",
+    "integrate_with_output_states",
     "record",
     "refusal",
     "run_ensemble",
@@ -288,14 +288,16 @@ def _cpu_only(what: str) -> InputError:
     return InputError(f"engine = 'cuda': {what} by the CPU engine alone; use engine='cpu'")
 
 
-def integrate_to_landing(ensemble: Ensemble, threads: int | None = None, progress: Any = None) -> Landings:
+def integrate_with_output_states(
+    ensemble: Ensemble, threads: int | None = None, progress: Any = None
+) -> OutputStates:
     """Refused: states are handed out by the CPU engine."""
     raise _cpu_only("states are handed out")
 
 
 def integrate_tangents(
     ensemble: Ensemble, tangents: _Array, threads: int | None = None, progress: Any = None
-) -> tuple[Landings, _Array]:
+) -> tuple[OutputStates, _Array]:
     """Refused: tangents are carried by the CPU engine."""
     raise _cpu_only("tangents are carried")
 

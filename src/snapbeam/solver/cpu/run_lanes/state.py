@@ -226,9 +226,9 @@ def _constants(m, shape, kernel_input, lane, i):
         m[at.LAW + f * WIDTH + lane] = kernel_input.law_numbers[i, f]
     step_time = record.step * record.tick
     m[at.TICK + lane], m[at.STEP + lane], m[at.STEP_TIME + lane] = record.tick, record.step, step_time
-    m[at.PERIOD + lane], m[at.LANDING + lane] = record.period, record.landing
+    m[at.PERIOD + lane], m[at.OUTPUT_INTERVAL + lane] = record.period, record.output_interval
     m[at.END + lane] = record.end
-    m[at.LIMIT + lane] = min(record.landing, record.end)
+    m[at.LIMIT + lane] = min(record.output_interval, record.end)
     m[at.COARSEST + lane], m[at.FINEST + lane] = record.coarsest, record.finest
     m[at.COARSE_TICKS + lane] = record.step >> record.coarsest
     m[at.PHASE0 + lane], m[at.OFFSET + lane], m[at.WELL_SIGN + lane] = (
