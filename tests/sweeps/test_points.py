@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 
+import snapbeam as sb
 from snapbeam.model.parameter_file import Config
 from snapbeam.sweeps.points import Grid, PointList, physical_points, points_of
 from snapbeam.util.validation import InputError
@@ -222,4 +223,4 @@ def test_axes_in_hz_keep_their_hz() -> None:
 )
 def test_too_many_points_in_hz_are_refused_before_they_are_made(axes) -> None:
     with pytest.raises(InputError, match="points"):
-        physical_points(Config().system.replace(**{"model.modes": 1}), axes)
+        sb.sweep(Config().system.replace(**{"model.modes": 1}), axes, sb.Integration(cycles=1))
