@@ -137,7 +137,7 @@ def test_tables() -> None:
     for table in (
         {name: row.quantity.unit for name, row in parameters().items()},
         {name: row.unit for name, row in STATISTICS.items()},
-        {name: row.units for name, row in SCHEMA.items()},
+        {name: row.unit for name, row in SCHEMA.items()},
         {name: row.unit for name, row in PHYSICAL.items()},
     ):
         for name, unit in table.items():

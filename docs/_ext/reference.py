@@ -142,7 +142,7 @@ def variable_tables() -> str:
     from snapbeam.simulation.dataset import IMPACT_COLUMNS, SCHEMA
     from snapbeam.solver.statistics import STATISTICS
 
-    runs = [(f"`{name}`", ", ".join(row.dims), row.units, row.long_name) for name, row in SCHEMA.items()]
+    runs = [(f"`{name}`", ", ".join(row.dims), row.unit, row.long_name) for name, row in SCHEMA.items()]
     impacts = [(f"`{name}`", unit, words) for name, unit, words in IMPACT_COLUMNS]
     statistics = [(f"`{row.name}`", row.dtype, row.unit, row.long_name) for row in STATISTICS.values()]
     return "\n".join((

@@ -22,13 +22,13 @@ from .model.drive.base import Drive as Drive
 from .model.drive.burst import Burst as Burst
 from .model.drive.chirp import Chirp as Chirp
 from .model.drive.constant_velocity import ConstantVelocity as ConstantVelocity
-from .model.drive.fixed_stop import AccelerationSine as AccelerationSine
-from .model.drive.fixed_stop import DisplacementSine as DisplacementSine
 from .model.drive.fixed_stop import FixedStop as FixedStop
 from .model.drive.half_sine import HalfSine as HalfSine
 from .model.drive.noise import BandLimitedNoise as BandLimitedNoise
 from .model.drive.recorded_motion import RecordedMotion as RecordedMotion
 from .model.drive.shock import Shock as Shock
+from .model.drive.sine import AccelerationSine as AccelerationSine
+from .model.drive.sine import DisplacementSine as DisplacementSine
 from .model.drive.sine import Sine as Sine
 from .model.drive.sum import SumDrive as SumDrive
 from .model.drive.two_tone import TwoTone as TwoTone
@@ -65,8 +65,8 @@ from .solver.statistics import register_statistic as register_statistic
 from .solver.statistics import unregister_statistic as unregister_statistic
 from .sweeps.checkpoint.read import read_checkpoint as read_checkpoint
 from .sweeps.checkpoint.records import CheckpointError as CheckpointError
-from .sweeps.checkpointed_sweep import CheckpointOptions as CheckpointOptions
-from .sweeps.checkpointed_sweep import SweepReport as SweepReport
+from .sweeps.compute import CheckpointOptions as CheckpointOptions
+from .sweeps.compute import SweepReport as SweepReport
 from .sweeps.measured_points import MeasuredPoints as MeasuredPoints
 from .sweeps.measured_points import read_measured_points as read_measured_points
 from .sweeps.replicates import Replicates as Replicates

@@ -22,7 +22,7 @@ from systems import SYSTEMS
 
 import snapbeam as sb
 from snapbeam.model.parameters import lookup, parameters
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions
+from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.sweeps.tasks import PointWork
 
 NOT_SWEPT = {

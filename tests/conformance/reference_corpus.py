@@ -567,7 +567,7 @@ def interface() -> dict[str, Any]:
     public = {name: getattr(sb, name) for name in sorted(sb.__all__)}
     unsigned = (enum.Enum, BaseException)
     signatures = {
-        name: str(inspect.signature(each))
+        name: re.sub(r" at 0x[0-9a-f]+", "", str(inspect.signature(each)))
         if inspect.isfunction(each) or (inspect.isclass(each) and not issubclass(each, unsigned))
         else type(each).__name__
         for name, each in public.items()

@@ -37,15 +37,11 @@ def energy_errors(
         (1, 100_000, 0.5, 3e-7),
         pytest.param(32, 10_000, 0.5, 3e-7, marks=pytest.mark.slow),
         pytest.param(1, 100_000, 0.1, 3e-7, marks=pytest.mark.slow),
-        pytest.param(32, 10_000, 0.1, 1.5e-5, marks=pytest.mark.slow),
+        pytest.param(32, 10_000, 0.1, 3e-7, marks=pytest.mark.slow),
     ],
 )
 def test_no_drift_within_a_well(integrate_ensemble, model_of, modes, cycles, share, bound) -> None:
-    """Measured: at most 7e-8 from the first hundred cycles to the last, without a trend.
-
-    With a tenth of the barrier's energy, where steps are twice as long, 4e-6 after the first hundred of 32 modes and
-    less later.
-    """
+    """Measured: at most 7e-8 from the first hundred cycles to the last, without a trend."""
     errors, crossings = energy_errors(
         integrate_ensemble, model_of(modes, 0.0), share, [100, cycles // 10, cycles]
     )
@@ -62,15 +58,11 @@ def test_energy_of_a_random_motion_stays_within_the_reserve_of_decisions(
     barrier = model.saddle_energy - model.well_energy
     velocity = model.linear_modes @ np.random.default_rng(0).standard_normal(modes)
     velocity *= math.sqrt(barrier / float(model.kinetic_energy(velocity)))
-    steps = {}
-    for share in (0.1, 0.19, 0.9):
+    for share in (0.1, 0.9):
         start = State(amplitude=model.well_amplitude, velocity=math.sqrt(share) * velocity)
         for cycles in (3, 30, 100):
             end = integrate_ensemble(model, None, cycles=cycles, start=start)
             assert abs(float(end.accumulators_of_runs["energy"][0]) / barrier - share) < 0.5 * RESERVE
-        steps[share] = int(end.accumulators_of_runs["steps"][0])
-    # below a fifth of the barrier steps are twice as long
-    assert steps[0.1] == steps[0.19] == pytest.approx(0.5 * steps[0.9], rel=1e-2)
 
 
 @pytest.mark.parametrize(("modes", "cycles", "measured"), [(1, 1000, 1.4e-4), (32, 300, 5e-4)])

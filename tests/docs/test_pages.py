@@ -305,3 +305,23 @@ def test_glossary_is_sorted_and_complete():
         "status",
     }
     assert needed <= set(entries)
+
+
+TEXTS = [
+    *(
+        ROOT / name
+        for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "benchmarks/README.md")
+    ),
+    *sorted((ROOT / "docs").glob("*.md")),
+]
+
+
+@pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.name)
+def test_links_lead_to_files_of_the_repository(path) -> None:
+    """Pages are read on the repository's page too, where nothing that is built exists."""
+    text = re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+    targets = {
+        link.split("#")[0] for link in re.findall(r"\]\(([^)\s]+)\)", text) if not re.match(r"[a-z]+:", link)
+    }
+    missing = [target for target in targets if target and not (path.parent / target).exists()]
+    assert not missing

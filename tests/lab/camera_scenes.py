@@ -147,7 +147,7 @@ def measured(kind, rng, folder, **asked):
     first = int(scene.skip * 40)
     recording = render_recording(
         time[first:] - time[first], sign * beam[first:], sign * shaker[first:], camera=camera, stage=stage,
-        defects=Defects(**scene.defects), rest_frames=scene.rest_frames, seed=int(rng.integers(2**31)),
+        defects=Defects(**scene.defects), rest_frames=scene.rest_frames, rng=int(rng.integers(2**31)),
     )  # fmt: skip
     turn = Orientation(stage.side, camera.shape)
     frames = turn.turn(np.stack(list(recording)).astype(np.float64)).copy()

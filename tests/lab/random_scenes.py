@@ -216,7 +216,7 @@ def measured(scene, folder, rng):
     first = int(scene.skip * 40)
     recording = render_recording(
         time[first:] - time[first], sign * beam[first:], sign * shaker[first:], camera=camera, stage=stage,
-        defects=Defects(**scene.defects), rest_frames=scene.rest_frames, seed=int(rng.integers(2**31)),
+        defects=Defects(**scene.defects), rest_frames=scene.rest_frames, rng=int(rng.integers(2**31)),
     )  # fmt: skip
     path = write(recording, Path(folder) / scene.name)
     rest = -sign * LEVEL  # what a person knows of the beam at rest

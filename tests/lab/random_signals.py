@@ -47,7 +47,7 @@ def drive_signal(rng, kind):
     signal = render_vibrometer(
         freq, amplitude, duration=length, onset=onset, start_up=start_up, start_up_share=share,
         phase=rng.uniform(-3.0, 3.0), distortion=float(rng.choice([0.0, 0.01, 0.03])), snr_db=rng.uniform(20.0, 42.0),
-        seed=int(rng.integers(2**31)),
+        rng=int(rng.integers(2**31)),
     )  # fmt: skip
     values, time, rate = signal.values.copy(), signal["time"].values, 20_000.0
     truth = {"amplitude": amplitude, "frequency": freq, "onset": onset}

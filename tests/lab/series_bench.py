@@ -40,14 +40,14 @@ def write_test(folder, name, ratio, velocity, *, seed=0, spoiled=None):
         run = run.assign_coords(time=("time", run.time.values - run.time.values[0], run.time.attrs))
     stage = lab.SyntheticStage(shaker_width=0.8e-3)
     rest = 0 if spoiled == "begins in motion" else 90
-    recording = lab.render_run(run, camera=CAMERA, stage=stage, seed=seed, rest_frames=rest)
+    recording = lab.render_run(run, camera=CAMERA, stage=stage, rng=seed, rest_frames=rest)
     path = recording.write(folder / f"{name}.cihx")
     if spoiled == "cut short":
         pixels = path.with_suffix(".mraw")
         pixels.write_bytes(pixels.read_bytes()[:3_000_000])
     if spoiled == "another test's vibrometer":
         frequency *= 1.4
-    seen = lab.render_vibrometer(frequency, speed, snr_db=30.0, seed=seed, **lasting)
+    seen = lab.render_vibrometer(frequency, speed, snr_db=30.0, rng=seed, **lasting)
     lab.write_signal(folder / f"{name}_vib.csv", seen)
     return {"frequency": frequency, "speed": speed, "response_class": clean}
 

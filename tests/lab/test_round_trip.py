@@ -37,7 +37,7 @@ def through_the_laboratory(folder, seed, *, cycles, camera, snr=None):
     )
     run = sb.simulate(sb.System(MODELS[modes], CONTACT, drive), sb.Integration(cycles=cycles))
     stage = SyntheticStage(shaker_width=min(0.8e-3, 0.5 * camera.shape[1] * camera.pixel_size))
-    recording = render_run(run, camera=camera, stage=stage, seed=seed)
+    recording = render_run(run, camera=camera, stage=stage, rng=seed)
     path = recording.write(folder / f"run{seed}.{'cihx' if seed % 2 else 'cih'}")
     with open_recording(path, pixel_size=camera.pixel_size) as read:
         tracked = track(read, buckling_level=BEAM.buckling_level, location=LOCATION)

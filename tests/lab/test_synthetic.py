@@ -54,12 +54,12 @@ def test_the_truth_is_the_mean_over_the_exposure():
 
 def test_noise_has_the_promised_strength_and_seed():
     stage = SyntheticStage()
-    first = render_recording(*STILL, camera=CAMERA, stage=stage, seed=4)
+    first = render_recording(*STILL, camera=CAMERA, stage=stage, rng=4)
     background = first.frame(2)[:15].astype(float)
     noise = background.std()
     assert 20.0 * np.log10((stage.beam - stage.background) * 4095 / noise) == pytest.approx(30.0, abs=0.3)
-    np.testing.assert_array_equal(first.frame(2), render_recording(*STILL, camera=CAMERA, seed=4).frame(2))
-    assert (first.frame(2) != render_recording(*STILL, camera=CAMERA, seed=5).frame(2)).mean() > 0.9
+    np.testing.assert_array_equal(first.frame(2), render_recording(*STILL, camera=CAMERA, rng=4).frame(2))
+    assert (first.frame(2) != render_recording(*STILL, camera=CAMERA, rng=5).frame(2)).mean() > 0.9
     assert (first.frame(2) != first.frame(3)).mean() > 0.9
 
 
@@ -133,7 +133,7 @@ def test_impossible_requests_are_refused_by_name(call, name):
 
 def test_vibrometer_signal_has_the_promised_sine_noise_and_start():
     signal = render_vibrometer(
-        80.0, 0.05, duration=2.0, onset=0.2, start_up=0.05, snr_db=20.0, distortion=0.02, seed=1
+        80.0, 0.05, duration=2.0, onset=0.2, start_up=0.05, snr_db=20.0, distortion=0.02, rng=1
     )
     time, velocity = signal["time"].values, signal.values
     assert signal.attrs["units"] == "m/s"

@@ -22,7 +22,7 @@ def rendered(motion=None, *, snr=30.0, stage=STICKER, shape=(160, 64), seed=0, l
     time, beam, shaker, *_ = impacts(5) if motion is None else motion
     camera = SyntheticCamera(frame_rate=FRAME_RATE, pixel_size=PIXEL, shape=shape, snr_db=snr, light=light)
     return render_recording(
-        time, beam, shaker, camera=camera, stage=SyntheticStage(**stage), seed=seed, **options
+        time, beam, shaker, camera=camera, stage=SyntheticStage(**stage), rng=seed, **options
     )
 
 
@@ -264,7 +264,7 @@ def test_a_contact_that_borders_on_lost_frames_is_not_bounded(tmp_path):
 @pytest.mark.slow
 def test_a_full_size_recording_is_tracked_at_200_frames_a_second(tmp_path):
     time, beam, shaker, *_ = impacts(18, pixel=12e-6, rate=10_000.0)
-    recording = render_recording(time, beam, shaker, camera=SyntheticCamera(), seed=2)
+    recording = render_recording(time, beam, shaker, camera=SyntheticCamera(), rng=2)
     with open_recording(recording.write(tmp_path / "a.cihx")) as read:
         start = clock.process_time()
         tracked = track(read, rest_displacement=1e-3 * float(recording.truth["displacement_mm"][0]))

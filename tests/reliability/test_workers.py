@@ -16,7 +16,7 @@ import pytest
 from snapbeam.sweeps import distributed as workers
 from snapbeam.sweeps.checkpoint.records import CheckpointError
 from snapbeam.sweeps.checkpoint.store import Checkpoint
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, CheckpointRunner, SweepReport
+from snapbeam.sweeps.compute import CheckpointOptions, CheckpointRunner, SweepReport
 from snapbeam.sweeps.distributed import ClusterWorkers, open_client, parse_cluster
 from snapbeam.sweeps.tasks import Stage
 

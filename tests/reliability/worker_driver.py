@@ -19,7 +19,7 @@ import numpy as np
 
 import snapbeam as sb
 from snapbeam.sweeps.checkpoint.store import Checkpoint
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, CheckpointRunner, SweepReport
+from snapbeam.sweeps.compute import CheckpointOptions, CheckpointRunner, SweepReport
 from snapbeam.sweeps.distributed import ClusterWorkers, open_client, parse_cluster
 from snapbeam.sweeps.tasks import MemoryRunner, PointWork, Stage
 

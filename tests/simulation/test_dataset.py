@@ -24,7 +24,7 @@ def test_labels():
     assert list(run["mode"].values) == [1, 2, 3]
     assert run.attrs == {"modes": 3}
     for name in run.variables:
-        assert run[name].attrs["units"] == SCHEMA[name].units
+        assert run[name].attrs["units"] == SCHEMA[name].unit
 
 
 @pytest.mark.parametrize(

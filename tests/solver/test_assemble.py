@@ -65,9 +65,9 @@ def test_ticks_make_whole_periods() -> None:
     np.testing.assert_array_equal(runs["end"], 7 * runs["period"])
     np.testing.assert_array_equal(runs["last_quarter"], runs["end"] // 4 * 3)
     assert ensemble.cycles == 7.0
-    landed = make_ensemble(SYSTEM, sb.Integration(), periods=2.5)
-    assert landed.runs["landing"][0] == landed.runs["period"][0]
-    assert landed.runs["end"][0] == landed.runs["period"][0] * 2.5
+    ensemble = make_ensemble(SYSTEM, sb.Integration(), periods=2.5)
+    assert ensemble.runs["output_interval"][0] == ensemble.runs["period"][0]
+    assert ensemble.runs["end"][0] == ensemble.runs["period"][0] * 2.5
 
 
 def test_the_tip_touches_unless_a_gap_is_given() -> None:

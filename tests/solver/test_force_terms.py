@@ -12,7 +12,7 @@ from numba import njit
 
 import snapbeam.solver
 from snapbeam.solver.compilation import inlined
-from snapbeam.solver.terms.interface import above_nearest_well, does_work
+from snapbeam.solver.terms.interface import center_from_divide, does_work
 
 SOLVER = Path(snapbeam.solver.__file__).parent
 
@@ -55,12 +55,12 @@ def test_files_that_name_a_term(term):
 
 
 class Offset(NamedTuple):
-    energy: float
+    level: float
 
     @staticmethod
     @inlined
-    def above_nearest_well(term, well_sign, energy):
-        return energy + well_sign * term.energy
+    def center_from_divide(term, center):
+        return center - term.level
 
 
 class Factor(NamedTuple):
@@ -68,8 +68,8 @@ class Factor(NamedTuple):
 
     @staticmethod
     @inlined
-    def above_nearest_well(term, well_sign, energy):
-        return energy * term.factor
+    def center_from_divide(term, center):
+        return center * term.factor
 
     @staticmethod
     @inlined
@@ -82,8 +82,8 @@ class Silent(NamedTuple):
 
 
 @njit
-def energy_above(terms, energy):
-    return above_nearest_well(terms, -1.0, energy), does_work(terms)
+def divided(terms, center):
+    return center_from_divide(terms, center), does_work(terms)
 
 
 @pytest.mark.parametrize(
@@ -96,9 +96,9 @@ def energy_above(terms, energy):
     ],
 )
 def test_an_operation_calls_the_terms_in_order(terms, expected):
-    assert energy_above(terms, 5.0) == expected
+    assert divided(terms, 5.0) == expected
 
 
 def test_an_operation_is_for_compiled_code():
     with pytest.raises(TypeError, match="compiled code only"):
-        above_nearest_well((), 1.0, 5.0)
+        center_from_divide((), 5.0)

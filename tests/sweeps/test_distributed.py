@@ -15,7 +15,7 @@ from small_map import setup_of, swept
 import snapbeam as sb
 from snapbeam.sweeps.checkpoint.records import CheckpointError
 from snapbeam.sweeps.checkpoint.store import Checkpoint
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, CheckpointRunner, SweepReport
+from snapbeam.sweeps.compute import CheckpointOptions, CheckpointRunner, SweepReport
 from snapbeam.sweeps.distributed import ATTEMPTS, ClusterWorkers, open_client, parse_cluster, slurm_arguments
 from snapbeam.sweeps.tasks import PointWork, Stage
 from snapbeam.util.status_codes import ResponseClass, RunStatus

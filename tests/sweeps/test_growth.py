@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import snapbeam as sb
 from snapbeam.cli.app import app
 from snapbeam.sweeps.checkpoint.store import layers_of
-from snapbeam.sweeps.checkpointed_sweep import SweepReport
+from snapbeam.sweeps.compute import SweepReport
 from snapbeam.sweeps.tasks import PointWork
 
 LONGER = {

@@ -9,7 +9,7 @@ from small_map import swept
 
 import snapbeam as sb
 from snapbeam.model.parameters import lookup
-from snapbeam.sweeps.checkpointed_sweep import SweepReport
+from snapbeam.sweeps.compute import SweepReport
 from snapbeam.sweeps.points import Grid
 from snapbeam.sweeps.refine import refine, refined_grid
 from snapbeam.sweeps.tasks import ResultTable

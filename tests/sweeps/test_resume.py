@@ -20,7 +20,7 @@ import snapbeam as sb
 from snapbeam.cli.app import app
 from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION
 from snapbeam.sweeps.checkpoint.store import Checkpoint
-from snapbeam.sweeps.checkpointed_sweep import SweepReport
+from snapbeam.sweeps.compute import SweepReport
 from snapbeam.sweeps.replicates import Replicates
 from snapbeam.sweeps.tasks import PointWork, Stage, chunk_size
 

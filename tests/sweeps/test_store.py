@@ -24,7 +24,7 @@ from snapbeam.sweeps.checkpoint import records as ledger
 from snapbeam.sweeps.checkpoint import store as tables
 from snapbeam.sweeps.checkpoint.records import CheckpointError, CheckpointLock, Record, TaskLog, append_line
 from snapbeam.sweeps.checkpoint.store import Checkpoint
-from snapbeam.sweeps.checkpointed_sweep import SweepReport
+from snapbeam.sweeps.compute import SweepReport
 from snapbeam.sweeps.tasks import PointWork, Stage
 from snapbeam.util.validation import InputError
 

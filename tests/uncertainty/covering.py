@@ -85,10 +85,10 @@ def _indices(given: bool) -> Counted:
     for seed in range(TRIALS):
         if given:
             ranks = np.random.default_rng(seed).random((2000, 3))
-            one = sb.uncertainty.sobol_indices_from_samples(ranks, ishigami(ranks.T), seed=seed)
+            one = sb.uncertainty.sobol_indices_from_samples(ranks, ishigami(ranks.T), rng=seed)
             held.append(np.concatenate([(one.low <= FIRST) & (FIRST <= one.high)]))
             continue
-        both = sb.uncertainty.sobol_indices(ishigami, 3, 64, seed=seed)
+        both = sb.uncertainty.sobol_indices(ishigami, 3, 64, rng=seed)
         parts = ((both.first, FIRST), (both.total, TOTAL))
         held.append(np.concatenate([(each.low <= truth) & (truth <= each.high) for each, truth in parts]))
     names = [f"{kind} {i + 1}" for kind in (("first",) if given else ("first", "total")) for i in range(3)]

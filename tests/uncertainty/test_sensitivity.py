@@ -40,7 +40,7 @@ def test_the_default_split_has_less_than_half_the_error_of_many_short_sequences(
     truth = np.concatenate([FIRST, TOTAL])
 
     def error(samples: int, **split: int) -> float:
-        found = [sb.uncertainty.sobol_indices(ishigami, 3, samples, seed=seed, **split) for seed in range(30)]
+        found = [sb.uncertainty.sobol_indices(ishigami, 3, samples, rng=seed, **split) for seed in range(30)]
         assert {each.runs for each in found} == {5 * 4096}
         return float(
             np.median(

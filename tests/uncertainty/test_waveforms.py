@@ -47,7 +47,7 @@ def measured(nominal: sb.System, logs: np.ndarray, draw: np.random.Generator) ->
 
 def found(waveform: sb.uncertainty.Waveform, seed: int = 0) -> sb.uncertainty.Posterior:
     return sb.uncertainty.estimate_posterior(
-        None, default_values.BEAM, PRIOR, waveforms=waveform, samples=200, seed=seed
+        None, default_values.BEAM, PRIOR, waveforms=waveform, samples=200, rng=seed
     )
 
 

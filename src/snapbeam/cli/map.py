@@ -81,7 +81,7 @@ def compute_map(
         measurements, system.model.reference_frequency, None if beam is None else beam.buckling_level
     )
 
-    from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, SweepReport, compute_sweep
+    from snapbeam.sweeps.compute import CheckpointOptions, SweepReport, compute_sweep
     from snapbeam.sweeps.setup import sweep_setup
 
     setup = sweep_setup(system, axes, settings.integration.replace(threads=threads))

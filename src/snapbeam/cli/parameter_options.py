@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from snapbeam.model.parameter_file import Config
-    from snapbeam.sweeps.checkpointed_sweep import SweepReport
+    from snapbeam.sweeps.compute import SweepReport
 
 __all__ = [
     "BEAM",

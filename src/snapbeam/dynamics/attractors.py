@@ -28,7 +28,7 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.display import plotter
-from snapbeam.util.validation import InputError, checked, finite_array, integer, within
+from snapbeam.util.validation import InputError, checked, finite_array, integer, seed_of, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -330,7 +330,7 @@ def find_attractors(
     transient: int | None = None,
     max_periods: int = 8,
     check_periods: int = 1000,
-    seed: int = 0,
+    rng: int | np.random.Generator | None = 0,
     tolerance: float = 1e-10,
     integration: Integration | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
@@ -359,8 +359,8 @@ def find_attractors(
         Longest period, in periods of the drive, that is looked for.
     check_periods : int
         Periods over which a chaotic attractor must not end.
-    seed : int
-        Seed of the initial states.
+    rng : int, numpy.random.Generator or None
+        Of the initial states: a seed; a generator, which gives one; None takes one from the system.
     tolerance : float
         Of the orbits, as in :func:`periodic_orbit`.
     integration : Integration, optional
@@ -394,7 +394,7 @@ def find_attractors(
         integer("max_periods", max_periods, 1, 512),
         integer("check_periods", check_periods, 20, 10**7),
     )
-    rows = _states_of(flow, states, seed)
+    rows = _states_of(flow, states, seed_of(rng))
     allowed = orbit_tolerance(tolerance)
 
     told = counting(progress, "attractors", "parts")
@@ -458,7 +458,7 @@ def _states_of(flow: Flow, states: ArrayLike | int, seed: int) -> _Array:
     if isinstance(states, (int, np.integer)) and not isinstance(states, bool):
         if not isinstance(flow, Stroboscope):
             raise InputError(f"states = {states}: must be an array of states for a flow that is not a System")
-        return spread_states(flow, integer("states", states, 1, 10**7), integer("seed", seed, 0, 2**63 - 1))
+        return spread_states(flow, integer("states", states, 1, 10**7), seed)
     rows = finite_array("states", states, 2)
     if rows.shape[1] != flow.dimension or not len(rows):
         raise InputError(f"states of shape {rows.shape}: must have the shape (states, {flow.dimension})")

@@ -606,21 +606,25 @@ class Stroboscope:
         model = self.system.model
         moved = None
         if tangents is None:
-            landings = engine.integrate_to_landing(ensemble, self.integration.threads)
+            output_states = engine.integrate_with_output_states(ensemble, self.integration.threads)
         else:
             back = model.linear_modes.T @ model.mass
             given = (tangents * self.scales).reshape(*tangents.shape[:2], 2, self.modes)
-            landings, changed = engine.integrate_tangents(ensemble, given @ back.T, self.integration.threads)
+            output_states, changed = engine.integrate_tangents(
+                ensemble, given @ back.T, self.integration.threads
+            )
             moved = (changed @ model.linear_modes.T).reshape(tangents.shape) / self.scales
-        failed = ~np.isin(landings.accumulators_of_runs["status"], _REACHED)
+        failed = ~np.isin(output_states.accumulators_of_runs["status"], _REACHED)
         if lost is not None:
             failed |= lost
-        last = self._rows(ensemble, landings.q[:, -1:], landings.p[:, -1:], landings.well_sign[:, -1:])[:, 0]
+        last = self._rows(
+            ensemble, output_states.q[:, -1:], output_states.p[:, -1:], output_states.well_sign[:, -1:]
+        )[:, 0]
         each = slice(self.cycles_per_period - 1, None, self.cycles_per_period)
         whole = None
         if every:
             whole = self._rows(
-                ensemble, landings.q[:, each], landings.p[:, each], landings.well_sign[:, each]
+                ensemble, output_states.q[:, each], output_states.p[:, each], output_states.well_sign[:, each]
             )
         for array in (last, whole, moved):
             if array is not None:
@@ -628,27 +632,32 @@ class Stroboscope:
         status = np.where(
             failed,
             np.where(
-                landings.accumulators_of_runs["status"] == 0, 3, landings.accumulators_of_runs["status"]
+                output_states.accumulators_of_runs["status"] == 0,
+                3,
+                output_states.accumulators_of_runs["status"],
             ),
             0,
         )
 
-        def after(landing: int) -> State:
-            q, p = (np.where(failed[:, None], 0.0, values[:, landing]) for values in (landings.q, landings.p))
+        def after(index: int) -> State:
+            q, p = (
+                np.where(failed[:, None], 0.0, values[:, index])
+                for values in (output_states.q, output_states.p)
+            )
             found = states_of(
-                ensemble, q, p, landings.well_sign[:, landing], landings.contact_ticks[:, landing], ensemble.runs["end"]
+                ensemble, q, p, output_states.well_sign[:, index], output_states.contact_ticks[:, index], ensemble.runs["end"]
             )  # fmt: skip
             # after a period every motion is where it began
             return replace(found, phase=ensemble.runs["phase"].copy(), statistics={"status": status})
 
-        ends = range(landings.q.shape[1])[each]
+        ends = range(output_states.q.shape[1])[each]
         return AdvancedStates(
             last,
             whole,
             moved,
-            statistics_of(ensemble, landings.accumulators_of_runs),
+            statistics_of(ensemble, output_states.accumulators_of_runs),
             after(-1),
-            tuple(after(landing) for landing in ends) if every else None,
+            tuple(after(index) for index in ends) if every else None,
         )
 
     def _require_period(self, own: Mapping[str, _Array]) -> None:

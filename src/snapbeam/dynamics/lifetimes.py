@@ -19,7 +19,7 @@ from snapbeam.simulation.save import code_flags
 from snapbeam.solver.assemble import cycles_of, make_ensemble, run_columns
 from snapbeam.solver.registry import resolve
 from snapbeam.solver.statistics import statistics_of
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, compute_table
+from snapbeam.sweeps.compute import CheckpointOptions, compute_table
 from snapbeam.sweeps.points import Columns, PointList
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
 from snapbeam.sweeps.tasks import PointWork, ResultTable

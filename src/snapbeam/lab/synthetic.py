@@ -36,6 +36,7 @@ from snapbeam.util.validation import (
     integer,
     nonnegative,
     positive,
+    seed_of,
     shown,
     within,
 )
@@ -778,7 +779,7 @@ def render_recording(
     defects: Defects | None = None,
     rest_frames: int = 10,
     zero_row: float | None = None,
-    seed: int = 0,
+    rng: int | np.random.Generator | None = 0,
     **spoiled: Any,
 ) -> SyntheticRecording:
     """Draw what a high-speed camera would see of a known motion.
@@ -800,8 +801,9 @@ def render_recording(
     zero_row
         Row of the middle of the beam at zero displacement, in the picture turned so that the shaker is below;
         chosen so that everything stays in the region unless given.
-    seed
-        Of the noise; each frame's noise depends on the seed and its number only.
+    rng
+        Of the noise: a seed, a generator, which gives one, or None for one from the system.  Each frame's noise depends on the
+        seed and its number only.
     **spoiled
         Fields of :class:`Defects`, such as ``blank_frames``, to change in *defects*.
 
@@ -848,7 +850,7 @@ def render_recording(
         if values.size != instants.size:
             raise InputError(f"{name} of {values.size} samples: time has {instants.size}")
     rest = integer("rest_frames", rest_frames, 0)
-    seed = integer("seed", seed, 0)
+    seed = seed_of(rng)
     sign = Orientation(stage.side, camera.shape).sign
     row = (
         _fitting_row(camera, stage, sign * beam, sign * shaker)
@@ -923,7 +925,7 @@ def render_run(
     *,
     camera: SyntheticCamera | None = None,
     stage: SyntheticStage | None = None,
-    seed: int = 0,
+    rng: int | np.random.Generator | None = 0,
     **options: Any,
 ) -> SyntheticRecording:
     """Draw what a high-speed camera would see of a simulated run about the shaker.
@@ -933,7 +935,7 @@ def render_run(
     run
         A run, or its dataset, with ``displacement_at_striker``, ``striker_displacement`` and the attribute
         ``length_scale``, the buckling level b [m].
-    camera, stage, seed, **options
+    camera, stage, rng, **options
         As for :func:`render_recording`.  Unless a stage is given, its beam is as thick as the run's and the
         shaker stands on the run's side.
 
@@ -966,7 +968,7 @@ def render_run(
         scale * dataset["striker_displacement"].values,
         camera=camera,
         stage=stage,
-        seed=seed,
+        rng=rng,
         **options,
     )
     for name, measured in (
@@ -992,7 +994,7 @@ def render_vibrometer(
     phase: float = 0.0,
     distortion: float = 0.0,
     snr_db: float = 30.0,
-    seed: int = 0,
+    rng: int | np.random.Generator | None = 0,
 ) -> xr.DataArray:
     """What a laser vibrometer would record of the shaker: rest, a start-up transient, a sine, and noise.
 
@@ -1011,8 +1013,8 @@ def render_vibrometer(
         Phase [rad] at the onset, and amplitude of the second harmonic over the first.
     snr_db
         20 log10(rms of the steady sine / standard deviation of the noise); infinite for none.
-    seed
-        Of the noise.
+    rng
+        Of the noise: a seed, a generator, which gives one, or None for one from the system.
 
     Returns
     -------
@@ -1040,7 +1042,8 @@ def render_vibrometer(
     second = within("distortion", distortion, 0.0, 1.0, closed="left")
     if not (snr_db == math.inf):
         within("snr_db", snr_db, -20.0, 200.0, closed="both", unit="dB")
-    rng = np.random.default_rng(integer("seed", seed, 0))
+    seed = seed_of(rng)
+    noisy = np.random.default_rng(seed)
     time = np.arange(round(length * rate)) / rate
     since = np.maximum(time - begin, 0.0)
     envelope = 1.0 - share * np.exp(-since / time_constant) if time_constant > 0.0 else np.ones_like(since)
@@ -1055,5 +1058,5 @@ def render_vibrometer(
         "true_noise": noise,
         "seed": seed,
     }
-    values = velocity + noise * rng.standard_normal(time.size)
+    values = velocity + noise * noisy.standard_normal(time.size)
     return make_signal(values, "m/s", rate, name="shaker velocity", attrs=truth)

@@ -17,7 +17,7 @@ from snapbeam.simulation.states import states_of
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.registry import resolve
-from snapbeam.solver.statistics import Landings, statistics_of
+from snapbeam.solver.statistics import OutputStates, statistics_of
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, finite_array, flag, instance, positive, shown
@@ -128,15 +128,15 @@ def advance(
     _, engine = resolve("cpu")
     vectors = None
     if tangent is None:
-        landings = engine.integrate_to_landing(ensemble, integration.threads, report)
+        ends = engine.integrate_with_output_states(ensemble, integration.threads, report)
     else:
         given = _checked_tangent(system, tangent, flat)
         back = system.model.linear_modes.T @ system.model.mass
-        landings, moved = engine.integrate_tangents(ensemble, given @ back.T, integration.threads, report)
-        moved[~np.isin(landings.accumulators_of_runs["status"], _REACHED)] = np.nan
+        ends, moved = engine.integrate_tangents(ensemble, given @ back.T, integration.threads, report)
+        moved[~np.isin(ends.accumulators_of_runs["status"], _REACHED)] = np.nan
         vectors = (moved @ system.model.linear_modes.T).reshape((*state.batch, *moved.shape[1:]))
-    found = _states(ensemble, landings, save_every_period)
-    passed = statistics_of(ensemble, landings.accumulators_of_runs)
+    found = _states(ensemble, ends, save_every_period)
+    passed = statistics_of(ensemble, ends.accumulators_of_runs)
     return _shaped(
         found, state.batch, save_every_period, {name: passed[name] for name in _STATISTICS}, vectors
     )
@@ -189,17 +189,17 @@ def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
         ) from None
 
 
-def _states(ensemble: Ensemble, landings: Landings, every: bool) -> list[State]:
+def _states(ensemble: Ensemble, ends: OutputStates, every: bool) -> list[State]:
     """Return the states after each period, or after the last one, with their status; NaN if a run did not reach it."""
-    count, accumulators = landings.q.shape[1], landings.accumulators_of_runs
+    count, accumulators = ends.q.shape[1], ends.accumulators_of_runs
     failed = ~np.isin(accumulators["status"], _REACHED)
     found = []
     for at in range(count) if every else (count - 1,):
-        ticks = np.minimum((at + 1) * ensemble.runs["landing"], ensemble.runs["end"])
-        q, p = landings.q[:, at].copy(), landings.p[:, at].copy()
+        ticks = np.minimum((at + 1) * ensemble.runs["output_interval"], ensemble.runs["end"])
+        q, p = ends.q[:, at].copy(), ends.p[:, at].copy()
         lost = failed & ((accumulators["time"] < ticks) | (at == count - 1))
         q[lost], p[lost] = 0.0, 0.0
-        state = states_of(ensemble, q, p, landings.well_sign[:, at], landings.contact_ticks[:, at], ticks)
+        state = states_of(ensemble, q, p, ends.well_sign[:, at], ends.contact_ticks[:, at], ticks)
         amplitude, velocity = state.amplitude.copy(), state.velocity.copy()
         amplitude[lost], velocity[lost] = np.nan, np.nan
         status: Any = np.where(lost, accumulators["status"], int(RunStatus.OK)).astype(np.int8)

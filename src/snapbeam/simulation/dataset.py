@@ -41,7 +41,7 @@ class Variable(NamedTuple):
     """Variable of a run: dimensions, unit and long name."""
 
     dims: tuple[str, ...]
-    units: str
+    unit: str
     long_name: str
 
 
@@ -154,7 +154,7 @@ def trajectory_dataset(
 
 def _labelled(name: str, values: np.ndarray) -> tuple[tuple[str, ...], np.ndarray, dict[str, str]]:
     quantity = SCHEMA[name]
-    return quantity.dims, values, {"units": quantity.units, "long_name": quantity.long_name}
+    return quantity.dims, values, {"units": quantity.unit, "long_name": quantity.long_name}
 
 
 def check_trajectory(
@@ -194,8 +194,8 @@ def check_trajectory(
         if variable.dims != quantity.dims:
             raise InputError(f"{name} with dimensions {variable.dims}: must have dimensions {quantity.dims}")
         units = variable.attrs.get("units")
-        if units != quantity.units:
-            raise InputError(f"{name} in units {shown(units)}: must be in {quantity.units!r}")
+        if units != quantity.unit:
+            raise InputError(f"{name} in units {shown(units)}: must be in {quantity.unit!r}")
         good = np.isfinite(variable.values)
         if valid is not None and name not in _COORDINATES:
             good = good | ~(valid if good.ndim == 1 else valid[:, None])

@@ -147,7 +147,7 @@ _REALS = (
 _INTEGERS = (
     "step",  # ticks of a flight step
     "period",  # ticks in which the drive's argument makes one turn
-    "landing",  # ticks from one state that is handed out to the next; the whole run if none is
+    "output_interval",  # ticks from one state that is handed out to the next; the whole run if none is
     "end",
     "last_quarter",
     "decide_crossings",  # crossings in the last quarter beyond which it is continuous; -1: never decide

@@ -225,7 +225,7 @@ class Tip(NamedTuple):
 
 @inlined
 def seen_from(tip, well_sign, rest):
-    """The tip as seen from the well *home*: +1 the one that rest is measured in, -1 the other."""
+    """The tip in coordinates about the well *well_sign*: +1 the one that *rest* is measured in, -1 the other."""
     return Tip(tip.offset + (1.0 - well_sign) * rest, tip.law, tip.drive)
 
 

@@ -15,7 +15,7 @@ from snapbeam.model.drive.sine import Sine
 from snapbeam.model.integration import ENGINES
 from snapbeam.solver.cpu import driver as cpu
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.statistics import Landings, Recorded
+from snapbeam.solver.statistics import OutputStates, Recorded
 from snapbeam.util.validation import InputError, choice
 
 __all__ = ["Engine", "resolve"]
@@ -38,10 +38,10 @@ class Engine(Protocol):
         """Integrate every run of an ensemble; a record of accumulators a run."""
         ...
 
-    def integrate_to_landing(
+    def integrate_with_output_states(
         self, ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None
-    ) -> Landings:
-        """As :meth:`run_ensemble`, and the states at every landing."""
+    ) -> OutputStates:
+        """As :meth:`run_ensemble`, and the states at every output time."""
         ...
 
     def integrate_tangents(
@@ -50,8 +50,8 @@ class Engine(Protocol):
         tangents: NDArray[np.float64],
         threads: int | None = None,
         progress: Progress | None = None,
-    ) -> tuple[Landings, NDArray[np.float64]]:
-        """As :meth:`integrate_to_landing`, with small changes of the states carried along."""
+    ) -> tuple[OutputStates, NDArray[np.float64]]:
+        """As :meth:`integrate_with_output_states`, with small changes of the states carried along."""
         ...
 
     def record(

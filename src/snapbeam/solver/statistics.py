@@ -31,8 +31,8 @@ __all__ = [
     "OTHER_WORK",
     "STATISTICS",
     "CompletedStep",
-    "Landings",
     "Last",
+    "OutputStates",
     "Reading",
     "Recorded",
     "Statistic",
@@ -672,23 +672,23 @@ def statistics_of(
 
 
 # ----------------------------------------------------------------------------------------------------
-# What engines hand over beside accumulators: states at landings, and pieces of a recorded run.
+# What engines hand over beside accumulators: output states, and pieces of a recorded run.
 
 
 _Array = NDArray[np.float64]
 
 
-class Landings(NamedTuple):
-    """States of many runs at every landing."""
+class OutputStates(NamedTuple):
+    """States of many runs at every output time."""
 
     accumulators_of_runs: NDArray[Any]
     q: _Array
-    """Linear modes about the current well, shape (runs, landings, N)."""
+    """Linear modes about the current well, shape (runs, output states, N)."""
     p: _Array
     well_sign: NDArray[np.int64]
-    """That well: +1 the first, -1 the other, shape (runs, landings)."""
+    """That well: +1 the first, -1 the other, shape (runs, output states)."""
     contact_ticks: NDArray[np.int64]
-    """Ticks since the present contact of each striker began, -1: apart, shape (runs, landings, strikers)."""
+    """Ticks since the present contact of each striker began, -1: apart, shape (runs, output states, strikers)."""
 
 
 class Last(NamedTuple):

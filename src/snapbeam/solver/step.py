@@ -38,7 +38,7 @@ within the kick, also exactly; the damping of a local force by a Runge-Kutta met
 The step itself decides nothing.  Whether a contact is closed is fixed for a whole step.  The caller observes the beam at
 the end, and inside the step where needed.  If a contact began or ended there, the caller takes a shorter step from the same
 beginning.  Then it accepts the step: the end becomes the next beginning, and the increments enter the statistics
-(``cpu/events.py: accept_step``, ``cpu/run_lanes/control.py: accept``, ``cuda/control.py``).
+(``cpu/events.py: accept_step``, ``cpu/run_lanes/control.py: accept_steps``, ``cuda/control.py``).
 
 Layouts.  This file does not know where numbers are in memory.  A number is a float, or a register of eight runs; q, p and k
 are rows in memory, registers, or one number in each thread of a block.  A layout provides the operations of

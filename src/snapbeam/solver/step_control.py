@@ -30,13 +30,10 @@ __all__ = [
     "count_zero_crossings_in_step",
     "first_contact_onset",
     "flight_level",
-    "is_low_energy",
-    "low_energy_limit",
     "refine_onset",
     "safe_interval",
     "square_of_rate",
     "square_of_signal",
-    "ticks_of",
     "time_beyond",
 ]
 
@@ -50,7 +47,7 @@ class Clock(NamedTuple):
     """Flight step."""
     period: int
     """Of the drive's argument."""
-    landing: int
+    output_interval: int
     """Between two output states."""
     end: int
     last_quarter: int
@@ -91,9 +88,6 @@ TRUST = 8
 # Flight steps are halved where the squared slopes differ from those of the well by more than this many times
 # the well's own, and again at every doubling.
 STRETCHED = 4.0
-# Below this share of the energy of the barrier, free flight takes steps of twice the length: what the steps
-# must resolve is how far the tension swings, and that goes with the root of the energy.
-_LOW_ENERGY = 0.2
 # Pieces per period of the fastest mode when a step is looked into.
 PIECES = 5.0
 _THIRD, _SIXTH, TWELFTH = 1.0 / 3.0, 1.0 / 6.0, 1.0 / 12.0
@@ -106,7 +100,7 @@ def clock_of(run, max_steps):
         run.tick,
         run.step,
         run.period,
-        run.landing,
+        run.output_interval,
         run.end,
         run.last_quarter,
         run.coarsest,
@@ -186,21 +180,6 @@ def contact_level(clock, elapsed, d, dv):
     return level
 
 
-@compiled
-def is_low_energy(energy, gamma, stretch_at_rest):
-    """Whether a beam of this energy above the well stays far below the barrier, gamma s^2 / 4 for squared slopes s.
-
-    Without impact and damping the energy is constant, so that the length of the steps is.
-    """
-    return energy < low_energy_limit(gamma, stretch_at_rest)
-
-
-@inlined
-def low_energy_limit(gamma, stretch_at_rest):
-    """The energy below which a beam has low energy, and flight steps are longer."""
-    return _LOW_ENERGY * 0.25 * gamma * stretch_at_rest * stretch_at_rest
-
-
 @inlined
 def time_beyond(time, crossing, step):
     """How long before *time* the centre last crossed the border of the wells; 0 if that is not one of the last steps."""
@@ -209,16 +188,8 @@ def time_beyond(time, crossing, step):
 
 
 @compiled
-def ticks_of(clock, level):
-    """Length of the step of a level, in ticks: halvings of the flight step, or -1 for twice its length."""
-    return clock.step << 1 if level < 0 else clock.step >> level
-
-
-@compiled
-def flight_level(clock, low_energy, stretch, stretch_at_rest):
-    """Halvings of the flight step for a beam stretched far beyond its wells; -1 if its energy is low."""
-    if low_energy:
-        return -1
+def flight_level(clock, stretch, stretch_at_rest):
+    """Halvings of the flight step for a beam stretched far beyond its wells."""
     level = 0
     reach = STRETCHED * stretch_at_rest
     while level < clock.finest and stretch_at_rest > 0.0 and abs(stretch) > reach:

@@ -55,9 +55,11 @@ the cycle, and modes that come in step with the kicks spoil single lengths."""
 _FINER = 2.0
 """Steps of sixth order that all others are compared with, over the shortest of them."""
 _STARTS = ((0.15, 1.0 / 60.0, 2.0, 0.3), (10.0, 1.0 / 160.0, 1.0, 1.0))
-"""Of each blow its energy over the barrier's, how long it lasts in periods of the first mode, the length of the steps
-that follow it over the flight step, and the error allowed over the limit: a beam that rings in its well, where steps
-are twice as long, and one that has been struck hard."""
+"""Of each blow its energy over the barrier's, how long it lasts at most in periods of the first mode, the length of the
+steps that are tried over the flight step, and the error allowed over the limit: a beam that rings in its well, and one
+that has been struck hard.  The first may ring for many cycles, so that steps of twice the length must serve."""
+_SHORT_IMPACT = 1.0 / 150.0
+"""Of the period of the first mode: impacts that are shorter excite higher modes, and the error allowed falls with them."""
 _STRUCK = 0.46
 """Where, over the length of the beam: no mode has a node there that its neighbours do not have near it."""
 _PERIODS = 2.0
@@ -72,7 +74,7 @@ _CHOSEN: OrderedDict[tuple[object, ...], float] = OrderedDict()
 _MOST_CHOSEN = 4096
 
 
-def flight_step(model: ReducedModel, order: int, limit: float) -> float:
+def flight_step(model: ReducedModel, order: int, limit: float, impact: float = math.inf) -> float:
     """The longest step in free flight, s, that serves a structure.
 
     Parameters
@@ -83,17 +85,22 @@ def flight_step(model: ReducedModel, order: int, limit: float) -> float:
     limit : float
         Greatest error of a displacement, over the buckling level, after two periods of the first mode; where the
         start is sensitive, that many times the displacement's relative slope along the velocity at the start.
+    impact : float
+        Duration of an impact, s: the blows that are tried last no longer, and of impacts shorter than 1/150 of the
+        period the limit is less in proportion.
     """
     period = 1.0 / model.reference_frequency
+    limit *= min(1.0, impact / (_SHORT_IMPACT * period))
     if model.nonlinear_stiffness == 0.0 or not model.tension_matrix.any():
         return period / _FEWEST  # nothing but linear modes, whose flow is exact
     structure = structure_of(model, "below")
     places = model.beam if model.contact_shape is None else model.contact_shape.tobytes()
-    key = (structure.hash, order, limit, period, model.length_scale, places)
+    longest = min(impact / period, max(duration for _, duration, *_ in _STARTS))
+    key = (structure.hash, order, limit, period, model.length_scale, places, longest)
     if key not in _CHOSEN:
-        chosen = period / _Bench(structure, order).fewest(limit)
+        chosen = period / _Bench(structure, order, longest).fewest(limit)
         if not structure.wells_are_mirror_images:
-            chosen = min(chosen, period / _Bench(structure, order, far=True).fewest(limit))
+            chosen = min(chosen, period / _Bench(structure, order, longest, far=True).fewest(limit))
         _CHOSEN[key] = chosen
         while len(_CHOSEN) > _MOST_CHOSEN:
             _CHOSEN.popitem(last=False)
@@ -103,7 +110,7 @@ def flight_step(model: ReducedModel, order: int, limit: float) -> float:
 class _Bench:
     """The structure, let go."""
 
-    def __init__(self, structure: Structure, order: int, far: bool = False) -> None:
+    def __init__(self, structure: Structure, order: int, impact: float, far: bool = False) -> None:
         model = structure.model
         self.structure = structure
         self.order = order
@@ -140,7 +147,8 @@ class _Bench:
         self.starts = []
         for energy, duration, *_ in _STARTS:
             # the spectrum of a pulse falls off beyond the inverse of what it lasts
-            velocity = blow / (1.0 + (self.omega * duration * self.period / math.pi) ** 2)
+            lasting = min(duration, impact) * self.period
+            velocity = blow / (1.0 + (self.omega * lasting / math.pi) ** 2)
             self.starts.append(velocity * math.sqrt(2.0 * energy * barrier / (velocity @ velocity)))
 
     def ends(self, velocity: _Array, counts: _Array, order: int) -> _Array:
@@ -303,18 +311,18 @@ def choose_base_step(
     order = _ORDER[accuracy]
     fastest = float(model.omega.max())
     limits = _LIMIT_OF_HITS if contact is not None and contact.impulsive else _LIMIT
-    flight = flight_step(model, order, limits[accuracy])
+    duration = 0.0
+    if contact is not None and not contact.impulsive:
+        mass = model.lightest_contact_mass
+        speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * model.reference_frequency
+        duration = contact.time_scale(mass, speed)
+    flight = flight_step(model, order, limits[accuracy], duration if duration > 0.0 else math.inf)
     if accuracy == "reference" and fastest * flight > _FREE_TURN:
         flight = _FREE_TURN / fastest
     decay = float((model.damping_ratio * model.omega).max())
     if decay * flight > _MOST_DECAY:
         flight = _MOST_DECAY / decay
     impact = flight
-    duration = 0.0
-    if contact is not None and not contact.impulsive:
-        mass = model.lightest_contact_mass
-        speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * model.reference_frequency
-        duration = contact.time_scale(mass, speed)
     if duration > 0.0:
         impact = _CONTACT_SHARE[accuracy] * duration
         flight = min(flight, impact * 2 ** _MOST_HALVINGS[accuracy])
@@ -378,10 +386,10 @@ def clocked(
         table["period"] = steps * SUBDIVISION
         table["tick"] = turn / table["period"]
         held = drive.duration * drive.frequency
-        table["landing"] = np.rint(table["period"] / held)
+        table["output_interval"] = np.rint(table["period"] / held)
         share = cycles_asked / drive.frequency / drive.duration
         table["end"] = np.rint(
-            share * table["period"] if periods is None else cycles_asked * table["landing"]
+            share * table["period"] if periods is None else cycles_asked * table["output_interval"]
         )
         table["end"] = np.minimum(table["end"], np.rint(left * table["period"]))
         cycles = float(table["end"][0] * table["tick"][0] * drive.frequency)
@@ -393,13 +401,13 @@ def clocked(
         table["end"] = table["period"] * int(cycles)
         if not cycles.is_integer():
             table["end"] = np.rint(table["period"] * cycles).astype(np.int64)
-        table["landing"] = table["period"]
+        table["output_interval"] = table["period"]
         if not repeats:
             _whole_steps(cycle, lengths, float(HORIZON))  # refused if that cannot be counted
             table["period"] *= HORIZON
     require_affordable(integration, system.model.modes, lengths, table["end"] / SUBDIVISION)
     if periods is None:
-        table["landing"] = table["end"]
+        table["output_interval"] = table["end"]
     table["last_quarter"] = table["end"] // 4 * 3
     return Clocked(cycles)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, compute_sweep
+from snapbeam.sweeps.compute import CheckpointOptions, compute_sweep
 from snapbeam.sweeps.replicates import Replicates
 from snapbeam.sweeps.setup import sweep_setup
 from snapbeam.util.diagnostics import counting

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.system import System
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, compute_sweep
+from snapbeam.sweeps.compute import CheckpointOptions, compute_sweep
 from snapbeam.sweeps.points import Grid, points_of
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup, variable_attributes
 from snapbeam.util.diagnostics import counting

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from snapbeam.util.validation import InputError, finite_array, integer, within
+from snapbeam.util.validation import InputError, finite_array, integer, seed_of, within
 
 __all__ = ["DifferentialEvolution", "dominates", "front_of"]
 
@@ -28,8 +28,9 @@ class DifferentialEvolution:
     bounds : array_like of shape (variables, 2)
     population : int
         At least 6.
-    seed : int
-        Generation g samples from its number and the seed alone.
+    rng : int, numpy.random.Generator or None
+        A seed; a generator, which gives one; None takes one from the system.  Generation g samples from its number and the
+        seed alone.
     weight, crossover : float
         F in (0, 2) and CR in [0, 1].
 
@@ -49,7 +50,7 @@ class DifferentialEvolution:
         self,
         bounds: ArrayLike,
         population: int = 24,
-        seed: int = 0,
+        rng: int | np.random.Generator | None = 0,
         weight: float = 0.6,
         crossover: float = 0.9,
     ) -> None:
@@ -57,7 +58,7 @@ class DifferentialEvolution:
         if self.bounds.shape[1] != 2 or (self.bounds[:, 0] >= self.bounds[:, 1]).any():
             raise InputError("bounds: must be pairs of which the first is less than the second")
         self.population = integer("population", population, 6, 100_000)
-        self.seed = integer("seed", seed, 0, 2**63 - 1)
+        self.seed = seed_of(rng)
         self.weight = within("weight", weight, 0.0, 2.0)
         self.crossover = within("crossover", crossover, 0.0, 1.0, closed="both")
         self.generation = 0

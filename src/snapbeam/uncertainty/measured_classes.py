@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from snapbeam.simulation.save import code_flags
 from snapbeam.uncertainty.monte_carlo import interval_of
 from snapbeam.util.status_codes import ResponseClass
-from snapbeam.util.validation import InputError, InputTypeError, checked, integer
+from snapbeam.util.validation import InputError, InputTypeError, checked, integer, seed_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,7 +45,11 @@ def class_counts(dataset: xr.Dataset) -> NDArray[np.int64]:
 
 @checked
 def score_measurements(
-    dataset: xr.Dataset, measurements: MeasuredPoints, *, samples: int = 10_000, seed: int = 0
+    dataset: xr.Dataset,
+    measurements: MeasuredPoints,
+    *,
+    samples: int = 10_000,
+    rng: int | np.random.Generator | None = 0,
 ) -> xr.Dataset:
     """How likely a probability map makes measured responses, one by one and all together.
 
@@ -58,7 +62,8 @@ def score_measurements(
         As :func:`snapbeam.sweeps.measured_points.read_measured_points` reads them; points of unknown class are left out.
     samples : int
         Sets of responses sampled from the map, with which the measured ones are compared.
-    seed : int
+    rng : int, numpy.random.Generator or None
+        A seed; a generator, which gives one; None takes one from the system.
 
     Returns
     -------
@@ -99,7 +104,7 @@ def score_measurements(
     if not hasattr(measurements, "response_class") or not hasattr(measurements, "frequency_ratio"):
         raise InputTypeError("measurements: must be MeasuredPoints, as read_measured_points reads them")
     integer("samples", samples, 100, 10**7)
-    integer("seed", seed, 0, 2**63 - 1)
+    seed = seed_of(rng)
     counts = class_counts(dataset)
     known = np.isin(measurements.response_class, _KINDS)
     if not known.any():

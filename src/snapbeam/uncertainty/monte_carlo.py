@@ -21,7 +21,7 @@ from snapbeam.model.parameters import lookup
 from snapbeam.model.state import amplitude_scale
 from snapbeam.model.system import System
 from snapbeam.solver.statistics import STATISTICS, rows_for
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, compute_table
+from snapbeam.sweeps.compute import CheckpointOptions, compute_table
 from snapbeam.sweeps.points import Columns, PointList
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
 from snapbeam.sweeps.tasks import PointWork

@@ -15,7 +15,7 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.system import System
 from snapbeam.solver.statistics import STATISTICS
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions
+from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.sweeps.points import Columns
 from snapbeam.uncertainty.differential_evolution import DifferentialEvolution, front_of
 from snapbeam.uncertainty.distributions import ParameterUncertainty

@@ -23,7 +23,7 @@ from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
 from snapbeam.simulation.simulate import simulate
 from snapbeam.simulation.tolerance import perturbation_growth
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions
+from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.uncertainty.distributions import Distribution, Empirical, ParameterUncertainty
 from snapbeam.uncertainty.measurements import Measurements
 from snapbeam.uncertainty.monte_carlo import reached, trials_of
@@ -37,6 +37,7 @@ from snapbeam.util.validation import (
     finite_array,
     integer,
     positive,
+    seed_of,
     shown,
     within,
 )
@@ -380,10 +381,10 @@ class Posterior:
         with np.errstate(divide="ignore"):
             return replace(self, weights=special.softmax(np.log(self.weights) + more))
 
-    def resampled(self, count: int, seed: int = 0) -> Posterior:
+    def resampled(self, count: int, rng: int | np.random.Generator | None = 0) -> Posterior:
         """Samples of equal weight, by systematic resampling."""
         integer("count", count, 1, 10**7)
-        generator = np.random.Generator(np.random.Philox(key=[integer("seed", seed, 0, 2**63 - 1), 0]))
+        generator = np.random.Generator(np.random.Philox(key=[seed_of(rng), 0]))
         ranks = (np.arange(count) + generator.random()) / count
         which = np.minimum(np.searchsorted(np.cumsum(self.weights), ranks), self.weights.size - 1)
         return Posterior(
@@ -436,7 +437,7 @@ def estimate_posterior(
     waveforms: Sequence[Waveform] | Waveform = (),
     modes: int = 8,
     samples: int = 2000,
-    seed: int = 0,
+    rng: int | np.random.Generator | None = 0,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> Posterior:
     """What measured frequencies, decays, collisions and waveforms say of a beam, beside what was known before.
@@ -458,7 +459,8 @@ def estimate_posterior(
         For the frequencies; a waveform has those of its system.
     samples : int
         Samples, at least 200.
-    seed : int
+    rng : int, numpy.random.Generator or None
+        A seed; a generator, which gives one; None takes one from the system.
     progress : callable, optional
         Called as ``progress(done, total)`` with samples of all stages, after the least squares; True writes a line to standard error.
 
@@ -502,7 +504,7 @@ def estimate_posterior(
     names = _checked_prior(prior, measured, tracked)
     known = np.array([positive(f"prior[{name}]", prior[name]) for name in names])
     integer("samples", samples, 200, 10**6)
-    integer("seed", seed, 0, 2**63 - 1)
+    seed = seed_of(rng)
     forward = None
     if measured is not None and (not tracked or _has_frequencies(measured)):
         forward = Forward(measured, integer("modes", modes, 1, 256))

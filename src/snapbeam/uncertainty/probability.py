@@ -13,7 +13,7 @@ from scipy import special
 
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions
+from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.sweeps.points import Points, points_of
 from snapbeam.sweeps.setup import SweepSetup, sweep_setup
 from snapbeam.uncertainty.distributions import ParameterUncertainty

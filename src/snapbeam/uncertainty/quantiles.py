@@ -14,7 +14,7 @@ from scipy import optimize, special
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.system import System
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions
+from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.sweeps.points import Grid, PointList, points_of
 from snapbeam.sweeps.setup import sweep_setup
 from snapbeam.uncertainty.distributions import ParameterUncertainty

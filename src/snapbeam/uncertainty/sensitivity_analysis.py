@@ -17,13 +17,23 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.system import System
 from snapbeam.solver.statistics import STATISTICS, of_one_named
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions
+from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.sweeps.points import PointList
 from snapbeam.uncertainty.distributions import ParameterUncertainty
 from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, require_held, trials_of
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.provenance import canonical_json
-from snapbeam.util.validation import InputError, axis, checked, choice, finite_array, integer, shown, within
+from snapbeam.util.validation import (
+    InputError,
+    axis,
+    checked,
+    choice,
+    finite_array,
+    integer,
+    seed_of,
+    shown,
+    within,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +71,12 @@ class Indices(NamedTuple):
 
 @checked
 def sobol_indices_from_samples(
-    inputs: ArrayLike, output: ArrayLike, *, confidence: float = 0.95, bins: int | None = None, seed: int = 0
+    inputs: ArrayLike,
+    output: ArrayLike,
+    *,
+    confidence: float = 0.95,
+    bins: int | None = None,
+    rng: int | np.random.Generator | None = 0,
 ) -> Indices:
     """First-order indices Var(E[y | x_j])/Var(y) of a sample, however it was sampled, of correlated inputs too.
 
@@ -76,7 +91,8 @@ def sobol_indices_from_samples(
     confidence : float
     bins : int, optional
         By default one for forty runs, 5 to 100: what varies within a bin is lost to the index.
-    seed : int
+    rng : int, numpy.random.Generator or None
+        A seed; a generator, which gives one; None takes one from the system.
         Chooses the groups.
 
     Returns
@@ -107,7 +123,7 @@ def sobol_indices_from_samples(
         raise InputError("output: does not vary, so nothing moves it")
     within("confidence", confidence, 0.0, 1.0)
     count = int(np.clip(y.size // 40, 5, 100)) if bins is None else integer("bins", bins, 2, y.size // 10)
-    generator = np.random.Generator(np.random.Philox(key=[integer("seed", seed, 0, 2**63 - 1), 0]))
+    generator = np.random.Generator(np.random.Philox(key=[seed_of(rng), 0]))
     group = generator.permutation(y.size) % _GROUPS
     binned = np.array([_bins(column, count) for column in x.T])
     whole = _all(binned, y, count)
@@ -159,7 +175,7 @@ def sobol_indices(
     *,
     replicates: int = 4,
     confidence: float = 0.95,
-    seed: int = 0,
+    rng: int | np.random.Generator | None = 0,
 ) -> Sobol:
     """Sobol's indices by Saltelli's estimator (``scipy.stats.sobol_indices``), over scrambled Sobol sequences.
 
@@ -177,7 +193,8 @@ def sobol_indices(
     replicates : int
         At least 4; use more points rather than more replicates.
     confidence : float
-    seed : int
+    rng : int, numpy.random.Generator or None
+        A seed; a generator, which gives one; None takes one from the system.
 
     Raises
     ------
@@ -195,7 +212,7 @@ def sobol_indices(
     integer("inputs", inputs, 1, 1000)
     integer("replicates", replicates, 4, 10_000)
     within("confidence", confidence, 0.0, 1.0)
-    integer("seed", seed, 0, 2**63 - 1)
+    seed = seed_of(rng)
     if integer("samples", samples, 2, 2**24) & (samples - 1):
         raise InputError(f"samples = {samples}: must be a power of 2")
     blocks = np.concatenate([_matrices(inputs, samples, seed, r) for r in range(replicates)], axis=1)
@@ -687,7 +704,7 @@ def _sobol(
         return values
 
     found = sobol_indices(
-        function, len(trials.uncertainty.of), count, replicates=_REPLICATES, confidence=confidence, seed=trials.uncertainty.seed
+        function, len(trials.uncertainty.of), count, replicates=_REPLICATES, confidence=confidence, rng=trials.uncertainty.seed
     )  # fmt: skip
     table: dict[str, _Array] = {}
     for name, indices in (("first_order", found.first), ("total_order", found.total)):
@@ -701,7 +718,7 @@ def _given_data(
     numbers = np.arange(count)
     scores = trials.uncertainty.normals(numbers)
     values = _ask(trials, quantity, scores, numbers)
-    found = sobol_indices_from_samples(scores, values, confidence=confidence, seed=trials.uncertainty.seed)
+    found = sobol_indices_from_samples(scores, values, confidence=confidence, rng=trials.uncertainty.seed)
     return {
         "first_order": found.estimate,
         "first_order_low": found.low,

@@ -42,6 +42,7 @@ __all__ = [
     "nonnegative",
     "parsed_json",
     "positive",
+    "seed_of",
     "shown",
     "within",
 ]
@@ -190,6 +191,20 @@ def integer(name: str, value: Any, low: int, high: int | None = None) -> int:
     if number < low or (high is not None and number > high):
         raise _refuse(name, value, allowed)
     return number
+
+
+def seed_of(rng: int | np.random.Generator | None) -> int:
+    """Return the seed that *rng* stands for: itself, a number that the generator draws, or one from the system (SPEC 7)."""
+    if rng is None:
+        rng = np.random.default_rng()
+    if isinstance(rng, np.random.Generator):
+        return int(rng.integers(2**63))
+    if isinstance(rng, (str, bytes)) or not isinstance(rng, (Integral, Real, np.ndarray)):
+        raise InputTypeError(
+            f"rng = {shown(rng)}: must be an integer of at least 0, a numpy.random.Generator or None, not "
+            f"{type(rng).__name__}"
+        )
+    return integer("rng", rng, 0, 2**63 - 1)
 
 
 def flag(name: str, value: Any) -> bool:

@@ -21,7 +21,7 @@ LINES = "Other lines in a shaker's record"
 def record(seed=0, snr_db=30.0, **options):
     """A vibrometer's record of a shaker that starts after 0.1 s."""
     known = {"duration": 0.8, "onset": 0.1, "start_up": 0.02} | options
-    return lab.render_vibrometer(FREQ, SPEED, seed=seed, snr_db=snr_db, **known)
+    return lab.render_vibrometer(FREQ, SPEED, rng=seed, snr_db=snr_db, **known)
 
 
 TRUE = record(snr_db=200.0)

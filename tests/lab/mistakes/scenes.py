@@ -148,7 +148,7 @@ def fields(folder, make):
             camera=SyntheticCamera(**CAMERA),
             stage=SyntheticStage(shaker_width=0.8e-3),
             rest_frames=24,
-            seed=wait,
+            rng=wait,
         )
         for wait in (half, 0)
     )

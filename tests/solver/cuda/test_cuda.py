@@ -42,7 +42,7 @@ def ensemble_of(modes, ratio, velocity, cycles, accuracy="standard", location=1 
     if cycles < 1:
         runs = ensemble.runs.copy()
         runs["end"] = (runs["period"] * cycles).astype(np.int64)
-        runs["landing"], runs["last_quarter"] = runs["end"], runs["end"] // 4 * 3
+        runs["output_interval"], runs["last_quarter"] = runs["end"], runs["end"] // 4 * 3
         ensemble = dataclasses.replace(ensemble, runs=runs)
     return ensemble
 

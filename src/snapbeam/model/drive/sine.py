@@ -1,10 +1,11 @@
-"""The sinusoidal drive of the paper (Eq. 16)."""
+"""Sines: by the velocity amplitude as in the paper (Eq. 16), by displacement or by acceleration."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.quantity import RUN, quantity
 
-__all__ = ["Sine"]
+__all__ = ["AccelerationSine", "DisplacementSine", "Sine"]
 
 
 _Array = NDArray[np.float64]
@@ -80,3 +81,103 @@ class Sine(Drive):
         """A omega^2."""
         numbers = self.numbers(columns, scale)
         return np.asarray(numbers["amplitude"] * numbers["omega"] ** 2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _OwnAmplitude(Drive):
+    """A sine whose amplitude is given otherwise; it is integrated as a :class:`Sine`."""
+
+    frequency_ratio: float = quantity(
+        "1", "excitation frequency over the first natural frequency", low=0.0, scope=RUN, symbol=r"\Omega"
+    )
+    harmonic = True
+    number_names = ("omega", "amplitude")
+    integrated_as: ClassVar[type[Drive] | None] = Sine
+
+    def _amplitude(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        raise NotImplementedError
+
+    def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """Angular frequency (rad/s) and amplitude of the displacement (m)."""
+        return {
+            "omega": columns["frequency_ratio"] * scale.omega,
+            "amplitude": self._amplitude(columns, scale),
+        }
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """One period of the sine."""
+        return np.asarray(2.0 * math.pi / (columns["frequency_ratio"] * scale.omega))
+
+    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
+        """Its amplitudes."""
+        numbers = self.numbers(columns, scale)
+        return numbers["amplitude"], numbers["amplitude"] * numbers["omega"]
+
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """A omega^2."""
+        numbers = self.numbers(columns, scale)
+        return np.asarray(numbers["amplitude"] * numbers["omega"] ** 2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DisplacementSine(_OwnAmplitude):
+    """A sine of the tip by its displacement, w_s(t) = w_0 + A sin(omega t + phase).
+
+    Parameters
+    ----------
+    frequency_ratio : float
+        Omega.
+    displacement_amplitude : float
+        A over the buckling level b.
+    phase : float
+        At the start, rad.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> striker = sb.Striker(drive=sb.DisplacementSine(frequency_ratio=1.2, displacement_amplitude=0.15))
+    """
+
+    displacement_amplitude: float = quantity(
+        "1", "displacement amplitude over b", low=0.0, closed="left", scope=RUN, symbol="A/b"
+    )
+    phase: float = quantity(
+        "rad", "phase of the drive at the start", default=0.0, low=-1e6, high=1e6, closed="both", scope=RUN,
+        short="drive_phase",
+    )  # fmt: skip
+    name = "displacement_sine"
+
+    def _amplitude(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        return np.asarray(columns["displacement_amplitude"] * scale.length)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AccelerationSine(_OwnAmplitude):
+    """A sine of the tip by its acceleration, whose amplitude is a: A = a/omega^2.
+
+    Parameters
+    ----------
+    frequency_ratio : float
+        Omega.
+    acceleration_amplitude : float
+        a over b omega_1^2.
+    phase : float
+        At the start, rad.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> base = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25))
+    """
+
+    acceleration_amplitude: float = quantity(
+        "1", "acceleration amplitude over b omega_1^2", low=0.0, closed="left", scope=RUN
+    )
+    phase: float = quantity(
+        "rad", "phase of the drive at the start", default=0.0, low=-1e6, high=1e6, closed="both", scope=RUN,
+        short="drive_phase",
+    )  # fmt: skip
+    name = "acceleration_sine"
+
+    def _amplitude(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        return np.asarray(columns["acceleration_amplitude"] * scale.length / columns["frequency_ratio"] ** 2)

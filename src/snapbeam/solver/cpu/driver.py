@@ -25,11 +25,11 @@ from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.further_contacts import NUMBERS, ONSET, TOUCHING, count_of, several
 from snapbeam.solver.registered_statistics import extras_of_table
 from snapbeam.solver.simd import WIDTH
-from snapbeam.solver.statistics import Landings, Last, Recorded, empty_accumulators
+from snapbeam.solver.statistics import Last, OutputStates, Recorded, empty_accumulators
 from snapbeam.solver.step_control import PIECES
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = ["integrate_tangents", "integrate_to_landing", "record", "run_ensemble", "usable_cores"]
+__all__ = ["integrate_tangents", "integrate_with_output_states", "record", "run_ensemble", "usable_cores"]
 
 
 _Array = NDArray[np.float64]
@@ -119,15 +119,15 @@ def run_ensemble(
     Runs are handed out longest first, a chunk at a time; what a run gives does not depend on which thread
     integrated it or on what it was integrated with.
     """
-    return _march(ensemble, threads, progress, landings=0).accumulators_of_runs
+    return _march(ensemble, threads, progress, output_states=0).accumulators_of_runs
 
 
-def integrate_to_landing(
+def integrate_with_output_states(
     ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
-) -> Landings:
-    """As :func:`run_ensemble`, and the states at every landing."""
-    landings = int(-(-ensemble.runs["end"][0] // ensemble.runs["landing"][0]))
-    return _march(ensemble, threads, progress, landings)
+) -> OutputStates:
+    """As :func:`run_ensemble`, and the states at every output time."""
+    output_states = int(-(-ensemble.runs["end"][0] // ensemble.runs["output_interval"][0]))
+    return _march(ensemble, threads, progress, output_states)
 
 
 def integrate_tangents(
@@ -135,8 +135,8 @@ def integrate_tangents(
     tangents: _Array,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> tuple[Landings, _Array]:
-    """As :func:`integrate_to_landing`, with tangents carried along to the end.
+) -> tuple[OutputStates, _Array]:
+    """As :func:`integrate_with_output_states`, with tangents carried along to the end.
 
     Parameters
     ----------
@@ -145,10 +145,10 @@ def integrate_tangents(
 
     Returns
     -------
-    landings : Landings
+    states : OutputStates
     tangents : array of shape (runs, k, 2, N)
     """
-    landings = int(-(-ensemble.runs["end"][0] // ensemble.runs["landing"][0]))
+    output_states = int(-(-ensemble.runs["end"][0] // ensemble.runs["output_interval"][0]))
     packed = _packed(ensemble)
     size = packed.layout.size
     spread = packed.spread(tangents).reshape(*tangents.shape[:2], 2 * size)
@@ -172,7 +172,7 @@ def integrate_tangents(
             first,
         )
 
-    found = _spread_over(ensemble, packed, march, arguments, threads, progress, landings)
+    found = _spread_over(ensemble, packed, march, arguments, threads, progress, output_states)
     return found, spread.reshape(*tangents.shape[:2], 2, size)[..., packed.rows]
 
 
@@ -180,11 +180,13 @@ def _march(
     ensemble: Ensemble,
     threads: int | None,
     progress: Callable[[int, int], object] | None,
-    landings: int,
-) -> Landings:
+    output_states: int,
+) -> OutputStates:
     packed = _packed(ensemble)
-    if landings == 0 and _few_modes_pay(ensemble, packed):
-        return _spread_over(ensemble, packed, *_side_by_side(ensemble, packed), threads, progress, landings)
+    if output_states == 0 and _few_modes_pay(ensemble, packed):
+        return _spread_over(
+            ensemble, packed, *_side_by_side(ensemble, packed), threads, progress, output_states
+        )
     march = _kernel(integrate_ensemble, ensemble)
 
     def arguments(which: _Integers, kernel_output: KernelOutput) -> tuple[Any, ...]:
@@ -201,7 +203,7 @@ def _march(
             kernel_output,
         )
 
-    return _spread_over(ensemble, packed, march, arguments, threads, progress, landings)
+    return _spread_over(ensemble, packed, march, arguments, threads, progress, output_states)
 
 
 def _few_modes_pay(ensemble: Ensemble, packed: Packed) -> bool:
@@ -252,14 +254,14 @@ def _spread_over(
     arguments: Callable[[_Integers, KernelOutput], tuple[Any, ...]],
     threads: int | None,
     progress: Callable[[int, int], object] | None,
-    landings: int,
-) -> Landings:
+    output_states: int,
+) -> OutputStates:
     """Hand the runs to threads, in chunks; *arguments* are those of *integrate*, whose memory is a thread's own."""
     size = packed.layout.size
     kernel_output = KernelOutput(
         empty_accumulators(ensemble.size, _beside(ensemble)),
-        np.empty((ensemble.size, landings, 2 * size)),
-        np.empty((ensemble.size, landings, 2 + _beside(ensemble)), dtype=np.int64),
+        np.empty((ensemble.size, output_states, 2 * size)),
+        np.empty((ensemble.size, output_states, 2 + _beside(ensemble)), dtype=np.int64),
         np.zeros(1, dtype=np.int64),
     )
     threads = threads or usable_cores()
@@ -288,7 +290,7 @@ def _spread_over(
             raise
     q, p = kernel_output.states[..., packed.rows], kernel_output.states[..., size + packed.rows]
     contacts = kernel_output.contacts
-    return Landings(kernel_output.accumulators_of_runs, q, p, contacts[..., 0], contacts[..., 1:])
+    return OutputStates(kernel_output.accumulators_of_runs, q, p, contacts[..., 0], contacts[..., 1:])
 
 
 def _last(

@@ -29,7 +29,6 @@ from snapbeam.solver.cpu.step import (
 from snapbeam.solver.cpu.terms.circuit import (
     accumulate_circuit,
     circuit_speed_bound,
-    disable_long_steps,
     missed_onset,
     validity_horizon,
 )
@@ -61,12 +60,10 @@ from snapbeam.solver.step_control import (
     close_impact,
     count_zero_crossings_in_step,
     first_contact_onset,
-    is_low_energy,
     refine_onset,
     safe_interval,
 )
 from snapbeam.solver.terms.interface import (
-    above_nearest_well,
     accumulate_work,
     add_potential_energy,
     add_to_speed_bound,
@@ -345,55 +342,41 @@ def swap_rows(rows):
 def monitor_energy(
     memory, layout, run, now, t, state, seen1, control, event, status, accumulators, kernel_input
 ):
-    """Evaluate the energy every eighth step and after a release, every step where some modes count as high.
+    """Add up the energy of the modes where some count as high, and end the run where its class is certain.
 
-    Updates the step control and the status.
-
-    *state* contains the locations of q, p and k, and the values of g.q and q.Gq.  The energy decides whether long steps
-    are permitted and whether early termination is possible.  Returns the step control and the status.
+    *state* contains the locations of q, p and k, and the values of g.q and q.Gq.  Every sixteenth step the energy decides
+    whether early termination is possible.  Returns the step control and the status.
     """
-    clock, steps_since_start, low_energy, last = (
-        run.clock,
-        control.steps_since_start,
-        control.low_energy,
-        control.energy_tick,
-    )
+    clock, steps_since_start, last = run.clock, control.steps_since_start, control.energy_tick
     q, p, k, gq, qr = state
-    released = event and not control.touching
-    looked_at, linear = released or (steps_since_start & 7) == 0, 0.0
+    decides = clock.decide_energy > -math.inf and (steps_since_start & 15) == 0
+    decides = (
+        decides and not (event or control.touching) and now.well_sign < 0.0 and seen1.w > clock.decide_reach
+    )
+    decides = decides and center_from_divide(layout.terms, seen1.c) > 0.0
+    linear = 0.0
     if run.high:
         pressed = control.touching and not event
         span, last = (t - last) * clock.tick, t
         linear = sample_energy(
             memory, layout, run, now.well_sign, (q, p, k), seen1, pressed, accumulators, span
         )
-    elif looked_at:
+    elif decides:
         near = relative_to_nearest_well(memory, layout.size, layout.terms, now.well_sign, run.spare, q)
         linear = modal_energy(memory, layout, near, p)
-    if looked_at:
-        if not control.touching:
-            energy = linear + tension_energy(layout.gamma, gq, qr)
-            if wells_differ(layout.terms):
-                energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
-            energy = add_potential_energy(memory, layout.size, layout.terms, q, energy)
-            low_energy = is_low_energy(
-                above_nearest_well(layout.terms, now.well_sign, energy), layout.gamma, layout.stretch
-            )
-            low_energy = disable_long_steps(layout.circuit, layout.terms, low_energy)
-            if (
-                not event
-                and now.well_sign < 0.0
-                and (steps_since_start & 15) == 0
-                and seen1.w > clock.decide_reach
-            ):
-                if center_from_divide(layout.terms, seen1.c) > 0.0 and energy < clock.decide_energy:
-                    status = _EARLY_STOP
+    if decides:
+        energy = linear + tension_energy(layout.gamma, gq, qr)
+        if wells_differ(layout.terms):
+            energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
+        energy = add_potential_energy(memory, layout.size, layout.terms, q, energy)
+        if energy < clock.decide_energy:
+            status = _EARLY_STOP
     if clock.decide_crossings >= 0 and accumulators.zero_crossings_last_quarter > clock.decide_crossings:
         status = _EARLY_STOP
     if status == _RUNNING and accumulators.steps >= clock.max_steps:
         status = _STEP_LIMIT
     return StepControl(
-        control.touching, low_energy, control.safe_gap, control.safe_center, last, steps_since_start
+        control.touching, control.safe_gap, control.safe_center, last, steps_since_start
     ), status
 
 
@@ -416,7 +399,15 @@ def accept_step(
     if not math.isfinite(about.d + about.dv):
         return (
             IntegratorState(
-                t, now.well_sign, now.stretch, now.rows, seen, now.control, now.sample, now.landed, _DIVERGED
+                t,
+                now.well_sign,
+                now.stretch,
+                now.rows,
+                seen,
+                now.control,
+                now.sample,
+                now.stored_states,
+                _DIVERGED,
             ),
             step,
         )
@@ -443,14 +434,13 @@ def accept_step(
         status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
         control = StepControl(
             touching or contact_event.event,
-            now.control.low_energy,
             contact_event.safe_gap,
             contact_event.safe_center,
             now.control.energy_tick,
             now.control.steps_since_start,
         )
         return IntegratorState(
-            t, now.well_sign, now.stretch, now.rows, seen, control, now.sample, now.landed, status
+            t, now.well_sign, now.stretch, now.rows, seen, control, now.sample, now.stored_states, status
         ), step
     whole, cut = step.ticks, contact_event.cut
     corrections = 0 if touching or not contact_event.event else _LOCATIONS if jumps(tip.law) else 1
@@ -506,11 +496,7 @@ def accept_step(
     # accept
     t += step.ticks
     status = _RUNNING if t < clock.end else _OK
-    low_energy, safe_gap, safe_center = (
-        now.control.low_energy,
-        contact_event.safe_gap,
-        contact_event.safe_center,
-    )
+    safe_gap, safe_center = contact_event.safe_gap, contact_event.safe_center
     if contact_event.event:
         safe_gap, safe_center = t, t
         if touching:
@@ -526,7 +512,7 @@ def accept_step(
     )
     touching = touching != contact_event.event
     control = StepControl(
-        touching, low_energy, safe_gap, safe_center, now.control.energy_tick, now.control.steps_since_start
+        touching, safe_gap, safe_center, now.control.energy_tick, now.control.steps_since_start
     )
     state = step.q1, step.p1, step.k1, done.gq, done.qr
     control, status = monitor_energy(
@@ -550,7 +536,7 @@ def accept_step(
     stretch = 2.0 * done.gq + done.qr
     return (
         IntegratorState(
-            t, now.well_sign, stretch, swap_rows(now.rows), seen1, control, sample, now.landed, status
+            t, now.well_sign, stretch, swap_rows(now.rows), seen1, control, sample, now.stored_states, status
         ),
         step,
     )

@@ -43,7 +43,7 @@ from snapbeam.solver.cpu.terms.further_contact_events import (
 )
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, mirror_further_contacts
 from snapbeam.solver.excitation import seen_from
-from snapbeam.solver.step_control import contact_level, flight_level, ticks_of, time_beyond
+from snapbeam.solver.step_control import contact_level, flight_level, time_beyond
 from snapbeam.solver.terms.interface import has_crossed, update_forces
 from snapbeam.util.status_codes import RunStatus
 
@@ -60,9 +60,9 @@ class KernelOutput(NamedTuple):
     accumulators_of_runs: Any
     """A record a run."""
     states: Any
-    """States at landings, q and p about the well at hand, shape (runs, landings, 2 rows); none if of length 0."""
+    """Output states, q and p about the well at hand, shape (runs, output states, 2 rows); none if of length 0."""
     contacts: Any
-    """That well, and for each striker the ticks since its contact began (-1: apart), shape (runs, landings, 1 + strikers)."""
+    """That well, and for each striker the ticks since its contact began (-1: apart), shape (runs, output states, 1 + strikers)."""
     stop_flag: Any
     """Not 0: stop."""
 
@@ -88,14 +88,14 @@ def propose_step(memory, blocks, workspace, run, now, accumulators):
             change_energy_origin(memory, layout, run, now, accumulators, beyond)
         well_sign = -well_sign
     accumulators.steps += 1
-    level = flight_level(clock, control.low_energy, stretch, layout.stretch)
+    level = flight_level(clock, stretch, layout.stretch)
     if control.touching:
         left = released_at(run.struck.law, seen.d, seen.dv)
         level = max(level, contact_level(clock, (t - accumulators.onset) * clock.tick, left, seen.dv))
     level = further_contacts_step_level(memory, layout.others, clock, t, control.touching, level)
-    ticks, at = ticks_of(clock, level), run.coefficients + (level + 1) * run.slot
+    ticks, at = clock.step >> level, run.coefficients + level * run.slot
     # up to the next state that is handed out, to a jump of the drive's velocity, or to the end
-    limit = min((now.landed + 1) * clock.landing, clock.end)
+    limit = min((now.stored_states + 1) * clock.output_interval, clock.end)
     limit = up_to_discontinuity(run.struck.drive, run.phase, clock.period, t, limit)
     if t + ticks > limit:
         ticks, at = limit - t, cut_slot(run)
@@ -112,7 +112,7 @@ def propose_step(memory, blocks, workspace, run, now, accumulators):
         seen,
         _with_one_more_step(control, energy_tick),
         now.sample,
-        now.landed,
+        now.stored_states,
         now.status,
     ), step
 
@@ -122,7 +122,6 @@ def _with_one_more_step(control, energy_tick):
     """One step more, and where the energy was last looked at."""
     return StepControl(
         control.touching,
-        control.low_energy,
         control.safe_gap,
         control.safe_center,
         energy_tick,
@@ -132,22 +131,24 @@ def _with_one_more_step(control, energy_tick):
 
 @inlined
 def store_state(memory, blocks, layout, run, now, accumulators, i, kernel_output):
-    """Keep the state of a run that has come to a landing, and begin again from it alone."""
-    if kernel_output.states.shape[1] == 0 or now.t < min((now.landed + 1) * run.clock.landing, run.clock.end):
+    """Keep the state of a run that has reached an output time, and begin again from it alone."""
+    if kernel_output.states.shape[1] == 0 or now.t < min(
+        (now.stored_states + 1) * run.clock.output_interval, run.clock.end
+    ):
         return now
-    size, rows, landed = layout.size, now.rows, now.landed
+    size, rows, stored = layout.size, now.rows, now.stored_states
     for row in range(size):
-        kernel_output.states[i, landed, row] = memory[rows.q + row]
-        kernel_output.states[i, landed, size + row] = memory[rows.p + row]
-    kernel_output.contacts[i, landed, 0] = int(now.well_sign)
-    kernel_output.contacts[i, landed, 1] = now.t - accumulators.onset if now.control.touching else -1
-    store_contact_states(memory, layout.others, now.t, kernel_output.contacts[i, landed])
+        kernel_output.states[i, stored, row] = memory[rows.q + row]
+        kernel_output.states[i, stored, size + row] = memory[rows.p + row]
+    kernel_output.contacts[i, stored, 0] = int(now.well_sign)
+    kernel_output.contacts[i, stored, 1] = now.t - accumulators.onset if now.control.touching else -1
+    store_contact_states(memory, layout.others, now.t, kernel_output.contacts[i, stored])
     if now.status != _RUNNING:
         return now
     if run.high:
         close_energy(memory, layout, run, now, accumulators)
     again, _ = restart_from_state(
-        memory, blocks, layout, run, now.t, now.well_sign, rows, now.control.touching, landed + 1, now.sample
+        memory, blocks, layout, run, now.t, now.well_sign, rows, now.control.touching, stored + 1, now.sample
     )
     return again
 

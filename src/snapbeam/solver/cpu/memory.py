@@ -195,7 +195,7 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
     *extra_rows* are added to the work rows of the first place.
     """
     size, first = packed.layout.size, packed.layout
-    slots = (ensemble.finest + 3) * slot_length(ensemble.order, size) + 8 * size
+    slots = (ensemble.finest + 2) * slot_length(ensemble.order, size) + 8 * size
     work = (WORK_ROWS + extra_rows) * size + slots
     second = first._replace(
         g=first.work + work, contact=first.work + work + size, work=first.work + work + 2 * size

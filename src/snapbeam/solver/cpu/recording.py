@@ -255,11 +255,11 @@ def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, acc
 def save_state(now, marks, reals):
     """Where a run stands, written down."""
     rows, seen, control = now.rows, now.seen, now.control
-    marks[0], marks[1], marks[2], marks[3] = now.t, now.sample, now.landed, now.status
+    marks[0], marks[1], marks[2], marks[3] = now.t, now.sample, now.stored_states, now.status
     marks[4], marks[5], marks[6] = rows.q, rows.p, rows.k
     marks[7], marks[8], marks[9] = rows.q1, rows.p1, rows.k1
-    marks[10], marks[11] = int(control.touching), int(control.low_energy)
-    marks[12], marks[13], marks[14], marks[15] = (
+    marks[10] = int(control.touching)
+    marks[11], marks[12], marks[13], marks[14] = (
         control.safe_gap,
         control.safe_center,
         control.energy_tick,
@@ -275,5 +275,5 @@ def restore_state(marks, reals):
     """Where a run stood when it was laid aside."""
     rows = Rows(marks[4], marks[5], marks[6], marks[7], marks[8], marks[9])
     seen = ContactKinematics(reals[2], reals[3], reals[4], reals[5], reals[6], reals[7])
-    control = StepControl(marks[10] != 0, marks[11] != 0, marks[12], marks[13], marks[14], marks[15])
+    control = StepControl(marks[10] != 0, marks[11], marks[12], marks[13], marks[14])
     return IntegratorState(marks[0], reals[0], reals[1], rows, seen, control, marks[1], marks[2], marks[3])

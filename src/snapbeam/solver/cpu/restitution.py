@@ -28,7 +28,6 @@ from snapbeam.solver.step_control import (
     close_impact,
     contact_level,
     count_zero_crossings_in_step,
-    ticks_of,
 )
 from snapbeam.solver.terms.interface import center_from_divide, seen_from_divide
 from snapbeam.util.status_codes import RunStatus
@@ -94,8 +93,8 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
     rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center
     t, seen, control = now.t, now.seen, now.control
     # however strongly it is stretched, a beam that is carried moves no faster than the tip
-    left = min((now.landed + 1) * clock.landing, clock.end) - t
-    ticks = min(ticks_of(clock, contact_level(clock, (t - accumulators.onset) * tick, 0.0, 0.0)), left)
+    left = min((now.stored_states + 1) * clock.output_interval, clock.end) - t
+    ticks = min(clock.step >> contact_level(clock, (t - accumulators.onset) * tick, 0.0, 0.0), left)
     ticks = max(1, ticks // 4)
     length = ticks * tick
     release = _release(memory, blocks, layout, run, tip, step.phase, length)
@@ -149,15 +148,13 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
         seen1 = ContactKinematics(
             about.w + rest_contact, about.wv, d, about.dv, about.c + rest_center, about.cv
         )
-    next_control = StepControl(
-        touching, control.low_energy, t, t, control.energy_tick, control.steps_since_start
-    )
+    next_control = StepControl(touching, t, t, control.energy_tick, control.steps_since_start)
     state = rows.q, rows.p, rows.k, gq, qr
     next_control, status = monitor_energy(
         memory, layout, run, now, t, state, seen1, next_control, released, status, accumulators, kernel_input
     )
     return IntegratorState(
-        t, now.well_sign, 2.0 * gq + qr, rows, seen1, next_control, sample, now.landed, status
+        t, now.well_sign, 2.0 * gq + qr, rows, seen1, next_control, sample, now.stored_states, status
     ), step
 
 
@@ -418,17 +415,33 @@ def accept_step_restitution(
         status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
         away = 0.0 if together else tip.law.coefficient * seen.dv
         wv = seen.wv + seen.dv + away
-        next_control = StepControl(together, False, t, t, control.energy_tick, control.steps_since_start)
+        next_control = StepControl(together, t, t, control.energy_tick, control.steps_since_start)
         after = ContactKinematics(seen.w, wv, 0.0, -away, seen.c, memory_rate(memory, layout, p))
         return IntegratorState(
-            t, now.well_sign, now.stretch, now.rows, after, next_control, now.sample, now.landed, status
+            t,
+            now.well_sign,
+            now.stretch,
+            now.rows,
+            after,
+            next_control,
+            now.sample,
+            now.stored_states,
+            status,
         ), step
 
     about = observe(memory, layout, tip, step.phase + tip.drive.omega * step.length, step.q1, step.p1)
     if not math.isfinite(about.d + about.dv):
         return (
             IntegratorState(
-                t, now.well_sign, now.stretch, now.rows, seen, control, now.sample, now.landed, _DIVERGED
+                t,
+                now.well_sign,
+                now.stretch,
+                now.rows,
+                seen,
+                control,
+                now.sample,
+                now.stored_states,
+                _DIVERGED,
             ),
             step,
         )
@@ -496,14 +509,14 @@ def accept_step_restitution(
         seen1 = ContactKinematics(about.w + rest_contact, about.wv, d, dv, about.c + rest_center, about.cv)
     safe_gap, safe_center = (t, t) if entry >= 0.0 else (contact_event.safe_gap, contact_event.safe_center)
     next_control = StepControl(
-        together, control.low_energy, safe_gap, safe_center, control.energy_tick, control.steps_since_start
+        together, safe_gap, safe_center, control.energy_tick, control.steps_since_start
     )
     state = rows.q, rows.p, rows.k, gq, qr
     next_control, status = monitor_energy(
         memory, layout, run, now, t, state, seen1, next_control, hit, status, accumulators, kernel_input
     )
     return IntegratorState(
-        t, now.well_sign, 2.0 * gq + qr, rows, seen1, next_control, sample, now.landed, status
+        t, now.well_sign, 2.0 * gq + qr, rows, seen1, next_control, sample, now.stored_states, status
     ), step
 
 

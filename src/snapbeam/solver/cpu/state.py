@@ -19,7 +19,7 @@ from snapbeam.solver.cpu.mode_lanes import (
     tension_rows,
 )
 from snapbeam.solver.cpu.step import observe, prepare
-from snapbeam.solver.cpu.terms.circuit import disable_long_steps, put_rate
+from snapbeam.solver.cpu.terms.circuit import put_rate
 from snapbeam.solver.cpu.terms.further_contact_events import (
     accumulate_open_further_contacts,
     begin_further_contacts,
@@ -39,10 +39,8 @@ from snapbeam.solver.step_control import (
     begin_statistics,
     clock_of,
     close_impact,
-    is_low_energy,
 )
 from snapbeam.solver.terms.interface import (
-    above_nearest_well,
     add_potential_energy,
     add_to_tension,
     enter_well,
@@ -125,8 +123,6 @@ class StepControl(NamedTuple):
     """The quantities that control the steps, kept from step to step."""
 
     touching: bool
-    low_energy: bool
-    """Whether the energy is so low that longer steps serve."""
     safe_gap: int
     """Until this tick the gap cannot close."""
     safe_center: int
@@ -134,7 +130,7 @@ class StepControl(NamedTuple):
     energy_tick: int
     """Tick at which the energy was last looked at."""
     steps_since_start: int
-    """Steps since the run began or landed."""
+    """Steps since the run began or was stored."""
 
 
 class Run(NamedTuple):
@@ -181,7 +177,7 @@ class IntegratorState(NamedTuple):
     control: StepControl
     sample: int
     """Instants recorded so far."""
-    landed: int
+    stored_states: int
     """States handed out so far."""
     status: int
 
@@ -189,7 +185,7 @@ class IntegratorState(NamedTuple):
 @inlined
 def cut_slot(run):
     """Where a step of any other length is prepared."""
-    return run.coefficients + (run.clock.finest + 2) * run.slot
+    return run.coefficients + (run.clock.finest + 1) * run.slot
 
 
 @inlined
@@ -217,8 +213,8 @@ def run_of(memory, layout, stages, kernel_input, i):
     clock = clock_of(record, kernel_input.max_steps)
     coefficients, slot = work + WORK_ROWS * size, (stages.flows + 1) // 2 * 4 * size + 2 * TURNS
     step_time = clock.step * clock.tick
-    for level in range(clock.finest + 2):
-        length, at = 2.0 * step_time / (1 << level), coefficients + level * slot
+    for level in range(clock.finest + 1):
+        length, at = step_time / (1 << level), coefficients + level * slot
         prepare(memory, layout, stages, struck.drive, length, at)
     fastest = drive_rate(struck.drive)
     for row in range(size):
@@ -290,8 +286,8 @@ def change_energy_origin(memory, layout, run, now, accumulators, span):
 
 
 @called
-def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching, landed, sample):
-    """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from a landing."""
+def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching, stored, sample):
+    """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from an output state."""
     q, p, k, r = rows.q, rows.p, rows.k, layout.work + 9 * layout.size
     update_forces(memory, layout.size, layout.terms, run.struck.drive, phase_at(run, t), q)
     evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, phase_at(run, t), q, 0.0, False)
@@ -308,12 +304,9 @@ def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching
     )
     energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
     energy = add_potential_energy(memory, layout.size, layout.terms, q, energy)
-    low_energy = is_low_energy(
-        above_nearest_well(layout.terms, well_sign, energy), layout.gamma, layout.stretch
-    )
     status = _RUNNING if t < run.clock.end else _OK
-    control = StepControl(touching, disable_long_steps(layout.circuit, layout.terms, low_energy), t, t, t, 0)
-    return IntegratorState(t, well_sign, 2.0 * gq + qr, rows, seen, control, sample, landed, status), energy
+    control = StepControl(touching, t, t, t, 0)
+    return IntegratorState(t, well_sign, 2.0 * gq + qr, rows, seen, control, sample, stored, status), energy
 
 
 @compiled
@@ -361,7 +354,7 @@ def begin(memory, blocks, workspace, kernel_input, i, accumulators):
         run.struck.law,
         with_further_contact_energy(memory, layout.others, energy + contact_energy(run.struck.law, seen.d)),
     )
-    control = StepControl(touching, now.control.low_energy, 0, 0, 0, 0)
+    control = StepControl(touching, 0, 0, 0, 0)
     begun = IntegratorState(0, now.well_sign, now.stretch, rows, seen, control, 0, 0, now.status)
     if run.high:
         close_energy(memory, layout, run, begun, accumulators)

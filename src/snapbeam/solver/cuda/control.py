@@ -21,10 +21,8 @@ from snapbeam.solver.step_control import (
     count_zero_crossings_in_step,
     first_contact_onset,
     flight_level,
-    is_low_energy,
     refine_onset,
     safe_interval,
-    ticks_of,
     time_beyond,
 )
 from snapbeam.util.status_codes import RunStatus
@@ -50,7 +48,7 @@ _close_impact, _accumulate_displacement, _accumulate_energy, _begin_other_well =
     shared(begin_other_well),
 )
 _time_beyond = shared(time_beyond)
-_safe_interval, _is_low_energy, _ticks_of = shared(safe_interval), shared(is_low_energy), shared(ticks_of)
+_safe_interval = shared(safe_interval)
 _flight_level, _contact_level, _seen_from = shared(flight_level), shared(contact_level), shared(seen_from)
 _first_downcrossing, _turning_point, _update_extrema = (
     shared(first_downcrossing),
@@ -258,21 +256,20 @@ def _acceptance_functions(functions: Functions) -> tuple[Any, Any]:
                 )  # fmt: skip
 
     @device
-    def monitor_energy(block, fixed, held, step, t, well_sign, touching, released, status, accumulators):
-        """Add up the energy of the modes; after some steps, or a release, it decides about the next ones."""
-        low_energy, own = held.low_energy, step.own
+    def monitor_energy(block, fixed, held, step, t, well_sign, touching, status, accumulators):
+        """Add up the energy of the modes; every sixteenth step it decides about an early end."""
+        own = step.own
         pressed = touching and not step.event
         linear, high, power, high_power = energies(block, fixed, own, step.seen, pressed)
         if block.lane == 0 and fixed.high:
             span = (t - held.energy_tick) * fixed.clock.tick
             _accumulate_energy(accumulators, linear, high, power, high_power, span)
-        if not touching and (released or (held.steps & 7) == 0):
+        far = well_sign < 0.0 and step.seen.w > fixed.clock.decide_reach and step.seen.c > 0.0
+        if far and not (touching or step.event) and (held.steps & 15) == 0:
             energy = linear + tension_energy(fixed.gamma, own.gq, own.qr)
-            low_energy = _is_low_energy(energy, fixed.gamma, fixed.rest_stretch)
-            far = well_sign < 0.0 and step.seen.w > fixed.clock.decide_reach and step.seen.c > 0.0
-            if not step.event and far and (held.steps & 15) == 0 and energy < fixed.clock.decide_energy:
+            if energy < fixed.clock.decide_energy:
                 status = _EARLY_STOP
-        return low_energy, t, status
+        return t, status
 
     return accumulate_step, monitor_energy
 
@@ -290,11 +287,11 @@ def step_function(functions: Functions) -> Any:
         clock = fixed.clock
         own, well_sign, energy_tick = change_well(block, fixed, held, accumulators)
         steps = held.steps + 1
-        level = _flight_level(clock, held.low_energy, 2.0 * own.gq + own.qr, fixed.rest_stretch)
+        level = _flight_level(clock, 2.0 * own.gq + own.qr, fixed.rest_stretch)
         if held.touching:
             elapsed = (held.t - held.onset) * clock.tick
             level = max(level, _contact_level(clock, elapsed, held.seen.d, held.seen.dv))
-        span, slot = _ticks_of(clock, level), level + 1
+        span, slot = clock.step >> level, level
         if held.t + span > clock.end:
             span, slot = clock.end - held.t, fixed.cut_slot
         phase = fixed.phase + _TWO_PI * ((held.t % clock.period) / clock.period)
@@ -305,7 +302,7 @@ def step_function(functions: Functions) -> Any:
             if block.lane == 0 and step.entered:
                 accumulators.touching, accumulators.onset = 1, held.t
             return Held(
-                held.t, well_sign, own, held.seen, held.touching or step.entered, held.low_energy, step.safe_gap,
+                held.t, well_sign, own, held.seen, held.touching or step.entered, step.safe_gap,
                 step.safe_center, onset, held.deepest, energy_tick, steps, status,
             )  # fmt: skip
         counted = held.touching or held.t + step.span > step.safe_center
@@ -314,7 +311,6 @@ def step_function(functions: Functions) -> Any:
         status = _RUNNING if t < clock.end else _OK
         touching, onset, deepest = held.touching != step.event, held.onset, step.deepest
         safe_gap, safe_center = step.safe_gap, step.safe_center
-        released = step.event and held.touching
         if step.event:
             safe_gap, safe_center = t, t
             if held.touching:
@@ -327,11 +323,11 @@ def step_function(functions: Functions) -> Any:
                 if block.lane == 0:
                     accumulators.touching, accumulators.onset = 1, t
         counting = Held(
-            held.t, held.well_sign, held.own, held.seen, held.touching, held.low_energy, held.safe_gap, held.safe_center,
+            held.t, held.well_sign, held.own, held.seen, held.touching, held.safe_gap, held.safe_center,
             held.onset, held.deepest, energy_tick, steps, held.status,
         )  # fmt: skip
-        low_energy, energy_tick, status = monitor_energy(
-            block, fixed, counting, step, t, well_sign, touching, released, status, accumulators
+        energy_tick, status = monitor_energy(
+            block, fixed, counting, step, t, well_sign, touching, status, accumulators
         )
         if counted and clock.decide_crossings >= 0:
             synchronise()
@@ -345,7 +341,6 @@ def step_function(functions: Functions) -> Any:
             step.own,
             seen,
             touching,
-            low_energy,
             safe_gap,
             safe_center,
             onset,

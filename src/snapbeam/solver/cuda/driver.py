@@ -26,14 +26,14 @@ from snapbeam.solver.cuda.layout import (
 )
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.splitting import COMPOSITIONS, TURNS
-from snapbeam.solver.statistics import Landings, Recorded, empty_accumulators, updated
+from snapbeam.solver.statistics import OutputStates, Recorded, empty_accumulators, updated
 from snapbeam.solver.step_control import PIECES
 from snapbeam.util.validation import InputError
 
 __all__ = [
     "Options",
     "integrate_tangents",
-    "integrate_to_landing",
+    "integrate_with_output_states",
     "record",
     "refusal",
     "run_ensemble",
@@ -154,7 +154,7 @@ class _Launch:
 
         threads, blocks = self.structure.threads, self.blocks
         distinct = (COMPOSITIONS[self.ensemble.order].flow.size + 1) // 2
-        flows = (self.finest + 3) * distinct + 2
+        flows = (self.finest + 2) * distinct + 2
         kernel_output = DeviceState(
             cuda.to_device(np.full(blocks, -1, dtype=np.int64)),
             cuda.to_device(np.zeros((blocks, MARKS), dtype=np.int64)),
@@ -163,7 +163,7 @@ class _Launch:
         )
         work = DeviceWorkspace(
             cuda.device_array((blocks, flows, 4, threads), dtype=np.float64),
-            cuda.device_array((blocks, self.finest + 3, 2, TURNS), dtype=np.float64),
+            cuda.device_array((blocks, self.finest + 2, 2, TURNS), dtype=np.float64),
             cuda.device_array((blocks, self.pieces + 1, 4), dtype=np.float64),
         )
         return kernel_output, work
@@ -288,14 +288,16 @@ def _cpu_only(what: str) -> InputError:
     return InputError(f"engine = 'cuda': {what} by the CPU engine alone; use engine='cpu'")
 
 
-def integrate_to_landing(ensemble: Ensemble, threads: int | None = None, progress: Any = None) -> Landings:
+def integrate_with_output_states(
+    ensemble: Ensemble, threads: int | None = None, progress: Any = None
+) -> OutputStates:
     """Refused: states are handed out by the CPU engine."""
     raise _cpu_only("states are handed out")
 
 
 def integrate_tangents(
     ensemble: Ensemble, tangents: _Array, threads: int | None = None, progress: Any = None
-) -> tuple[Landings, _Array]:
+) -> tuple[OutputStates, _Array]:
     """Refused: tangents are carried by the CPU engine."""
     raise _cpu_only("tangents are carried")
 

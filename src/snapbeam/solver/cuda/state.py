@@ -24,7 +24,6 @@ from snapbeam.solver.step_control import (
     begin_statistics,
     clock_of,
     close_impact,
-    is_low_energy,
 )
 from snapbeam.util.status_codes import RunStatus
 
@@ -36,7 +35,7 @@ _TWO_PI = 2.0 * math.pi
 
 _close_impact, _begin_statistics = shared(close_impact), shared(begin_statistics)
 _accumulate_energy = shared(accumulate_energy)
-_clock_of, _seen_from, _is_low_energy = shared(clock_of), shared(seen_from), shared(is_low_energy)
+_clock_of, _seen_from = shared(clock_of), shared(seen_from)
 
 
 class Fixed(NamedTuple):
@@ -81,7 +80,6 @@ class Held(NamedTuple):
     own: Standing
     seen: ContactKinematics
     touching: bool
-    low_energy: bool
     safe_gap: int
     safe_center: int
     onset: int
@@ -137,15 +135,15 @@ def _run_constants_function(functions: Functions, threads: int, finest: int) -> 
             fastest = max(fastest, structure[0, j])
         finest_look = _TWO_PI / (PIECES * fastest)
         step_pieces = max(4, math.ceil(step_time / finest_look))
-        whole_look = (finest + 3) * distinct
+        whole_look = (finest + 2) * distinct
         if fresh:
-            for level in range(clock.finest + 2):
-                prepare(block, mode, struck.drive.omega, 2.0 * step_time / (1 << level), level)
+            for level in range(clock.finest + 1):
+                prepare(block, mode, struck.drive.omega, step_time / (1 << level), level)
             flow_into(block, mode, step_time / step_pieces, whole_look)
         return Fixed(
             struck, clock, record.phase, record.rest_contact, record.rest_center, record.tip_speed,
             finest_look, step_pieces, step_time, mode, structure[4, lane], structure[6, lane],
-            kernel_input.gamma, kernel_input.stretch, finest + 2, whole_look, kernel_input.high,
+            kernel_input.gamma, kernel_input.stretch, finest + 1, whole_look, kernel_input.high,
         )  # fmt: skip
 
     return run_constants_of
@@ -180,7 +178,6 @@ def _begin_and_finish_functions(functions: Functions) -> tuple[Any, Any]:
         energy = sum_one(block, mode_energy(fixed.mode.omega, q, p)) + tension_energy(
             fixed.gamma, own.gq, own.qr
         )
-        low_energy = _is_low_energy(energy, fixed.gamma, fixed.rest_stretch)
         touching = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
         linear, high, power, high_power = energies(block, fixed, own, seen, touching)
         if lane == 0:
@@ -194,7 +191,7 @@ def _begin_and_finish_functions(functions: Functions) -> tuple[Any, Any]:
                 fixed.struck.law,
                 energy + contact_energy(fixed.struck.law, seen.d),
             )
-        return Held(0, well_sign, own, seen, touching, low_energy, 0, 0, 0, max(seen.d, 0.0), 0, 0, _RUNNING)
+        return Held(0, well_sign, own, seen, touching, 0, 0, 0, max(seen.d, 0.0), 0, 0, _RUNNING)
 
     @device
     def finish(block, fixed, held, accumulators):
@@ -242,8 +239,8 @@ def _save_and_restore_functions() -> tuple[Any, Any]:
             reals[index, 5],
         )
         return Held(
-            accumulators.time, float(marks[index, 2]), own, seen, accumulators.touching != 0, marks[index, 3] != 0,
-            marks[index, 0], marks[index, 1], accumulators.onset, reals[index, 8], marks[index, 4], accumulators.steps, _RUNNING,
+            accumulators.time, float(marks[index, 2]), own, seen, accumulators.touching != 0,
+            marks[index, 0], marks[index, 1], accumulators.onset, reals[index, 8], marks[index, 3], accumulators.steps, _RUNNING,
         )  # fmt: skip
 
     @device
@@ -266,7 +263,7 @@ def _save_and_restore_functions() -> tuple[Any, Any]:
                 held.safe_center,
                 int(held.well_sign),
             )
-            marks[index, 3], marks[index, 4] = int(held.low_energy), held.energy_tick
+            marks[index, 3] = held.energy_tick
             reals[index, 0], reals[index, 1], reals[index, 2] = seen.w, seen.wv, seen.d
             reals[index, 3], reals[index, 4], reals[index, 5] = seen.dv, seen.c, seen.cv
             reals[index, 6], reals[index, 7], reals[index, 8] = own.gq, own.qr, held.deepest

@@ -15,8 +15,8 @@ Beside operations, a class has
 ``kick_work(memory, size, term, weight, g, r, kick, p)``, ``accumulator`` and ``work_description``
     Its work in a kick of *weight* seconds, J, exact: the row *kick* is the whole acceleration of the kick, contact
     included, and p the row of the velocities before it.  With it, the name and long name of the statistic of the work.
-``keeps_steps_short``, ``may_hide_onset``
-    True if the term changes the motion at low energy, or within a step, more than the step control and the look-ahead expect.
+``may_hide_onset``
+    True if the term changes the motion within a step more than the look-ahead expects.
 ``needs_tension_product``
     True if ``kick_work`` reads r = G q at the first kick of a step too.
 """
@@ -37,7 +37,6 @@ from snapbeam.solver.step_control import ContactKinematics
 __all__ = [
     "ExternalWork",
     "TermMemory",
-    "above_nearest_well",
     "acceleration_about_nearest_well",
     "accumulate_work",
     "add_acceleration",
@@ -54,7 +53,6 @@ __all__ = [
     "end_exchange",
     "enter_well",
     "has_crossed",
-    "keeps_steps_short",
     "may_hide_onset",
     "needs_tension_product",
     "no_external_work",
@@ -220,12 +218,6 @@ def enter_well(memory: Any, size: int, terms: Any, well_sign: float) -> Any:
 
 
 @_operation()
-def above_nearest_well(terms: Any, well_sign: float, energy: Any) -> Any:
-    """Take the *energy* above the first well relative to the well that the beam is near."""
-    raise _of_kernels()
-
-
-@_operation()
 def relative_to_nearest_well(memory: Any, size: int, terms: Any, well_sign: float, spare: int, q: Any) -> Any:
     """The row of the displacements from the well that the beam is near: *q* itself, or *spare*, written here."""
     raise _of_kernels()
@@ -294,11 +286,6 @@ def depends_on_velocity(terms: Any) -> bool:
     raise _of_kernels()
 
 
-def keeps_steps_short(terms: Any) -> bool:
-    """Whether a term forbids the longer steps at low energy."""
-    raise _of_kernels()
-
-
 def may_hide_onset(terms: Any) -> bool:
     """Whether a term may change the motion so much within a step that the look-ahead misses a contact."""
     raise _of_kernels()
@@ -308,7 +295,6 @@ _compiled_for_terms(does_work, _write_flag("kick_work"))
 _compiled_for_terms(needs_tension_product, _write_flag("needs_tension_product"))
 _compiled_for_terms(wells_differ, _write_flag("relative_to_nearest_well"))
 _compiled_for_terms(depends_on_velocity, _write_flag("end_exchange"))
-_compiled_for_terms(keeps_steps_short, _write_flag("keeps_steps_short"))
 _compiled_for_terms(may_hide_onset, _write_flag("may_hide_onset"))
 
 

@@ -149,7 +149,6 @@ class LocalForce(NamedTuple):
         """The potential energy of F."""
         return energy + _energy(term.law, memory[term.state + _ORIGIN] + _product(memory, size, term.row, q))
 
-    keeps_steps_short = True  # type: ignore[misc]
     may_hide_onset = True  # type: ignore[misc]
 
 

@@ -81,12 +81,6 @@ class SecondWell(NamedTuple):
 
     @staticmethod
     @inlined
-    def above_nearest_well(term, well_sign, energy):
-        """In the second well, less its depth."""
-        return energy - term.depth if well_sign < 0.0 else energy
-
-    @staticmethod
-    @inlined
     def relative_to_nearest_well(memory, size, term, well_sign, spare, q):
         """q less the second well."""
         if well_sign > 0.0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import compiled, inlined
@@ -59,7 +60,6 @@ from snapbeam.solver.step_control import (
     close_impact,
     count_zero_crossings_in_step,
     first_contact_onset,
-    low_energy_limit,
     refine_onset,
     safe_interval,
     square_of_rate,
@@ -106,12 +106,12 @@ def _change_wells(m, n, shape, lane_settings, kernel_input, which):
 
 @inlined
 def _flight_level(m, n, lane_settings):
-    """Halvings of the flight step in free flight, or -1."""
+    """Halvings of the flight step in free flight."""
     level = splat(0.0)
     if lane_settings.stretch > 0.0:
         far = halvings(vabs(load(m, at.STRETCH)), splat(STRETCHED * lane_settings.stretch))
         level = vmin(vmax(far, level), load(m, at.FINEST))
-    return pick(mask_of(n[at.LOW_ENERGY]), splat(-1.0), level)
+    return level
 
 
 @inlined
@@ -164,7 +164,7 @@ def _prepare_any_length(m, shape, lane_settings, odd):
     while odd:
         lane = lowest(odd)
         odd &= odd - 1
-        place = slot_of(lane_settings, lane, at.LEVELS - 1)
+        place = slot_of(lane_settings, lane, at.LEVELS)
         prepare(m, shape, lane_settings, place, m[at.LENGTH + lane], m[at.OMEGA + lane])
         load_prepared_step(m, shape, place, lane)
         m[at.KEY + lane] = _CUSTOM
@@ -510,28 +510,22 @@ def _every(steps, share, many):
 
 
 @inlined
-def _monitor_energy(m, n, shape, lane_settings, kernel_input, law, seen1, released, events, which):
-    """After some steps, or a release, look at the energy; returns the lanes whose future is certain."""
-    steps_since_start = load(m, at.STEPS_SINCE_START)
-    due = (released | _every(steps_since_start, 0.125, 8.0)) & which
+def _monitor_energy(m, n, shape, lane_settings, kernel_input, law, seen1, events, which):
+    """Add up the energy of the modes, and every sixteenth step return the lanes whose future is certain."""
     linear = splat(0.0)
     if kernel_input.high:
         pressed = n[at.TOUCHING] & which & ~events
         linear = sample_energy(m, shape, law, at.Q1, at.P1, at.K1, seen1.d, pressed, load(m, at.T), which)
-    if due == 0:
+    decides = which & ~(n[at.TOUCHING] | events) & _every(load(m, at.STEPS_SINCE_START), 0.0625, 16.0)
+    decides &= bits(less(splat(-math.inf), load(m, at.DECIDE_ENERGY)))
+    decides &= bits(less(load(m, at.WELL_SIGN), 0.0))
+    decides &= bits(less(load(m, at.DECIDE_REACH), seen1.w)) & bits(less(0.0, seen1.c))
+    if decides == 0:
         return 0
     if not kernel_input.high:
         linear = modal_energy(m, shape, at.Q1, at.P1)
-    apart = due & ~n[at.TOUCHING]
     energy = linear + tension_energy(lane_settings.gamma, load(m, at.GQ), load(m, at.QR))
-    low_energy = bits(less(energy, low_energy_limit(lane_settings.gamma, lane_settings.stretch)))
-    n[at.LOW_ENERGY] = (n[at.LOW_ENERGY] & ~apart) | (low_energy & apart)
-    sixteenth = _every(steps_since_start, 0.0625, 16.0)
-    sure = apart & ~events & sixteenth & bits(less(load(m, at.WELL_SIGN), 0.0))
-    if sure:
-        sure &= bits(less(load(m, at.DECIDE_REACH), seen1.w)) & bits(less(0.0, seen1.c))
-        sure &= bits(less(energy, load(m, at.DECIDE_ENERGY)))
-    return sure
+    return decides & bits(less(energy, load(m, at.DECIDE_ENERGY)))
 
 
 @inlined
@@ -570,7 +564,7 @@ def accept_steps(
         _begin_and_end_contacts(m, n, kernel_input, accumulators_of_runs, events)
     for bit in (at.CUTTING, at.EVENT, at.LOOKS, at.PROBED):
         n[bit] &= ~which
-    sure = _monitor_energy(m, n, shape, lane_settings, kernel_input, law, seen1, released, events, which)
+    sure = _monitor_energy(m, n, shape, lane_settings, kernel_input, law, seen1, events, which)
     many = load(m, at.DECIDE_CROSSINGS)
     sure |= bits(less(-0.5, many)) & bits(less(many, load(m, at.CROSSINGS_LAST_QUARTER))) & which
     for i in range(modes_of(shape)):

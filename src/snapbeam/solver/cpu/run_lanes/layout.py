@@ -17,14 +17,14 @@ __all__ = ["shape_of"]
 
 MOST = 16
 """Modes, at most."""
-LEVELS = 24
+LEVELS = 23
 """Lengths of step that are prepared for each run, at most."""
 FLOWS = 6
 """Distinct flows of a composition, at most."""
 
 # Of each run:
 (
-    T, WITHIN, PERIOD, TICK, LANDING, LIMIT, END, TICKS, LENGTH, KEY, WHOLE, LEVEL, PHASE0, PHASE, SINE, COSINE, WELL_SIGN,
+    T, WITHIN, PERIOD, TICK, OUTPUT_INTERVAL, LIMIT, END, TICKS, LENGTH, KEY, WHOLE, LEVEL, PHASE0, PHASE, SINE, COSINE, WELL_SIGN,
     STRETCH, OFFSET, OMEGA, AMPLITUDE, REST_CONTACT, REST_CENTER, TIP_SPEED, STEP_TIME, STEP, COARSEST,
     COARSE_TICKS, FINEST, PIECES, LOOK_KEY, FINEST_LOOK, LOOK_PIECES, LOOK_PIECE, SAFE_GAP, SAFE_CENTER,
     ENERGY_TICK, STEPS_SINCE_START, ONSET, SIDE, DECIDE_REACH, DECIDE_ENERGY, DECIDE_CROSSINGS, CROSSINGS_LAST_QUARTER, STEPS, MAX_STEPS, W, WV, D,
@@ -76,14 +76,13 @@ def sizes(modes: int, distinct: int, pieces: int) -> tuple[int, int]:
 (
     LIVE,  # hold a run
     TOUCHING,
-    LOW_ENERGY,
     CUTTING,  # take a step that was cut where the contact begins or ends
     EVENT,  # and do so at the end of the step at hand
     LOOKS,  # look once more where they enter
     ASIDE,  # look for the deepest point of a contact, inside the step at hand
     PROBED,  # have done so
     ODD,  # take a step of a length that is not prepared
-) = range(9)
+) = range(8)
 RUNS = 16
 """The run of each lane."""
 

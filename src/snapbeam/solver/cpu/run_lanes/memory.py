@@ -52,7 +52,7 @@ def suits(ensemble: Ensemble, packed: Packed, most: int = at.MOST) -> bool:
         and law.vectorizable
         and not (law.rate_dependent or law.impulsive)
         and ensemble.law_numbers.shape[1] <= _LAW_NUMBERS
-        and ensemble.finest + 2 <= at.LEVELS
+        and ensemble.finest + 1 <= at.LEVELS
         and 2.0 * flow * longest < packed.layout.gentle
         and float(ensemble.runs["end"].max()) + 2.0 * float(ensemble.runs["period"].max()) < _MOST_TICKS
         and not type(extras_of_table()).owner.rows

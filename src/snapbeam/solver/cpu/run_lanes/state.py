@@ -29,7 +29,7 @@ from snapbeam.solver.physics import (
 )
 from snapbeam.solver.simd import WIDTH, broadcast_load, lanes_tuple, load, mask_of, pick, splat, store
 from snapbeam.solver.splitting import TURNS, Stages
-from snapbeam.solver.step_control import PIECES, TWELFTH, ContactKinematics, begin_statistics, is_low_energy
+from snapbeam.solver.step_control import PIECES, TWELFTH, ContactKinematics, begin_statistics
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = [
@@ -112,7 +112,7 @@ def prepare(m, shape, lane_settings, place, length, omega):
 @inlined
 def slot_of(lane_settings, lane, level):
     """Where the prepared step of a level stands."""
-    return at.TABLES + (lane * (at.LEVELS + 1) + level + 1) * lane_settings.slot
+    return at.TABLES + (lane * (at.LEVELS + 1) + level) * lane_settings.slot
 
 
 @compiled
@@ -124,8 +124,8 @@ def _prepare_all(m, shape, lane_settings, lane, levels):
             m,
             shape,
             lane_settings,
-            slot_of(lane_settings, lane, level - 1),
-            2.0 * step_time / (1 << level),
+            slot_of(lane_settings, lane, level),
+            step_time / (1 << level),
             omega,
         )
 
@@ -226,9 +226,9 @@ def _constants(m, shape, kernel_input, lane, i):
         m[at.LAW + f * WIDTH + lane] = kernel_input.law_numbers[i, f]
     step_time = record.step * record.tick
     m[at.TICK + lane], m[at.STEP + lane], m[at.STEP_TIME + lane] = record.tick, record.step, step_time
-    m[at.PERIOD + lane], m[at.LANDING + lane] = record.period, record.landing
+    m[at.PERIOD + lane], m[at.OUTPUT_INTERVAL + lane] = record.period, record.output_interval
     m[at.END + lane] = record.end
-    m[at.LIMIT + lane] = min(record.landing, record.end)
+    m[at.LIMIT + lane] = min(record.output_interval, record.end)
     m[at.COARSEST + lane], m[at.FINEST + lane] = record.coarsest, record.finest
     m[at.COARSE_TICKS + lane] = record.step >> record.coarsest
     m[at.PHASE0 + lane], m[at.OFFSET + lane], m[at.WELL_SIGN + lane] = (
@@ -258,7 +258,7 @@ def begin_run(m, n, shape, lane_settings, kernel_input, lane, i, accumulators):
     record, bit = kernel_input.runs[i], 1 << lane
     n[at.RUNS + lane] = i
     _constants(m, shape, kernel_input, lane, i)
-    _prepare_all(m, shape, lane_settings, lane, record.finest + 2)
+    _prepare_all(m, shape, lane_settings, lane, record.finest + 1)
     m[at.KEY + lane], m[at.LOOK_KEY + lane], m[at.LOOK_PIECES + lane] = -99.0, -1.0, 0.0
     m[at.T + lane] = m[at.WITHIN + lane] = 0.0
     energy = observe_run(m, shape, lane_settings, lane)
@@ -303,6 +303,4 @@ def begin_run(m, n, shape, lane_settings, kernel_input, lane, i, accumulators):
         n[at.TOUCHING] |= bit
     if kernel_input.high:
         close_energy(m, shape, kernel_input, n[at.TOUCHING], bit)
-    if is_low_energy(energy, lane_settings.gamma, lane_settings.stretch):
-        n[at.LOW_ENERGY] |= bit
     return _RUNNING if record.end > 0 else _OK

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import inlined
 from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, splat, store, vabs
-from snapbeam.solver.terms.interface import keeps_steps_short, may_hide_onset
+from snapbeam.solver.terms.interface import may_hide_onset
 
 __all__ = [
     "Circuit",
@@ -28,7 +28,6 @@ __all__ = [
     "apply_tap",
     "circuit_acceleration_rows",
     "circuit_speed_bound",
-    "disable_long_steps",
     "kick_source",
     "lean_kick",
     "missed_onset",
@@ -76,14 +75,6 @@ def put_rate(memory, circuit, rate):
     if circuit is None:
         return
     memory[circuit.rate] = rate
-
-
-@inlined
-def disable_long_steps(circuit, terms, low_energy):
-    """Whether steps may be longer: never with a circuit or a local force, which couple all modes at any energy."""
-    if circuit is None and not keeps_steps_short(terms):
-        return low_energy
-    return False
 
 
 @inlined

@@ -127,7 +127,7 @@ def evaluate_contacts(memory, size, others, drive, argument, q, weight, begins):
 
 @inlined
 def mirror_further_contacts(memory, others, well_sign):
-    """Where they are, as seen from the well *home*."""
+    """Where they are, in coordinates about the well *well_sign*."""
     if others is None:
         return
     for j in range(count_of(others.kinds)):

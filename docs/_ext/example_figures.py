@@ -1,0 +1,28 @@
+"""Draw the figures of examples that pages show, into docs/images: ``python docs/_ext/example_figures.py``."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+
+DOCS = Path(__file__).parents[1]
+EXAMPLES = ("ex24_dynamics", "ex25_design", "ex43_cheapest_place")
+
+
+def main() -> None:
+    """Run each example and save the figures that it leaves open, in their order."""
+    for name in EXAMPLES:
+        runpy.run_path(str(DOCS.parent / "examples" / f"{name}.py"), run_name="__main__")
+        for number, figure in enumerate(plt.get_fignums(), 1):
+            plt.figure(figure).savefig(DOCS / "images" / f"{name}_{number}.png", dpi=150)
+        plt.close("all")
+
+
+if __name__ == "__main__":
+    main()
