@@ -1,6 +1,6 @@
 """Exact solutions, in SI units."""
 
-from math import gamma, pi, sqrt
+from math import asin, atan2, gamma, pi, sqrt
 
 
 def bouncing_ball(height: float, gravity: float, restitution: float, bounces: int) -> dict[str, float]:
@@ -23,3 +23,22 @@ def hertz_wall(mass: float, contact_stiffness: float, speed: float) -> dict[str,
     depth = (1.25 * mass * speed**2 / contact_stiffness) ** 0.4
     duration = 2 * depth / speed * sqrt(pi) * gamma(1.4) / gamma(0.9)
     return {"force": contact_stiffness * depth**1.5, "duration": duration}
+
+
+def two_sided_stop(
+    mass: float, stiffness: float, gap: float, speed: float, restitution: float, impacts: int
+) -> dict[str, float]:
+    """Time of the last impact and speed after it."""
+    rate = sqrt(stiffness / mass)
+    time = asin(gap * rate / speed) / rate
+    fast = restitution * sqrt(speed**2 - (rate * gap) ** 2)
+    for _ in range(int(impacts) - 1):
+        time += 2 * atan2(rate * gap, fast) / rate
+        fast *= restitution
+    return {"time": time, "speed": fast}
+
+
+def two_masses(mass: float, second_mass: float, contact_stiffness: float, speed: float) -> dict[str, float]:
+    """Largest force, time in contact, speed of the second sphere after the impact."""
+    relative = hertz_wall(mass * second_mass / (mass + second_mass), contact_stiffness, speed)
+    return {**relative, "second_speed": 2 * mass * speed / (mass + second_mass)}

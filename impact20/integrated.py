@@ -67,3 +67,30 @@ def hertz_wall(mass: float, contact_stiffness: float, speed: float) -> dict[str,
     fall, _ = _until(right, [float(v) for v in peak], 0, -1, 10.0)
     force = contact_stiffness * (length * peak[0]) ** 1.5
     return {"force": force, "duration": (rise + fall) * length / speed}
+
+
+def two_sided_stop(
+    mass: float, stiffness: float, gap: float, speed: float, restitution: float, impacts: int
+) -> dict[str, float]:
+    """Lengths in units of the gap, measured from the stop ahead; times in units of sqrt(mass/stiffness)."""
+    unit = sqrt(mass / stiffness)
+    time, state = 0.0, [1.0, -speed * unit / gap]
+    for _ in range(int(impacts)):
+        span, end = _until(lambda t, y: [y[1], 1.0 - y[0]], state, 0, -1, 100.0)
+        time += span
+        state = [2.0, restitution * float(end[1])]
+    return {"time": time * unit, "speed": -state[1] * gap / unit}
+
+
+def two_masses(mass: float, second_mass: float, contact_stiffness: float, speed: float) -> dict[str, float]:
+    """Penetration, its rate and the speed of the second sphere; lengths in units of (mass speed^2/stiffness)^(2/5)."""
+    length, ratio = (mass * speed**2 / contact_stiffness) ** 0.4, mass / second_mass
+
+    def right(_time: float, y: np.ndarray) -> list[float]:
+        force = max(y[0], 0.0) ** 1.5
+        return [y[1], -(1 + ratio) * force, ratio * force]
+
+    rise, peak = _until(right, [0.0, 1.0, 0.0], 1, -1, 10.0)
+    fall, end = _until(right, [float(v) for v in peak], 0, -1, 10.0)
+    force = contact_stiffness * (length * peak[0]) ** 1.5
+    return {"force": force, "duration": (rise + fall) * length / speed, "second_speed": float(end[2]) * speed}
