@@ -185,3 +185,41 @@ def test_every_extra_is_tried():
     stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert set(stated["optional-dependencies"]) == set(alone.EXTRAS)
     assert set(alone.USES) == {"", *alone.EXTRAS}
+
+
+def test_the_conda_recipe_has_the_dependencies_of_the_package():
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    recipe = (ROOT / "recipe" / "recipe.yaml").read_text(encoding="utf-8")
+    run = re.search(r"  run:\n((?:    - [^\n]*\n)+)", recipe).group(1)
+    held = {
+        line.strip("- ").replace("matplotlib-base", "matplotlib").replace(" ", "")
+        for line in run.splitlines()
+    }
+    assert held == {*stated["dependencies"], "python" + stated["requires-python"]}
+
+
+def test_the_paper_cites_what_its_bibliography_has():
+    """Each citation resolves, each entry is cited and has a DOI, and the text has at most 1,000 words."""
+    text = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
+    entries = dict(
+        re.findall(
+            r"@\w+\{(\w+),(.*?)\n\}", (ROOT / "paper" / "paper.bib").read_text(encoding="utf-8"), re.DOTALL
+        )
+    )
+    body = text.split("---", 2)[2]
+    assert set(re.findall(r"@([a-z]+\d{4})", body)) == set(entries)
+    assert all("doi = {10." in entry for entry in entries.values())
+    assert len(body.split()) <= 1000
+    assert (ROOT / "paper" / re.search(r"\]\((\S+\.png)\)", body).group(1)).exists()
+
+
+def test_the_paper_states_the_verdicts_that_are_stored():
+    first = (ROOT / "docs" / "data" / "claims.md").read_text(encoding="utf-8").split("**")[1]
+    numbers = re.search(r"Of (\d+) statements (\d+) hold, (\d+) hold in part and (\d+) fail", first).groups()
+    text = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
+    assert (
+        re.search(
+            r"Of (\d+) testable statements (\d+) hold, (\d+) hold in part and (\d+) fail", text
+        ).groups()
+        == numbers
+    )
