@@ -15,6 +15,8 @@ from any_beam import AnyBeam, Endless, Numbers, drawn
 
 import snapbeam as sb
 
+pytestmark = pytest.mark.filterwarnings("ignore:b/r = :snapbeam.util.diagnostics.DiagnosticWarning")
+
 WELL = 1e-10
 """Response to a relative change of the drive by 1e-13, of the buckling level, up to which a run is well-conditioned."""
 LIMIT = {"standard": 1e-3, "reference": 1e-8}
