@@ -72,13 +72,15 @@ def test_a_long_start_is_none(plain) -> None:
 def test_a_base_and_a_load_that_hardly_move(plain) -> None:
     def base(size: float) -> np.ndarray:
         return end(
-            base=sb.BaseExcitation(
+            base_excitation=sb.BaseExcitation(
                 motion=sb.AccelerationSine(frequency_ratio=1.21, acceleration_amplitude=size)
             )
         )
 
     def load(size: float) -> np.ndarray:
-        return end(axial=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=size)))
+        return end(
+            axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=size))
+        )
 
     recedes(plain, base, (1e-4, 1e-6, 1e-8), 1e-7)
     recedes(plain, load, (1e-2, 1e-4, 1e-6), 1e-6)
