@@ -83,7 +83,7 @@ def solved(rng: np.random.Generator) -> Drawn | None:
 
 
 def judge(tried: list[Drawn | None]) -> None:
-    """Of the well-conditioned runs 97 in 100 are within the limits of both levels, and all near them."""
+    """Of the well-conditioned runs 95 in 100 are within the limits of both levels, and all near them."""
     draws = [draw for draw in tried if draw is not None]
     assert len(draws) >= 0.98 * len(tried)
     well = [draw for draw in draws if draw.separation <= WELL]
@@ -94,7 +94,7 @@ def judge(tried: list[Drawn | None]) -> None:
         print(f"{accuracy}: median error {median:.1e}, worst {worst.error[accuracy]:.1e} at {worst.words}")
         over = [draw for draw in well if draw.error[accuracy] > limit]
         print(f"{accuracy}: {len(over)} of {len(well)} beyond {limit:g}")
-        assert len(over) <= 0.03 * len(well)
+        assert len(over) <= 0.05 * len(well)
         for draw in over:
             assert draw.error[accuracy] <= max(5.0 * limit, CARRIED / 1e-13 * draw.separation), (
                 accuracy,
