@@ -179,14 +179,6 @@ REFUSALS = [
         {"sweep": {"frequency_ratio": "0.1:2:3", "frequency_hz": "10:200:3"}},
         "[sweep] frequency_hz: the same axis is given as drive.frequency_ratio",
     ),
-    (
-        {"sweep": {"frequency_hz": "10:200:3", "beam.thickness": "3e-4:4e-4:2"}},
-        "drive.frequency_hz: is made into drive.frequency_ratio, whose unit changes along beam.thickness",
-    ),
-    (
-        {"sweep": {"model.modes": [1, 8]}, "drive": {"velocity_m_s": 0.03}},
-        "drive.velocity_m_s: is made into drive.velocity_amplitude, whose unit changes along model.modes",
-    ),
 ]
 
 

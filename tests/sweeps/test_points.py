@@ -197,7 +197,7 @@ def test_refusals(given, message: str) -> None:
 
 
 def test_axes_in_hz_keep_their_hz() -> None:
-    """Axes in Hz and m are a grid of ratios; beside an axis that changes the frequency, each point has its own ratio."""
+    """Axes in Hz and m are a grid of ratios; beside an axis that changes the frequency they stay in Hz."""
     system = Config().system.replace(**{"model.modes": 1})
     freq = system.model.reference_frequency
     grid = physical_points(system, {"frequency_hz": [50.0, 100.0], "striker.location_m": [0.04, 0.06]})
@@ -205,13 +205,41 @@ def test_axes_in_hz_keep_their_hz() -> None:
     np.testing.assert_allclose(grid.axes["drive.frequency_ratio"] * freq, [50.0, 100.0], rtol=1e-14)
     np.testing.assert_allclose(grid.axes["striker.location"] * 0.161, [0.04, 0.06], rtol=1e-14)
     made = physical_points(system, {"beam.length": [0.1, 0.161], "drive.frequency_hz": [50.0, 100.0]})
-    assert isinstance(made, PointList)
-    assert made.labels["frequency_hz"].tolist() == [50.0, 100.0, 50.0, 100.0]
-    own = [system.replace(**{"beam.length": length}).model.reference_frequency for length in (0.1, 0.161)]
-    ratios = made.columns["drive.frequency_ratio"]
-    np.testing.assert_allclose(ratios * np.repeat(own, 2), [50.0, 100.0, 50.0, 100.0], rtol=1e-12)
+    assert isinstance(made, Grid)
+    assert made.axes["drive.frequency_hz"].tolist() == [50.0, 100.0]
+    assert made.dims == ("beam_length", "frequency_hz")
     with pytest.raises(InputError, match="given twice"):
         physical_points(system, {"frequency_hz": [50.0], "frequency_ratio": [1.0]})
+
+
+def test_a_sweep_over_the_length_at_fixed_hz() -> None:
+    """Each run is that of its own structure at its own ratio, and the dataset says both."""
+    system = Config().system.replace(**{"model.modes": 1})
+    once = sb.Integration(cycles=3)
+    axes = {"beam.length": [0.1, 0.161], "drive.frequency_hz": [50.0, 100.0], "drive.velocity_m_s": [0.03]}
+    swept = sb.sweep(system, axes, once)
+    assert swept.min_displacement.dims == ("beam_length", "frequency_hz", "velocity_m_s")
+    assert "frequency_ratio" not in swept.attrs
+    for length in (0.1, 0.161):
+        own = system.replace(**{"beam.length": length})
+        for hertz in (50.0, 100.0):
+            at = {"beam_length": length, "frequency_hz": hertz}
+            ratio = hertz / own.model.reference_frequency
+            np.testing.assert_allclose(swept.frequency_ratio.sel(at), ratio, rtol=1e-14)
+            speed = 0.03 / (own.scale.length * own.scale.omega)
+            run = sb.sweep(own, {"frequency_ratio": [ratio], "velocity_amplitude": [speed]}, once)
+            assert float(swept.min_displacement.sel(at).item()) == float(run.min_displacement.item())
+
+
+def test_axes_of_text_have_units() -> None:
+    axes = points_of({"beam.thickness": "0.2mm:400um:3", "harvester.resistance": "1kΩ,1MOhm"}).axes
+    np.testing.assert_allclose(axes["beam.thickness"], [2e-4, 3e-4, 4e-4], rtol=1e-12)
+    np.testing.assert_allclose(axes["harvester.resistance"], [1e3, 1e6], rtol=1e-12)
+    for text in ("1um,2Hz", "1 g"):
+        with pytest.raises(InputError, match="does not fit; must be in m"):
+            points_of({"beam.thickness": text})
+    with pytest.raises(InputError, match="must be a number without a unit"):
+        points_of({"drive.frequency_ratio": "1Hz,2Hz"})
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,8 @@ def compute_map(
         _check_two_axes(plot, axes)
     _check_variable(variable, plot, overlaid=measurements is not None or quasi_static_line)
     system = settings.system
-    system.model.require_bistable("a map")
+    if plot is not None and variable in (None, "response_class"):
+        system.model.require_bistable("a map of response classes")
     beam = system.model.beam
     overlay = read_overlay(
         measurements, system.model.reference_frequency, None if beam is None else beam.buckling_level
@@ -118,7 +119,15 @@ def compute_map(
             else draw(dataset, plot, "response_class", **overlays)
         )
     add_json(**map_facts(dataset), seconds=elapsed, files=files)
-    out().print(map_summary(dataset, files, None if opt.is_long(keeping) else elapsed))
+    out().print(
+        map_summary(
+            dataset,
+            files,
+            None if opt.is_long(keeping) else elapsed,
+            variable,
+            bistable=system.model.is_bistable,
+        )
+    )
     out().print(*lines, sep="\n", markup=False, end="\n" if lines else "")
     if counts.failed:
         raise typer.Exit(FAILED)
@@ -133,7 +142,7 @@ def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
     from snapbeam.model.parameter_axes import PHYSICAL
     from snapbeam.model.parameter_file import DEFAULT_AXES
 
-    named: dict[str, Any] = settings.axes()
+    named: dict[str, Any] = settings.axes(keep_units=True)
     order = ("model.modes", "drive.frequency_ratio", "drive.velocity_amplitude", "striker.location")
     if any(text for text in given.get("sweep") or ()) or any(name not in order for name in named):
         return named
@@ -177,10 +186,10 @@ def _check_variable(variable: str | None, plot: Path | None, *, overlaid: bool) 
 
 
 def _check_two_axes(path: Path, axes: dict[str, Any]) -> None:
-    from snapbeam.model.parameters import lookup
+    from snapbeam.model.parameter_axes import parameter_of_axis
     from snapbeam.util.validation import InputError
 
-    many = [lookup(name).short for name, values in axes.items() if len(values) > 1]
+    many = [parameter_of_axis(name).short for name, values in axes.items() if len(values) > 1]
     if len(many) != 2:
         raise InputError(
             f"plot = {str(path)!r}: a map is drawn over two axes, not {len(many)} ({', '.join(many)}); "

@@ -252,7 +252,23 @@ def _option(name: str, is_axis: bool) -> Any:
         return Annotated[str | None, typer.Option(flag, metavar="|".join(row.quantity.choices), **options)]
     if row is not None and row.quantity.kind is int:
         return Annotated[int | None, typer.Option(flag, parser=parse_count, metavar="COUNT", **options)]
-    return Annotated[float | None, typer.Option(flag, parser=parse_number, metavar="NUMBER", **options)]
+    unit = physical.unit if physical is not None else unit
+    return Annotated[float | None, typer.Option(flag, parser=_parser(unit), metavar="NUMBER", **options)]
+
+
+def _parser(unit: str) -> Callable[[str], float]:
+    """A parser of numbers that may have a unit: ``2e-6`` or ``2um``."""
+
+    def parse(text: str) -> float:
+        from snapbeam.model.parameter_axes import parse_axis
+        from snapbeam.util.validation import InputError
+
+        try:
+            return float(parse_axis("", text, unit=unit or "1"))
+        except (InputError, TypeError):
+            raise typer.BadParameter(f"{text!r} is not a number{f' in {unit}' if unit else ''}") from None
+
+    return parse
 
 
 _UPRIGHT = re.compile(r"\\mathrm\{([^}]*)\}")
@@ -396,7 +412,7 @@ def _assignment(text: str, option: str) -> tuple[str, str]:
 
 def _value(name: str, value: Any) -> Any:
     """The text of an option as what its parameter holds."""
-    from snapbeam.model.parameter_axes import PHYSICAL
+    from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, parse_axis
     from snapbeam.model.parameters import row_of
     from snapbeam.util.validation import InputError
 
@@ -412,7 +428,9 @@ def _value(name: str, value: Any) -> Any:
         if kind is int:
             return int(value)
         if kind is float and (row is not None or name in PHYSICAL or name.startswith("initial_state.")):
-            return parse_number(value)
+            return float(parse_axis(name, value, unit=parameter_of_axis(name).quantity.unit))
+    except InputError:
+        raise
     except (ValueError, KeyError, typer.BadParameter):
         words = {bool: "true or false", int: "a whole number"}.get(kind, "a number")
         raise InputError(f"{name} = {value!r}: must be {words}") from None
@@ -741,6 +759,7 @@ def config_of_file(path: Path, point: str | None) -> Config:
         ``name=value,name=value``: the point nearest to these coordinates, its values exact.
     """
     from snapbeam.cli.console import open_result
+    from snapbeam.model.parameter_axes import PHYSICAL
     from snapbeam.model.parameter_file import config_from_mapping
     from snapbeam.util.validation import InputError, parsed_json
 
@@ -768,16 +787,19 @@ def config_of_file(path: Path, point: str | None) -> Config:
     sections["integration"] = run
     for name, value in _at_point(dataset, point, path).items():
         section, _, field = name.partition(".")
+        if name in PHYSICAL:
+            sections[section].pop(PHYSICAL[name].parameter.partition(".")[2], None)
         sections.setdefault(section, {})[field] = value
     return config_from_mapping(sections, path.name)
 
 
 def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, Any]:
     """Values of the parameters at the nearest point, by dotted name."""
-    from snapbeam.model.parameters import lookup
+    from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, physical_name
     from snapbeam.util.validation import InputError
 
     axes = {name: dataset[name] for name in map(str, dataset.dims) if "parameter" in dataset[name].attrs}
+    physical = {parameter_of_axis(name).short: name for name in PHYSICAL}
     if point is None:
         return {}
     if "point" in dataset.dims:
@@ -785,7 +807,8 @@ def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, A
     found: dict[str, Any] = {}
     for part in point.split(","):
         name, equals, value = part.partition("=")
-        short = lookup(name.strip()).short
+        name = physical_name(name.strip()) or physical.get(name.strip(), name.strip())
+        short = parameter_of_axis(name).short
         if not equals or short not in axes:
             raise InputError(f"point = {point!r}: must name axes of {path.name}: {', '.join(axes)}")
         values = axes[short].values

@@ -37,8 +37,18 @@ _SYMBOLS = {"frequency_ratio": "Omega", "velocity_amplitude": "V", "location": "
 _PAPER = ("frequency_ratio", "velocity_amplitude", "location")
 
 
-def map_summary(dataset: xr.Dataset, files: Sequence[Path], elapsed: float | None = None) -> RenderableType:
-    """Return the classes, the lowest interwell amplitude, what failed, the files and what to try next."""
+def map_summary(
+    dataset: xr.Dataset,
+    files: Sequence[Path],
+    elapsed: float | None = None,
+    variable: str | None = None,
+    *,
+    bistable: bool = True,
+) -> RenderableType:
+    """Return the classes, the lowest interwell amplitude, what failed, the files and what to try next.
+
+    Of a beam with one well: the range of *variable*, or of the centre's displacement, in place of the classes.
+    """
     attrs = dataset.attrs
     runs = dataset["response_class"].size
     noun = "point" if "computed" in dataset or "class_fraction" in dataset else "run"
@@ -46,6 +56,13 @@ def map_summary(dataset: xr.Dataset, files: Sequence[Path], elapsed: float | Non
     if elapsed is not None:
         head += f" in {duration(elapsed)} ({runs / max(elapsed, 1e-9):.3g} runs/s)"
     lines = [head]
+    if not bistable:
+        lines.append("The beam has one well: response classes are not shown.")
+        lines += _ranges(
+            dataset, (variable,) if variable else ("min_midspan_displacement", "max_midspan_displacement")
+        )
+        lines += [*status_lines(dataset), *(f"Written: {file_line(path)}" for path in files)]
+        return Group(*lines)
     low = lowest_interwell(dataset)
     failed = _failed_below(dataset, low)
     if low is None:
@@ -65,6 +82,17 @@ def map_summary(dataset: xr.Dataset, files: Sequence[Path], elapsed: float | Non
     lines_after += [f"Written: {file_line(path)}" for path in files]
     lines_after += ["Next:", *(f"  {line}" for line in _suggestions(dataset, files, low))]
     return Group(*lines, class_table(dataset), *lines_after)
+
+
+def _ranges(dataset: xr.Dataset, names: Sequence[str]) -> list[str]:
+    """Lines with the least and the greatest value of variables."""
+    lines = []
+    for name in names:
+        unit = dataset[name].attrs.get("units", "1")
+        unit = "" if unit == "1" else f" {unit}"
+        low, high = float(dataset[name].min()), float(dataset[name].max())
+        lines.append(f"{dataset[name].attrs.get('long_name', name)}: {low:.4g} to {high:.4g}{unit}")
+    return lines
 
 
 def map_facts(dataset: xr.Dataset) -> dict[str, Any]:

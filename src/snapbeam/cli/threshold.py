@@ -63,15 +63,13 @@ def threshold(
     -o threshold.nc --plot threshold.png
     """
     from snapbeam.cli.console import check_pictures, draw, write_map
-    from snapbeam.model.parameters import lookup
     from snapbeam.util.files import check_writable
 
     settings = configured(given, lambda config, _: _axes_of(config, parameter))
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
-    name = lookup(parameter).name
     axes = _axes_of(settings, parameter)
-    values = axes.pop(name)
+    name, values = axes.popitem()
 
     from snapbeam.sweeps.threshold import threshold as find
 
@@ -101,12 +99,13 @@ def threshold(
 
 def _axes_of(settings: Config, parameter: str) -> dict[str, Any]:
     """The axes of a search, those of the structure first, and the values to choose from."""
-    from snapbeam.model.parameter_axes import parse_axis
+    from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, parse_axis
     from snapbeam.model.parameters import lookup
     from snapbeam.util.validation import InputError
 
-    axes: dict[str, Any] = settings.axes()
+    axes: dict[str, Any] = settings.axes(keep_units=True)
     name = lookup(parameter).name
+    name = next((each for each, row in PHYSICAL.items() if row.parameter == name and each in axes), name)
     values = axes.pop(name, None)
     if values is None:
         if name != "drive.velocity_amplitude":
@@ -116,7 +115,7 @@ def _axes_of(settings: Config, parameter: str) -> dict[str, Any]:
         values = np.atleast_1d(parse_axis("velocity_amplitude", _VALUES))
     if not [each for each in axes if each != "model.modes"]:
         axes["drive.frequency_ratio"] = np.atleast_1d(parse_axis("frequency_ratio", "0.1:4:64"))
-    return dict(sorted(axes.items(), key=lambda item: lookup(item[0]).is_run)) | {name: values}
+    return dict(sorted(axes.items(), key=lambda item: parameter_of_axis(item[0]).is_run)) | {name: values}
 
 
 def _summary(dataset: xr.Dataset, elapsed: float) -> list[str]:

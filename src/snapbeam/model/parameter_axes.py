@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.drive.shock import GRAVITY
-from snapbeam.model.parameters import lookup
+from snapbeam.model.parameters import Parameter, lookup
 from snapbeam.model.system import System
 from snapbeam.util.validation import (
     InputError,
@@ -29,8 +31,10 @@ __all__ = [
     "PHYSICAL",
     "Axis",
     "Physical",
+    "axis_that_changes_unit",
     "checked_physical",
     "from_physical",
+    "parameter_of_axis",
     "parse_axis",
     "physical_name",
     "to_physical",
@@ -46,7 +50,9 @@ _FORMS = "a number, numbers separated by commas, or start:stop:count, such as 0.
 _WHOLE = "a whole number, whole numbers separated by commas, such as 1,32, or start:stop:count"
 
 
-def parse_axis(name: str, value: float | str | Sequence[float], *, whole: bool = False) -> Axis:
+def parse_axis(
+    name: str, value: float | str | Sequence[float], *, whole: bool = False, unit: str = "1"
+) -> Axis:
     """Return *value* as one number, or as a strictly increasing axis.
 
     Parameters
@@ -55,9 +61,11 @@ def parse_axis(name: str, value: float | str | Sequence[float], *, whole: bool =
         The parameter to name in a refusal.
     value : float, str or sequence of float
         ``0.18``, ``"0.18"``, ``"1/2.1"``, ``"0.1,0.2,0.5"``, or ``"0.1:4:64"`` for 64 points from 0.1 to 4,
-        both included.
+        both included.  Numbers of text may have a unit: ``"1.9um:2.1um:5"``, ``"1kohm,1Mohm"``.
     whole : bool
         Whether the numbers are to be whole, as a refusal then says.
+    unit : str
+        Unit of the parameter, in which the result is.
 
     Returns
     -------
@@ -71,7 +79,7 @@ def parse_axis(name: str, value: float | str | Sequence[float], *, whole: bool =
     instance("name", name, str, "text")
     flag("whole", whole)
     if isinstance(value, str):
-        return _parse_text(name, value, _WHOLE if whole else _FORMS)
+        return _parse_text(name, value, _WHOLE if whole else _FORMS, unit)
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return _finite(name, shown(value), finite(name, value))
     if isinstance(value, bool) or not isinstance(value, (Sequence, np.ndarray)):
@@ -82,10 +90,10 @@ def parse_axis(name: str, value: float | str | Sequence[float], *, whole: bool =
 _MOST_POINTS = 10_000_000
 
 
-def _parse_text(name: str, text: str, forms: str) -> Axis:
+def _parse_text(name: str, text: str, forms: str, unit: str) -> Axis:
     parts = text.split(":")
     if len(parts) == 3:
-        start, stop = (_number(name, text, part, forms) for part in parts[:2])
+        start, stop = (_number(name, text, part, forms, unit) for part in parts[:2])
         try:
             count = int(parts[2])
         except ValueError:
@@ -97,11 +105,37 @@ def _parse_text(name: str, text: str, forms: str) -> Axis:
         return np.linspace(start, stop, count)
     if len(parts) != 1:
         raise InputError(f"{name} = {shown(text)}: must be {forms}")
-    numbers = [_number(name, text, part, forms) for part in text.split(",")]
+    numbers = [_number(name, text, part, forms, unit) for part in text.split(",")]
     return numbers[0] if len(numbers) == 1 else axis(name, numbers, -math.inf, math.inf)
 
 
-def _number(name: str, text: str, part: str, forms: str) -> float:
+_WITH_UNIT = re.compile(r"(.*?[\d.])\s*([A-Za-zµμΩ][A-Za-zµμΩ/]*)")
+_PREFIXES = {"p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
+_WITH_PREFIX = ("m", "m/s", "m/s^2", "s", "Hz", "N", "Pa", "ohm", "F", "H")
+
+
+def _scaled(unit: str) -> tuple[str, float]:
+    """A unit without its prefix, and what the prefix multiplies by."""
+    plain = unit.replace("Ω", "ohm").replace("Ohm", "ohm")
+    if plain in _WITH_PREFIX or plain[:1] not in _PREFIXES or plain[1:] not in _WITH_PREFIX:
+        return plain, 1.0
+    return plain[1:], _PREFIXES[plain[0]]
+
+
+def _factor(name: str, text: str, given: str, unit: str) -> float:
+    """What a number in the unit *given* is multiplied by to be in *unit*."""
+    (mine, factor), (own, scale) = _scaled(given), _scaled(unit)
+    if mine != own:
+        must = "a number without a unit" if unit == "1" else f"in {unit}"
+        raise InputError(f"{name} = {text!r}: the unit {given!r} does not fit; must be {must}")
+    return factor / scale
+
+
+def _number(name: str, text: str, part: str, forms: str, unit: str) -> float:
+    found = _WITH_UNIT.fullmatch(part.strip())
+    if found is not None:
+        number = _number(name, text, found[1], forms, unit)
+        return number * _factor(name, text, found[2], unit)
     numerator, slash, denominator = part.partition("/")
     try:
         value = float(numerator) / float(denominator) if slash else float(part)
@@ -166,6 +200,29 @@ def physical_name(name: str) -> str | None:
     return found[0] if found else None
 
 
+_CHANGES_UNITS = ("beam.", "boundary.", "imperfection.", "model.")
+"""Sections of parameters that may change the first natural frequency and the length scale."""
+
+
+def parameter_of_axis(name: str) -> Parameter:
+    """The row of an axis: a parameter, or one in its physical unit by its dotted name, such as ``drive.frequency_hz``.
+
+    Raises
+    ------
+    InputError
+        If there is none: the message names the nearest.
+    """
+    if name not in PHYSICAL:
+        return lookup(name)
+    row = PHYSICAL[name]
+    ratio = lookup(row.parameter)
+    own = dataclasses.replace(
+        ratio.quantity, unit=row.unit, long_name=row.words, symbol="", high=math.inf, plausible=None
+    )
+    short = name.removeprefix("drive.").removeprefix("striker.").replace(".", "_")
+    return dataclasses.replace(ratio, name=name, short=short, quantity=own)
+
+
 def unit_of(system: System, name: str) -> float:
     """What a ratio of 1 is in the physical unit of *name*."""
     scale, row = system.scale, PHYSICAL[name]
@@ -174,6 +231,22 @@ def unit_of(system: System, name: str) -> float:
     if system.model.beam is None:
         raise InputError("striker.location_m: a structure given by matrices has no length; give location")
     return system.model.beam.length
+
+
+def axis_that_changes_unit(system: System, name: str, axes: Mapping[str, Any]) -> str | None:
+    """The first of some axes along which a ratio of 1 is not always the same in the physical unit of *name*."""
+    unit = unit_of(system, name)
+    for other, values in axes.items():
+        if not other.startswith(_CHANGES_UNITS):
+            continue
+        for value in values:
+            try:
+                own = unit_of(system.replace(**{other: value.item()}), name)
+            except InputError:  # valid together with another axis, or refused when the sweep is checked
+                return other
+            if abs(own / unit - 1.0) > 1e-9:
+                return other
+    return None
 
 
 def _unit(system: System, name: str) -> float:

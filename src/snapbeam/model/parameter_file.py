@@ -26,7 +26,14 @@ from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.local_force import LOCAL_FORCES
 from snapbeam.model.mapping import SECTIONS as SYSTEM_SECTIONS
 from snapbeam.model.mapping import parts_from_mapping
-from snapbeam.model.parameter_axes import PHYSICAL, checked_physical, parse_axis, physical_name, unit_of
+from snapbeam.model.parameter_axes import (
+    PHYSICAL,
+    axis_that_changes_unit,
+    checked_physical,
+    parameter_of_axis,
+    parse_axis,
+    physical_name,
+)
 from snapbeam.model.parameters import Parameter, lookup, parameters, row_of
 from snapbeam.model.quantity import quantities
 from snapbeam.model.reduced_model import ReducedModel
@@ -329,7 +336,8 @@ def parsed_axis(name: str, value: Any) -> Any:
     if row is not None and row.quantity.kind in (str, bool):
         words = value.split(",") if isinstance(value, str) else value
         return np.array([row.quantity.check(short, word) for word in words])
-    return np.atleast_1d(parse_axis(short, value, whole=row is not None and row.quantity.kind is int))
+    whole = row is not None and row.quantity.kind is int
+    return np.atleast_1d(parse_axis(short, value, whole=whole, unit=parameter_of_axis(name).quantity.unit))
 
 
 def contradictions(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -449,7 +457,7 @@ class Config:
         """Names of what was not given: the values of the paper's beam beside another beam, and else the default drive."""
         if not self.section("beam"):
             return ()
-        found, swept = self._defaults(), self.axes() if self.section("sweep") else {}
+        found, swept = self._defaults(), self.axes(keep_units=True) if self.section("sweep") else {}
         sections = ("beam", "model", "contact") if self.extends_paper else ("drive",)
         return tuple(
             f"{section}.{name}"
@@ -466,7 +474,8 @@ class Config:
         axes : mapping of str to array_like, optional
             The axes by dotted name, in place of those that were given.
         """
-        axes = self.axes() if axes is None and self.section("sweep") else dict(axes or {})
+        axes = self.axes(keep_units=True) if axes is None and self.section("sweep") else dict(axes or {})
+        swept = {PHYSICAL[name].parameter if name in PHYSICAL else name for name in axes}
         if self.model.length_scale is None:  # a beam that does not buckle makes no system
             sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
             sections |= {
@@ -474,7 +483,7 @@ class Config:
             }
         else:
             sections = {
-                name: {key: value for key, value in values.items() if f"{name}.{key}" not in axes}
+                name: {key: value for key, value in values.items() if f"{name}.{key}" not in swept}
                 for name, values in self.system.to_mapping().items()
             }
             sections.pop("initial_state", None)
@@ -489,7 +498,7 @@ class Config:
             if value is not None and f"integration.{name}" not in axes
         }
         if axes:
-            whole_number = {name: lookup(name).quantity.kind is int for name in axes}
+            whole_number = {name: parameter_of_axis(name).quantity.kind is int for name in axes}
             sections["sweep"] = {
                 name: np.asarray(values, dtype=int if whole_number[name] else None).tolist()
                 for name, values in axes.items()
@@ -662,15 +671,18 @@ class Config:
         """How runs are integrated."""
         return Integration(**self.section("integration"))
 
-    def axes(self, default: Mapping[str, str] | None = None) -> dict[str, _Array]:
+    def axes(
+        self, default: Mapping[str, str] | None = None, *, keep_units: bool = False
+    ) -> dict[str, _Array]:
         """The axes, by dotted name, those in physical units made into ratios; *default* if none is named.
 
-        A single value makes an axis of one point.
+        A single value makes an axis of one point.  If an axis changes the structure, and with it what a ratio of 1 is, values
+        in physical units stay as they are with *keep_units*, and those that are no axes become axes of one point.
 
         Raises
         ------
         InputError
-            For values in physical units that are out of range.
+            For values in physical units that are out of range, or that change along an axis without *keep_units*.
         """
         given = self.section("sweep") or dict(default or {})
         found: dict[str, Any] = {}
@@ -681,23 +693,23 @@ class Config:
                 found[PHYSICAL[name].parameter] = np.array(ratios)
             else:
                 found[lookup(name).name] = parsed
-        self._require_fixed_units(found)
-        return found
-
-    def _require_fixed_units(self, axes: Mapping[str, Any]) -> None:
-        """Refuse numbers in Hz, m/s or m beside an axis that changes what they are a multiple of."""
         own = [name for name in PHYSICAL if name.partition(".")[2] in self.section(name.partition(".")[0])]
-        for name in [*own, *(name for name in self.section("sweep") if name in PHYSICAL)]:
-            for axis, values in axes.items():
-                if axis.partition(".")[0] not in ("beam", "boundary", "imperfection", "model"):
-                    continue
-                there = [self.system.replace(**{axis: values[at].item()}) for at in (0, -1)]
-                if any(abs(unit_of(each, name) / unit_of(self.system, name) - 1.0) > 1e-9 for each in there):
-                    ratio = PHYSICAL[name].parameter
-                    raise InputError(
-                        f"{name}: is made into {ratio}, whose unit changes along {axis}; give {ratio}, or use sb.sweep "
-                        f"with an axis {name}"
-                    )
+        for name in [*own, *(name for name in given if name in PHYSICAL)]:
+            axis = axis_that_changes_unit(self.system, name, found)
+            if axis is None:
+                continue
+            ratio = PHYSICAL[name].parameter
+            if not keep_units:
+                raise InputError(
+                    f"{name}: is made into {ratio}, whose unit changes along {axis}; give {ratio}, or use sb.sweep "
+                    f"with an axis {name}"
+                )
+            found.pop(ratio, None)
+            section, _, key = name.partition(".")
+            found[name] = (
+                parsed_axis(name, given[name]) if name in given else np.array([self.section(section)[key]])
+            )
+        return found
 
     def to_mapping(self) -> dict[str, dict[str, Any]]:
         """What was given, plain, as a file would hold it."""
@@ -736,7 +748,7 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "", *, comple
             config.model  # noqa: B018
             if config.model.length_scale is not None and not config.is_static:
                 config.system  # noqa: B018
-                config.axes()
+                config.axes(keep_units=True)
             config.integration  # noqa: B018
         except InputError as error:
             lines = [with_section(str(error), found)]

@@ -10,8 +10,8 @@ from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
-from snapbeam.model.parameter_axes import PHYSICAL
-from snapbeam.model.parameters import Parameter, lookup
+from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis
+from snapbeam.model.parameters import Parameter
 from snapbeam.plot.style import cell_edges
 from snapbeam.util.validation import InputError
 
@@ -47,6 +47,9 @@ _PREFIXES = {
     "m": ((-3, "m"), (-6, "µ")),
     "Pa": ((9, "G"), (6, "M"), (3, "k")),
     "s": ((-3, "m"), (-6, "µ")),
+    "N": ((-3, "m"), (-6, "µ"), (-9, "n")),
+    "Hz": ((6, "M"), (3, "k")),
+    "ohm": ((6, "M"), (3, "k")),
 }
 """Powers of ten, from great to small, that have a prefix before a unit."""
 _DECADES = 10.0
@@ -124,7 +127,7 @@ def _parameter(dataset: xr.Dataset, name: str) -> Parameter | None:
     """The row of the table for an axis, by its attribute, or for a fixed parameter, by the name in the dataset."""
     full = dataset[name].attrs.get("parameter", name) if name in dataset.coords else name
     try:
-        return lookup(str(full))
+        return parameter_of_axis(str(full))
     except InputError:
         return None
 

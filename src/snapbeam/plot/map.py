@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis
 from snapbeam.model.quasi_static import quasi_static_threshold
 from snapbeam.plot.agreement import draw_agreement
 from snapbeam.plot.axes import axis_label, dress, edges_of, in_units, positions, symbol_of
@@ -32,7 +33,7 @@ from snapbeam.plot.style import (
 )
 from snapbeam.solver.statistics import STATISTICS
 from snapbeam.sweeps.measured_points import MeasuredPoints
-from snapbeam.util.si_prefixes import scale_of
+from snapbeam.util.si_prefixes import prefixed, scale_of
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, instance, shown
 
@@ -242,6 +243,11 @@ def subtitle(dataset: xr.Dataset, axes: tuple[str, ...]) -> str:
         value = _scalar(dataset, name)
         if name not in axes and value is not None:
             parts.append(f"{symbol_of(dataset, name)} = {value:.4g}")
+    for row in map(parameter_of_axis, PHYSICAL):
+        value = _scalar(dataset, row.short)
+        if row.short not in axes and value is not None:
+            unit = row.quantity.unit
+            parts.append(f"{value:.4g} µm" if unit == "um" else prefixed(value, unit, 4))
     parts += base_and_load(dataset)
     beam = "" if any(name.startswith("beam") for name in axes) else beam_text(dataset.attrs)
     return "\n".join(line for line in (beam, ", ".join(parts)) if line)

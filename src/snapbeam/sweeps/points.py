@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.parameter_axes import PHYSICAL, physical_name, unit_of
+from snapbeam.model.parameter_axes import (
+    PHYSICAL,
+    axis_that_changes_unit,
+    checked_physical,
+    parameter_of_axis,
+    parse_axis,
+    physical_name,
+    unit_of,
+)
 from snapbeam.model.parameters import Parameter, lookup, parameters, short_names
 from snapbeam.util.provenance import array_hash
 from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, shown
@@ -30,6 +38,7 @@ __all__ = [
     "labels_of",
     "physical_points",
     "points_of",
+    "ratios_of",
     "require_memory",
 ]
 
@@ -61,7 +70,7 @@ class Grid:
     @cached_property
     def order(self) -> tuple[str, ...]:
         """Axes in the order in which points are counted."""
-        structural = [name for name in self.axes if not lookup(name).is_run]
+        structural = [name for name in self.axes if not parameter_of_axis(name).is_run]
         return (*structural, *(name for name in self.axes if name not in structural))
 
     @property
@@ -72,7 +81,7 @@ class Grid:
     @property
     def dims(self) -> tuple[str, ...]:
         """Dimensions of the dataset."""
-        return tuple(lookup(name).short for name in self.axes)
+        return tuple(parameter_of_axis(name).short for name in self.axes)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -97,7 +106,7 @@ class Grid:
 
     def coordinates(self) -> dict[str, Any]:
         """Return dimensions, values and attributes of the axes, by name."""
-        return {lookup(name).short: _coordinate(lookup(name), values) for name, values in self.axes.items()}
+        return {row.short: _coordinate(row, self.axes[row.name]) for row in map(parameter_of_axis, self.axes)}
 
     def describe(self) -> dict[str, Any]:
         """Return plain values that identify the grid."""
@@ -168,9 +177,9 @@ _POINT_BYTES = 700
 _MEMORY = 4 * 2**30
 
 
-def require_memory(points: int, remedy: str) -> None:
-    """Refuse a sweep whose results do not fit into the memory, before any of them is computed or read."""
-    size = points * _POINT_BYTES
+def require_memory(points: int, remedy: str, bytes_each: int = _POINT_BYTES) -> None:
+    """Refuse a sweep whose results, or values, do not fit into the memory, before any of them is computed or read."""
+    size = points * bytes_each
     if size > _MEMORY:
         raise InputError(
             f"{points} points would take {size / 2**30:.3g} GiB of memory, the limit is {_MEMORY / 2**30:.0f} GiB: {remedy}"
@@ -214,47 +223,43 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:
 
 
 def physical_points(system: System, axes: Mapping[str, Any]) -> Points:
-    """Return the points of axes in Hz, m/s, g, um or m.
+    """Return the grid of axes of which some may be in Hz, m/s, g, um or m.
 
-    They are a grid of ratios.  If an axis changes the structure, and with it the unit of a ratio, they are a list of all
-    combinations instead, each with the ratio of its own structure.
+    These become ratios.  Where another axis changes the structure, and with it the unit of a ratio, they stay as they are
+    given; :meth:`~snapbeam.sweeps.setup.SweepSetup.groups` makes the ratios of each structure.
     """
-    physical = {full: name for name in axes if (full := physical_name(str(name))) is not None}
-    if not physical:
+    given = {PHYSICAL[own].parameter: own for name in axes if (own := physical_name(str(name))) is not None}
+    if not given:
         return points_of(axes)
-    grid = points_of({
-        PHYSICAL[each].parameter if (each := physical_name(str(name))) is not None else name: values
-        for name, values in axes.items()
-    })  # fmt: skip
-    own_axes = {PHYSICAL[full].parameter: full for full in physical}
-    structural = [name for name in grid.axes if not lookup(name).is_run]
-    if not structural:
-        return _in_ratios(grid, {ratio: unit_of(system, full) for ratio, full in own_axes.items()})
-    require_memory(grid.size, "give fewer points, or a frequency ratio in place of Hz")
-    columns = grid.take(np.arange(grid.size))
-    units: dict[tuple[Any, ...], list[float]] = {}
-    rows = list(zip(*(columns[name].tolist() for name in structural), strict=True))
-    for row in rows:
-        if row not in units:
-            own = system.replace(**dict(zip(structural, row, strict=True)))
-            units[row] = [unit_of(own, full) for full in physical]
-    table = np.array([units[row] for row in rows])
-    labels = {}
-    for full, unit in zip(physical, table.T, strict=True):
-        ratio = PHYSICAL[full].parameter
-        labels[full.removeprefix("drive.").replace(".", "_")] = columns[ratio]
-        columns[ratio] = columns[ratio] / unit
-    if np.allclose(table, table[0], rtol=1e-9, atol=0.0):
-        return _in_ratios(grid, dict(zip(own_axes, table[0], strict=True)))
-    made = _list_of(columns)
-    return PointList(made.columns, labels)
+    found: dict[str, NDArray[Any]] = {}
+    for name, values in axes.items():
+        own = physical_name(str(name))
+        row = _swept(str(name)) if own is None else parameter_of_axis(own)
+        ratio = row.name if own is None else PHYSICAL[own].parameter
+        if ratio in found:
+            raise InputError(f"{name}: is given twice among the axes; give it once")
+        found[ratio] = _axis(row, str(name), values)
+    axes = {}
+    for name, values in found.items():
+        if name not in given:
+            axes[name] = values
+        elif axis_that_changes_unit(system, given[name], found) is not None:
+            axes[given[name]] = values
+        else:
+            axes[name] = values / unit_of(system, given[name])
+    plain = points_of({name: values for name, values in axes.items() if name not in PHYSICAL})
+    return Grid({name: plain.axes.get(name, values) for name, values in axes.items()})
 
 
-def _in_ratios(grid: Points, units: Mapping[str, float]) -> Points:
-    """The grid with the axes of *units* divided by them."""
-    return points_of({
-        name: values / units[name] if name in units else values for name, values in grid.axes.items()
-    })  # fmt: skip
+def ratios_of(system: System, columns: Mapping[str, Any]) -> dict[str, Any]:
+    """Return columns with those in physical units as ratios of one structure."""
+    found = dict(columns)
+    for name in columns.keys() & PHYSICAL.keys():
+        values = found.pop(name)
+        for value in np.unique(values).tolist():
+            checked_physical(system, name, value, name)
+        found[PHYSICAL[name].parameter] = values / unit_of(system, name)
+    return found
 
 
 def _swept(name: str) -> Parameter:
@@ -272,6 +277,8 @@ def _axis(row: Parameter, name: str, values: Any) -> NDArray[Any]:
         if len(set(words)) < len(words):
             raise InputError(f"{name} = {words}: must differ from each other")
         return np.array(words)
+    if isinstance(values, str):
+        values = np.atleast_1d(parse_axis(name, values, whole=item.kind is int, unit=item.unit))
     if not isinstance(values, (list, tuple, range)) and np.ndim(values) == 0:
         raise InputError(f"{name} = {shown(values)}: must be an array; put a single value into the system")
     closed = item.closed if item.kind is float else "both"

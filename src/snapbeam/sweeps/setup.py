@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.integration import Integration
+from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, unit_of
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import quantities
 from snapbeam.model.state import State, started
@@ -22,7 +23,16 @@ from snapbeam.solver.assemble import cycles_of, make_ensemble, plans_of, run_col
 from snapbeam.solver.registry import resolve
 from snapbeam.solver.statistics import STATISTICS, statistics_of
 from snapbeam.solver.step_size import Plan, require_resolved
-from snapbeam.sweeps.points import Columns, Grid, Points, labels_of, physical_points, points_of
+from snapbeam.sweeps.points import (
+    Columns,
+    Grid,
+    Points,
+    labels_of,
+    physical_points,
+    points_of,
+    ratios_of,
+    require_memory,
+)
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, shown
@@ -48,8 +58,8 @@ def require_parameters(system: System, points: Points) -> None:
     for name in first:
         if (
             name.startswith(("integration.", "initial_state."))
-            or not lookup(name).is_run
-            or name in system.parameters
+            or not parameter_of_axis(name).is_run
+            or _ratio(name) in system.parameters
         ):
             continue
         section, _, field = name.partition(".")
@@ -72,9 +82,15 @@ def require_parameters(system: System, points: Points) -> None:
 def _at(system: System, point: dict[str, Any]) -> System:
     """Return the system at a point."""
     plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in point.items()}
-    return system.replace(
-        **{name: value for name, value in plain.items() if not name.startswith("integration.")}
-    )
+    plain = {name: value for name, value in plain.items() if not name.startswith("integration.")}
+    physical = {name: plain.pop(name) for name in list(plain) if name in PHYSICAL}
+    system = system.replace(**plain)
+    return system.replace(**ratios_of(system, physical)) if physical else system
+
+
+def _ratio(name: str) -> str:
+    """The dotted name of a parameter, of that in physical units too."""
+    return PHYSICAL[name].parameter if name in PHYSICAL else name
 
 
 def diagnostics_of(system: System, points: Points) -> Iterator[Diagnostic]:
@@ -105,8 +121,11 @@ def require_every_structure(setup: SweepSetup) -> None:
     """
     names = setup.points.names
     stepped = setup.integration.step is not None or "integration.step" in names
-    if not stepped and all(lookup(name).is_run and not name.startswith("initial_state.") for name in names):
+    if not stepped and all(
+        parameter_of_axis(name).is_run and not name.startswith("initial_state.") for name in names
+    ):
         return
+    require_memory(setup.points.size, "give fewer points", 16 * (len(names) + 1))
     columns = setup.points.take(np.arange(setup.points.size))
     for system, integration, _, points in setup.groups(columns):
         setup.start_of(system, points)
@@ -202,11 +221,13 @@ class SweepSetup:
         self, columns: Columns
     ) -> Iterator[tuple[System, Integration, NDArray[np.int64], dict[str, NDArray[np.float64]]]]:
         """Yield the points by model: a system, an integration, the numbers of its points, and their parameters."""
-        structural = [name for name in columns if not lookup(name).is_run]
+        structural = [name for name in columns if not parameter_of_axis(name).is_run]
         own = [name for name in columns if name not in structural]
         total = next(iter(columns.values())).size
         if not structural:
-            points = {name: np.asarray(columns[name], dtype=np.float64) for name in own}
+            points = ratios_of(
+                self.system, {name: np.asarray(columns[name], dtype=np.float64) for name in own}
+            )
             yield self.system, self.integration, np.arange(total), points
             return
         keys: dict[tuple[Any, ...], list[int]] = {}
@@ -215,12 +236,13 @@ class SweepSetup:
         for key, members in keys.items():
             which = np.array(members)
             changes = dict(zip(structural, key, strict=True))
+            points = {name: np.asarray(columns[name][which], dtype=np.float64) for name in own}
             try:
                 system, integration = self.neighbour(changes)
+                points = ratios_of(system, points)
             except InputError as error:
                 where = ", ".join(f"{name} = {value}" for name, value in changes.items())
                 raise InputError(f"at {where}: {error}") from None
-            points = {name: np.asarray(columns[name][which], dtype=np.float64) for name in own}
             yield system, integration, which, points
 
     def neighbour(self, changes: dict[str, Any]) -> tuple[System, Integration]:
@@ -253,7 +275,9 @@ class SweepSetup:
         """Parameters of drive and striker that every dataset contains and that are not swept, by dotted name."""
         parameters = self.system.parameters
         return {
-            name: parameters[name] for name in _ALWAYS if name in parameters and name not in self.points.names
+            name: parameters[name]
+            for name in _ALWAYS
+            if name in parameters and name not in map(_ratio, self.points.names)
         }
 
     @property
@@ -291,7 +315,7 @@ class SweepSetup:
         own |= {lookup(name).short: value for name, value in self.fixed.items()}
         more = own | (more or {})
         attrs = attributes_of(title, self.system, self.integration, self.plan, more, self.points.describe())
-        varied = {lookup(name).short for name in self.points.names}
+        varied = {lookup(_ratio(name)).short for name in self.points.names}
         if self.structural:
             varied |= {
                 "reference_frequency",
@@ -350,16 +374,33 @@ class SweepSetup:
                 plan = plans_of(system, integration, run_columns(system, {}))[0]
                 made[key] = system.model.reference_frequency, plan.step, system.scale.length
             table[(slice(None), *at)] = made[key]
+        found = self._ratios(names, dims, columns)
         labels = {
             "reference_frequency": ("Hz", "frequency that Omega and V are normalised by"),
             "step": ("s", "step in free flight"),
             "length_scale": ("m", "length that displacements are normalised by"),
         }
-        return {
+        return found | {
             name: (dims, values, {"units": unit, "long_name": words})
             for (name, (unit, words)), values in zip(labels.items(), table, strict=True)
             if name not in dims and name not in self.points.coordinates()
         }
+
+    def _ratios(self, names: list[str], dims: tuple[str, ...], columns: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the ratios that axes in physical units are at each structure."""
+        found = {}
+        for name in self.points.names:
+            if name not in PHYSICAL:
+                continue
+            shape = np.shape(columns[names[0]])
+            units = np.empty(shape)
+            for at in np.ndindex(shape):
+                own = {each: columns[each][at].item() for each in names}
+                units[at] = unit_of(self.neighbour(own)[0], name)
+            row = lookup(PHYSICAL[name].parameter)
+            values = self.points.axes[name] / units[..., None]
+            found[row.short] = ((*dims, parameter_of_axis(name).short), values, labels_of(row))
+        return found
 
 
 def sweep_setup(system: System, axes: Any, integration: Integration | None = None) -> SweepSetup:

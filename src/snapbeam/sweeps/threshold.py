@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.integration import Integration
+from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, physical_name
 from snapbeam.model.parameters import lookup
 from snapbeam.model.system import System
 from snapbeam.sweeps.compute import CheckpointOptions, compute_sweep
-from snapbeam.sweeps.points import Grid, points_of
+from snapbeam.sweeps.points import Grid
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup, variable_attributes
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.status_codes import ResponseClass, RunStatus
@@ -117,7 +118,7 @@ def threshold(
     >>> found["lower_threshold"].dims
     ('frequency_ratio',)
     """
-    row = lookup(parameter)
+    row = parameter_of_axis(physical_name(str(parameter)) or lookup(parameter).name)
     if not row.is_run or row.quantity.kind is not float:
         raise InputError(
             f"parameter = {shown(parameter)}: must be a number that may differ between runs, such as velocity_amplitude"
@@ -129,11 +130,10 @@ def threshold(
     asked = Integration() if integration is None else integration
     if not isinstance(asked, Integration):
         raise InputError(f"integration = {shown(integration)}: must be an Integration")
-    points = points_of({**axes, row.name: values})
-    assert isinstance(points, Grid)
-    setup = sweep_setup(system, points, asked.replace(early_termination=True))
+    setup = sweep_setup(system, {**axes, row.name: values}, asked.replace(early_termination=True))
     computed = compute_sweep(setup, CheckpointOptions(), progress=counting(progress, "threshold", "runs"))
-    return _dataset(setup, row.name, computed)
+    along = row.name if row.name in setup.points.axes else PHYSICAL[row.name].parameter
+    return _dataset(setup, along, computed)
 
 
 def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
@@ -141,9 +141,9 @@ def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
     from snapbeam.util.datasets import xr
 
     assert isinstance(setup.points, Grid)
-    row = lookup(along)
+    row = parameter_of_axis(along)
     values = setup.points.axes[along]
-    dims = tuple(lookup(name).short for name in setup.points.axes if name != along)
+    dims = tuple(parameter_of_axis(name).short for name in setup.points.axes if name != along)
     whole = (*dims, row.short)
     response = computed["response_class"].transpose(*whole).values
     rows = _thresholds(response)
