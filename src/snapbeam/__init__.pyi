@@ -25,6 +25,7 @@ from .model.drive.constant_velocity import ConstantVelocity as ConstantVelocity
 from .model.drive.fixed_stop import FixedStop as FixedStop
 from .model.drive.half_sine import HalfSine as HalfSine
 from .model.drive.noise import BandLimitedNoise as BandLimitedNoise
+from .model.drive.recorded_acceleration import RecordedAcceleration as RecordedAcceleration
 from .model.drive.recorded_motion import RecordedMotion as RecordedMotion
 from .model.drive.shock import Shock as Shock
 from .model.drive.sine import AccelerationSine as AccelerationSine

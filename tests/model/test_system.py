@@ -209,6 +209,7 @@ OF_OTHERS = {
     "layer": (sb.LayeredHertz(4e8, 1e13), {"stiffness": 3e8, "layer_stiffness": 2e13}),
     "restitution": (None, {}),
     "recorded_motion": (None, {}),
+    "recorded_acceleration": (None, {}),
     "burst": (
         sb.Burst(frequency_ratio=1.0, velocity_amplitude=0.1, duration_cycles=5.0),
         {

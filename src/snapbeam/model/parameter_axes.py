@@ -28,6 +28,7 @@ from snapbeam.util.validation import (
 )
 
 __all__ = [
+    "CHANGES_UNITS",
     "PHYSICAL",
     "Axis",
     "Physical",
@@ -200,7 +201,7 @@ def physical_name(name: str) -> str | None:
     return found[0] if found else None
 
 
-_CHANGES_UNITS = ("beam.", "boundary.", "imperfection.", "model.")
+CHANGES_UNITS = ("beam.", "boundary.", "imperfection.", "model.")
 """Sections of parameters that may change the first natural frequency and the length scale."""
 
 
@@ -237,7 +238,7 @@ def axis_that_changes_unit(system: System, name: str, axes: Mapping[str, Any]) -
     """The first of some axes along which a ratio of 1 is not always the same in the physical unit of *name*."""
     unit = unit_of(system, name)
     for other, values in axes.items():
-        if not other.startswith(_CHANGES_UNITS):
+        if not other.startswith(CHANGES_UNITS):
             continue
         for value in values:
             try:

@@ -11,7 +11,6 @@ from typing import Any
 from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.drive.combined import MOST_STRIKERS
-from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
 from snapbeam.util.validation import InputError, InputTypeError, shown
@@ -253,9 +252,9 @@ def check_others(system: Any) -> None:
             "velocity cannot act against another contact that is closed; use a HertzContact, or "
             "a HuntCrossley of the same restitution for the first striker"
         )
-    if isinstance(system.striker.drive, RecordedMotion):
+    if system.striker.drive.samples().size:
         raise InputError(
-            "drive = 'recorded_motion' with several strikers: a recording has its own time axis; use drives given by formulas"
+            f"drive = {system.striker.drive.name!r} with several strikers: a recording has its own time axis; use drives given by formulas"
         )
     for number, each in enumerate(others, 2):
         _check_one(number, each)
@@ -279,7 +278,7 @@ def _check_one(number: int, another: ContactPair) -> None:
             f"striker_{number}.mass = {striker.mass:g}: of several strikers the first alone may be a body, since the "
             "reduced structure contains one body; leave the mass out, or make this one the first"
         )
-    if isinstance(striker.drive, RecordedMotion):
+    if striker.drive.samples().size:
         raise InputError(
-            f"drive_{number} = 'recorded_motion': a recording has its own time axis; use a drive given by a formula, or a FixedStop"
+            f"drive_{number} = {striker.drive.name!r}: a recording has its own time axis; use a drive given by a formula, or a FixedStop"
         )

@@ -19,7 +19,6 @@ from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.diagnostics import doubts_of
 from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.drive.fixed_stop import FixedStop
-from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.harvester import Harvester
 from snapbeam.model.local_force import LocalForce
@@ -91,11 +90,11 @@ def check_environment(system: Any) -> None:
         )
     if (
         striker is not None
-        and isinstance(striker.drive, RecordedMotion)
+        and striker.drive.samples().size
         and (base is not None or load is not None or force is not None)
     ):
         raise InputError(
-            f"drive = 'recorded_motion' with {words}: a recording has its own time axis; use a drive given by a formula, "
+            f"drive = {striker.drive.name!r} with {words}: a recording has its own time axis; use a drive given by a formula, "
             "or a FixedStop"
         )
     if load is not None and system.model.beam is None:
@@ -399,7 +398,9 @@ class System:
         parts = [f"modes={self.model.modes}", f"contact={self.contact!r}"]
         if self.striker is not None:
             parts.append(
-                f"striker={self.striker!r}" if self.striker.drive.harmonic else "striker=recorded_motion"
+                f"striker={self.striker!r}"
+                if self.striker.drive.harmonic
+                else f"striker={self.striker.drive.name}"
             )
         if self.further_contacts:
             parts.append(f"strikers={1 + len(self.further_contacts)}")

@@ -14,6 +14,7 @@ from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.drive.base import HORIZON, Drive
 from snapbeam.model.drive.combined import joined
+from snapbeam.model.drive.recorded_acceleration import RecordedAcceleration
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.early_termination import decidable_energy, passed_heights
 from snapbeam.model.external_force import RecordedForce
@@ -195,7 +196,7 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
     names |= {f"drive_{number}": f"tip{number - 1}" for number in range(2, 2 + len(system.further_contacts))}
     kinds: dict[str, type[Drive]] = {}
     found: dict[str, _Array] = {}
-    speed, fastest = np.zeros(runs), np.zeros(runs)
+    speed, fastest, samples = np.zeros(runs), np.zeros(runs), np.empty(0)
     for section, drive in system.moving:
         part, own = names[section], _own_driven(columns, section, runs)
         numbers = drive.numbers(own, scale)
@@ -213,7 +214,7 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
         found["base_hardest"] = base.motion.peak_acceleration(own, scale)
         found["base_sign"], found["base_follow"] = np.full(runs, sign), np.full(runs, follow)
         speed = speed + abs(follow) * base.motion.bounds(own, scale)[1]
-    samples = np.empty(0)
+        samples = base.motion.samples()
     if system.external_force is not None:
         history = system.external_force.history
         own = _own_driven(columns, "external_force", runs)
@@ -405,16 +406,18 @@ def make_ensemble(
 
 
 def _require_record(system: System, table: NDArray[Any], driven: Driven) -> None:
-    """Refuse runs that last longer than a recorded force."""
-    force = system.external_force
-    if force is None or not isinstance(force.history, RecordedForce):
+    """Refuse runs that last longer than a recorded force or acceleration."""
+    records = [each for _, each in system.moving if isinstance(each, (RecordedForce, RecordedAcceleration))]
+    if not records:
         return
+    record = min(records, key=lambda each: each.duration)
     omega = driven.numbers[:, driven.kind.number_names.index("omega")]
     ends = float((table["end"] * table["tick"] + table["phase"] / omega).max())
-    if ends > force.history.duration * (1.0 + 1e-9):
+    if ends > record.duration * (1.0 + 1e-9):
+        what = "force" if isinstance(record, RecordedForce) else "acceleration"
         raise InputError(
-            f"cycles: the run ends after {ends:g} s, but the recorded force lasts {force.history.duration:g} s; ask for "
-            "fewer cycles, or give a longer record"
+            f"cycles: the run ends after {ends:g} s, but the recorded {what} lasts {record.duration:g} s; ask for fewer "
+            "cycles, or give a longer record"
         )
 
 

@@ -6,6 +6,7 @@ from snapbeam.model.drive import (  # noqa: F401, I001  the order of DRIVES
     constant_velocity,
     half_sine,
     noise,
+    recorded_acceleration,
     recorded_motion,
     shock,
     sine,

@@ -61,6 +61,10 @@ class SumDrive(Timed):
         for drive in drives:
             if not isinstance(drive, Drive):
                 raise InputTypeError(f"drive = {shown(drive)}: must be a drive, such as Sine(...)")
+            if drive.samples().size:
+                raise InputError(
+                    f"drive = {drive.name!r} in a sum: a recording has its own time axis; add the records instead"
+                )
             flat += drive.parts_of_sum if isinstance(drive, SumDrive) else [drive]
         made = mixture(tuple(type(each) for each in flat))
         values = {

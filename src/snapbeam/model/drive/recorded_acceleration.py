@@ -1,0 +1,177 @@
+"""A motion given by its measured acceleration."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.drive.shock import GRAVITY
+from snapbeam.model.quantity import check_fields, quantity
+from snapbeam.util.validation import InputError, finite_array
+
+__all__ = ["RecordedAcceleration"]
+
+
+_Array = NDArray[np.float64]
+
+_KNOTS = 8.0
+"""Samples in the shortest period that the steps resolve."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedAcceleration(Timed):
+    """A motion by its measured acceleration, such as that of a shaken base.
+
+    Between samples the acceleration is the cubic spline through all of them.  Velocity and displacement are its exact
+    integrals; the velocity has zero mean over the record, so that the motion ends where it began.  Low frequencies in a
+    record, such as an offset of the sensor, become large displacements: filter them out first if the displacement
+    matters, that is for a striker, or for a base under a striker in space.  A cycle is a period of the first mode.  A run
+    must end before the record does.
+
+    Parameters
+    ----------
+    record : array_like of shape (samples,)
+        Acceleration, m/s^2, the first sample at the start of the run; :meth:`from_g` takes g.
+    sampling_frequency : float
+        Samples per second, Hz.
+
+    Raises
+    ------
+    InputError
+        For fewer than four samples and for values that are not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> time = np.arange(2000) / 1e4  # s
+    >>> record = 0.3 * np.sin(2.0 * np.pi * 80.0 * time)  # g
+    >>> motion = sb.RecordedAcceleration.from_g(record, sampling_frequency=1e4)
+    >>> base = sb.BaseExcitation(motion=motion)
+    """
+
+    record: _Array = quantity("m/s^2", "acceleration, sampled", kind=object)
+    sampling_frequency: float = quantity("Hz", "samples per second", low=0.0)
+
+    name = "recorded_acceleration"
+    number_names = ("omega", "fastest", "table", "samples", "interval")
+    amplitudes = ()
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        record = finite_array("record", self.record, 1).copy()
+        if record.size < 4:
+            raise InputError(f"record of {record.size} samples: must hold at least 4; give a longer one")
+        record.setflags(write=False)
+        object.__setattr__(self, "record", record)
+
+    @classmethod
+    def from_g(cls, record: ArrayLike, sampling_frequency: float) -> RecordedAcceleration:
+        """Return a motion whose acceleration is given in g = 9.80665 m/s^2.
+
+        Examples
+        --------
+        >>> import snapbeam as sb
+        >>> float(sb.RecordedAcceleration.from_g([0.0, 1.0, 0.0, -1.0], 1000.0).record[1])
+        9.80665
+        """
+        return cls(record=GRAVITY * finite_array("record", record, 1), sampling_frequency=sampling_frequency)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, RecordedAcceleration):
+            return NotImplemented
+        return self.sampling_frequency == other.sampling_frequency and np.array_equal(
+            self.record, other.record
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.sampling_frequency, self.record.tobytes()))
+
+    @property
+    def duration(self) -> float:
+        """Length of the record, s."""
+        return (self.record.size - 1) / self.sampling_frequency
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """A period of the first mode."""
+        return np.full(next(iter(columns.values())).size, 2.0 * math.pi / scale.omega)
+
+    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """Location and number of the samples, and their interval, s."""
+        runs = next(iter(columns.values())).size
+        fixed = {
+            "fastest": 2.0 * math.pi * self.sampling_frequency / _KNOTS,
+            "table": 0.0,
+            "samples": float(self.record.size),
+            "interval": 1.0 / self.sampling_frequency,
+        }
+        return {name: np.full(runs, value) for name, value in fixed.items()}
+
+    @cached_property
+    def _rows(self) -> _Array:
+        """Acceleration, its rate, velocity and displacement at the samples, shape (samples, 4)."""
+        from scipy.interpolate import CubicSpline
+
+        times = np.arange(self.record.size) / self.sampling_frequency
+        spline = CubicSpline(times, self.record)
+        velocity = spline.antiderivative()
+        moved = spline.antiderivative(2)
+        mean = float(moved(times[-1])) / times[-1]
+        return np.column_stack(
+            (self.record, spline(times, 1), velocity(times) - mean, moved(times) - mean * times)
+        )
+
+    def samples(self) -> _Array:
+        """Acceleration, its rate, velocity and displacement, sample after sample."""
+        return self._rows.ravel()
+
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """A bound on the spline: between two samples it is at most both, and 4/27 of an interval times each slope."""
+        most = np.abs(self._rows).max(axis=0)
+        peak = float(most[0] + 8.0 / 27.0 * most[1] / self.sampling_frequency)
+        return np.full(next(iter(columns.values())).size, peak)
+
+    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
+        """Bounds on displacement and speed: those at the samples, and what half an interval can add."""
+        return self._bound(columns, scale, 1.0)
+
+    def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """The bound on the displacement to the other side."""
+        return self._bound(columns, scale, -1.0)[0]
+
+    def _bound(self, columns: Mapping[str, _Array], scale: Scale, sign: float) -> tuple[_Array, _Array]:
+        half = 0.5 / self.sampling_frequency
+        speed = np.abs(self._rows[:, 2]).max() + half * self.peak_acceleration(columns, scale)
+        return float((sign * self._rows[:, 3]).max()) + half * speed, speed
+
+    @staticmethod
+    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+        """Displacement and velocity: the integrals of the cubic between two samples."""
+        at = min(argument / (drive.omega * drive.interval), drive.samples - 1.0)
+        i = min(int(at), int(drive.samples) - 2)
+        row = int(drive.table) + 4 * i
+        s, interval = at - i, drive.interval
+        a0, rise = memory[row], memory[row + 4] - memory[row]
+        a, b = memory[row + 1] * interval, memory[row + 5] * interval
+        c2, c3 = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
+        gained = interval * s * (a0 + s * (a / 2.0 + s * (c2 / 3.0 + s * c3 / 4.0)))
+        moved = interval * interval * s * s * (a0 / 2.0 + s * (a / 6.0 + s * (c2 / 12.0 + s * c3 / 20.0)))
+        return memory[row + 3] + memory[row + 2] * interval * s + moved, memory[row + 2] + gained
+
+    @staticmethod
+    def acceleration(drive: Any, memory: Any, argument: float) -> float:
+        """The cubic between two samples."""
+        at = min(argument / (drive.omega * drive.interval), drive.samples - 1.0)
+        i = min(int(at), int(drive.samples) - 2)
+        row = int(drive.table) + 4 * i
+        s, interval = at - i, drive.interval
+        a0, rise = memory[row], memory[row + 4] - memory[row]
+        a, b = memory[row + 1] * interval, memory[row + 5] * interval
+        return a0 + s * (a + s * (3.0 * rise - 2.0 * a - b + s * (a + b - 2.0 * rise)))
