@@ -46,7 +46,7 @@ def test_says_what_made_it(name):
             assert "/" not in dataset.attrs["command"].replace("docs/data", "")
 
 
-FORMER = dict.fromkeys(("fig8", "lifetimes", "sensitivity", "transients"), "c2020ad0df9d5481")
+FORMER = {"fig8": "c2020ad0df9d5481"}
 """Data of the solver before free flight had one step length at every energy, as the page on the reproduction says."""
 
 
