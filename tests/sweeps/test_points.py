@@ -174,10 +174,6 @@ def frame(**columns) -> pd.DataFrame:
             "velocity_amplitud: is not a parameter; did you mean 'velocity_ampl",
         ),
         (
-            frame(frequency_hz=[100.0], location=[0.3]),
-            "frequency_hz: give frequency_ratio; .*from_physical",
-        ),
-        (
             pd.DataFrame({"frequency_ratio": [1.0], "drive.frequency_ratio": [2.0]}),
             r"drive\.frequency_ratio: is given twice among the points",
         ),
@@ -229,6 +225,21 @@ def test_a_sweep_over_the_length_at_fixed_hz() -> None:
             speed = 0.03 / (own.scale.length * own.scale.omega)
             run = sb.sweep(own, {"frequency_ratio": [ratio], "velocity_amplitude": [speed]}, once)
             assert float(swept.min_displacement.sel(at).item()) == float(run.min_displacement.item())
+
+
+def test_a_list_in_hz() -> None:
+    """With a structure that differs each point has its own ratio; both are in the dataset."""
+    system = Config().system.replace(**{"model.modes": 1})
+    once = sb.Integration(cycles=2)
+    first = system.model.reference_frequency
+    swept = sb.sweep(system, frame(frequency_hz=[50.0, 100.0]), once)
+    np.testing.assert_allclose(swept.frequency_ratio * first, [50.0, 100.0], rtol=1e-14)
+    assert swept.frequency_hz.values.tolist() == [50.0, 100.0]
+    lengths = [0.1, 0.161]
+    swept = sb.sweep(system, frame(frequency_hz=[50.0, 100.0], **{"beam.length": lengths}), once)
+    own = [system.replace(**{"beam.length": length}).model.reference_frequency for length in lengths]
+    np.testing.assert_allclose(swept.frequency_ratio * own, [50.0, 100.0], rtol=1e-14)
+    assert swept.frequency_hz.values.tolist() == [50.0, 100.0]
 
 
 def test_axes_of_text_have_units() -> None:

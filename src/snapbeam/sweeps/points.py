@@ -36,6 +36,7 @@ __all__ = [
     "PointList",
     "Points",
     "labels_of",
+    "list_in_ratios",
     "physical_points",
     "points_of",
     "ratios_of",
@@ -157,8 +158,8 @@ class PointList:
     def coordinates(self) -> dict[str, Any]:
         """Return dimension, values and attributes of each parameter and label, by name."""
         found: dict[str, Any] = {
-            lookup(name).short: ((POINT,), values, labels_of(lookup(name)))
-            for name, values in self.columns.items()
+            row.short: ((POINT,), self.columns[row.name], labels_of(row))
+            for row in map(parameter_of_axis, self.columns)
         }
         return found | {name: ((POINT,), values, {}) for name, values in self.labels.items()}
 
@@ -251,6 +252,16 @@ def physical_points(system: System, axes: Mapping[str, Any]) -> Points:
     return Grid({name: plain.axes.get(name, values) for name, values in axes.items()})
 
 
+def list_in_ratios(system: System, points: PointList) -> PointList:
+    """Return a list of points without columns in physical units, which become labels, unless the structure changes."""
+    if any(not parameter_of_axis(name).is_run for name in points.columns):
+        return points
+    given = {
+        parameter_of_axis(name).short: values for name, values in points.columns.items() if name in PHYSICAL
+    }
+    return PointList(ratios_of(system, points.columns), points.labels | given) if given else points
+
+
 def ratios_of(system: System, columns: Mapping[str, Any]) -> dict[str, Any]:
     """Return columns with those in physical units as ratios of one structure."""
     found = dict(columns)
@@ -297,10 +308,11 @@ def _list_of(columns: dict[str, NDArray[Any]]) -> PointList:
                 values = np.full(_length(columns), values)
             else:
                 raise InputError(f"{name} of shape {values.shape}: a list of points must have one dimension")
-        if _is_label(name):
+        physical = physical_name(name)
+        if physical is None and _is_label(name):
             labels[name] = values
             continue
-        row = _swept(name)
+        row = _swept(name) if physical is None else parameter_of_axis(physical)
         if row.name in known:
             raise InputError(f"{name}: is given twice among the points, also as {row.name}; give it once")
         item = row.quantity
@@ -325,12 +337,8 @@ def _is_label(name: str) -> bool:
     Raises
     ------
     InputError
-        For a parameter in a physical unit, and for a name that is almost the name of a parameter.
+        For a name that is almost the name of a parameter.
     """
-    physical = physical_name(name)
-    if physical is not None:
-        ratio = lookup(PHYSICAL[physical].parameter).short
-        raise InputError(f"{name}: give {ratio}; snapbeam.model.parameter_axes.from_physical converts it")
     table = parameters()
     known = [*table, *short_names(), *(full.partition(".")[2] for full in table)]
     if name in known:

@@ -26,8 +26,10 @@ from snapbeam.solver.step_size import Plan, require_resolved
 from snapbeam.sweeps.points import (
     Columns,
     Grid,
+    PointList,
     Points,
     labels_of,
+    list_in_ratios,
     physical_points,
     points_of,
     ratios_of,
@@ -398,6 +400,9 @@ class SweepSetup:
                 own = {each: columns[each][at].item() for each in names}
                 units[at] = unit_of(self.neighbour(own)[0], name)
             row = lookup(PHYSICAL[name].parameter)
+            if isinstance(self.points, PointList):
+                found[row.short] = (dims, self.points.columns[name] / units, labels_of(row))
+                continue
             values = self.points.axes[name] / units[..., None]
             found[row.short] = ((*dims, parameter_of_axis(name).short), values, labels_of(row))
         return found
@@ -418,6 +423,8 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         points: Points = physical_points(system, axes)
     else:
         points = axes if isinstance(axes, Points) else points_of(axes)
+    if isinstance(points, PointList):
+        points = list_in_ratios(system, points)
     require_parameters(system, points)
     law = type(system.contact) if system.contact is not None else None
     resolved = resolve(
