@@ -13,12 +13,12 @@ from urllib.parse import urlencode
 
 from snapbeam import InputError
 from snapbeam.explorer.jobs import ADDRESS
-from snapbeam.model.parameters import lookup
+from snapbeam.model.parameter_axes import parameter_of_axis
 
 __all__ = ["Address", "number"]
 
 
-_KEYS = ("x", "y", "show", "at", "b", "view", "set", "theme", "tab", "card")
+_KEYS = ("x", "y", "show", "at", "b", "view", "set", "theme", "type", "tab", "card")
 _MOST = 64
 
 
@@ -36,6 +36,8 @@ class Address:
         What is seen of the map.
     changes : dict
         Parameters that differ from the map's system, by dotted name.
+    theme, type : str
+        "dark" or "default"; "large" for a lecture.
     tab, card : str
         The view of the run, and the card beside it; empty for the first one.
     words : tuple of str
@@ -50,6 +52,7 @@ class Address:
     view: tuple[float, ...] | None = None
     changes: Mapping[str, Any] = field(default_factory=dict)
     theme: str = "default"
+    type: str = ""
     tab: str = ""
     card: str = ""
     words: tuple[str, ...] = ()
@@ -81,6 +84,8 @@ class Address:
             parts["view"] = ",".join(repr(float(value)) for value in self.view)
         if self.theme != "default":
             parts["theme"] = self.theme
+        if self.type:
+            parts["type"] = self.type
         return urlencode({name: value for name, value in parts.items() if value}, safe=",:")
 
 
@@ -93,6 +98,10 @@ def _with(found: Address, name: str, text: str) -> Address:
         if text not in ("default", "dark"):
             raise InputError("must be default or dark")
         return replace(found, theme=text)
+    if name == "type":
+        if text != "large":
+            raise InputError("must be large")
+        return replace(found, type=text)
     if name == "view":
         view = tuple(number("view", part) for part in text.split(","))
         if len(view) != 4 or not (view[0] < view[1] and view[2] < view[3]):
@@ -107,7 +116,7 @@ def _pairs(text: str) -> dict[str, Any]:
         name, colon, value = part.partition(":")
         if not colon:
             raise InputError("must be name:value,name:value")
-        row = lookup(name)
+        row = parameter_of_axis(name)
         if row.quantity.kind in (str, bool):
             pairs[row.name] = row.quantity.check(name, value if row.quantity.kind is str else value == "True")
         else:

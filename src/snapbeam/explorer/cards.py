@@ -47,8 +47,9 @@ from snapbeam.explorer.maps import (
 )
 from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.style import Html, Look, framed_plot, styled
+from snapbeam.model.parameter_axes import CHANGES_UNITS, PHYSICAL, parameter_of_axis
 from snapbeam.model.parameter_file import Config, config_from_mapping
-from snapbeam.model.parameters import Parameter, lookup, parameters
+from snapbeam.model.parameters import Parameter, parameters
 from snapbeam.plot.style import CLASS_COLORS
 from snapbeam.util.input_files import parsed_toml
 
@@ -181,7 +182,7 @@ class WindowControl:
             ((left, right), self.card.plane.names[0], self.card.plane.x),
             ((low, high), self.card.plane.names[1], self.card.plane.y),
         ):
-            item = lookup(name).quantity
+            item = parameter_of_axis(name).quantity
             least = max(a, item.low) if np.isfinite(item.low) else a
             most = min(b, item.high) if np.isfinite(item.high) else b
             if axis.log:
@@ -463,10 +464,29 @@ class MapCard:
             return []
         return self.shared.windows(self.plane_key, self.own)
 
+    def _units(self) -> dict[str, tuple[float, str]]:
+        """What a ratio of 1 is in Hz, mm/s or g along the axes of the map, where one structure is shown."""
+        names, fixed = self.plane.names, {} if self.source.is_list else self.plane.fixed_values()
+        if self.system is None or any(name.startswith(CHANGES_UNITS) for name in names):
+            return {}
+        system = self.system.replace(**{
+            name: value for name, value in fixed.items() if name.startswith(CHANGES_UNITS)
+        })  # fmt: skip
+        rows = {row.parameter: row for row in PHYSICAL.values() if row.unit != "m"}
+        found = {}
+        for side, name in zip("xy", names, strict=True):
+            if name in rows:
+                row, scale = rows[name], system.scale
+                factor = row.unit_of(scale.length, scale.omega)
+                factor, unit = (1e3 * factor, "mm/s") if row.unit == "m/s" else (factor, row.unit)
+                found[side] = factor, "µm" if unit == "um" else unit
+        return found
+
     # ------------------------------------------------------------------ drawing
 
     def redraw(self) -> None:
         """Show everything again."""
+        self.view.show_units(self._units())
         name, layers = self.show.value, self.layers.value
         words: list[str] = []
         try:
@@ -521,9 +541,8 @@ class MapCard:
         return (0.0, 1.0) if values is None or name == "response_class" else _span(values)
 
     def _fixed_short(self) -> dict[str, Any]:
-        from snapbeam.model.parameters import lookup
 
-        return {lookup(name).short: value for name, value in self.plane.fixed_values().items()}
+        return {parameter_of_axis(name).short: value for name, value in self.plane.fixed_values().items()}
 
     def _draw_dots(self, wanted: bool, words: list[str]) -> None:
         dots = self.dots
@@ -1071,7 +1090,7 @@ class TakeCard:
             over = {
                 name: value
                 for name, value in point.values.items()
-                if page.card.source.is_list or lookup(name).short in skeleton.dims
+                if page.card.source.is_list or parameter_of_axis(name).short in skeleton.dims
             }
             command = run_command(over if on_map else point.values, file, on_map)
             beside = "" if on_map else " (with the system saved as system.toml beside it)"
@@ -1348,7 +1367,7 @@ def window_dataset(window: Any) -> xr.Dataset:
     dataset = axes_dataset(
         window.system, {window.names[1]: window.y, window.names[0]: window.x}, window.integration
     )
-    dims = tuple(lookup(name).short for name in (window.names[1], window.names[0]))
+    dims = tuple(parameter_of_axis(name).short for name in (window.names[1], window.names[0]))
     own = window.own()
     for name, values in window.values.items():
         row = STATISTICS[name]

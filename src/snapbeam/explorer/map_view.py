@@ -12,14 +12,17 @@ from bokeh.models import (
     ColumnDataSource,
     CustomJS,
     FixedTicker,
+    LinearAxis,
     LinearColorMapper,
+    LogAxis,
+    LogScale,
     Range1d,
 )
 from numpy.typing import NDArray
 
 from snapbeam import ResponseClass
 from snapbeam.explorer.maps import Axis, Plane, Window, picture, visible_strides
-from snapbeam.explorer.style import Look, colors_of, columns, figure, inner_size, sequential
+from snapbeam.explorer.style import Look, colors_of, columns, figure, inner_size, sequential, style_axis
 from snapbeam.model import quasi_static_threshold
 from snapbeam.plot.style import CLASS_COLORS
 
@@ -118,7 +121,7 @@ class MapView:
             text_color="#ffffff",
             text_outline_color="#000000",
             text_font_style="bold",
-            text_font_size="14px",
+            text_font_size=look.font(14),
         )
         self.box = BoxAnnotation(fill_alpha=0.0, line_color=look.accent, line_width=2, visible=False)
         self.plot.add_layout(self.box)
@@ -135,6 +138,42 @@ class MapView:
         self.plot.js_on_event(
             "mouseleave", CustomJS(args={"probe": self.probe}, code="probe.data = {x: [], y: []};")
         )
+        self.physical: dict[str, Any] = {}
+        """Axes in physical units opposite to those of the ratios, with what a ratio of 1 is, by "x" and "y"."""
+
+    def show_units(self, units: dict[str, tuple[float, str]]) -> None:
+        """Show further axes on top ("x") and on the right ("y"), in which a ratio of 1 is a number of a unit."""
+        for name, axis, place in (("x", self.x, "above"), ("y", self.y, "right")):
+            if name in self.physical:
+                self.physical[name].visible = name in units
+            if name not in units:
+                continue
+            factor, label = units[name]
+            own = getattr(self.plot, f"{name}_range")
+            if name not in self.physical:
+                other = Range1d(own.start * factor, own.end * factor)
+                getattr(self.plot, f"extra_{name}_ranges")["unit"] = other
+                kind = LogAxis if axis.log else LinearAxis
+                made = kind(**{f"{name}_range_name": "unit"})
+                if axis.log:
+                    getattr(self.plot, f"extra_{name}_scales")["unit"] = LogScale()
+                style_axis(made, self.look)
+                self.plot.add_layout(made, place)
+                self.physical[name] = made
+                scaled = ColumnDataSource({"factor": [factor]}, name=f"map-unit-{name}")
+                made.tags = [scaled]
+                code = (
+                    "const f = scaled.data.factor[0]; other.setv({start: own.start * f, end: own.end * f});"
+                )
+                follow = CustomJS(args={"own": own, "other": other, "scaled": scaled}, code=code)
+                own.js_on_change("start", follow)
+                own.js_on_change("end", follow)
+                other.js_on_change("start", follow)
+            self.physical[name].tags[0].data = {"factor": [factor]}
+            self.physical[name].axis_label = label
+            getattr(self.plot, f"extra_{name}_ranges")["unit"].update(
+                start=own.start * factor, end=own.end * factor
+            )
 
     # ------------------------------------------------------------------ what was asked for
 

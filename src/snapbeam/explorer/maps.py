@@ -29,9 +29,10 @@ from snapbeam import (
     sweep,
 )
 from snapbeam.explorer.jobs import WINDOW_POINTS, Jobs, Token
+from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis
 from snapbeam.model.parameter_file import config_from_mapping, config_text
-from snapbeam.model.parameters import lookup
 from snapbeam.plot.axes import edges_of, is_geometric, positions
+from snapbeam.sweeps.points import ratios_of
 from snapbeam.util.netcdf import read_netcdf
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ def parameter_name(skeleton: xr.Dataset, name: str) -> str | None:
         return None
     said = skeleton[name].attrs.get("parameter", "")
     try:
-        return lookup(str(said)).name
+        return parameter_of_axis(str(said)).name
     except InputError:
         return None
 
@@ -451,16 +452,16 @@ def axes_dataset(system: System, axes: Mapping[str, Any], integration: Integrati
     """Coordinates and attributes of a sweep that is not computed."""
     import json
 
-    from snapbeam.model.parameters import lookup
+    from snapbeam.model.parameter_axes import parameter_of_axis
     from snapbeam.util.datasets import xr
 
     coords: dict[str, Any] = {}
     for name, values in axes.items():
-        row = lookup(name)
+        row = parameter_of_axis(name)
         labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
         coords[row.short] = ((row.short,), np.asarray(values), labels)
     for name in ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location"):
-        row = lookup(name)
+        row = parameter_of_axis(name)
         if row.short not in coords and name in system.parameters:
             labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
             coords[row.short] = ((), system.parameters[name], labels)
@@ -563,12 +564,17 @@ class Point:
         of_system = {
             name: value for name, value in self.values.items() if not name.startswith("integration.")
         }
-        return base.replace(**of_system), integration.replace(**of_run) if of_run else integration
+        physical = {name: of_system.pop(name) for name in list(of_system) if name in PHYSICAL}
+        system = base.replace(**of_system)
+        if physical:
+            system = system.replace(**ratios_of(system, physical))
+        return system, integration.replace(**of_run) if of_run else integration
 
     def words(self) -> str:
         """The point for a person, in few digits."""
         return ", ".join(
-            f"{lookup(name).short.replace('_', ' ')} {_brief(value)}" for name, value in self.values.items()
+            f"{parameter_of_axis(name).short.replace('_', ' ')} {_brief(value)}"
+            for name, value in self.values.items()
         )
 
 
@@ -617,7 +623,7 @@ def integration_of(attrs: Mapping[str, Any]) -> Integration:
 def parameter_of(skeleton: xr.Dataset, name: str) -> str:
     """The dotted name of an axis."""
     attrs = skeleton[name].attrs if name in skeleton.coords else {}
-    return lookup(str(attrs.get("parameter", name))).name
+    return parameter_of_axis(str(attrs.get("parameter", name))).name
 
 
 def compared(expected: Mapping[str, Any], outcome: RunSummary, engine: str) -> tuple[bool, str]:
@@ -724,14 +730,14 @@ class Axis:
     @staticmethod
     def words_of(source: Source, name: str) -> str:
         """What stands along it: words, symbol and unit."""
-        from snapbeam.model.parameters import lookup
+        from snapbeam.model.parameter_axes import parameter_of_axis
 
         attrs = source.skeleton[name].attrs
         text, unit = source.label(name)
         text = text.replace("omega_1", "ω₁")
         symbol = ""
         if "parameter" in attrs or name in ("frequency_ratio", "velocity_amplitude", "location"):
-            symbol = plain_symbol(lookup(str(attrs.get("parameter", name))).quantity.symbol)
+            symbol = plain_symbol(parameter_of_axis(str(attrs.get("parameter", name))).quantity.symbol)
         return " ".join(part for part in (text, symbol, "" if unit == "1" else f"({unit})") if part)
 
     @property
@@ -930,7 +936,7 @@ class Plane:
     @property
     def can_zoom(self) -> bool:
         """Whether both axes are of numbers between which there are others."""
-        return all(lookup(name).quantity.kind is float for name in self.names)
+        return all(parameter_of_axis(name).quantity.kind is float for name in self.names)
 
 
 def _plain_plane(value: Any) -> Any:
@@ -1431,9 +1437,9 @@ def _structure_order(
 
 
 def _is_run(name: str) -> bool:
-    from snapbeam.model.parameters import lookup
+    from snapbeam.model.parameter_axes import parameter_of_axis
 
-    return lookup(name).is_run
+    return parameter_of_axis(name).is_run
 
 
 def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) -> dict[str, NDArray[Any]]:
@@ -1495,7 +1501,7 @@ def _value(value: Any) -> str:
 def run_command(values: Mapping[str, Any], file: str, on_map: bool) -> str:
     """The command that computes a point: of a file's map, or of a parameter file kept beside it."""
     if file and on_map:
-        point = ",".join(f"{lookup(name).short}={_value(value)}" for name, value in values.items())
+        point = ",".join(f"{parameter_of_axis(name).short}={_value(value)}" for name, value in values.items())
         source = ["--from", file, "--point", point]
     else:
         source = ["--config", _CONFIG]

@@ -122,7 +122,7 @@ class Page:
         self.doc = pn.state.curdoc
         self.closed = False
         self.address = Address.read(arguments)
-        self.look: Look = look_of(self.address.theme)
+        self.look: Look = look_of(self.address.theme, lecture=self.address.type == "large")
         self.card = MapCard(self.look, shared, self.address, self.post, self.later)
         self.card.asked = self.ask
         self.card.moved = self.write_address
@@ -132,6 +132,7 @@ class Page:
         self.points: list[Point | None] = [None, None]
         self._tokens: list[Token | None] = [None, None]
         self.add_run: Callable[[RunView], None] = lambda view: None
+        self.share_height: Callable[[bool], None] = lambda two: None
         self.compare = pn.widgets.Toggle(name="Two points", width=100, align="center")
         self.target = pn.widgets.RadioButtonGroup(
             options=["A", "B"], value="A", visible=False, align="center"
@@ -246,11 +247,11 @@ class Page:
 
     def _make_fields(self) -> None:
         names = self.card.plane.parameters
-        from snapbeam.model.parameters import lookup
+        from snapbeam.model.parameter_axes import parameter_of_axis
 
         self.fields, self.errors = {}, {}
         for name in dict.fromkeys(names):
-            row = lookup(name)
+            row = parameter_of_axis(name)
             unit = "" if row.quantity.unit == "1" else f" ({row.quantity.unit})"
             field = pn.widgets.TextInput(name=row.short.replace("_", " ") + unit, value="", width=170)
             field.param.watch(lambda _: self.post(self._ask_typed), "enter_pressed")
@@ -461,6 +462,7 @@ class Page:
             self.later(self.runs[1].complete, _AFTER)
         if len(self.runs) > 1:
             self.runs[1].layout.visible = self.compare.value
+            self.share_height(self.compare.value)
         if self.compare.value:
             self.target.value = "B"
         self._mark()
@@ -485,11 +487,11 @@ class Page:
                 self.errors[name].object = ""
 
     def _ask_typed(self) -> None:
-        from snapbeam.model.parameters import lookup
+        from snapbeam.model.parameter_axes import parameter_of_axis
 
         values: dict[str, Any] = {}
         for name, field in self.fields.items():
-            row = lookup(name)
+            row = parameter_of_axis(name)
             item, text = row.quantity, str(field.value_input or field.value).strip()
             self.errors[name].object = ""
             try:
@@ -546,7 +548,7 @@ class Page:
         tab, shown = self.runs[0].tabs.active, 0 if self.cards is None else self.cards.active
         return Address(
             card.x.value, card.y.value, card.show.value, at, b if self.compare.value else {}, view, self.changes,
-            self.address.theme, self.runs[0].parts[tab].title if tab else "", self.card_names[shown] if shown else "",
+            self.address.theme, self.address.type, self.runs[0].parts[tab].title if tab else "", self.card_names[shown] if shown else "",
         ).write()  # fmt: skip
 
 

@@ -256,7 +256,7 @@ class BeamPanel(RunPanel):
             y_units="screen",
             text="",
             text_color=look.text,
-            text_font_size="12px",
+            text_font_size=look.font(12),
             syncable=False,
         )
         self.plot.add_layout(words)
@@ -870,7 +870,7 @@ class WaveformPanel(RunPanel):
             height=165,
             used=215,
             share=0.4,
-            y_axis_label="contact force f (N)",
+            y_axis_label="force f (N)",
             y_range=(0.0, 1.0),
             x_axis_label="cycles of excitation τ",
             **common,

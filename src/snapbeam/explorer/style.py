@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -64,6 +64,12 @@ class Look:
     striker: str
     accent: str
     second: str
+    scale: float = 1.0
+    """Size of all type over the usual one."""
+
+    def font(self, size: int) -> str:
+        """A size of type, of one in pixels."""
+        return f"{round(size * self.scale)}px"
 
 
 LIGHT = Look(
@@ -94,9 +100,14 @@ DARK = Look(
 )
 
 
-def look_of(theme: str) -> Look:
-    """The look of a theme of Panel's."""
-    return DARK if theme == "dark" else LIGHT
+LECTURE = 1.4
+"""Size of type for a projector."""
+
+
+def look_of(theme: str, *, lecture: bool = False) -> Look:
+    """The look of a theme of Panel's; with larger type and lines for a *lecture*."""
+    look = DARK if theme == "dark" else LIGHT
+    return replace(look, scale=LECTURE) if lecture else look
 
 
 @cache
@@ -107,6 +118,7 @@ def sheet(look: Look) -> str:
         name: getattr(look, name) for name in ("page", "card", "text", "faint", "grid", "accent", "striker")
     }
     variables = "".join(f"--sb-{name}: {value};" for name, value in names.items())
+    variables += f"--sb-scale: {look.scale};"
     return (
         f":root, :host {{ {variables} color-scheme: {'dark' if look.name == 'dark' else 'light'}; }}\n{text}"
     )
@@ -142,23 +154,18 @@ def figure(look: Look, *, used: int = 0, share: float = 1.0, **options: Any) -> 
         "border_fill_color": look.card,
         "background_fill_color": look.card,
         "outline_line_color": look.faint,
-        "min_border_left": 58,
+        "min_border_left": round(58 * look.scale),
         "min_border_right": 6,
         "min_border_top": 6,
         "lod_threshold": None,
     }
     plot = bokeh_figure(**(settings | options))
     for axis in plot.axis:
-        axis.axis_label_text_color = axis.major_label_text_color = look.text
-        axis.axis_label_text_font_style = "normal"
-        axis.axis_label_text_font_size = "12px"
-        axis.major_label_text_font_size = "11px"
-        axis.axis_line_color = axis.major_tick_line_color = look.faint
-        axis.minor_tick_line_color = None
+        style_axis(axis, look)
     plot.grid.grid_line_color = look.grid
     plot.stylesheets = plot.toolbar.stylesheets = [focused(look)]
     if used:
-        tall = f"max({plot.height}px, calc({share:g} * (100vh - {used}px)))"
+        tall = f"max(calc(var(--sb-share, 1) * {plot.height}px), calc(var(--sb-share, 1) * {share:g} * (100vh - {used}px)))"
         plot.stylesheets = [
             *plot.stylesheets,
             f"@media (min-width: 1000px) {{ :host {{ min-height: {tall} !important; }} }}",
@@ -166,9 +173,19 @@ def figure(look: Look, *, used: int = 0, share: float = 1.0, **options: Any) -> 
     plot.toolbar.logo = None
     plot.toolbar.autohide = False
     plot.title.text_color = look.text
-    plot.title.text_font_size = "12px"
+    plot.title.text_font_size = look.font(12)
     plot.title.text_font_style = "normal"
     return plot
+
+
+def style_axis(axis: Any, look: Look) -> None:
+    """Give an axis the style of the page."""
+    axis.axis_label_text_color = axis.major_label_text_color = look.text
+    axis.axis_label_text_font_style = "normal"
+    axis.axis_label_text_font_size = look.font(12)
+    axis.major_label_text_font_size = look.font(11)
+    axis.axis_line_color = axis.major_tick_line_color = look.faint
+    axis.minor_tick_line_color = None
 
 
 def framed_plot(plot: Any, **options: Any) -> Any:
@@ -196,10 +213,10 @@ def legend(plot: Any, look: Look) -> None:
         item.background_fill_color = look.card
         item.background_fill_alpha = 0.75
         item.label_text_color = look.text
-        item.label_text_font_size = "11px"
+        item.label_text_font_size = look.font(11)
         item.border_line_color = None
         item.padding, item.spacing, item.margin = 3, 8, 4
-        item.glyph_height = item.label_height = 14
+        item.glyph_height = item.label_height = round(14 * look.scale)
         item.glyph_width = 34
         item.click_policy = "hide"
 
@@ -404,11 +421,12 @@ document.addEventListener('input', (event) => {
   refused.data = {name: [large.name], bytes: [large.size], count: [refused.data.count[0] + 1]};
 }, true);
 """
-_THEME = """
+_TURN = """
 const search = new URLSearchParams(window.location.search);
-if (search.get('theme') === 'dark') { search.delete('theme'); } else { search.set('theme', 'dark'); }
+if (search.get('%(name)s') === '%(value)s') { search.delete('%(name)s'); } else { search.set('%(name)s', '%(value)s'); }
 window.location.search = search.toString();
 """
+"""Load the page again with another look; the address keeps all else."""
 
 
 def framed(page: Page) -> Any:
@@ -417,10 +435,19 @@ def framed(page: Page) -> Any:
     pn.config.raw_css = [sheet(look)]
     words = Markup('<h1>snapbeam <span class="faint">{}</span></h1>').format(shared.source.name)
     title = Html(words, margin=0, sizing_mode="stretch_width")
-    dark = pn.widgets.Button(name="Dark" if look.name == "default" else "Light", width=70, align="center")
-    dark.js_on_click(code=_THEME)
+    dark = pn.widgets.Button(name="Dark" if look.name == "default" else "Light", align="center")
+    dark.js_on_click(code=_TURN % {"name": "theme", "value": "dark"})
+    lecture = pn.widgets.Button(name="Lecture" if look.scale == 1.0 else "Desk", align="center")
+    lecture.js_on_click(code=_TURN % {"name": "type", "value": "large"})
     top = pn.Row(
-        title, page.target, page.compare, dark, sizing_mode="stretch_width", css_classes=["top"], margin=0
+        title,
+        page.target,
+        page.compare,
+        lecture,
+        dark,
+        sizing_mode="stretch_width",
+        css_classes=["top"],
+        margin=0,
     )
     map_tab = pn.Column(page.old, page.card.layout, sizing_mode="stretch_width", margin=0)
     others = page_tabs(page)
@@ -458,7 +485,11 @@ def framed(page: Page) -> Any:
         styled(view.layout, look)
         runs.append(view.layout)
 
-    page.add_run = add_run
+    def share_height(two: bool) -> None:
+        """Let two runs, one over the other, have the height of one."""
+        runs.css_classes = ["right", "two"] if two else ["right"]
+
+    page.add_run, page.share_height = add_run, share_height
     doc = page.doc
     page.bar.js_on_change("data", CustomJS(args={"bar": page.bar}, code=_ADDRESS))
     if doc is not None:
