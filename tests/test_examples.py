@@ -20,6 +20,7 @@ DEAR = {
     "ex23_extended_models",
     "ex24_dynamics",
     "ex25_design",
+    "ex26_backbone",
     "ex30_experiment",
     "ex42_the_paper",
 }

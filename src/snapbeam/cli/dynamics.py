@@ -268,6 +268,55 @@ def hysteresis(
         raise typer.Exit(FAILED)
 
 
+@dynamics.command("backbone-curve", cls=ShortHelpCommand)
+@cli_command
+@with_parameters(*BEAM, *MODEL)
+def backbone_curve(
+    given: Any,
+    well: Annotated[
+        str,
+        typer.Option(help="Motion about the lower or the upper well, or across both.", rich_help_panel=_OWN),
+    ] = "lower",
+    mode: Annotated[
+        int | None, opt.count_option("Linear mode in which the motion about a well begins (1).", _OWN)
+    ] = None,
+    amplitude_limit: Annotated[
+        float | None,
+        opt.number_option("Displacement of the centre, over b, where the curve ends (2.5).", _OWN),
+    ] = None,
+    max_points: Annotated[int | None, opt.count_option("Most points of the curve (200).", _OWN)] = None,
+    output: Output = Path("backbone_curve.nc"),
+    plot: opt.Plot = None,
+) -> None:
+    """Compute a backbone curve: frequency of the free, undamped motion over its amplitude, with its stability.
+
+    Example: snapbeam dynamics backbone-curve --modes 3 --well both -o backbone.nc --plot backbone.png
+    """
+    from snapbeam.cli.console import check_pictures, draw, write_map
+    from snapbeam.dynamics.backbone import backbone_curve as curve_of
+    from snapbeam.util.files import check_writable
+
+    settings = configured(given)
+    check_writable(output, "output", (".nc",))
+    check_pictures(("plot", plot))
+    begun = time.monotonic()
+    with progress(None, "backbone curve", "points") as report:
+        chosen = {"mode": mode, "amplitude_limit": amplitude_limit, "max_points": max_points}
+        named = {name: value for name, value in chosen.items() if value is not None}
+        curve = curve_of(settings.model, well=well, progress=report, **named)  # type: ignore[arg-type]
+    hertz, stable = curve["frequency"].values, curve["stable"].values
+    lines = [
+        f"{hertz.size} motions in {duration(time.monotonic() - begun)}, {hertz[0]:.5g} to {hertz[-1]:.5g} Hz; "
+        f"{int(stable.sum())} stable",
+        f"The curve ends: {curve.attrs['end']}",
+    ]
+    files = [write_map(curve, output)]
+    if plot is not None:
+        files.append(draw(curve, plot))
+    add_json(summary=lines, files=files)
+    out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
+
+
 @dynamics.command("lyapunov-spectrum", cls=ShortHelpCommand)
 @cli_command
 @with_parameters(*_ALL, axes=_AXES[:3])

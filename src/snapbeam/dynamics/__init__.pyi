@@ -3,6 +3,7 @@
 from .attractors import Attractor as Attractor
 from .attractors import Attractors as Attractors
 from .attractors import find_attractors as find_attractors
+from .backbone import backbone_curve as backbone_curve
 from .basins import basin_entropy as basin_entropy
 from .basins import basins_of_attraction as basins_of_attraction
 from .basins import dynamical_integrity as dynamical_integrity

@@ -2,6 +2,7 @@
 
 from .dataset import plot_dataset as plot_dataset
 from .dynamics import plot_attractors as plot_attractors
+from .dynamics import plot_backbone as plot_backbone
 from .dynamics import plot_basins as plot_basins
 from .dynamics import plot_diagram as plot_diagram
 from .dynamics import plot_exponents as plot_exponents

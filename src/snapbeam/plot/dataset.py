@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from snapbeam.plot.dynamics import (
     MAX_CURVES,
     plot_attractors,
+    plot_backbone,
     plot_basins,
     plot_diagram,
     plot_edge,
@@ -136,6 +137,9 @@ _KINDS = (
         lambda _: {"midspan_displacement": _branch, "multipliers": plot_multipliers},
     ),
     _Kind("periodic orbit", {"multiplier_real", "state"}, set(), lambda _: {"multipliers": plot_multipliers}),
+    _Kind(
+        "backbone curve", {"participation", "initial_amplitude"}, {"point"}, lambda _: {"frequency_ratio": plot_backbone}
+    ),
     _Kind("attractors", {"points", "share"}, {"attractor"}, lambda _: {"points": plot_attractors}),
     _Kind("Lyapunov exponents", {"exponent"}, set(), lambda _: {"exponent": plot_exponents}),
     _Kind("basins of attraction", {"basin"}, set(), lambda _: {"basin": plot_basins}),

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = [
     "MAX_CURVES",
     "plot_attractors",
+    "plot_backbone",
     "plot_basins",
     "plot_diagram",
     "plot_edge",
@@ -528,6 +529,67 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             ax.set_aspect("equal", adjustable="datalim")
             ax.set(xlabel="Floquet multiplier, real part", ylabel="Floquet multiplier, imaginary part")
             ax.legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=3)
+        fix_ticks(ax)
+    return ax
+
+
+def plot_backbone(
+    datasets: xr.Dataset | Sequence[xr.Dataset],
+    ax: Axes | None = None,
+    *,
+    labels: Sequence[str] | None = None,
+) -> Axes:
+    """Draw backbone curves: the amplitude of the centre over the frequency; unstable motions are dashed, with dots.
+
+    Parameters
+    ----------
+    datasets : xarray.Dataset or sequence of xarray.Dataset
+        Of :func:`snapbeam.dynamics.backbone_curve`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure one column wide by default.
+    labels : sequence of str, optional
+        Of the curves, in a legend; the wells by default if there are several.
+
+    Raises
+    ------
+    InputError
+        If a dataset is no backbone curve.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
+    >>> ax = sb.plot.plot_backbone(sb.dynamics.backbone_curve(model, max_points=5))
+    """
+    from snapbeam.util.datasets import xr
+
+    curves = [datasets] if isinstance(datasets, xr.Dataset) else list(datasets)
+    for curve in curves:
+        if not {"frequency_ratio", "max_midspan", "stable"} <= set(map(str, curve.variables)):
+            raise InputError(f"no backbone curve among {list(map(str, curve.variables))}")
+    words = {"lower": "about the lower well", "upper": "about the upper well", "both": "across both wells"}
+    if labels is None:
+        labels = [words[curve.attrs["well"]] for curve in curves]
+    with figure_style():
+        one_model = len({curve.attrs["modes"] for curve in curves}) == 1
+        ax = axes_or_new(ax, curves[0] if one_model else None, height=70.0)
+        for number, (curve, label) in enumerate(zip(curves, labels, strict=True)):
+            frequency = curve["frequency_ratio"].values
+            height = 0.5 * (curve["max_midspan"] - curve["min_midspan"]).values
+            stable = curve["stable"].values
+            color = f"C{number}"
+            for which, line, name in ((stable, "-", label), (~stable, "--.", "")):
+                # a segment is drawn as its first point is
+                shown = which | np.append(False, which[:-1])
+                if which.any():
+                    ax.plot(
+                        np.where(shown, frequency, np.nan), np.where(shown, height, np.nan), line, color=color, label=name, markersize=3,
+                    )  # fmt: skip
+        ax.set(xlabel=r"Frequency $\Omega$", ylabel="Amplitude of the centre ($b$)")
+        ax.set_ylim(bottom=0.0)
+        if len(curves) > 1:
+            ax.legend()
         fix_ticks(ax)
     return ax
 

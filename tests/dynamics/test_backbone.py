@@ -1,0 +1,134 @@
+"""Backbone curves: elliptic integrals, harmonic balance, energy, a stop, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.special import ellipk
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.util.validation import InputError
+
+ONE = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
+THREE = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+
+
+def farthest(curve) -> np.ndarray:
+    """Greatest amplitude of the one buckling mode, m^0.5."""
+    height = np.maximum(np.abs(curve.min_midspan), np.abs(curve.max_midspan)).values
+    return height * ONE.length_scale / abs(ONE.midspan_shape[0])
+
+
+def test_one_mode_about_a_well_is_an_elliptic_integral() -> None:
+    curve = sb.dynamics.backbone_curve(ONE, lowest_frequency_ratio=0.4)
+    assert curve.attrs["end"] == "lowest_frequency_ratio"
+    mass, g, square = ONE.mass[0, 0], ONE.nonlinear_stiffness, -ONE.stiffness[0] / ONE.nonlinear_stiffness
+    outer = farthest(curve)
+    period = 2.0 * ellipk(2.0 - 2.0 * square / outer**2) / (outer * np.sqrt(g / (2.0 * mass)))
+    np.testing.assert_allclose(curve.frequency * period, 1.0, rtol=0.0, atol=1e-8)
+    assert curve.stable.all()
+    np.testing.assert_allclose(curve.participation, 1.0, rtol=1e-12)
+
+
+def test_one_mode_across_both_wells() -> None:
+    curve = sb.dynamics.backbone_curve(ONE, well="both", amplitude_limit=2.5)
+    assert curve.attrs["end"] == "amplitude_limit"
+    mass, g, k = ONE.mass[0, 0], ONE.nonlinear_stiffness, -ONE.stiffness[0]
+    outer = farthest(curve)
+    period = 4.0 * ellipk(g * outer**2 / (2.0 * (g * outer**2 - k))) / np.sqrt((g * outer**2 - k) / mass)
+    np.testing.assert_allclose(curve.frequency * period, 1.0, rtol=0.0, atol=1e-8)
+    assert float(curve.energy.min()) > ONE.saddle_energy - ONE.well_energy
+    assert (np.diff(curve.energy) > 0.0).all()
+    np.testing.assert_allclose(curve.min_midspan, -curve.max_midspan, rtol=0.0, atol=1e-8)
+
+
+def balanced(model: sb.ReducedModel, amplitude: np.ndarray, frequency: float, harmonics: int = 24):
+    """Cosine coefficients and frequency that satisfy the equations of motion at 4 points a harmonic, from a guess."""
+    n, count = model.modes, 4 * harmonics
+    phase = np.pi * (np.arange(count) + 0.5) / count
+    order = np.arange(harmonics + 1)
+    table = np.cos(np.outer(phase, order))
+    inverse = np.linalg.inv(model.mass)
+    unit = model.length_scale / abs(model.midspan_shape[0])
+    begun = amplitude / unit
+
+    def residual(x):
+        omega, a = x[-1] * frequency * 2.0 * np.pi, x[:-1].reshape(harmonics + 1, n)
+        alpha, speeding = unit * table @ a, -unit * omega**2 * table @ (order[:, None] ** 2 * a)
+        force = (
+            -alpha * model.stiffness - model.nonlinear_stiffness * np.sum(alpha**2, axis=1)[:, None] * alpha
+        )
+        off = (speeding - force @ inverse) / (unit * (2.0 * np.pi * frequency) ** 2)
+        return np.concatenate((off.ravel(), a.sum(axis=0)[:1] - begun[:1]))
+
+    guess = np.zeros((harmonics + 1, n))
+    guess[0] = model.well_amplitude / unit
+    guess[1] = begun - guess[0]
+    found = least_squares(residual, np.append(guess, 1.0), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    assert np.abs(found.fun).max() < 1e-9
+    a = found.x[:-1].reshape(harmonics + 1, n)
+    return unit * a.sum(axis=0), found.x[-1] * frequency
+
+
+@pytest.mark.slow
+def test_three_modes_against_harmonic_balance() -> None:
+    curve = sb.dynamics.backbone_curve(THREE, amplitude_limit=0.5)
+    for at in (3, 7, curve.sizes["point"] - 1):
+        point = curve.isel(point=at)
+        begun, frequency = balanced(THREE, point.initial_amplitude.values, float(point.frequency))
+        assert frequency == pytest.approx(float(point.frequency), rel=1e-8)
+        unit = THREE.length_scale / abs(THREE.midspan_shape[0])
+        np.testing.assert_allclose(begun, point.initial_amplitude, rtol=0.0, atol=1e-7 * unit)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", [1, 2, 3])
+def test_it_begins_at_the_natural_frequencies(mode: int) -> None:
+    curve = sb.dynamics.backbone_curve(THREE, mode=mode, max_points=6)
+    assert float(curve.frequency[0]) == pytest.approx(THREE.natural_frequencies[mode - 1], rel=1e-5)
+    assert float(curve.participation[0, mode - 1]) > 0.999
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("side", ["below", "above"])
+def test_with_a_stop_the_solver_comes_back(side: str) -> None:
+    """Motion about a well against a stop: after a period :func:`snapbeam.simulate` is where it began."""
+    free = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.0)
+    stop = sb.Striker(drive=sb.FixedStop(), gap=5e-5, side=side)
+    system = sb.System(free, sb.HertzContact(1e6), stop)
+    well = "lower" if side == "below" else "upper"
+    curve = sb.dynamics.backbone_curve(system, well=well, amplitude_limit=0.6, max_points=60)
+    alone = sb.dynamics.backbone_curve(free, well=well, amplitude_limit=0.6, max_points=60)
+    assert float(curve.frequency[-1]) > float(alone.frequency[-1])  # a stop stiffens
+    point = curve.isel(point=-1)
+    state = sb.State(amplitude=point.initial_amplitude.values, velocity=np.zeros(1), phase=0.0)
+    period = 1.0 / float(point.frequency)
+    cycles = int(np.ceil(period * free.reference_frequency))
+    run = sb.simulate(
+        system.replace(initial_state=state),
+        sb.Integration(cycles=cycles, accuracy="reference"),
+        sample_times=np.array([0.5 * period, period]),
+    )
+    heights = run.dataset["midspan_displacement"].values
+    ends = sorted((float(point.min_midspan), float(point.max_midspan)))
+    np.testing.assert_allclose(sorted(heights), ends, rtol=0.0, atol=1e-6)
+
+
+def test_refusals() -> None:
+    shaken = sb.System(ONE, paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))
+    with pytest.raises(InputError, match="its striker moves"):
+        sb.dynamics.backbone_curve(shaken)
+    load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0))
+    with pytest.raises(InputError, match="axial_load: a backbone curve is of free motion"):
+        sb.dynamics.backbone_curve(sb.System(ONE, axial_load=load))
+    with pytest.raises(InputError, match="well = 'middle'"):
+        sb.dynamics.backbone_curve(ONE, well="middle")
+    with pytest.raises(InputError, match="mode = 2"):
+        sb.dynamics.backbone_curve(ONE, mode=2)
+    lossy = sb.System(ONE, sb.HuntCrossley(1e8, 0.5), sb.Striker(drive=sb.FixedStop()))
+    with pytest.raises(InputError, match="loses energy"):
+        sb.dynamics.backbone_curve(lossy)
+    with pytest.raises(InputError, match="must be System or ReducedModel"):
+        sb.dynamics.backbone_curve(paper.BEAM)
