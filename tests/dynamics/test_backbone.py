@@ -8,11 +8,11 @@ from scipy.optimize import least_squares
 from scipy.special import ellipk
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.util.validation import InputError
 
-ONE = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
-THREE = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+ONE = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
+THREE = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
 
 
 def farthest(curve) -> np.ndarray:
@@ -95,7 +95,7 @@ def test_it_begins_at_the_natural_frequencies(mode: int) -> None:
 @pytest.mark.parametrize("side", ["below", "above"])
 def test_with_a_stop_the_solver_comes_back(side: str) -> None:
     """Motion about a well against a stop: after a period :func:`snapbeam.simulate` is where it began."""
-    free = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.0)
+    free = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.0)
     stop = sb.Striker(drive=sb.FixedStop(), gap=5e-5, side=side)
     system = sb.System(free, sb.HertzContact(1e6), stop)
     well = "lower" if side == "below" else "upper"
@@ -117,7 +117,7 @@ def test_with_a_stop_the_solver_comes_back(side: str) -> None:
 
 
 def test_refusals() -> None:
-    shaken = sb.System(ONE, paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))
+    shaken = sb.System(ONE, default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))
     with pytest.raises(InputError, match="its striker moves"):
         sb.dynamics.backbone_curve(shaken)
     load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0))
@@ -131,4 +131,4 @@ def test_refusals() -> None:
     with pytest.raises(InputError, match="loses energy"):
         sb.dynamics.backbone_curve(lossy)
     with pytest.raises(InputError, match="must be System or ReducedModel"):
-        sb.dynamics.backbone_curve(paper.BEAM)
+        sb.dynamics.backbone_curve(default_values.BEAM)
