@@ -388,10 +388,10 @@ class _Lines:
 
 
 def open_result(file: Path) -> xr.Dataset:
-    """Return the dataset of a result file, read into memory."""
-    from snapbeam.util.netcdf import read_netcdf
+    """Return the dataset of a result file, or of a result in it (``FILE.nc:GROUP``), read into memory."""
+    from snapbeam.util.netcdf import read_result
 
-    return read_netcdf(file, "file")
+    return read_result(file, "file")
 
 
 def check_pictures(*pictures: tuple[str, Path | None]) -> None:

@@ -33,7 +33,7 @@ from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis
 from snapbeam.model.parameter_file import config_from_mapping, config_text
 from snapbeam.plot.axes import edges_of, is_geometric, positions
 from snapbeam.sweeps.points import ratios_of
-from snapbeam.util.netcdf import read_netcdf
+from snapbeam.util.netcdf import read_result, split_group
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -358,7 +358,7 @@ class FileSource(DatasetSource):
     """A map in a NetCDF file, of which a variable is read when it is first shown."""
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self._given, self._path = path, split_group(path)[0]
         self._lock = threading.Lock()
         self._all: xr.Dataset | None = None
         self._held: dict[str, xr.DataArray] = {}
@@ -377,7 +377,7 @@ class FileSource(DatasetSource):
     def _open(self) -> xr.Dataset:
         if not self._path.is_file():
             raise InputError(f"{self._path.name}: there is no such file any more")
-        return read_netcdf(self._path, "map", lazily=True)
+        return read_result(self._given, "map", lazily=True)
 
     def variable(self, name: str) -> xr.DataArray:
         """A variable, read from the file the first time."""
@@ -527,7 +527,7 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
             raise InputError(f"file: is no path ({error})") from None
         if folder:
             return CheckpointSource(path)
-        if not path.exists():
+        if not split_group(path)[0].exists():
             raise InputError(f"map = {str(path)!r}: there is no such file or checkpoint")
         return FileSource(path)
     raise InputTypeError(

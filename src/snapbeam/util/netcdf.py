@@ -13,7 +13,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,15 @@ if TYPE_CHECKING:
     import h5netcdf
     import xarray as xr
 
-__all__ = ["hdf5_stream", "netcdf_file", "read_netcdf", "refuse_large", "write_netcdf"]
+__all__ = [
+    "hdf5_stream",
+    "netcdf_file",
+    "read_netcdf",
+    "read_result",
+    "refuse_large",
+    "split_group",
+    "write_netcdf",
+]
 
 
 _MEMORY = 4 * 2**30
@@ -99,6 +107,41 @@ def read_netcdf(
         raise InputError(
             f"{name} = {str(path)!r}: is no NetCDF file of results, or is damaged ({said or type(error).__name__})"
         ) from error
+
+
+def split_group(path: str | os.PathLike[str]) -> tuple[Path, str | None]:
+    """The file and the group that ``FILE.nc:GROUP`` names, or the file alone."""
+    text = os.fspath(path)
+    file, colon, group = text.rpartition(".nc:")
+    if not colon or not group.isidentifier() or os.path.exists(text):
+        return Path(path), None
+    return Path(f"{file}.nc"), group
+
+
+def read_result(path: str | os.PathLike[str], name: str = "path", *, lazily: bool = False) -> xr.Dataset:
+    """Read the dataset in a file of a result; of a file of several, that of ``FILE.nc:GROUP``.
+
+    Raises
+    ------
+    InputError
+        As of :func:`read_netcdf`, and if the file has several datasets and none is named, or not the one that is.
+    """
+    import h5py
+
+    file, group = split_group(file_path(name, path))
+    if group is None:
+        dataset = read_netcdf(file, name, lazily=lazily)
+        if dataset.variables:
+            return dataset
+    with h5py.File(file, "r") if file.is_file() else nullcontext({}) as stored:
+        groups = [each for each in stored if isinstance(stored[each], h5py.Group)]
+    if group is None and groups:
+        raise InputError(
+            f"{name} = {str(path)!r}: has the results {', '.join(groups)}; give one as {file.name}:{groups[0]}"
+        )
+    if group is not None and groups and group not in groups:
+        raise InputError(f"{name} = {str(path)!r}: has no result {group!r}; it has {', '.join(groups)}")
+    return read_netcdf(file, name, group, lazily=lazily)
 
 
 def write_netcdf(
