@@ -46,14 +46,10 @@ def test_says_what_made_it(name):
             assert "/" not in dataset.attrs["command"].replace("docs/data", "")
 
 
-FORMER = {"fig8": "c2020ad0df9d5481"}
-"""Data of the solver before free flight had one step length at every energy, as the page on the reproduction says."""
-
-
 @pytest.mark.parametrize("name", KEPT)
 def test_one_engine_made_them_all_and_it_is_todays(name):
     with h5py.File(DATA / f"{name}.nc") as file:
-        assert file.attrs["solver_fingerprint"] == FORMER.get(name, solver_fingerprint())
+        assert file.attrs["solver_fingerprint"] == solver_fingerprint()
 
 
 @pytest.mark.parametrize("modes", [1, 32])
