@@ -46,10 +46,15 @@ def swept(name: str, count: int, seed: int, *, mirrored: bool = False, modes: in
 def test_none_is_missing() -> None:
     """Every kind of law, drive, motion of a base, load and harvester, and every parameter but those of runs.
 
-    ``test_external_force.py``, ``test_local_force.py`` and ``test_shock.py`` compare those with independent solutions.
+    ``test_external_force.py``, ``test_local_force.py``, ``test_shock.py`` and ``test_recorded_acceleration.py`` compare
+    those with independent solutions.
     """
+    others = sb.Shock, sb.RecordedAcceleration
     elsewhere = {
-        f"{section}.{name}" for section in ("drive", "base_excitation") for name in quantities(sb.Shock)
+        f"{section}.{name}"
+        for section in ("drive", "base_excitation")
+        for kind in others
+        for name in quantities(kind)
     }
     systems = [extended.system() for extended in SYSTEMS.values()]
     there = {(section, type(drive).name) for each in systems for section, drive in each.moving}
@@ -65,7 +70,7 @@ def test_none_is_missing() -> None:
         "harvester": HARVESTERS,
     }
     for section, names in known.items():
-        missing = {name for name in names if (section, name) not in there and name != "shock"}
+        missing = {name for name in names if (section, name) not in there} - {kind.name for kind in others}
         assert not missing, f"{section}: no extended system has {missing}"
     own = set().union(*(each.parameters for each in systems))
     missing = {
