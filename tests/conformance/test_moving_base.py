@@ -139,7 +139,7 @@ def test_never_ended_early_by_energy() -> None:
     early, whole = (
         sb.sweep(
             system,
-            {"base_excitation.acceleration_amplitude": np.linspace(0.05, 0.6, 24)},
+            {"base_excitation.acceleration_amplitude": np.geomspace(0.002, 0.6, 24)},
             sb.Integration(cycles=60, early_termination=decided),
         )
         for decided in (True, False)
