@@ -58,7 +58,8 @@ def test_what_is_no_attractor_of_the_map_is_undecided() -> None:
         pendulum(), np.array([[math.asin(0.5), 0.01], [math.asin(0.5), 0.02]]), transient=600
     )
     assert [each.period for each in found.attractors] == [1]
-    rest, _, undecided = shares_of_the_pendulum(found, 60)
+    with pytest.warns(sb.DiagnosticWarning, match="of the states are undecided after 60 periods"):
+        rest, _, undecided = shares_of_the_pendulum(found, 60)
     assert rest == pytest.approx(0.15, abs=0.02) and undecided == pytest.approx(0.85, abs=0.02)
 
 

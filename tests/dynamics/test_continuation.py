@@ -85,7 +85,7 @@ def scratch(ratio: float, restitution: float, periods: int, looks: int = 40_001)
 
 def grazes_at(restitution: float, periods: int, below: float) -> float:
     """The greatest ratio below another at which the flight touches the wall a second time."""
-    ratios = np.linspace(below, 1.002 * periods, 80)
+    ratios = np.append(np.linspace(below, 1.002 * periods, 80), np.linspace(1.0019, 1.0003, 20) * periods)
     rooms = np.array([scratch(float(ratio), restitution, periods, 4001) for ratio in ratios])
     first = int(np.flatnonzero(rooms < 0.0)[0])
     return float(brentq(scratch, ratios[first], ratios[first - 1], args=(restitution, periods)))

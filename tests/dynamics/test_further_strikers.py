@@ -317,7 +317,8 @@ def test_questions_of_dynamics() -> None:
     found = sb.dynamics.find_attractors(system, 8)
     assert any(each.orbit is not None for each in found.attractors)
     grid = {"amplitude[1]": np.linspace(-1.2, 1.2, 4), "velocity[1]": [-0.1, 0.1]}
-    basin = sb.dynamics.basins_of_attraction(found, grid, periods=100).basin
+    with pytest.warns(sb.DiagnosticWarning, match=r"undecided .* search for further attractors"):
+        basin = sb.dynamics.basins_of_attraction(found, grid, periods=100).basin
     assert basin.shape == (4, 2) and int(basin.max()) >= 0
     diagram = sb.dynamics.bifurcation_diagram(
         system, "drive_2.velocity_amplitude", [0.04, 0.05], periods=(100, 8), grazing=True

@@ -354,7 +354,10 @@ def passage_of(flow: Stroboscope, coordinates: _Array, periods: int) -> Passage:
 
 
 def _turn_back(time: _Array, depth: _Array, held: NDArray[np.bool_]) -> float:
-    """Least gap at a turning point of the gap apart from contact, by the parabola through three samples."""
+    """Least gap at a turning point of the gap apart from contact, by the quartic through five samples.
+
+    Where contact is nearer, by the parabola through three.
+    """
     best = np.nan
     inner = np.arange(1, time.size - 1)
     free = ~(held[inner - 1] | held[inner] | held[inner + 1])
@@ -363,7 +366,16 @@ def _turn_back(time: _Array, depth: _Array, held: NDArray[np.bool_]) -> float:
         before, here, after = depth[i - 1], depth[i], depth[i + 1]
         bend = before - 2.0 * here + after
         top = here if bend == 0.0 else here - (after - before) ** 2 / (8.0 * bend)
-        best = np.nanmin([best, max(-top, 0.0)])
+        if 2 <= i < time.size - 2 and not held[i - 2 : i + 3].any() and bend != 0.0:
+            curve = np.polynomial.Polynomial.fit(np.arange(-2.0, 3.0), depth[i - 2 : i + 3], 4).convert()
+            slope, place = curve.deriv(), 0.5 * (before - after) / bend
+            for _ in range(4):
+                place -= slope(place) / slope.deriv()(place)
+            if abs(place) <= 1.0:
+                top = float(curve(place))
+        best = np.nanmin(
+            [best, abs(top)]
+        )  # beyond the tip by less than a contact that a step sees: as far off
     return float(best)
 
 
