@@ -237,7 +237,7 @@ def random_runs(modes: int, count: int, seed: int, cycles: int) -> tuple[int, in
 def test_early_terminations(modes, count, cycles) -> None:
     decided, wrong, classes = random_runs(modes, count, 10 * modes, cycles)
     assert wrong == 0
-    assert decided > count // 10
+    assert decided >= count // 10
     assert classes == {0, 1, 2, 3}
 
 

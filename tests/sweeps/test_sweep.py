@@ -243,7 +243,7 @@ def test_recorded_drives(system) -> None:
     )
     shaken = system.replace(striker=record)
     ds = sb.sweep(shaken, {"location": [0.3, 0.5], "modes": [1, 2]}, sb.Integration())
-    assert ds.attrs["cycles"] == pytest.approx(record.duration * 95.0)
+    assert ds.attrs["cycles"] == pytest.approx(record.drive.duration * 95.0)
     for i, j in itertools.product(range(2), range(2)):
         changed = shaken.replace(
             **{"striker.location": ds.location[i].item(), "model.modes": ds.modes[j].item()}

@@ -26,7 +26,7 @@ def test_better_than_as_many_random_designs_of_a_beam() -> None:
         spread = sb.uncertainty.ParameterUncertainty(of=TOLERANCE, phase=True, seed=seed)
         arguments = (small_system(), BOUNDS, "speed", LIMIT, spread)
         ds = sb.uncertainty.optimize_design(*arguments, effort, integration=HOW)
-        assert ds.sizes["tried"] == DESIGNS
+        assert ds.sizes["tried"] <= DESIGNS  # the search ends where it makes no progress
         problem = sb.uncertainty.design_problem(*arguments, samples=8, integration=HOW)
         low, high = np.array(list(problem.bounds.values())).T
         x = np.random.default_rng(1000 + seed).uniform(low, high, (DESIGNS, 3))

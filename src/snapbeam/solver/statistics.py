@@ -294,7 +294,8 @@ _ROWS = (
     ),
     Statistic(
         "other_well_reached", "bool", "1",
-        "whether the centre came more than half of the way from the border of the wells to the well it did not begin in",
+        "whether the centre came more than half of the way from the border of the wells to the well it did not begin in, "
+        "or provably stays in that well",
         lambda reading: reading.other_well_reached,
     ),
     Statistic("final_well_proven", "bool", "1", "whether the run provably ends in its last well", lambda r: r.final),
@@ -613,7 +614,10 @@ class Reading:
 
     @cached_property
     def other_well_reached(self) -> NDArray[np.bool_]:
-        """Runs whose centre came more than half of the way from the border of the wells to the other well."""
+        """Runs whose centre came more than half of the way from the border of the wells to the other well.
+
+        Runs that provably stay in that well count too: an early end may come before the first half of the way.
+        """
         structure, kept = self.ensemble.structure, self.accumulators
         if not structure.model.is_bistable:
             return np.zeros(kept.size, dtype=bool)
@@ -622,7 +626,8 @@ class Reading:
         second = float(structure.center @ from_mirror_image) - first
         upper, lower = 0.5 * (max(first, second) - level), 0.5 * (min(first, second) - level)
         over, under = kept["max_center"] - level > upper, kept["min_center"] - level < lower
-        return np.asarray(self.good & np.where(self.first_side < 0, over, under))
+        stays = self.final & (kept["side"] == -self.first_side)
+        return np.asarray(self.good & (np.where(self.first_side < 0, over, under) | stays))
 
     @cached_property
     def final(self) -> NDArray[np.bool_]:
