@@ -63,11 +63,13 @@ def write_test_series(folder, points=POINTS):
 
 def coarse_map(cycles=CYCLES):
     """A small map of the same beam."""
-    return sb.response_map(
-        MODEL,
-        CONTACT,
-        frequency_ratio=np.linspace(0.3, 3.9, 13),
-        velocity_amplitude=np.linspace(0.05, 0.6, 12),
-        location=LOCATION,
-        cycles=cycles,
+    shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2, location=LOCATION)
+    return sb.sweep(
+        sb.System(MODEL, CONTACT, shaker),
+        {
+            "frequency_ratio": np.linspace(0.3, 3.9, 13),
+            "velocity_amplitude": np.linspace(0.05, 0.6, 12),
+            "location": [LOCATION],
+        },
+        sb.Integration(cycles=cycles),
     )

@@ -55,7 +55,7 @@ def test_an_objective_and_a_constraint_of_one() -> None:
     runs = problem.runs_of(np.array([[0.2]]), numbers)[0]
     assert estimate.objectives[0, 0] == pytest.approx(runs["peak_force_striker_2"].mean(), rel=1e-12)
     assert not np.array_equal(runs["peak_force_striker_2"], runs["peak_force"])
-    assert goal.words == "mean peak contact force, striker 2" and goal._quantity.unit == "N"
+    assert goal.long_name == "mean peak contact force, striker 2" and goal._quantity.unit == "N"
 
 
 def test_who_is_not_there_is_refused() -> None:

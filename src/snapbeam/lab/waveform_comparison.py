@@ -15,7 +15,16 @@ from snapbeam.lab.vibrometer import measure_drive
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.status_codes import ResponseClass, classify
-from snapbeam.util.validation import InputError, choice, finite, integer, nonnegative, positive
+from snapbeam.util.validation import (
+    InputError,
+    checked,
+    choice,
+    finite,
+    finite_array,
+    integer,
+    nonnegative,
+    positive,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -136,6 +145,7 @@ def run_of_signal(signal: xr.DataArray, length: float, at: str = "midspan_displa
     )
 
 
+@checked
 def compare_waveforms(
     measured: xr.Dataset | xr.DataArray,
     simulated: xr.Dataset,
@@ -189,6 +199,10 @@ def compare_waveforms(
     from snapbeam.util.datasets import xr
 
     choice("at", at, _PLACES)
+    onsets = [
+        np.empty(0) if times is None else finite_array(name, times, 1)
+        for name, times in (("measured_onsets", measured_onsets), ("simulated_onsets", simulated_onsets))
+    ]
     if isinstance(measured, xr.DataArray):
         if "length_scale" not in simulated.attrs:
             raise InputError(
@@ -271,10 +285,8 @@ def compare_waveforms(
         apart=apart,
         diagnostics=tuple(diagnostics),
         at=at,
-        measured_impacts=_impacts(
-            measured_onsets, start or float(measured["time"][0]), rate, shift, low, high
-        ),
-        simulated_impacts=_impacts(simulated_onsets, 0.0, model_rate, 0.0, low, high),
+        measured_impacts=_impacts(onsets[0], start or float(measured["time"][0]), rate, shift, low, high),
+        simulated_impacts=_impacts(onsets[1], 0.0, model_rate, 0.0, low, high),
     )
 
 
@@ -379,12 +391,8 @@ def _spectra(grid: _Array, step: float, columns: dict[str, _Array]) -> xr.Datase
     return xr.Dataset(data, {"frequency_ratio": ("frequency_ratio", ratio, {"units": "1"})})
 
 
-def _impacts(
-    onsets: ArrayLike | None, start: float, rate: float, shift: float, low: float, high: float
-) -> _Array:
-    if onsets is None:
-        return np.empty(0)
-    at = (np.asarray(onsets, dtype=np.float64) - start) * rate + shift
+def _impacts(onsets: _Array, start: float, rate: float, shift: float, low: float, high: float) -> _Array:
+    at = (onsets - start) * rate + shift
     return at[(at >= low) & (at <= high)]
 
 

@@ -15,7 +15,7 @@ from matplotlib.patches import Patch, Rectangle
 from snapbeam.plot.axes import dress, edges_of, positions
 from snapbeam.plot.style import axes_or_new, figure_style, fix_ticks, set_title
 from snapbeam.util.status_codes import RunStatus
-from snapbeam.util.validation import InputError, checked, choice
+from snapbeam.util.validation import InputError, checked, choice, instance, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -533,6 +533,7 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     return ax
 
 
+@checked
 def plot_backbone(
     datasets: xr.Dataset | Sequence[xr.Dataset],
     ax: Axes | None = None,
@@ -553,7 +554,7 @@ def plot_backbone(
     Raises
     ------
     InputError
-        If a dataset is no backbone curve.
+        If a dataset is no backbone curve, or *labels* is not one text for each.
 
     Examples
     --------
@@ -566,11 +567,16 @@ def plot_backbone(
 
     curves = [datasets] if isinstance(datasets, xr.Dataset) else list(datasets)
     for curve in curves:
+        instance("datasets", curve, xr.Dataset, "datasets of backbone_curve")
         if not {"frequency_ratio", "max_midspan", "stable"} <= set(map(str, curve.variables)):
-            raise InputError(f"no backbone curve among {list(map(str, curve.variables))}")
+            raise InputError(f"datasets: no backbone curve among {list(map(str, curve.variables))}")
+    if not curves:
+        raise InputError("datasets = []: must hold at least one backbone curve")
     words = {"lower": "about the lower well", "upper": "about the upper well", "both": "across both wells"}
     if labels is None:
         labels = [words[curve.attrs["well"]] for curve in curves]
+    if len(labels) != len(curves) or not all(isinstance(label, str) for label in labels):
+        raise InputError(f"labels = {shown(list(labels))}: must be one text for each of {len(curves)} curves")
     with figure_style():
         one_model = len({curve.attrs["modes"] for curve in curves}) == 1
         ax = axes_or_new(ax, curves[0] if one_model else None, height=70.0)
@@ -581,10 +587,10 @@ def plot_backbone(
             color = f"C{number}"
             for which, line, name in ((stable, "-", label), (~stable, "--.", "")):
                 # a segment is drawn as its first point is
-                shown = which | np.append(False, which[:-1])
+                segments = which | np.append(False, which[:-1])
                 if which.any():
                     ax.plot(
-                        np.where(shown, frequency, np.nan), np.where(shown, height, np.nan), line, color=color, label=name, markersize=3,
+                        np.where(segments, frequency, np.nan), np.where(segments, height, np.nan), line, color=color, label=name, markersize=3,
                     )  # fmt: skip
         ax.set(xlabel=r"Frequency $\Omega$", ylabel="Amplitude of the centre ($b$)")
         ax.set_ylim(bottom=0.0)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from snapbeam.util.files import atomic_path, check_writable
-from snapbeam.util.validation import InputError, instance
+from snapbeam.util.validation import InputError, file_path, instance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -127,7 +127,7 @@ def write_table(dataset: xr.Dataset, path: str | os.PathLike[str]) -> list[str]:
     from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
-    if Path(path).suffix.lower() == ".mat":
+    if file_path("path", path).suffix.lower() == ".mat":
         from scipy.io import savemat
 
         target = check_writable(path, "path", TABLE_SUFFIXES, "MATLAB 5.0 MAT-file")
