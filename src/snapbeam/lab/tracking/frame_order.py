@@ -1,8 +1,10 @@
 """Frames that are lost, or shown twice, located by the motion of striker and beam.
 
 A frame that is lost makes both move two steps in one; a frame shown twice makes both stand still for one.  Some
-frames before a place and as many after it are fitted with one cubic over time, whose clock runs on evenly, jumps by
-the frames that were lost, or stops for a frame.  The striker moves smoothly, so more frames tell more of it.
+frames before a place and as many after it are fitted with one polynomial over time, whose clock runs on evenly, jumps by
+the frames that were lost, or stops for a frame.  The striker moves smoothly, so more frames tell more of it.  Where
+the motion turns back, a cubic over few frames may be too stiff and a jump of the clock makes up for it: a place
+counts only if no other fit, over more frames or of a higher degree, is good with the even clock alone.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.tracking.measure import TrackedRows
@@ -21,7 +24,7 @@ __all__ = ["FrameOrder", "find_order", "without_repeats"]
 
 
 _HALVES = (5, 8, 12)  # frames on either side of a place; of the beam the first
-_DEGREE = 3
+_DEGREES = (3, 5)
 _MOST = 3  # frames lost at one place
 _BETTER = 30.0  # chi-square by which a clock must be better than one that runs on evenly
 _TOUCHING = 3.0  # times as much, where the tip may touch the beam
@@ -52,8 +55,17 @@ def find_order(row: Floats, shaker: Floats, penetration: Floats) -> FrameOrder:
         return FrameOrder((), (), ())
     followed = bool(np.isfinite(shaker).any())
     # a beam that may be struck changes its velocity; without a shaker nothing tells when
-    beam = _better(row, penetration, _HALVES[0], 0.0 if followed else 1.0 / _TOUCHING)
-    gain = np.max([beam + _better(shaker, penetration, half, 1.0 / _TOUCHING) for half in _HALVES], axis=0)
+    beam = _better(row, penetration, _HALVES[0], _DEGREES[0], 0.0 if followed else 1.0 / _TOUCHING)
+    gain = np.max(
+        [
+            beam + _better(shaker, penetration, half, degree, 1.0 / _TOUCHING)
+            for half in _HALVES
+            for degree in _DEGREES
+        ],
+        axis=0,
+    )
+    for values in (row, shaker):
+        gain[_contradicted(values)] = 0.0
     best = gain.argmax(0)
     size = gain.max(0)
     repeated, missing, many = [], [], []
@@ -86,7 +98,7 @@ def without_repeats(rows: TrackedRows, order: FrameOrder) -> TrackedRows:
     return dataclasses.replace(rows, flags=flags, confidence=confidence, **changed)
 
 
-def _better(values: Floats, penetration: Floats, half: int, touching: float) -> Floats:
+def _better(values: Floats, penetration: Floats, half: int, degree: int, touching: float) -> Floats:
     """Chi-square by which each clock is better than an even one, before each frame.
 
     *touching* is the share of it that counts where the tip may touch the beam.
@@ -97,15 +109,36 @@ def _better(values: Floats, penetration: Floats, half: int, touching: float) -> 
         return out
     views = np.lib.stride_tricks.sliding_window_view
     windows = views(values, 2 * half)
-    left = np.stack([_left(windows, clock) for clock in _clocks(half)]) / noise**2
-    freedom = 2.0 * half - _DEGREE - 1.0
-    fits = freedom + _SPREADS * math.sqrt(2.0 * freedom)
+    left = np.stack([_left(windows, clock, degree) for clock in _clocks(half)]) / noise**2
+    fits = _good(half, degree)
     better = np.where((left[0] > fits) & (left[1:] > fits), 0.0, left[0] - left[1:])
     with np.errstate(invalid="ignore"):
         flying = (views(penetration, 2 * half) < -_APART).all(1)
     better *= np.where(flying, 1.0, touching)
     out[:, half : half + better.shape[1]] = np.where(np.isfinite(better), better, 0.0)
     return out
+
+
+def _contradicted(values: Floats) -> NDArray[np.bool_]:
+    """Clocks with which a fit before each frame is not good, and is with the even one."""
+    out = np.zeros((_MOST + 1, values.size), dtype=bool)
+    noise = _noise(values)
+    if not math.isfinite(noise):
+        return out
+    for half in _HALVES:
+        windows = np.lib.stride_tricks.sliding_window_view(values, 2 * half)
+        for degree in _DEGREES:
+            left = np.stack([_left(windows, clock, degree) for clock in _clocks(half)]) / noise**2
+            fits = _good(half, degree)
+            with np.errstate(invalid="ignore"):
+                out[:, half : half + left.shape[1]] |= (left[0] <= fits) & (left[1:] > fits)
+    return out
+
+
+def _good(half: int, degree: int) -> float:
+    """Chi-square up to which a fit is good."""
+    freedom = 2.0 * half - degree - 1.0
+    return freedom + _SPREADS * math.sqrt(2.0 * freedom)
 
 
 def _clocks(half: int) -> Floats:
@@ -117,10 +150,10 @@ def _clocks(half: int) -> Floats:
     return np.stack([even, twice, *late])
 
 
-def _left(windows: Floats, clock: Floats) -> Floats:
-    """Sum of squares that a cubic over *clock* leaves of each window."""
+def _left(windows: Floats, clock: Floats, degree: int) -> Floats:
+    """Sum of squares that a polynomial over *clock* leaves of each window."""
     middle = (clock - clock.mean()) / clock.size
-    basis = np.linalg.qr(np.vander(middle, _DEGREE + 1))[0]
+    basis = np.linalg.qr(np.vander(middle, degree + 1))[0]
     left: Floats = ((windows - (windows @ basis) @ basis.T) ** 2).sum(1)
     return left
 
