@@ -107,6 +107,16 @@ def test_a_bar_along_the_border_is_told_from_the_background():
     assert border_bar(light) == 6
 
 
+def test_background_between_a_fixed_line_and_the_beam_is_no_bar():
+    """Nor where the camera drifts, which moves the line by a few pixels."""
+    light = np.zeros((30, 80, 24), dtype=bool)
+    for k, frame in enumerate(light):
+        line, beam = 12 + round(3.0 * (k / 29.0) ** 3), 40 + int(8.0 * np.sin(0.4 * k))
+        frame[line : line + 4] = True
+        frame[beam : beam + 12] = True
+    assert border_bar(~light) == 0
+
+
 def test_a_gap_of_two_pixels_is_no_contact_unless_the_tip_merges():
     beam, _, depth = motion()
     for merged, told in ((0, True), (5, False)):

@@ -152,7 +152,8 @@ def fixed_bars(mask: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
 def border_bar(side: NDArray[np.bool_]) -> int:
     """Rows of a bar that never moves along the far border, beside a beam that does; 0 if there is none.
 
-    *side* holds the pixels that are as bright or as dark as the border.
+    *side* holds the pixels that are as bright or as dark as the border.  Background between a fixed line and the beam
+    moves with that line, if the camera does.
     """
     exits = np.where(side.all(1), side.shape[1], (~side).argmax(1))
     usual = np.median(exits, axis=0)
@@ -162,7 +163,7 @@ def border_bar(side: NDArray[np.bool_]) -> int:
     rows = int(np.percentile(usual[still], 90)) + 1
     rest = side.copy()
     rest[:, : rows + 1] = False
-    return rows if _moving_beam(rest) else 0
+    return rows if _moving_beam(rest, exits) else 0
 
 
 def _still_bands(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -197,13 +198,16 @@ def _peaks(share: NDArray[np.floating]) -> NDArray[np.intp]:
     return middle
 
 
-def _moving_beam(mask: NDArray[np.bool_]) -> bool:
-    """Whether what is left of a mask holds an object that crosses the picture, ends within it and moves."""
+def _moving_beam(mask: NDArray[np.bool_], edge: NDArray[np.intp] | None = None) -> bool:
+    """Whether what is left of a mask holds an object that crosses the picture, ends within it and moves.
+
+    Against *edge*, rows (frames, columns), if given.
+    """
     objects = column_objects(mask)
     bounded = objects.found & (objects.end < mask.shape[1]) & (objects.end - objects.start >= 3)
     if (bounded.mean(0) > 0.4).mean() < _ACROSS:
         return False
-    where = np.where(bounded, objects.start, np.nan)
+    where = np.where(bounded, objects.start if edge is None else objects.start - edge, np.nan)
     columns = np.flatnonzero(bounded.mean(0) > 0.4)
     travel = np.nanpercentile(where[:, columns], 97, axis=0) - np.nanpercentile(where[:, columns], 3, axis=0)
     return bool(np.median(travel) > _MOVES)
