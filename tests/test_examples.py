@@ -21,6 +21,7 @@ DEAR = {
     "ex24_dynamics",
     "ex25_design",
     "ex26_backbone",
+    "ex27_bifurcation_curves",
     "ex30_experiment",
     "ex42_the_paper",
 }

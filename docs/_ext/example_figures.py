@@ -12,7 +12,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 DOCS = Path(__file__).parents[1]
-EXAMPLES = ("ex24_dynamics", "ex25_design", "ex26_backbone", "ex43_cheapest_place")
+EXAMPLES = ("ex24_dynamics", "ex25_design", "ex26_backbone", "ex27_bifurcation_curves", "ex43_cheapest_place")
 
 
 def main() -> None:

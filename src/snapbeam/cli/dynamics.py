@@ -446,6 +446,90 @@ def branch(
     _finish(found.to_dataset(), output, plot, lines)
 
 
+@dynamics.command("bifurcation-curve", cls=ShortHelpCommand)
+@cli_command
+@with_parameters(*_ALL)
+def bifurcation_curve(
+    given: Any,
+    parameter: Parameter = "velocity_amplitude",
+    bounds: Annotated[
+        str, typer.Option(help="Bounds of the parameter, low:high.", rich_help_panel=_OWN)
+    ] = "0.005:0.3",
+    second: Annotated[
+        str, typer.Option(help="Second parameter of the curve.", rich_help_panel=_OWN)
+    ] = "frequency_ratio",
+    second_bounds: Annotated[
+        str, typer.Option(help="Bounds of the second parameter, low:high.", rich_help_panel=_OWN)
+    ] = "0.5:3",
+    number: Annotated[
+        int | None,
+        opt.count_option("Number of the fold, flip or Neimark-Sacker point of the branch (1).", _OWN),
+    ] = None,
+    period: Annotated[
+        int | None, opt.count_option("Period of the orbit in periods of the drive (1).", _OWN)
+    ] = None,
+    transient: Annotated[
+        int | None, opt.count_option("Transient periods to integrate before the search (500).", _OWN)
+    ] = None,
+    max_points: Annotated[
+        int | None, opt.count_option("Maximum number of points to either side (200).", _OWN)
+    ] = None,
+    output: Output = Path("bifurcation_curve.nc"),
+    plot: opt.Plot = None,
+) -> None:
+    """Continue a fold, flip or Neimark-Sacker point in two parameters, and locate cusps and fold-flips.
+
+    A periodic orbit is continued along the first parameter until the point with this number is found.
+
+    Example: snapbeam dynamics bifurcation-curve --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --second-bounds 1.2:2
+    """
+    from snapbeam.cli.parameter_options import parse_window
+    from snapbeam.dynamics.bifurcation_curves import CURVES
+    from snapbeam.dynamics.bifurcation_curves import bifurcation_curve as curve_of
+    from snapbeam.dynamics.branches import continuation
+    from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, periodic_orbit
+    from snapbeam.util.validation import InputError
+
+    settings = configured(given)
+    _checked(output, plot)
+    limits, others = parse_window(bounds), parse_window(second_bounds)
+    assert limits is not None and others is not None
+    wanted = 1 if number is None else number
+    begun = time.monotonic()
+    options = None if given.get("integration.accuracy") is None else settings.integration
+    try:
+        orbit = periodic_orbit(
+            settings.system, period=1 if period is None else period, transient=500 if transient is None else transient,
+            integration=options,
+        )  # fmt: skip
+        branch = continuation(orbit, parameter, limits)
+        found = [point for point in branch.special_points if point.kind in CURVES]
+        if len(found) < wanted:
+            raise InputError(
+                f"number (--number) = {wanted}: the branch in {parameter} has {len(found)} such points: "
+                f"{', '.join(map(_plain, branch.special_points)) or 'none'}"
+            )
+        curve = curve_of(
+            found[wanted - 1],
+            (second, parameter),
+            (others, limits),
+            max_points=200 if max_points is None else max_points,
+        )
+    except OrbitNotFoundError as error:
+        raise InputError(f"no such curve: {error}") from None
+    names = curve.attrs["parameters"]
+    lines = [
+        f"{_plain(found[wanted - 1])}: {curve.sizes['point']} points in {duration(time.monotonic() - begun)}",
+        *(
+            f"{kind} at "
+            + ", ".join(f"{name} = {float(curve[f'special_point_{name}'][k]):.8g}" for name in names)
+            for k, kind in enumerate(curve["special_point_kind"].values)
+        ),
+        f"The curve ends: {curve.attrs['termination_reason']}",
+    ]
+    _finish(curve, output, plot, lines)
+
+
 @dynamics.command("basins", cls=ShortHelpCommand)
 @cli_command
 @with_parameters(*_ALL)

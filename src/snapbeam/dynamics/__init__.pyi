@@ -9,6 +9,7 @@ from .basins import basins_of_attraction as basins_of_attraction
 from .basins import dynamical_integrity as dynamical_integrity
 from .basins import uncertainty_exponent as uncertainty_exponent
 from .bifurcation import bifurcation_diagram as bifurcation_diagram
+from .bifurcation_curves import bifurcation_curve as bifurcation_curve
 from .branches import Branch as Branch
 from .branches import SpecialPoint as SpecialPoint
 from .branches import continuation as continuation

@@ -744,8 +744,8 @@ _LONGEST = 20_000
 """Maximum number of periods that the damping chooses."""
 
 
-def fixed_parameters(flow: Flow, varied: str = "") -> dict[str, Any]:
-    """Return the parameters that a figure states: beam, modes, excitation and location, without the varied one."""
+def fixed_parameters(flow: Flow, *varied: str) -> dict[str, Any]:
+    """Return the parameters that a figure states: beam, modes, excitation and location, without the varied ones."""
     if not isinstance(flow, Stroboscope):
         return {}
     system, model = flow.system, flow.system.model
@@ -764,7 +764,7 @@ def fixed_parameters(flow: Flow, varied: str = "") -> dict[str, Any]:
         attrs |= {lookup(f"{section}.{name}").short: float(value) for name, value in drive.values().items()}
     if system.striker is not None:
         attrs["location"] = float(system.striker.location)
-    return {name: value for name, value in attrs.items() if name != varied}
+    return {name: value for name, value in attrs.items() if name not in varied}
 
 
 def settling_periods(flow: Flow, rates: ArrayLike = (), least: int = 200) -> tuple[int, str]:

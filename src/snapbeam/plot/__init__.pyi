@@ -4,6 +4,7 @@ from .dataset import plot_dataset as plot_dataset
 from .dynamics import plot_attractors as plot_attractors
 from .dynamics import plot_backbone as plot_backbone
 from .dynamics import plot_basins as plot_basins
+from .dynamics import plot_bifurcation_curve as plot_bifurcation_curve
 from .dynamics import plot_diagram as plot_diagram
 from .dynamics import plot_exponents as plot_exponents
 from .dynamics import plot_lifetimes as plot_lifetimes

@@ -10,6 +10,7 @@ from snapbeam.plot.dynamics import (
     plot_attractors,
     plot_backbone,
     plot_basins,
+    plot_bifurcation_curve,
     plot_diagram,
     plot_edge,
     plot_exponents,
@@ -135,6 +136,10 @@ _KINDS = (
     _Kind(
         "branch of orbits", {"multiplier_real", "stable"}, {"orbit"},
         lambda _: {"midspan_displacement": _branch, "multipliers": plot_multipliers},
+    ),
+    _Kind(
+        "bifurcation curve", {"special_point_kind", "multiplier_real"}, {"point"},
+        lambda ds: {str(list(ds.attrs["parameters"])[1]): plot_bifurcation_curve},
     ),
     _Kind("periodic orbit", {"multiplier_real", "state"}, set(), lambda _: {"multipliers": plot_multipliers}),
     _Kind(

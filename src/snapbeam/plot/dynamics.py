@@ -600,6 +600,86 @@ def plot_backbone(
     return ax
 
 
+_CURVE_LINES = {"fold": "-", "flip": "--", "Neimark-Sacker": ":"}
+_CURVE_MARKS = {"cusp": "*", "fold-flip": "D"}
+
+
+@checked
+def plot_bifurcation_curve(
+    datasets: xr.Dataset | Sequence[xr.Dataset],
+    ax: Axes | None = None,
+    *,
+    labels: Sequence[str] | None = None,
+) -> Axes:
+    """Draw bifurcation curves over their two parameters, on a response map too: fold -, flip --, Neimark-Sacker dots.
+
+    Points of codimension two are marked: cusps by stars, fold-flips by diamonds, grazing by circles.
+
+    Parameters
+    ----------
+    datasets : xarray.Dataset or sequence of xarray.Dataset
+        Of :func:`snapbeam.dynamics.bifurcation_curve`, all over the same parameters.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw, such as a map over these parameters; a new figure one column wide by default.
+    labels : sequence of str, optional
+        Of the curves; their kinds by default.
+
+    Raises
+    ------
+    InputError
+        If a dataset is no bifurcation curve, the parameters differ, or *labels* is not one text for each.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
+    >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12)
+    >>> names, bounds = ("frequency_ratio", "velocity_amplitude"), ((1.5, 1.7), (0.02, 0.1))
+    >>> curve = sb.dynamics.bifurcation_curve(branch.special_points[0], names, bounds, max_points=5)
+    >>> ax = sb.plot.plot_bifurcation_curve(curve)
+    """
+    from snapbeam.util.datasets import xr
+
+    curves = [datasets] if isinstance(datasets, xr.Dataset) else list(datasets)
+    if not curves:
+        raise InputError("datasets = []: must hold at least one bifurcation curve")
+    for curve in curves:
+        instance("datasets", curve, xr.Dataset, "datasets of bifurcation_curve")
+        if curve.attrs.get("kind") not in _CURVE_LINES or "special_point_kind" not in curve:
+            raise InputError(f"datasets: no bifurcation curve among {list(map(str, curve.variables))}")
+    names = list(curves[0].attrs["parameters"])
+    if any(list(curve.attrs["parameters"]) != names for curve in curves):
+        raise InputError("datasets: curves over different parameters")
+    if labels is None:
+        labels = [curve.attrs["kind"] for curve in curves]
+    if len(labels) != len(curves) or not all(isinstance(label, str) for label in labels):
+        raise InputError(f"labels = {shown(list(labels))}: must be one text for each of {len(curves)} curves")
+    new = ax is None
+    with figure_style():
+        ax = axes_or_new(ax, curves[0], height=70.0)
+        for number, (curve, label) in enumerate(zip(curves, labels, strict=True)):
+            kind, color = curve.attrs["kind"], f"C{number}" if new else "black"
+            x, y = (curve[name].values for name in names)
+            ax.plot(x, y, _CURVE_LINES[kind], color=color, label=label, linewidth=1.0)
+            for at, words in enumerate(curve["special_point_kind"].values):
+                place = [float(curve[f"special_point_{name}"][at]) for name in names]
+                ax.plot(
+                    *place, _CURVE_MARKS.get(str(words), "o"), color=color, markersize=4.0, label=str(words)
+                )
+        if new:
+            dress(ax.xaxis, curves[0], names[0])
+            dress(ax.yaxis, curves[0], names[1])
+        unique = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
+        if unique:
+            ax.legend(unique.values(), unique.keys(), loc="best")
+        fix_ticks(ax)
+    return ax
+
+
 def _multipliers_along(dataset: xr.Dataset, ax: Axes, sizes: Any) -> None:
     over = dataset["multiplier_real"].dims
     sizes = -np.sort(-(sizes if over[0] == "orbit" else sizes.T), axis=1)

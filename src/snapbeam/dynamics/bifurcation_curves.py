@@ -1,0 +1,479 @@
+"""Bifurcation curves: folds, flips and Neimark-Sacker points of periodic orbits continued in two parameters.
+
+With the return map P^m(x; lambda, mu) and its derivative J, a curve solves P^m(x) = x and g(x, lambda, mu) = 0.  At a
+fold (flip) J - I (J + I) is singular; g then is the last unknown of the system bordered by two vectors b and c,
+
+    [J -/+ I  b] [v]   [0]
+    [  c^T    0] [g] = [1],
+
+which is zero where the matrix is singular, and smooth (Govaerts, Numerical Methods for Bifurcations of Dynamical
+Equilibria, SIAM, 2000).  At a Neimark-Sacker point g = |mu|^2 - 1 of the pair nearest to the unit circle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.dynamics.branches import SpecialPoint
+from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, fixed_parameters
+from snapbeam.dynamics.periodic_orbits import (
+    Family,
+    OrbitNotFoundError,
+    Return,
+    jacobian,
+    newton,
+    orbit_tolerance,
+)
+from snapbeam.model.parameters import lookup
+from snapbeam.util.diagnostics import counting
+from snapbeam.util.validation import InputError, checked, instance, integer, interval, shown, within
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["CURVES", "bifurcation_curve"]
+
+_Array = NDArray[np.float64]
+CURVES = ("fold", "flip", "Neimark-Sacker")
+_TOLERANCE = 1e-9
+_SHORTEST, _LONGEST = 1e-6, 1.0
+_DIFFERENCE = 1e-5
+"""Step of differences, in units of the well's amplitude and of the ranges of the parameters."""
+_EASIER = (1.0, 30.0, 1000.0)
+"""Factors of the tolerance that are tried one after the other."""
+_ITERATIONS = 25
+_EASY, _HARD = 5, 10
+_HALVINGS = 40
+_FINE = 1e-5
+"""Relative error of tangents at level "reference"."""
+
+
+class _Plane(Family):
+    """A flow over two parameters that differ between runs."""
+
+    def __init__(self, flow: Flow, names: tuple[str, str]) -> None:
+        super().__init__(flow)
+        self.names = names
+
+    def advance(
+        self, x: _Array, periods: int, value: Any = None, tangents: _Array | None = None
+    ) -> AdvancedStates:
+        """Take states some periods on, at values of the two parameters, shape (2,) or (runs, 2)."""
+        values = np.broadcast_to(value, (len(x), 2))
+        points = {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(self.names)}
+        return self.flow.advance(x, periods, tangents=tangents, points=points)
+
+
+class _Point(NamedTuple):
+    """One point of a curve."""
+
+    y: _Array
+    """State, and the parameters over their ranges."""
+    tangent: _Array
+    came: Return
+    table: _Array
+    """Derivative of the equations, shape (d + 1, d + 2)."""
+    iterations: int
+    residual: float
+
+
+class _Curve:
+    """The equations of one curve."""
+
+    def __init__(self, plane: _Plane, kind: str, period: int, spans: _Array, tolerance: float) -> None:
+        self.plane, self.kind, self.period = plane, kind, period
+        self.spans, self.tolerance = spans, tolerance
+        self.borders: tuple[_Array, _Array] | None = None
+
+    def came(self, y: _Array) -> Return:
+        """The return map and its derivative by the state."""
+        return jacobian(self.plane, y[:-2], self.period, y[-2:] * self.spans)  # type: ignore[arg-type]
+
+    def border(self, came: Return) -> None:
+        """Take the singular vectors at a point of the curve as borders: the bordered matrix is regular nearby."""
+        if self.kind != "Neimark-Sacker":
+            left, _, right = np.linalg.svd(self._singular(came))
+            self.borders = left[:, -1], right[-1]
+
+    def _singular(self, came: Return) -> _Array:
+        sign = 1.0 if self.kind == "fold" else -1.0
+        table: _Array = came.jacobian - sign * np.eye(len(came.x))
+        return table
+
+    def test(self, came: Return) -> float:
+        """What is zero on the curve."""
+        if self.kind == "Neimark-Sacker":
+            return _pair(came)
+        assert self.borders is not None
+        size = len(came.x)
+        table = np.zeros((size + 1, size + 1))
+        table[:size, :size], table[:size, size], table[size, :size] = self._singular(came), *self.borders
+        return float(np.linalg.solve(table, np.append(np.zeros(size), 1.0))[-1])
+
+    def equations(self, y: _Array) -> tuple[_Array, Return]:
+        """Residual of the orbit and of the condition, shape (d + 1,)."""
+        came = self.came(y)
+        return np.append(came.x - y[:-2], self.test(came)), came
+
+    def derivative(self, y: _Array) -> tuple[_Array, Return, _Array]:
+        """Residual, return map and the derivative of the residual, shape (d + 1, d + 2)."""
+        size = y.size - 2
+        moves = _DIFFERENCE * np.eye(size + 2)
+        came, *beside = self._all(np.concatenate([y[None], y + moves, y - moves]))
+        table = np.empty((size + 1, size + 2))
+        table[:size, :size] = came.jacobian - np.eye(size)
+        for k, (above, below) in enumerate(zip(beside[: size + 2], beside[size + 2 :], strict=True)):
+            table[size, k] = (self.test(above) - self.test(below)) / (2.0 * _DIFFERENCE)
+            if k >= size:
+                table[:size, k] = (above.x - below.x) / (2.0 * _DIFFERENCE)
+        return np.append(came.x - y[:-2], self.test(came)), came, table
+
+    def _all(self, y: _Array) -> list[Return]:
+        """The return map and its derivative at several states and values at once."""
+        if not self.plane.flow.smooth:
+            return [self.came(each) for each in y]
+        runs, size = len(y), y.shape[1] - 2
+        tangents = np.tile(np.eye(size), (runs, 1, 1))
+        advanced = self.plane.advance(y[:, :-2], self.period, y[:, -2:] * self.spans, tangents)
+        assert advanced.tangents is not None
+        impacts = advanced.statistics.get("impacts", np.full(runs, -1))
+        return [
+            Return(x, moved.T, int(hits))
+            for x, moved, hits in zip(advanced.states, advanced.tangents, impacts, strict=True)
+        ]
+
+    def correct(self, guess: _Array, row: _Array, before: _Array, known: _Array | None = None) -> _Point:
+        """The point of the curve on the plane through *guess* across *row*, as well as its residual allows.
+
+        Raises
+        ------
+        OrbitNotFoundError
+        """
+
+        def residual(y: _Array) -> _Array:
+            return np.append(self.equations(y)[0], row @ (y - guess))
+
+        def derivative(y: _Array) -> tuple[_Array, _Array]:
+            found, _, table = self.derivative(y)
+            return np.append(found, row @ (y - guess)), np.vstack([table, row])
+
+        first = None if known is None else np.vstack([known, row])
+        for easier in _EASIER:
+            try:
+                shot = newton(residual, derivative, guess, easier * self.tolerance, _ITERATIONS, first)
+                break
+            except OrbitNotFoundError:
+                # light impacts make the multipliers rough; what is left counts as error
+                if easier == _EASIER[-1]:
+                    raise
+                first = None
+        _, came, table = self.derivative(shot.x)
+        if not np.isfinite(table).all():
+            raise OrbitNotFoundError("a run beside the orbit failed")
+        return _Point(shot.x, _tangent(table, before), came, table, shot.iterations, shot.residual)
+
+    def error(self, point: _Point, relative: float) -> _Array:
+        """By how much the parameters may be off for the residual and the error of the map's derivative."""
+        size = point.y.size - 2
+        steep = float(np.abs(point.came.jacobian).sum())
+        off = np.append(np.full(size, point.residual), relative * steep + point.residual)
+        inverse = np.linalg.pinv(point.table)[size:]
+        return np.asarray(np.abs(inverse) @ off * self.spans)
+
+
+def _pair(came: Return) -> float:
+    values = np.linalg.eigvals(came.jacobian)
+    pairs = np.abs(values[np.abs(values.imag) > 1e-9])
+    if not pairs.size:
+        raise OrbitNotFoundError("the pair of multipliers has become real")
+    return float(pairs[np.argmin(np.abs(pairs - 1.0))] ** 2 - 1.0)
+
+
+def _tangent(table: _Array, before: _Array) -> _Array:
+    """Of the curve, of length one, towards where *before* points."""
+    found: _Array = np.linalg.svd(table)[2][-1]
+    return found if found @ before >= 0.0 else -found
+
+
+# ----------------------------------------------------------------------------------------------------
+# Points of codimension two between two points of a curve.
+
+
+def _monitors(curve: _Curve, one: _Point, point: _Point) -> dict[str, float]:
+    """What changes its sign at points of codimension two, from the point *one* on."""
+    found = {}
+    eye = np.eye(len(point.came.x))
+    if curve.kind == "fold":
+        # at a cusp the curve goes on in the states and turns back in the plane of the parameters
+        found["cusp"] = float(point.tangent[-2:] @ one.tangent[-2:])
+        found["fold-flip"] = float(np.linalg.slogdet(point.came.jacobian + eye)[0])
+    elif curve.kind == "flip":
+        found["fold-flip"] = float(np.linalg.slogdet(point.came.jacobian - eye)[0])
+    if point.came.impacts >= 0:
+        found[f"grazing {curve.kind}"] = 1.0 if point.came.impacts == one.came.impacts else -1.0
+    return found
+
+
+def _between(curve: _Curve, one: _Point, other: _Point) -> list[tuple[str, _Point]]:
+    """Points of codimension two between two points, by halving."""
+    found = []
+    ahead = _monitors(curve, one, other)
+    for kind, begun in _monitors(curve, one, one).items():
+        if not begun * ahead[kind] < 0.0:
+            continue
+        low, high, nearest = 0.0, 1.0, other
+        along = other.y - one.y
+        row = along / np.linalg.norm(along)
+        for _ in range(_HALVINGS):
+            part = 0.5 * (low + high)
+            try:
+                nearest = curve.correct(one.y + part * along, row, one.tangent, one.table)
+            except OrbitNotFoundError:
+                break
+            if begun * _monitors(curve, one, nearest)[kind] > 0.0:
+                low = part
+            else:
+                high = part
+            if (high - low) * np.linalg.norm(along) < curve.tolerance:
+                break
+        found.append((kind, nearest))
+    return found
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+@checked
+def bifurcation_curve(
+    special_point: SpecialPoint,
+    names: tuple[str, str],
+    bounds: tuple[tuple[float, float], tuple[float, float]],
+    *,
+    max_points: int = 200,
+    step: float = 0.01,
+    max_step: float = 0.03,
+    tolerance: float = _TOLERANCE,
+    progress: Callable[[int, int], object] | bool | None = None,
+) -> xr.Dataset:
+    """Follow a fold, flip or Neimark-Sacker point of periodic orbits in two parameters, to both sides.
+
+    Located on the way are cusps, orbits with multipliers +1 and -1 (fold-flip), and grazing, where the number of impacts
+    changes.  Other points of codimension two (resonances, generalized flips) are not sought.
+
+    Parameters
+    ----------
+    special_point : SpecialPoint
+        Of a branch (:func:`continuation`).
+    names : (str, str)
+        Two parameters that can differ between runs, by dotted name or the name in datasets.
+    bounds : pair of pairs of float
+        Least and greatest value of each.
+    max_points : int
+        Points at most, to either side.
+    step, max_step : float
+        First and greatest distance between points, in units of the well's amplitude for the state and of the range
+        for each parameter; between 1e-6 and 1.
+    tolerance : float
+        Of orbit and condition, as in :func:`periodic_orbit`; up to 1,000 times as much where light impacts make the
+        multipliers rough, which the errors then contain.
+    progress : callable, optional
+        Called as ``progress(done, total)`` with points; True writes a line to standard error.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``point``: both parameters, their errors at these steps, the state, the multipliers, impacts.  Over
+        ``special_point``: kind and parameters of points of codimension two.
+
+    Raises
+    ------
+    InputError
+        For bad input.
+    OrbitNotFoundError
+        If not even the first point is found with both parameters.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
+    >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12)
+    >>> curve = sb.dynamics.bifurcation_curve(
+    ...     branch.special_points[0],
+    ...     ("frequency_ratio", "velocity_amplitude"),
+    ...     ((1.5, 1.7), (0.02, 0.1)),
+    ... )
+    >>> curve.attrs["kind"]
+    'fold'
+    """
+    instance("special_point", special_point, SpecialPoint, "a special point of a branch")
+    if special_point.kind not in CURVES:
+        raise InputError(f"special_point = {special_point!r}: must be one of {', '.join(CURVES)}")
+    flow = special_point.orbit.flow
+    for name in names:
+        if isinstance(flow, Stroboscope) and not lookup(name).is_run:
+            raise InputError(f"names = {shown(names)}: {name} cannot differ between runs")
+    if len(names) != 2 or names[0] == names[1]:
+        raise InputError(f"names = {shown(names)}: must be two different parameters")
+    if len(bounds) != 2:
+        raise InputError(f"bounds = {shown(bounds)}: must be a minimum and a maximum of each parameter")
+    limits = np.array([interval(f"bounds[{k}]", pair) for k, pair in enumerate(bounds)])
+    begun = np.array([flow.value(name) for name in names])
+    for k, name in enumerate(names):
+        within(name, float(begun[k]), *limits[k], closed="both")
+    count = integer("max_points", max_points, 2, 10**6)
+    length, longest = (
+        within(words, value, _SHORTEST, _LONGEST, closed="both")
+        for words, value in (("step", step), ("max_step", max_step))
+    )
+    spans = limits[:, 1] - limits[:, 0]
+    curve = _Curve(
+        _Plane(flow, (names[0], names[1])),
+        special_point.kind,
+        special_point.orbit.period,
+        spans,
+        orbit_tolerance(tolerance),
+    )
+    y = np.append(special_point.orbit.coordinates, begun / spans)
+    curve.border(curve.came(y))
+    # the special point was located with other steps of differences: once more, across the curve
+    table = curve.derivative(y)[2]
+    first = curve.correct(y, _tangent(table, np.ones(y.size)), np.ones(y.size), table)
+    report = counting(progress, "bifurcation curve", "points")
+    sides, special, ends = [], [], []
+    for sign in (-1.0, 1.0):
+        start = first._replace(tangent=sign * first.tangent)
+        points, events, end = _follow(
+            curve, start, limits / spans[:, None], count, min(length, longest), longest, report
+        )
+        sides.append(points)
+        special += events
+        ends.append(end)
+    points = [*reversed(sides[0][1:]), first, *sides[1][1:]]
+    return _dataset(curve, names, points, special, ends, flow)
+
+
+def _follow(
+    curve: _Curve,
+    first: _Point,
+    limits: _Array,
+    max_points: int,
+    length: float,
+    longest: float,
+    progress: Callable[[int, int], object] | None,
+) -> tuple[list[_Point], list[tuple[str, _Point]], str]:
+    points, events = [first], list[tuple[str, _Point]]()
+    while len(points) < max_points:
+        last = points[-1]
+        guess, row, over = last.y + length * last.tangent, last.tangent, False
+        shares = [
+            (value - last.y[k - 2]) / (length * last.tangent[k - 2])
+            for k in range(2)
+            for value in limits[k]
+            if (guess[k - 2] - value) * (last.y[k - 2] - value) < 0.0
+        ]
+        if shares:
+            # the last point stands at the limit itself
+            over, guess = True, last.y + min(shares) * length * last.tangent
+            k = int(np.argmin(np.abs(guess[-2:, None] - limits).min(axis=1)))
+            row = np.zeros(guess.size)
+            row[k - 2] = 1.0
+        try:
+            curve.border(last.came)
+            point = curve.correct(guess, row, last.tangent, last.table if points[1:] else None)
+            turned = float(point.tangent @ last.tangent)
+            if np.linalg.norm(point.y - last.y) > 3.0 * length or turned < 0.5:
+                raise OrbitNotFoundError("the next point is too far away, or on another curve")
+            if not over and not ((limits[:, 0] <= point.y[-2:]) & (point.y[-2:] <= limits[:, 1])).all():
+                raise OrbitNotFoundError("the corrected point is beyond the limits")
+        except (OrbitNotFoundError, np.linalg.LinAlgError) as error:
+            length *= 0.5
+            if length < _SHORTEST * longest:
+                return points, events, f"no further point: {error}"
+            continue
+        events += _between(curve, last, point)
+        points.append(point)
+        if progress is not None:
+            progress(len(points), max_points)
+        if over:
+            return points, events, "limit of a parameter"
+        if (
+            len(points) > 8
+            and np.linalg.norm(point.y - first.y) < 0.75 * length
+            and point.tangent @ first.tangent > 0.9
+        ):
+            return points, events, "closed"
+        if point.iterations <= _EASY and turned > 0.95:
+            length = min(1.4 * length, longest)
+        elif point.iterations >= _HARD or turned < 0.8:
+            length *= 0.6
+    return points, events, f"{max_points} points, the maximum (max_points)"
+
+
+def _dataset(
+    curve: _Curve,
+    names: tuple[str, str],
+    points: list[_Point],
+    special: list[tuple[str, _Point]],
+    ends: list[str],
+    flow: Flow,
+) -> xr.Dataset:
+    from snapbeam.util.datasets import xr
+
+    relative = _FINE if isinstance(flow, Stroboscope) else 1e-9
+    errors = np.array([curve.error(point, relative) for point in points])
+    values = np.array([point.y[-2:] for point in points]) * curve.spans
+    places = np.array([point.y[-2:] for _, point in special]).reshape(-1, 2) * curve.spans
+    multipliers = np.array([np.linalg.eigvals(point.came.jacobian) for point in points])
+    coordinates = getattr(flow, "names", tuple(f"x[{i + 1}]" for i in range(points[0].y.size - 2)))
+    variables: dict[str, Any] = {
+        "state": (
+            ("point", "coordinate"),
+            np.array([point.y[:-2] for point in points]),
+            _labels("state of the orbit"),
+        ),
+        "multiplier_real": (("point", "multiplier"), multipliers.real, _labels("Floquet multiplier")),
+        "multiplier_imag": (("point", "multiplier"), multipliers.imag, _labels("its imaginary part")),
+        "impacts": (
+            "point",
+            np.array([p.came.impacts for p in points], np.int32),
+            _labels("impacts within the period"),
+        ),
+        "special_point_kind": (
+            "special_point",
+            np.array([kind for kind, _ in special], dtype=str),
+            {"long_name": "kind of the point of codimension two"},
+        ),
+    }
+    coords: dict[str, Any] = {"coordinate": list(coordinates)}
+    shorts = []
+    for k, name in enumerate(names):
+        short, labels = name, {"units": "1", "long_name": name}
+        if isinstance(flow, Stroboscope):
+            row = lookup(name)
+            short, labels = row.short, {"units": row.quantity.unit, "long_name": row.quantity.long_name}
+        shorts.append(short)
+        coords[short] = ("point", values[:, k], labels | {"parameter": name})
+        off = labels | {"long_name": f"by how much it may be off at these steps: {labels['long_name']}"}
+        variables[f"{short}_error"] = ("point", errors[:, k], off)
+        variables[f"special_point_{short}"] = ("special_point", places[:, k], labels)
+    attrs = {
+        **fixed_parameters(flow, *shorts),
+        "title": f"bifurcation curve of periodic orbits: {curve.kind}",
+        "kind": curve.kind,
+        "parameters": shorts,
+        "period": curve.period,
+        "termination_reason": "; ".join(ends),
+    }
+    return xr.Dataset(variables, coords, attrs)
+
+
+def _labels(words: str) -> dict[str, str]:
+    return {"units": "1", "long_name": words}
