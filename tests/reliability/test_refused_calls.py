@@ -137,7 +137,7 @@ def test_data_frames_where_settings_belong(system, run, tmp_path):
             sb.simulate_to_file(system, **named)
 
 
-def test_results_of_another_kind(run, tmp_path):
+def test_results_of_another_kind(system, run, tmp_path):
     signal = sb.lab.make_signal(np.sin(np.arange(500.0)), "m/s", 1e3)
     for call in (
         lambda: sb.RunSummary.from_statistics({"a": 1}),
@@ -148,6 +148,9 @@ def test_results_of_another_kind(run, tmp_path):
         lambda: sb.lab.measure_drive(signal, frequency=SHORT),
         lambda: sb.lab.measure_response(run.dataset, start="a"),
         lambda: sb.lab.identify_decay(signal, frequencies="abc"),
+        lambda: sb.lab.identify_decay(signal, frequencies=[]),
+        lambda: sb.lab.make_signal([0.1, 0.3], "m", time=range(10**12)),
+        lambda: sb.force_displacement(system, displacement_range=[1.0, 2.0, 3.0]),
     ):
         with pytest.raises(InputError):
             call()

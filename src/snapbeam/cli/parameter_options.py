@@ -428,7 +428,10 @@ def _value(name: str, value: Any) -> Any:
         if kind is int:
             return int(value)
         if kind is float and (row is not None or name in PHYSICAL or name.startswith("initial_state.")):
-            return float(parse_axis(name, value, unit=parameter_of_axis(name).quantity.unit))
+            numbers = np.ravel(parse_axis(name, value, unit=parameter_of_axis(name).quantity.unit))
+            if numbers.size != 1:
+                raise InputError(f"{name} = {value!r}: must be one number, not {numbers.size}")
+            return float(numbers[0])
     except InputError:
         raise
     except (ValueError, KeyError, typer.BadParameter):

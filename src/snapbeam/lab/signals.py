@@ -231,6 +231,7 @@ def make_signal(
     if (time is None) == (sampling_frequency is None):
         raise InputError(f"{name}: must have exactly one of sampling_frequency (Hz) and time (s)")
     if time is not None:
+        time = finite_array("time", time, 1)
         if np.shape(time) != array.shape:
             raise InputError(
                 f"{name}: time of shape {np.shape(time)} and values of shape {array.shape}: must agree"

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from snapbeam.model.equilibria import condensed, tangent_stiffness
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
-from snapbeam.util.validation import InputError, InputTypeError, checked, choice, finite, shown, within
+from snapbeam.util.validation import InputError, InputTypeError, checked, choice, interval, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -637,10 +637,7 @@ def _window(
 ) -> tuple[float, float]:
     """Range of the displacement, m."""
     if given is not None:
-        low, high = (finite("displacement_range", each, "two numbers of m") for each in given)
-        if not low < high:
-            raise InputError(f"displacement_range = {given!r}: must be two numbers of m, the lower first")
-        return low, high
+        return interval("displacement_range", given)
     places = [float(own.shape @ each.amplitude) for each in model.equilibria]
     for branch, found in zip(branches, critical, strict=True):
         places += [own.displacement(*branch.at(t)) for t, _ in found]

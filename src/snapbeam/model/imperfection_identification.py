@@ -98,6 +98,8 @@ def identify_imperfection(
         if any(column is None for column in columns):
             break
         slope = (np.stack(columns, axis=1) - found[:, None]) / step
+        if not np.isfinite(slope).all():
+            break
         change = np.linalg.lstsq(slope, -found, rcond=None)[0]
         change *= min(1.0, 0.3 / max(float(np.abs(change[0])), 10.0 * float(np.abs(change[1])), 1e-300))
         for _ in range(_TRIES):

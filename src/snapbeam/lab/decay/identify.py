@@ -119,6 +119,8 @@ def identify_decay(
             for i, f in enumerate(np.atleast_1d(finite_array("frequencies", frequencies)).tolist())
         ]
     )
+    if asked == []:
+        raise InputError("frequencies = []: must hold at least one frequency, Hz")
     samples = check_signal(signal)
     if exponential_window is not None:
         samples = undone(samples, positive("exponential_window", exponential_window, "s"))
