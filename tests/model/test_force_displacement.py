@@ -207,7 +207,7 @@ def test_wells_and_refusals() -> None:
         sb.force_displacement(perfect)
     with pytest.raises(InputError, match="must be a number in"):
         sb.force_displacement(perfect, 1.2)
-    with pytest.raises(InputError, match="the lower first"):
+    with pytest.raises(InputError, match="of which the second is larger"):
         sb.force_displacement(perfect, 0.5, displacement_range=(1e-3, -1e-3))
     with pytest.raises(InputError, match="must contain a part of the curve"):
         sb.force_displacement(arch(2.0, 1), 0.5, displacement_range=(1e-9, 1.0001e-9))
