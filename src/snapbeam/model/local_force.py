@@ -216,7 +216,7 @@ class LocalSpring(LocalForce):
 
 @dataclass(frozen=True, kw_only=True)
 class QuadraticDamping(LocalForce):
-    """Quadratic damping of a point, F = -c |v| v, such as the drag of a tip mass in air.
+    """Quadratic damping of a point, F = -c abs(v) v, such as the drag of a tip mass in air.
 
     Parameters
     ----------
