@@ -136,5 +136,8 @@ def test_what_cannot_be_followed_is_refused() -> None:
         sb.dynamics.bifurcation_curve(grazing, ("a", "b"), bounds)
     orbit = sb.dynamics.periodic_orbit(struck(1.6, 0.03), transient=100)
     fold = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12).special_points[0]
+    pair = ("velocity_amplitude", "drive.velocity_amplitude")
+    with pytest.raises(InputError, match="two different parameters"):
+        sb.dynamics.bifurcation_curve(fold, pair, ((0.02, 0.3), (0.02, 0.3)))
     with pytest.raises(InputError, match=r"modes cannot differ between runs|names"):
         sb.dynamics.bifurcation_curve(fold, ("velocity_amplitude", "modes"), ((0.02, 0.3), (1, 3)))

@@ -286,7 +286,7 @@ def bifurcation_curve(
     Returns
     -------
     xarray.Dataset
-        Over ``point``: both parameters, their errors at these steps, the state, the multipliers, impacts.  Over
+        Over ``point``: both parameters, their errors at these steps, the state, the multipliers, impacts, residual.  Over
         ``special_point``: kind and parameters of points of codimension two.
 
     Raises
@@ -320,7 +320,7 @@ def bifurcation_curve(
     for name in names:
         if isinstance(flow, Stroboscope) and not lookup(name).is_run:
             raise InputError(f"names = {shown(names)}: {name} cannot differ between runs")
-    if len(names) != 2 or names[0] == names[1]:
+    if len(names) != 2 or len({lookup(n).name if isinstance(flow, Stroboscope) else n for n in names}) < 2:
         raise InputError(f"names = {shown(names)}: must be two different parameters")
     if len(bounds) != 2:
         raise InputError(f"bounds = {shown(bounds)}: must be a minimum and a maximum of each parameter")
@@ -445,6 +445,11 @@ def _dataset(
             "point",
             np.array([p.came.impacts for p in points], np.int32),
             _labels("impacts within the period"),
+        ),
+        "residual": (
+            "point",
+            np.array([point.residual for point in points]),
+            _labels("of the return and of the condition"),
         ),
         "special_point_kind": (
             "special_point",
