@@ -50,9 +50,10 @@ $(VENV)/.installed-run: pyproject.toml constraints.txt | $(BIN)/python
 	$(PIP) install --constraint constraints.txt --editable .
 	@touch $@
 
-# Every package is compared with its hash.
+# Every package is compared with its hash.  The list is complete: with dependencies, pip 23 ignores the pin of a package
+# that another one asks for with an extra.
 $(VENV)/.installed-dev: pyproject.toml requirements-dev.txt | $(BIN)/python
-	$(PIP) install --require-hashes --requirement requirements-dev.txt
+	$(PIP) install --require-hashes --no-deps --requirement requirements-dev.txt
 	$(PIP) install --no-deps --no-build-isolation --editable .
 	@touch $@
 
