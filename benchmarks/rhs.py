@@ -43,7 +43,7 @@ class CompiledSystem:
     function: Any
     """``function(t, u, du, memory)`` writes du; all arrays of float64."""
     memory: _Array
-    start: _Array
+    initial_state: _Array
     """State at rest in the well, with the shaker in touch."""
     rows: NDArray[np.int64]
     """Where q of each linear mode stands in the state."""
@@ -93,5 +93,5 @@ def compiled_system(case: Case, weight: float) -> CompiledSystem:
             pull -= memory[squared + i] * memory[q + i]
             du[size + i] = inverse * pull - 2.0 * memory[damping + i] * u[size + i]
 
-    start = np.concatenate((start_q / scale, np.zeros(size)))
-    return CompiledSystem(function, memory, start, packed.rows, scale)
+    initial_state = np.concatenate((start_q / scale, np.zeros(size)))
+    return CompiledSystem(function, memory, initial_state, packed.rows, scale)

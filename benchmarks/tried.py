@@ -103,8 +103,8 @@ def _splitting_record(
     case: Case, name: str, composition: Composition, step: float, repeats: int
 ) -> dict[str, Any]:
     key = 100 + list(_SPLITTINGS).index(name)
-    coarsest = max(0, round(math.log2(step / _CONTACT_STEP)))
-    plan = Plan(key, step, coarsest, coarsest + 3)
+    min_contact_halvings = max(0, round(math.log2(step / _CONTACT_STEP)))
+    plan = Plan(key, step, min_contact_halvings, min_contact_halvings + 3)
     COMPOSITIONS[key] = composition
     try:
         ensemble = case.ensemble(plan, 200)

@@ -12,7 +12,7 @@ from numba import njit
 
 import snapbeam.solver
 from snapbeam.solver.compilation import inlined
-from snapbeam.solver.terms.interface import center_from_divide, does_work
+from snapbeam.solver.terms.interface import center_from_barrier, does_work
 
 SOLVER = Path(snapbeam.solver.__file__).parent
 
@@ -59,7 +59,7 @@ class Offset(NamedTuple):
 
     @staticmethod
     @inlined
-    def center_from_divide(term, center):
+    def center_from_barrier(term, center):
         return center - term.level
 
 
@@ -68,7 +68,7 @@ class Factor(NamedTuple):
 
     @staticmethod
     @inlined
-    def center_from_divide(term, center):
+    def center_from_barrier(term, center):
         return center * term.factor
 
     @staticmethod
@@ -83,7 +83,7 @@ class Silent(NamedTuple):
 
 @njit
 def divided(terms, center):
-    return center_from_divide(terms, center), does_work(terms)
+    return center_from_barrier(terms, center), does_work(terms)
 
 
 @pytest.mark.parametrize(
@@ -101,4 +101,4 @@ def test_an_operation_calls_the_terms_in_order(terms, expected):
 
 def test_an_operation_is_for_compiled_code():
     with pytest.raises(TypeError, match="compiled code only"):
-        center_from_divide((), 5.0)
+        center_from_barrier((), 5.0)

@@ -22,7 +22,7 @@ from snapbeam.solver.simd import (
     vmin,
     vtrunc,
 )
-from snapbeam.solver.step_control import Clock, contact_level
+from snapbeam.solver.step_control import Clock, contact_halvings
 
 
 @compiled
@@ -64,8 +64,8 @@ def _graded(length, want, out):
 
 @compiled
 def _one_by_one(clock, want):
-    # contact_level takes half of what has passed since the onset
-    return contact_level(clock, 2.0 * want, 0.0, 1.0)
+    # contact_halvings takes half of what has passed since the onset
+    return contact_halvings(clock, 2.0 * want, 0.0, 1.0)
 
 
 @pytest.mark.parametrize("seed", range(4))

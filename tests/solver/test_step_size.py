@@ -20,14 +20,14 @@ from snapbeam.solver.step_size import choose_base_step, flight_step
 def test_steps_in_contact_resolve_the_impact_and_the_fastest_mode(modes: int, accuracy: str) -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes)
     plan = choose_base_step(model, default_values.CONTACT, accuracy=accuracy)
-    longest = plan.step / 2**plan.coarsest
+    longest = plan.step / 2**plan.min_contact_halvings
     assert longest * model.omega.max() <= math.pi
     if accuracy == "reference":
         assert plan.step * model.omega.max() <= 4.0
     speed = 0.2 * model.length_scale * 2.0 * math.pi * model.reference_frequency
     mass = min(model.contact_mass(x) for x in np.linspace(0.02, 0.5, 25))
     assert longest <= default_values.CONTACT.impact_duration(mass, speed) / 6.0 * (1.0 + 1e-12)
-    assert plan.finest > plan.coarsest
+    assert plan.max_halvings > plan.min_contact_halvings
 
 
 @pytest.mark.slow

@@ -327,8 +327,10 @@ def run_dataset(
         values[:, _COLUMN["energy"]] -= own
     if structure.circuit:
         values[:, _COLUMN["energy"]] -= 0.5 * recorded.p[:, -1] ** 2
-    if ensemble.tapped is not None:  # dissipated in the resistance of the coil
-        values[:, _COLUMN["dissipated"]] += (1.0 - ensemble.tapped.share[0]) * values[:, _COLUMN["circuit"]]
+    if ensemble.circuit_coupling is not None:  # dissipated in the resistance of the coil
+        values[:, _COLUMN["dissipated"]] += (1.0 - ensemble.circuit_coupling.share[0]) * values[
+            :, _COLUMN["circuit"]
+        ]
     location = 0.5 if system.striker is None else system.striker.location
     shape = model.shape_at(location)
     displacement = alpha @ shape / scale
@@ -364,8 +366,8 @@ def run_dataset(
         of_each = strikers_of(ensemble, system, recorded, values, variables["striker_displacement"])
         variables["energy_contact"] = of_each.pop("energy_contact")
         variables |= of_each
-    if ensemble.tapped is not None:
-        variables |= _harvested(ensemble, ensemble.tapped, recorded, values)
+    if ensemble.circuit_coupling is not None:
+        variables |= _harvested(ensemble, ensemble.circuit_coupling, recorded, values)
     if struck and system.contact is not None and system.contact.is_dissipative:
         variables["energy_lost_contact"] = values[:, _COLUMN["lost"]]
     at = recorded.times
@@ -387,20 +389,20 @@ def run_dataset(
 
 
 def _harvested(
-    ensemble: Ensemble, tapped: CircuitCoupling, recorded: Recorded, values: _Array
+    ensemble: Ensemble, coupling: CircuitCoupling, recorded: Recorded, values: _Array
 ) -> dict[str, _Array]:
     """Return the variables of a harvester."""
     structure = ensemble.structure
-    assert structure.tapped is not None
+    assert structure.circuit_row is not None
     if structure.circuit:
         y = structure.circuit_of(recorded.p)
     else:
-        y = -tapped.rate[0] * (recorded.p @ structure.tapped)
-    lost = (tapped.rate[0] if structure.circuit else 1.0 / tapped.rate[0]) * y * y
+        y = -coupling.rate[0] * (recorded.p @ structure.circuit_row)
+    lost = (coupling.rate[0] if structure.circuit else 1.0 / coupling.rate[0]) * y * y
     found = {
-        "voltage": tapped.volts[0] * y,
-        "power_load": tapped.share[0] * lost,
-        "energy_harvested": tapped.share[0] * values[:, _COLUMN["circuit"]],
+        "voltage": coupling.volts[0] * y,
+        "power_load": coupling.share[0] * lost,
+        "energy_harvested": coupling.share[0] * values[:, _COLUMN["circuit"]],
     }
     if structure.circuit:
         found["energy_circuit"] = 0.5 * y * y

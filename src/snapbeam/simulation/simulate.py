@@ -71,8 +71,8 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
         "reference_frequency": model.reference_frequency,
         "step": plan.step,
         "order": plan.order,
-        "longest_contact_step": plan.step / 2**plan.coarsest,
-        "shortest_contact_step": plan.step / 2**plan.finest,
+        "longest_contact_step": plan.step / 2**plan.min_contact_halvings,
+        "shortest_contact_step": plan.step / 2**plan.max_halvings,
     }
     if system.contact is not None:
         attrs["contact_type"] = system.contact.name

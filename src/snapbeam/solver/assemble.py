@@ -371,9 +371,9 @@ def make_ensemble(
     table["phase"] = np.where(np.isnan(state.phase), phases_of(system, columns, runs), state.phase)
     table["offset"] = _offsets(system, structure, state, columns, table, places.rows, starts, driven)
     table["tip_speed"] = driven.speed
-    tapped = _tapped(system, columns, runs)
-    if tapped is not None:
-        table["circuit_rate"] = tapped.rate
+    coupling = _circuit_coupling(system, columns, runs)
+    if coupling is not None:
+        table["circuit_rate"] = coupling.rate
     highest = table["rest_contact"] + table["offset"] + driven.highest
     if structure.body_mass is not None or driven.kind.parts or system.further_contacts or system.local_force:
         highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown, and a shaken beam too
@@ -399,7 +399,7 @@ def make_ensemble(
         max_steps=most_steps(integration, system.model.modes),
         high_omega=integration.high_frequency_ratio * system.scale.omega,
         cycles=time.cycles,
-        tapped=tapped,
+        circuit_coupling=coupling,
         harvester=system.harvester,
         others=others_of(system, structure, columns, runs, since),
     )
@@ -493,11 +493,11 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
             for each, rate in zip(plans, fastest.tolist(), strict=True)
         ]
     if integration.step is None and system.harvester is not None:
-        tapped = _tapped(system, columns, len(plans))
-        assert tapped is not None
+        coupling = _circuit_coupling(system, columns, len(plans))
+        assert coupling is not None
         # a circuit couples the fastest modes too, and is in its kicks
         longest = _TAPPED[integration.accuracy] / _fastest_open(system)
-        rates = tapped.rate if system.harvester.inertia > 0.0 else np.zeros(len(plans))
+        rates = coupling.rate if system.harvester.inertia > 0.0 else np.zeros(len(plans))
         plans = [
             each._replace(step=min(each.step, longest, 1.0 / rate if rate > 0.0 else math.inf))
             for each, rate in zip(plans, rates.tolist(), strict=True)
@@ -509,7 +509,12 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
         return plans
     mass = _struck(system).lightest_contact_mass
     more = max(0, math.ceil(0.5 * math.log2(1.0 + mass / striker.mass) - 1e-9))
-    return [each._replace(coarsest=each.coarsest + more, finest=each.finest + more) for each in plans]
+    return [
+        each._replace(
+            min_contact_halvings=each.min_contact_halvings + more, max_halvings=each.max_halvings + more
+        )
+        for each in plans
+    ]
 
 
 def _longest_with_local_force(system: System, force: LocalForce, accuracy: str) -> float:
@@ -549,10 +554,16 @@ def _struck(system: System) -> ReducedModel:
 def _serving(plans: Sequence[Plan]) -> Plan:
     """Steps that serve several contacts: as short as the shortest of them, in flight and in contact."""
     step = min(each.step for each in plans)
-    longest = min(each.step * 0.5**each.coarsest for each in plans)
-    shortest = min(each.step * 0.5**each.finest for each in plans)
-    coarsest, finest = (math.ceil(math.log2(step / each) - 1e-9) for each in (longest, shortest))
-    return plans[0]._replace(step=step, coarsest=max(0, coarsest), finest=max(0, coarsest, finest))
+    longest = min(each.step * 0.5**each.min_contact_halvings for each in plans)
+    shortest = min(each.step * 0.5**each.max_halvings for each in plans)
+    min_contact_halvings, max_halvings = (
+        math.ceil(math.log2(step / each) - 1e-9) for each in (longest, shortest)
+    )
+    return plans[0]._replace(
+        step=step,
+        min_contact_halvings=max(0, min_contact_halvings),
+        max_halvings=max(0, min_contact_halvings, max_halvings),
+    )
 
 
 def _plans_of(
@@ -591,7 +602,7 @@ def _side(system: System, state: State, goes_on: bool) -> str:
     if goes_on:
         # the same from call to call, whichever well it comes to
         return "below"
-    # seen from the well the beam starts in, so that mirror images are mirrored to the bit
+    # measured from the well the beam starts in, so that mirror images are mirrored to the bit
     first = state.flat()[0]
     return "above" if float(first.amplitude @ system.model.midspan_shape) > 0.0 else "below"
 
@@ -653,7 +664,7 @@ def _offsets(
     return np.asarray(np.where(np.isnan(flat.striker_position), offset, position))
 
 
-def _tapped(system: System, columns: Mapping[str, _Array], runs: int) -> CircuitCoupling | None:
+def _circuit_coupling(system: System, columns: Mapping[str, _Array], runs: int) -> CircuitCoupling | None:
     """The circuit of a harvester, for every run."""
     harvester = system.harvester
     if harvester is None:

@@ -65,13 +65,13 @@ class Ensemble:
     drive_numbers: _Array
     """Numbers of the drive likewise."""
     samples: _Array
-    """What the drive looks up."""
+    """Tables of the drive."""
     location: _Array
     """x_s of each run."""
     highest: _Array
     """Highest position that the tip of each run ever has, m; -inf without one."""
     contact_rows: _Array
-    """V^T phi of every location, shape (locations, N), seen from the striker's side."""
+    """V^T phi of every location, shape (locations, N), as the striker pushes: positive into the beam."""
     starts: _Array
     """q and p of every start, shape (starts, 2, N)."""
     max_steps: int
@@ -79,12 +79,12 @@ class Ensemble:
     """Angular frequency above which a mode counts as high, rad/s."""
     cycles: float
     """Cycles of excitation of each run."""
-    tapped: CircuitCoupling | None = None
+    circuit_coupling: CircuitCoupling | None = None
     harvester: Harvester | None = None
     others: FurtherContactTable | None = None
 
     @property
-    def struck(self) -> bool:
+    def has_striker(self) -> bool:
         """Whether there is a striker."""
         return bool((self.runs["offset"] > FAR_AWAY).any())
 
@@ -114,9 +114,9 @@ class Ensemble:
         return times
 
     @property
-    def finest(self) -> int:
+    def max_halvings(self) -> int:
         """Most halvings of the flight step that any run takes."""
-        return int(self.runs["finest"].max())
+        return int(self.runs["max_halvings"].max())
 
     @property
     def fastest(self) -> float:
@@ -127,7 +127,7 @@ class Ensemble:
 
 
 # ----------------------------------------------------------------------------------------------------
-# What describes one run of an ensemble to an engine: a record by name, SI units, seen from the striker's side.
+# What describes one run of an ensemble to an engine: a record by name, SI units, as the striker pushes: positive into the beam.
 
 
 _REALS = (
@@ -140,7 +140,7 @@ _REALS = (
     "decide_energy",  # energy above the well below which a beam in the far well stays there; -inf: never decide
     "decide_reach",  # highest future position of the tip, or 0 if that is higher
     "contact_time",  # s since the present contact began; negative: apart; NaN: the penetration decides
-    "lowest",  # height of a flight that is too low to be seen, m
+    "lowest",  # height of a flight that is too low to be resolved, m
     "circuit_rate",  # of a harvester's circuit, 1/s
     "well_sign",  # +1 if q and p are counted from the first well, -1 from the other
 )
@@ -151,8 +151,8 @@ _INTEGERS = (
     "end",
     "last_quarter",
     "decide_crossings",  # crossings in the last quarter beyond which it is continuous; -1: never decide
-    "coarsest",  # halvings of the flight step that make the longest contact step
-    "finest",  # and the shortest
+    "min_contact_halvings",  # halvings of the flight step that make the longest contact step
+    "max_halvings",  # and the shortest
     "contact_row",
     "start_row",
 )

@@ -22,7 +22,7 @@ __all__ = [
     "numbers_of",
     "part_acceleration",
     "part_motion",
-    "seen_from",
+    "tip_about_well",
     "tip_acceleration",
     "tip_motion",
     "turned_motion",
@@ -210,7 +210,7 @@ def _joined_motion(drive, memory, argument):
 
 
 class Tip(NamedTuple):
-    """A tip, seen from the side it pushes from: ``penetration = offset + motion - row . q``.
+    """A tip, positive as it pushes: ``penetration = offset + motion - row . q``.
 
     The contact's row carries the sign of the side.
     """
@@ -224,7 +224,7 @@ class Tip(NamedTuple):
 
 
 @inlined
-def seen_from(tip, well_sign, rest):
+def tip_about_well(tip, well_sign, rest):
     """The tip in coordinates about the well *well_sign*: +1 the one that *rest* is measured in, -1 the other."""
     return Tip(tip.offset + (1.0 - well_sign) * rest, tip.law, tip.drive)
 

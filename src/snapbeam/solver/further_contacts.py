@@ -27,7 +27,7 @@ OFFSET, REST, SIGN, SPEED = 0, 1, 2, 3
 # as they stand
 HERE, TOUCHING, ONSET, SAFE, DEPTH, RATE, DEEPEST, PUSHED = 4, 5, 6, 7, 8, 9, 10, 11
 # of the step at hand
-DEPTH1, RATE1, CUT, FORCE, IMPULSE, WORK, GROSS, KEPT, WORKED = 12, 13, 14, 15, 16, 17, 18, 19, 20
+DEPTH1, RATE1, EVENT_TICKS, FORCE, IMPULSE, WORK, GROSS, KEPT, WORKED = 12, 13, 14, 15, 16, 17, 18, 19, 20
 # of the state that a run begins in: s since the contact began; negative: apart; NaN: the penetration decides
 SINCE = 21
 # of the step that tangents go through again: whether the striker touched in it, and the slope of its force

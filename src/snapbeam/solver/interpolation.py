@@ -3,7 +3,7 @@
 Between two instants a signal is taken as the cubic that matches both values and both slopes (Hermite);
 with s in [0, 1] and h the interval, u(s) = c0 + c1 s + c2 s^2 + c3 s^3.  Intervals are taken short enough that
 the cubic turns at most once inside, which it does where its slopes at the ends have opposite signs; a
-second turn, with slopes of one sign, is not looked for.
+second turn, with slopes of one sign, is not located.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def sign_of(u, otherwise):
 
 @inlined
 def count_zero_crossings(side, u0, v0, u1, v1, h):
-    """Zero crossings of the cubic, given the *side* (-1, 1; 0: none yet) it was last seen on.
+    """Zero crossings of the cubic, given the *side* (-1, 1; 0: none yet) it was on last.
 
     Returns how many, where in [0, 1] the last one is (-1 if none), and the side at the end.  A value
     of exactly zero is on the side that the signal was on before.

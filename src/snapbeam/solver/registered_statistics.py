@@ -37,22 +37,28 @@ def extras_of_table() -> Any:
 
 
 def observe(
-    extras: Any, accumulators: Any, time: float, length: float, seen: Any, seen1: Any, touching: bool
+    extras: Any,
+    accumulators: Any,
+    time: float,
+    length: float,
+    kinematics: Any,
+    kinematics1: Any,
+    touching: bool,
 ) -> None:
     """Update every registered statistic by a step."""
     rows = type(extras).owner.rows
     for row in rows:
         name = f"own_{row.name}"
         accumulators[name] = row.update(
-            accumulators[name], _passed.py_func(time, length, seen, seen1, touching)
+            accumulators[name], _passed.py_func(time, length, kinematics, kinematics1, touching)
         )
 
 
 @inlined
-def _passed(time, length, seen, seen1, touching):
+def _passed(time, length, kinematics, kinematics1, touching):
     return CompletedStep(
-        time, length, (seen.w, seen1.w), (seen.wv, seen1.wv), (seen.c, seen1.c), (seen.cv, seen1.cv),
-        (seen.d, seen1.d), touching,
+        time, length, (kinematics.w, kinematics1.w), (kinematics.wv, kinematics1.wv), (kinematics.c, kinematics1.c), (kinematics.cv, kinematics1.cv),
+        (kinematics.d, kinematics1.d), touching,
     )  # fmt: skip
 
 
@@ -77,13 +83,13 @@ def _chain(rows: tuple[Statistic, ...]) -> Any:
 
 
 @overloaded(observe)
-def _observe(extras, accumulators, time, length, seen, seen1, touching):
+def _observe(extras, accumulators, time, length, kinematics, kinematics1, touching):
     rows = extras.instance_class.owner.rows
     if not rows:
-        return lambda extras, accumulators, time, length, seen, seen1, touching: None
+        return lambda extras, accumulators, time, length, kinematics, kinematics1, touching: None
     apply = _chain(rows)
 
-    def implementation(extras, accumulators, time, length, seen, seen1, touching):
-        apply(accumulators, _passed(time, length, seen, seen1, touching))
+    def implementation(extras, accumulators, time, length, kinematics, kinematics1, touching):
+        apply(accumulators, _passed(time, length, kinematics, kinematics1, touching))
 
     return implementation

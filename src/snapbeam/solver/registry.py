@@ -61,7 +61,7 @@ class Engine(Protocol):
         in_contact: bool,
         progress: Callable[[float], object] | None = None,
     ) -> Iterator[Recorded]:
-        """Integrate one run and give what it wrote down, in pieces."""
+        """Integrate one run and return its records, one part after the other."""
         ...
 
 

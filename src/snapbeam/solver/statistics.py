@@ -202,7 +202,7 @@ def _response(reading: Reading) -> Values:
         -reading.first_side * accumulators["side"],
     )
     ensemble = reading.ensemble
-    if not (ensemble.structure.wells_are_mirror_images and ensemble.struck):
+    if not (ensemble.structure.wells_are_mirror_images and ensemble.has_striker):
         # the paper's rule is for equal wells and a striker; here the centre may cross far from the other well
         kinds = np.where(reading.other_well_reached, kinds, ResponseClass.INTRAWELL)
     return np.where(reading.good, kinds, ResponseClass.UNKNOWN)
@@ -228,8 +228,8 @@ def _dissipated(reading: Reading) -> Values:
 
 
 def _harvested(reading: Reading) -> Values:
-    tapped = reading.ensemble.tapped
-    return reading.seen("circuit_energy") * (0.0 if tapped is None else tapped.share)
+    coupling = reading.ensemble.circuit_coupling
+    return reading.seen("circuit_energy") * (0.0 if coupling is None else coupling.share)
 
 
 def _harvested_power(reading: Reading) -> Values:
@@ -253,21 +253,21 @@ def _late_load_power(reading: Reading) -> Values:
 
 
 def _late_harvested_power(reading: Reading) -> Values:
-    tapped = reading.ensemble.tapped
-    return _late_load_power(reading) * (0.0 if tapped is None else tapped.share)
+    coupling = reading.ensemble.circuit_coupling
+    return _late_load_power(reading) * (0.0 if coupling is None else coupling.share)
 
 
 def _late_voltage(reading: Reading) -> Values:
-    tapped = reading.ensemble.tapped
-    if tapped is None:
+    coupling = reading.ensemble.circuit_coupling
+    if coupling is None:
         return _late_load_power(reading) * 0.0
-    per_square = tapped.rate if reading.ensemble.structure.circuit else 1.0 / tapped.rate
-    return np.sqrt(_late_load_power(reading) / per_square) * np.abs(tapped.volts)
+    per_square = coupling.rate if reading.ensemble.structure.circuit else 1.0 / coupling.rate
+    return np.sqrt(_late_load_power(reading) / per_square) * np.abs(coupling.volts)
 
 
 def _peak_voltage(reading: Reading) -> Values:
-    tapped = reading.ensemble.tapped
-    return reading.seen("peak_circuit") * (0.0 if tapped is None else np.abs(tapped.volts))
+    coupling = reading.ensemble.circuit_coupling
+    return reading.seen("peak_circuit") * (0.0 if coupling is None else np.abs(coupling.volts))
 
 
 def _mean_power(reading: Reading) -> Values:

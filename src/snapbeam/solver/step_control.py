@@ -11,9 +11,9 @@ from snapbeam.solver.simd import select_less
 
 __all__ = [
     "GRADING",
-    "PIECES",
     "RELEASE",
-    "STRETCHED",
+    "STRETCH_LIMIT",
+    "SUBINTERVALS",
     "TRUST",
     "TWELFTH",
     "Clock",
@@ -26,10 +26,10 @@ __all__ = [
     "begin_statistics",
     "clock_of",
     "close_impact",
-    "contact_level",
+    "contact_halvings",
     "count_zero_crossings_in_step",
     "first_contact_onset",
-    "flight_level",
+    "flight_halvings",
     "refine_onset",
     "safe_interval",
     "square_of_rate",
@@ -51,9 +51,9 @@ class Clock(NamedTuple):
     """Between two output states."""
     end: int
     last_quarter: int
-    coarsest: int
+    min_contact_halvings: int
     """Halvings of the flight step that make the longest contact step."""
-    finest: int
+    max_halvings: int
     """Halvings of the flight step that make the shortest contact step."""
     max_steps: int
     decide_energy: float
@@ -65,7 +65,7 @@ class Clock(NamedTuple):
 
 
 class ContactKinematics(NamedTuple):
-    """What is seen of a run at an instant, from the striker's side."""
+    """Displacement, penetration and their rates at an instant, positive as the striker pushes."""
 
     w: float
     """Displacement of the beam at the striker, m, and its rate."""
@@ -87,9 +87,9 @@ _MARGIN = 1.25
 TRUST = 8
 # Flight steps are halved where the squared slopes differ from those of the well by more than this many times
 # the well's own, and again at every doubling.
-STRETCHED = 4.0
-# Pieces per period of the fastest mode when a step is looked into.
-PIECES = 5.0
+STRETCH_LIMIT = 4.0
+# Subintervals per period of the fastest mode when a step is sampled inside.
+SUBINTERVALS = 5.0
 _THIRD, _SIXTH, TWELFTH = 1.0 / 3.0, 1.0 / 6.0, 1.0 / 12.0
 
 
@@ -103,8 +103,8 @@ def clock_of(run, max_steps):
         run.output_interval,
         run.end,
         run.last_quarter,
-        run.coarsest,
-        run.finest,
+        run.min_contact_halvings,
+        run.max_halvings,
         max_steps,
         run.decide_energy,
         run.decide_reach,
@@ -113,15 +113,15 @@ def clock_of(run, max_steps):
 
 
 @compiled
-def begin_statistics(accumulators, center, seen, law, energy):
-    """Begin a run's statistics with what is seen of it at the start.
+def begin_statistics(accumulators, center, kinematics, law, energy):
+    """Begin a run's statistics with its kinematics at the start.
 
     *center* is where the centre is from the height that divides the wells.
     """
     accumulators.side = sign_of(center, 0)
-    accumulators.min_displacement, accumulators.max_displacement = seen.w, seen.w
-    accumulators.min_center, accumulators.max_center = seen.c, seen.c
-    accumulators.deepest = mark_of(law, seen.d, seen.dv)
+    accumulators.min_displacement, accumulators.max_displacement = kinematics.w, kinematics.w
+    accumulators.min_center, accumulators.max_center = kinematics.c, kinematics.c
+    accumulators.deepest = mark_of(law, kinematics.d, kinematics.dv)
     accumulators.first_energy = energy
 
 
@@ -169,13 +169,13 @@ def safe_interval(distance, bound, tip_speed, acceleration, step):
 
 
 @compiled
-def contact_level(clock, elapsed, d, dv):
+def contact_halvings(clock, elapsed, d, dv):
     """Halvings of the flight step for a step in contact: graded from the onset and towards the release."""
     want = GRADING * elapsed
     if dv < 0.0:
         want = min(want, -RELEASE * d / dv)
-    level = clock.coarsest
-    while level < clock.finest and (clock.step >> level) * clock.tick > want:
+    level = clock.min_contact_halvings
+    while level < clock.max_halvings and (clock.step >> level) * clock.tick > want:
         level += 1
     return level
 
@@ -188,54 +188,67 @@ def time_beyond(time, crossing, step):
 
 
 @compiled
-def flight_level(clock, stretch, stretch_at_rest):
+def flight_halvings(clock, stretch, stretch_at_rest):
     """Halvings of the flight step for a beam stretched far beyond its wells."""
     level = 0
-    reach = STRETCHED * stretch_at_rest
-    while level < clock.finest and stretch_at_rest > 0.0 and abs(stretch) > reach:
+    reach = STRETCH_LIMIT * stretch_at_rest
+    while level < clock.max_halvings and stretch_at_rest > 0.0 and abs(stretch) > reach:
         reach *= 2.0
         level += 1
     return level
 
 
 @compiled
-def first_contact_onset(inner_samples, pieces, piece):
-    """When the penetration first becomes positive inside a step that was looked into; -1 if it does not."""
-    for i in range(pieces):
+def first_contact_onset(inner_samples, subintervals, subinterval):
+    """When the penetration first becomes positive inside a step that was sampled; -1 if it does not."""
+    for i in range(subintervals):
         rise = first_upcrossing(
-            inner_samples[i, 0], inner_samples[i, 1], inner_samples[i + 1, 0], inner_samples[i + 1, 1], piece
+            inner_samples[i, 0],
+            inner_samples[i, 1],
+            inner_samples[i + 1, 0],
+            inner_samples[i + 1, 1],
+            subinterval,
         )
         if rise >= 0.0:
-            return (i + rise) * piece
+            return (i + rise) * subinterval
     return -1.0
 
 
 @compiled
-def refine_onset(clock, cut, whole, seen, least):
-    """Where a step of *whole* ticks is to be cut that was cut at *cut*, where the gap has not just closed.
+def refine_onset(clock, event_ticks, whole, kinematics, smallest_correction):
+    """Where a step of *whole* ticks should end that was shortened to *event_ticks* and did not end at the onset.
 
     The samples inside the step follow from a linear flow with a tension that varies linearly; a step that ends there
-    is more accurate.  *least* is the smallest correction, s, that is made.
+    is more accurate.  *smallest_correction* is the smallest correction, s, that is made.
     """
-    if seen.dv > 0.0:
-        late = seen.d / seen.dv
-        if abs(late) > least:
-            return min(max(1, cut - round(late / clock.tick)), whole)
-    return cut
+    if kinematics.dv > 0.0:
+        late = kinematics.d / kinematics.dv
+        if abs(late) > smallest_correction:
+            return min(max(1, event_ticks - round(late / clock.tick)), whole)
+    return event_ticks
 
 
 @compiled
 def count_zero_crossings_in_step(
-    accumulators, clock, start, length, seen, seen1, inner_samples, rest, pieces, piece
+    accumulators,
+    clock,
+    start,
+    length,
+    kinematics,
+    kinematics1,
+    inner_samples,
+    rest,
+    subintervals,
+    subinterval,
 ):
-    """Count zero crossings of the centre in a step, through what was seen when it was looked into."""
-    left, left_rate, begun = seen.c, seen.cv, 0.0
+    """Count zero crossings of the centre in a step, through the samples inside it."""
+    left, left_rate, begun = kinematics.c, kinematics.cv, 0.0
     i = 1
     while True:
-        if i < pieces and i * piece < length:
-            right, right_rate, ended = rest + inner_samples[i, 2], inner_samples[i, 3], i * piece
+        if i < subintervals and i * subinterval < length:
+            right, right_rate, ended = rest + inner_samples[i, 2], inner_samples[i, 3], i * subinterval
         else:
-            right, right_rate, ended = seen1.c, seen1.cv, length
+            right, right_rate, ended = kinematics1.c, kinematics1.cv, length
         found, last, side = count_zero_crossings(
             accumulators.side, left, left_rate, right, right_rate, ended - begun
         )
@@ -253,29 +266,41 @@ def count_zero_crossings_in_step(
 
 
 @compiled
-def accumulate_displacement(accumulators, seen, seen1, length):
+def accumulate_displacement(accumulators, kinematics, kinematics1, length):
     """Widen the extremes of the beam at the striker and at the centre by a step, and add to their mean squares."""
     accumulators.min_displacement, accumulators.max_displacement = update_extrema(
         accumulators.min_displacement,
         accumulators.max_displacement,
-        seen.w,
-        seen.wv,
-        seen1.w,
-        seen1.wv,
+        kinematics.w,
+        kinematics.wv,
+        kinematics1.w,
+        kinematics1.wv,
         length,
     )
     accumulators.min_center, accumulators.max_center = update_extrema(
-        accumulators.min_center, accumulators.max_center, seen.c, seen.cv, seen1.c, seen1.cv, length
+        accumulators.min_center,
+        accumulators.max_center,
+        kinematics.c,
+        kinematics.cv,
+        kinematics1.c,
+        kinematics1.cv,
+        length,
     )
-    accumulators.peak_velocity = max(accumulators.peak_velocity, abs(seen1.wv))
-    accumulators.peak_midspan_velocity = max(accumulators.peak_midspan_velocity, abs(seen1.cv))
+    accumulators.peak_velocity = max(accumulators.peak_velocity, abs(kinematics1.wv))
+    accumulators.peak_midspan_velocity = max(accumulators.peak_midspan_velocity, abs(kinematics1.cv))
     if length > 0.0:
         inverse = 1.0 / length
-        accumulators.square_displacement += square_of_signal(seen.w, seen.wv, seen1.w, seen1.wv, length)
-        accumulators.square_center += square_of_signal(seen.c, seen.cv, seen1.c, seen1.cv, length)
-        accumulators.square_velocity += square_of_rate(seen.w, seen.wv, seen1.w, seen1.wv, length, inverse)
+        accumulators.square_displacement += square_of_signal(
+            kinematics.w, kinematics.wv, kinematics1.w, kinematics1.wv, length
+        )
+        accumulators.square_center += square_of_signal(
+            kinematics.c, kinematics.cv, kinematics1.c, kinematics1.cv, length
+        )
+        accumulators.square_velocity += square_of_rate(
+            kinematics.w, kinematics.wv, kinematics1.w, kinematics1.wv, length, inverse
+        )
         accumulators.square_midspan_velocity += square_of_rate(
-            seen.c, seen.cv, seen1.c, seen1.cv, length, inverse
+            kinematics.c, kinematics.cv, kinematics1.c, kinematics1.cv, length, inverse
         )
 
 

@@ -38,8 +38,9 @@ __all__ = [
 #
 # How long a step may be follows from how the tension detunes the modes, from which of them come in step with the kicks,
 # and from how much energy there is; no formula holds from one mode to a hundred and from shallow beams to deep ones.  So
-# it is tried: the structure is struck at one point in its well, gently and hard, and integrated for two periods of its first
-# mode with steps of many lengths.  What differs from the finest of them by less than a limit serves, where the error is
+# it is tried: the structure in its well gets a weak and a strong impulse at one point and is integrated for two periods
+# of its first mode with steps of many lengths.  A step serves if its result differs by less than a limit from that of
+# steps shorter than all of them, where the error is
 # counted in the relative change of velocity at the start that would have done as much.
 
 
@@ -55,9 +56,9 @@ the cycle, and modes that come in step with the kicks spoil single lengths."""
 _FINER = 2.0
 """Steps of sixth order that all others are compared with, over the shortest of them."""
 _STARTS = ((0.15, 1.0 / 60.0, 2.0, 0.3), (10.0, 1.0 / 160.0, 1.0, 1.0))
-"""Of each blow its energy over the barrier's, how long it lasts at most in periods of the first mode, the length of the
+"""Of each impulse its energy over the barrier's, how long it lasts at most in periods of the first mode, the length of the
 steps that are tried over the flight step, and the error allowed over the limit: a beam that rings in its well, and one
-that has been struck hard.  The first may ring for many cycles, so that steps of twice the length must serve."""
+after a strong impulse.  The first may ring for many cycles, so that steps of twice the length must serve."""
 _SHORT_IMPACT = 1.0 / 150.0
 """Of the period of the first mode: impacts that are shorter excite higher modes, and the error allowed falls with them."""
 _STRUCK = 0.46
@@ -86,7 +87,7 @@ def flight_step(model: ReducedModel, order: int, limit: float, impact: float = m
         Greatest error of a displacement, over the buckling level, after two periods of the first mode; where the
         start is sensitive, that many times the displacement's relative slope along the velocity at the start.
     impact : float
-        Duration of an impact, s: the blows that are tried last no longer, and of impacts shorter than 1/150 of the
+        Duration of an impact, s: the impulses that are tried last no longer, and of impacts shorter than 1/150 of the
         period the limit is less in proportion.
     """
     period = 1.0 / model.reference_frequency
@@ -131,12 +132,12 @@ class _Bench:
             self.well, self.rest, self.force = (each[lowest] for each in structure.about_second_well())
         self.rows = (np.array(shapes) @ model.linear_modes)[:, lowest] / length
         if model.beam is not None:
-            struck = model.shape_at(_STRUCK)
+            tip = model.shape_at(_STRUCK)
         else:
-            struck = model.midspan_shape if model.contact_shape is None else model.contact_shape
-        blow = (struck @ model.linear_modes)[lowest]
-        if not blow.any():
-            blow = np.ones(self.omega.size)
+            tip = model.midspan_shape if model.contact_shape is None else model.contact_shape
+        impulse_shape = (tip @ model.linear_modes)[lowest]
+        if not impulse_shape.any():
+            impulse_shape = np.ones(self.omega.size)
         if not structure.wells_are_mirror_images and model.landscape is not None:
             barrier = model.saddle_energy - model.landscape.deepest.energy
         elif model.is_bistable:
@@ -148,7 +149,7 @@ class _Bench:
         for energy, duration, *_ in _STARTS:
             # the spectrum of a pulse falls off beyond the inverse of what it lasts
             lasting = min(duration, impact) * self.period
-            velocity = blow / (1.0 + (self.omega * lasting / math.pi) ** 2)
+            velocity = impulse_shape / (1.0 + (self.omega * lasting / math.pi) ** 2)
             self.starts.append(velocity * math.sqrt(2.0 * energy * barrier / (velocity @ velocity)))
 
     def ends(self, velocity: _Array, counts: _Array, order: int) -> _Array:
@@ -205,10 +206,10 @@ class _Bench:
         worst = np.zeros(counts.size)
         for velocity, (_, _, longer, share) in zip(self.starts, _STARTS, strict=True):
             own = np.ceil(_PERIODS * counts / longer)
-            finest = np.ceil(_FINER * own[-1:])
+            reference_count = np.ceil(_FINER * own[-1:])
             with np.errstate(all="ignore"):
-                best = self.ends(velocity, finest, 6)
-                beside = self.ends((1.0 + _NEIGHBOUR) * velocity, finest, 6)
+                best = self.ends(velocity, reference_count, 6)
+                beside = self.ends((1.0 + _NEIGHBOUR) * velocity, reference_count, 6)
                 slope = min(max(1.0, float(np.abs(beside - best).max()) / _NEIGHBOUR), _MOST_SLOPE)
                 difference = np.abs(self.ends(velocity, own, self.order) - best).max(axis=1) / (share * slope)
             worst = np.maximum(worst, np.where(np.isfinite(difference), difference, np.inf))
@@ -281,9 +282,9 @@ class Plan(NamedTuple):
     order: int
     step: float
     """Flight step, s."""
-    coarsest: int
+    min_contact_halvings: int
     """Halvings of the flight step that make the longest contact step."""
-    finest: int
+    max_halvings: int
     """Halvings of the flight step that make the shortest contact step."""
 
 
@@ -328,10 +329,10 @@ def choose_base_step(
         flight = min(flight, impact * 2 ** _MOST_HALVINGS[accuracy])
         if fastest > 0.0:
             impact = min(impact, _CONTACT_TURN / fastest)
-    coarsest = max(0, math.ceil(math.log2(flight / impact)))
+    min_contact_halvings = max(0, math.ceil(math.log2(flight / impact)))
     if step is not None:
         flight = positive("step", step, "s")
-    return Plan(order, flight, coarsest, coarsest + _HALVINGS[order])
+    return Plan(order, flight, min_contact_halvings, min_contact_halvings + _HALVINGS[order])
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -376,8 +377,8 @@ def clocked(
     drive = system.primary_excitation[1] if system.primary_excitation is not None else None
     repeats = drive is None or (drive.is_periodic and len(system.moving) < 2)
     table["step"] = SUBDIVISION
-    table["coarsest"] = [plan.coarsest for plan in plans]
-    table["finest"] = [plan.finest for plan in plans]
+    table["min_contact_halvings"] = [plan.min_contact_halvings for plan in plans]
+    table["max_halvings"] = [plan.max_halvings for plan in plans]
     if isinstance(drive, RecordedMotion):
         turn = np.full(table.size, drive.duration)
         left = 1.0 - table["phase"] / (2.0 * math.pi)

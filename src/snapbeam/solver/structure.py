@@ -62,8 +62,8 @@ class LocalForceRow:
 class Structure:
     """Linear modes about the well that a striker pushes away from, and the tension that couples them.
 
-    Everything is seen from the striker's side: a structure that is struck from above is the mirror image of the one
-    that is struck from below.  Arrays have shape (N,) unless said otherwise.
+    Positive is the direction in which the striker pushes: a structure with the striker above is the mirror image of the
+    one with the striker below.  Arrays have shape (N,) unless said otherwise.
     """
 
     omega: _Array
@@ -84,7 +84,7 @@ class Structure:
     center_rest: float
     """Displacement of the centre in the well, m."""
     sign: float
-    """+1 seen from below, -1 from above."""
+    """+1 with the striker below, -1 above."""
     equilibrium: _Array
     """alpha in the well, as it is in space."""
     model: ReducedModel
@@ -94,7 +94,7 @@ class Structure:
     """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi).  Of an external force
     F(t) along a row h: V^T h, where F stands for the acceleration."""
     local_force: LocalForceRow | None = None
-    tapped: _Array | None = None
+    circuit_row: _Array | None = None
     """Of a harvester: its coupling, scaled so that half the square of the circuit's coordinate is its energy."""
     circuit: bool = False
     """Whether the circuit's coordinate is the velocity of a mode of its own, the last one."""
@@ -106,7 +106,7 @@ class Structure:
         return np.array([(shape[None, :] @ self.equilibrium)[0] for shape in shapes])
 
     def row(self, shape: _Array) -> _Array:
-        """V^T shape, seen from the striker's side."""
+        """V^T shape, positive as the striker pushes."""
         row: _Array = self.sign * (self.model.linear_modes.T @ shape)
         if self.body_mass is not None:
             row = np.append(row, -1.0 / math.sqrt(self.body_mass))
@@ -193,8 +193,8 @@ class Structure:
         digest.update(np.array([self.nonlinear_stiffness, self.sign]).tobytes())
         if self.unequal_wells is not None:
             digest.update(np.ascontiguousarray(self.unequal_wells.force).tobytes())
-        if self.tapped is not None:
-            digest.update(np.ascontiguousarray(self.tapped).tobytes())
+        if self.circuit_row is not None:
+            digest.update(np.ascontiguousarray(self.circuit_row).tobytes())
         if self.base_load is not None:
             digest.update(np.ascontiguousarray(self.base_load).tobytes())
         if self.body_mass is not None:
@@ -225,7 +225,7 @@ def structure_of(
     model = model if sign > 0.0 else model.mirrored
     equilibrium = sign * model.well_amplitude
     modes = model.linear_modes
-    struck = Structure(
+    structure = Structure(
         omega=model.omega,
         damping_ratio=model.damping_ratio,
         coupling=model.tension_matrix,
@@ -243,8 +243,8 @@ def structure_of(
         local_force=None if local_force is None else _local_force(model, equilibrium, local_force),
     )
     if striker is not None and striker.mass is not None:
-        struck = _with_body(struck, striker, carried_by_base=base is not None and base.striker_on_base)
-    return struck if harvester is None else _with_circuit(struck, harvester)
+        structure = _with_body(structure, striker, carried_by_base=base is not None and base.striker_on_base)
+    return structure if harvester is None else _with_circuit(structure, harvester)
 
 
 def _base_load(
@@ -262,7 +262,7 @@ def _local_force(model: ReducedModel, equilibrium: _Array, local_force: LocalFor
 
 
 def _uneven(model: ReducedModel, sign: float) -> UnequalWells | None:
-    """What unequal wells add, of a model that is seen from the striker's side."""
+    """What unequal wells add, of a model that is positive as the striker pushes."""
     if model.landscape is None or model.transverse_force is None or not model.is_bistable:
         return None
     lower, upper = model.landscape.lower, model.landscape.upper
@@ -307,7 +307,7 @@ def _with_circuit(structure: Structure, harvester: Harvester) -> Structure:
     coupling = np.zeros(structure.omega.size)
     coupling[:modes] = structure.model.linear_modes.T @ harvester.row(structure.model)
     if harvester.inertia == 0.0:
-        return dataclasses.replace(structure, tapped=coupling)
+        return dataclasses.replace(structure, circuit_row=coupling)
     coupling = coupling / math.sqrt(harvester.inertia)
     count = structure.omega.size + 1
     tension = np.zeros((count, count))
@@ -320,7 +320,7 @@ def _with_circuit(structure: Structure, harvester: Harvester) -> Structure:
         unequal_wells=None if structure.unequal_wells is None else _with_rest(structure.unequal_wells),
         base_load=None if structure.base_load is None else np.append(structure.base_load, 0.0),
         local_force=_longer(structure.local_force),
-        tapped=np.append(coupling, 0.0),
+        circuit_row=np.append(coupling, 0.0),
         circuit=True,
     )
 

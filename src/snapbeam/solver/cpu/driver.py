@@ -26,7 +26,7 @@ from snapbeam.solver.further_contacts import NUMBERS, ONSET, TOUCHING, count_of,
 from snapbeam.solver.registered_statistics import extras_of_table
 from snapbeam.solver.simd import WIDTH
 from snapbeam.solver.statistics import Last, OutputStates, Recorded, empty_accumulators
-from snapbeam.solver.step_control import PIECES
+from snapbeam.solver.step_control import SUBINTERVALS
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["integrate_tangents", "integrate_with_output_states", "record", "run_ensemble", "usable_cores"]
@@ -48,7 +48,7 @@ _ASKING = Lock()
 _POLL = 0.2
 """Seconds after which an interrupt is heard."""
 _SLICE_STEPS = 200_000
-"""Steps of a recorded run between two looks at what else is wanted: some 0.1 s."""
+"""Steps of a recorded run between two checks for a stop or full buffers: some 0.1 s."""
 _SLICE_BYTES = 32 * 2**20
 """Size of a slice's buffers, at most."""
 
@@ -67,7 +67,7 @@ def _packed(ensemble: Ensemble) -> Packed:
 
 
 def _asked(ensemble: Ensemble, packed: Packed, memory: Memory | None) -> KernelInput:
-    """The ensemble in this engine's layout; without *memory*, of a drive that looks nothing up."""
+    """The ensemble in this engine's layout; without *memory*, for a drive without tables."""
     law, drive = ensemble.law.numbers_type(), ensemble.drive.numbers_type()
     return KernelInput(
         runs=ensemble.runs,
@@ -88,8 +88,8 @@ def _asked(ensemble: Ensemble, packed: Packed, memory: Memory | None) -> KernelI
 
 def _room(ensemble: Ensemble) -> Scratch:
     longest = float(ensemble.step_times.max())
-    pieces = 2 * max(8, math.ceil(PIECES * ensemble.fastest * longest / (2.0 * math.pi)) + 1)
-    return Scratch(np.empty((pieces + 1, 4)), np.empty(pieces * 4 * WIDTH))
+    subintervals = max(8, math.ceil(SUBINTERVALS * ensemble.fastest * longest / (2.0 * math.pi)) + 1)
+    return Scratch(np.empty((subintervals + 1, 4)), np.empty(subintervals * 4 * WIDTH))
 
 
 def _kernel(march: Callable[..., Any], ensemble: Ensemble) -> Any:
@@ -294,10 +294,10 @@ def _spread_over(
 
 
 def _last(
-    memory: _Array, packed: Packed, aside: tuple[_Integers, _Array], accumulators_of_runs: NDArray[Any]
+    memory: _Array, packed: Packed, saved_state: tuple[_Integers, _Array], accumulators_of_runs: NDArray[Any]
 ) -> Last:
     """Final state of a run that was saved."""
-    marks, reals = aside
+    marks, reals = saved_state
     q, p = memory[marks[4] : marks[4] + packed.layout.size], memory[marks[5] : marks[5] + packed.layout.size]
     since = [int(marks[0] - accumulators_of_runs["onset"][0]) if marks[10] else -1]
     others = packed.layout.others
@@ -340,7 +340,7 @@ def record(
     in_contact: bool,
     progress: Callable[[float], object] | None = None,
 ) -> Iterator[Recorded]:
-    """Integrate the one run of an ensemble once, and give what it wrote down in pieces, in order.
+    """Integrate the one run of an ensemble once, and return its records, one part after the other.
 
     Parameters
     ----------
@@ -356,8 +356,8 @@ def record(
     memory, accumulators_of_runs = lay_out(ensemble, packed), empty_accumulators(1, _beside(ensemble))
     kernel_input, scratch = _asked(ensemble, packed, memory), _room(ensemble)
     buffers = _buffers(ensemble, times, size)
-    aside = np.zeros(MARKS, dtype=np.int64), np.zeros(REALS)
-    aside[0][0] = -1
+    saved_state = np.zeros(MARKS, dtype=np.int64), np.zeros(REALS)
+    saved_state[0][0] = -1
     marks = np.zeros(3, dtype=np.int64)
     accumulators, end = accumulators_of_runs[0], float(ensemble.runs["end"][0])
     outputs = Outputs(
@@ -365,7 +365,7 @@ def record(
         np.empty((buffers.samples, VALUES)), _impact_rows(ensemble, buffers), marks, buffers.most, in_contact,
     )  # fmt: skip
     arguments = (
-        memory.memory, memory.blocks, memory.layouts[0], memory.stages, kernel_input, scratch, accumulators, outputs, aside, _SLICE_STEPS,
+        memory.memory, memory.blocks, memory.layouts[0], memory.stages, kernel_input, scratch, accumulators, outputs, saved_state, _SLICE_STEPS,
     )  # fmt: skip
     ready(march, *arguments)
     while True:
@@ -379,12 +379,12 @@ def record(
             yield Recorded(
                 outputs.at[:count].copy(), rows[:, packed.rows], rows[:, size + packed.rows],
                 outputs.values[:count].copy(), outputs.impacts[:held].copy(), accumulators_of_runs.copy(),
-                _last(memory.memory, packed, aside, accumulators_of_runs),
+                _last(memory.memory, packed, saved_state, accumulators_of_runs),
             )  # fmt: skip
             if not running:
                 return
             marks[1] += held
             outputs.impacts[:, 4:] = 1.0
-            aside[0][1] = 0
+            saved_state[0][1] = 0
         if progress is not None:
             progress(float(accumulators_of_runs["time"][0]) / end)

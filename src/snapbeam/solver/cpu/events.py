@@ -17,8 +17,15 @@ from snapbeam.solver.cpu.mode_lanes import (
     signals,
     speed_bound,
 )
-from snapbeam.solver.cpu.recording import record_aside, record_contact, record_instants
-from snapbeam.solver.cpu.state import IntegratorState, Rows, StepControl, cut_slot, look_slot, sample_energy
+from snapbeam.solver.cpu.recording import record_contact, record_inside_step, record_instants
+from snapbeam.solver.cpu.state import (
+    IntegratorState,
+    Rows,
+    StepControl,
+    sample_energy,
+    sampling_slot,
+    variable_slot,
+)
 from snapbeam.solver.cpu.step import (
     Step,
     observe,
@@ -42,7 +49,7 @@ from snapbeam.solver.cpu.terms.further_contact_events import (
     update_further_contacts,
 )
 from snapbeam.solver.cpu.terms.step_across import mark_at_jump, taken_across
-from snapbeam.solver.excitation import seen_from, turned_motion
+from snapbeam.solver.excitation import tip_about_well, turned_motion
 from snapbeam.solver.interpolation import (
     cubic,
     first_downcrossing,
@@ -67,9 +74,9 @@ from snapbeam.solver.terms.interface import (
     accumulate_work,
     add_potential_energy,
     add_to_speed_bound,
-    center_from_divide,
+    center_from_barrier,
+    kinematics_from_barrier,
     relative_to_nearest_well,
-    seen_from_divide,
     wells_differ,
 )
 from snapbeam.util.status_codes import RunStatus
@@ -94,7 +101,7 @@ def locate_peak_force(
     tip: Any,
     now: Any,
     step: Any,
-    seen1: Any,
+    kinematics1: Any,
     sample: Any,
     accumulators: Any,
     outputs: Any,
@@ -107,53 +114,63 @@ def locate_peak_force(
 
 
 @inlined
-def aside(step, run, length, size):
-    """*step*, cut to *length* and written to the spare rows: a look ahead."""
+def step_inside(step, run, length, size):
+    """*step*, shortened to *length* and written to the spare rows: a trial step."""
     return Step(
-        0, cut_slot(run), length, step.phase, step.touching, step.q, step.p, step.k,
+        0, variable_slot(run), length, step.phase, step.touching, step.q, step.p, step.k,
         run.spare, run.spare + size, run.spare + 2 * size, step.r
     )  # fmt: skip
 
 
 @inlined
-def _deepest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs):
+def _deepest_point(
+    memory, blocks, layout, stages, run, tip, now, step, kinematics1, sample, accumulators, outputs
+):
     """The maximum penetration of a contact so far, its turning point within the step included.
 
     Returns that and how many samples there are: the turning point is one where the run is recorded.
     """
-    seen, deepest = now.seen, max(accumulators.deepest, seen1.d)
-    turn = turning_point(seen.d, seen.dv, seen1.d, seen1.dv, step.length) if seen.dv > 0.0 else -1.0
+    kinematics, deepest = now.kinematics, max(accumulators.deepest, kinematics1.d)
+    turn = (
+        turning_point(kinematics.d, kinematics.dv, kinematics1.d, kinematics1.dv, step.length)
+        if kinematics.dv > 0.0
+        else -1.0
+    )
     if (
         turn > 0.0
-        and update_extrema(seen.d, deepest, seen.d, seen.dv, seen1.d, seen1.dv, step.length)[1] > deepest
+        and update_extrema(
+            kinematics.d, deepest, kinematics.d, kinematics.dv, kinematics1.d, kinematics1.dv, step.length
+        )[1]
+        > deepest
     ):
         part, size = turn * step.length, layout.size
-        prepare(memory, layout, stages, run.struck.drive, part, cut_slot(run))
+        prepare(memory, layout, stages, run.tip.drive, part, variable_slot(run))
         with_energy = None if outputs is None else True
-        short = aside(step, run, part, size)
+        short = step_inside(step, run, part, size)
         here = take_step(memory, blocks, layout, stages, tip, short, with_energy)
         here = taken_across(memory, blocks, layout, stages, run, tip, now.t, short, here, with_energy)
         there = step.phase + tip.drive.omega * part
-        about = observe(memory, layout, tip, there, run.spare, run.spare + size)
+        observed = observe(memory, layout, tip, there, run.spare, run.spare + size)
         if outputs is not None:
             when = now.t * run.clock.tick + part
-            sample = record_aside(
-                memory, layout, tip, now, short, here, when, about, sample, accumulators, outputs
+            sample = record_inside_step(
+                memory, layout, tip, now, short, here, when, observed, sample, accumulators, outputs
             )
-        deepest = max(deepest, about.d)
+        deepest = max(deepest, observed.d)
     return deepest, sample
 
 
 @inlined
 def _greatest_force(
-    memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
+    memory, blocks, layout, stages, run, tip, now, step, kinematics1, sample, accumulators, outputs
 ):
-    """The maximum force of a contact so far: looked for on the cubic through the step, then stepped to."""
-    seen, law = now.seen, tip.law
+    """The maximum force of a contact so far: located on the cubic through the step, then evaluated by a trial step."""
+    kinematics, law = now.kinematics, tip.law
     greatest = max(
-        accumulators.deepest, max(felt_force(law, seen.d, seen.dv), felt_force(law, seen1.d, seen1.dv))
+        accumulators.deepest,
+        max(felt_force(law, kinematics.d, kinematics.dv), felt_force(law, kinematics1.d, kinematics1.dv)),
     )
-    c0, c1, c2, c3 = cubic(seen.d, seen.dv, seen1.d, seen1.dv, step.length)
+    c0, c1, c2, c3 = cubic(kinematics.d, kinematics.dv, kinematics1.d, kinematics1.dv, step.length)
     best, at = greatest, 0.0
     for i in range(1, _PARTS):
         s = i / _PARTS
@@ -163,63 +180,65 @@ def _greatest_force(
             best, at = force, s
     if at > 0.0:
         part, size = at * step.length, layout.size
-        prepare(memory, layout, stages, run.struck.drive, part, cut_slot(run))
+        prepare(memory, layout, stages, run.tip.drive, part, variable_slot(run))
         with_energy = None if outputs is None else True
-        short = aside(step, run, part, size)
+        short = step_inside(step, run, part, size)
         here = take_step(memory, blocks, layout, stages, tip, short, with_energy)
         here = taken_across(memory, blocks, layout, stages, run, tip, now.t, short, here, with_energy)
         there = step.phase + tip.drive.omega * part
-        about = observe(memory, layout, tip, there, run.spare, run.spare + size)
+        observed = observe(memory, layout, tip, there, run.spare, run.spare + size)
         if outputs is not None:
             when = now.t * run.clock.tick + part
-            sample = record_aside(
-                memory, layout, tip, now, short, here, when, about, sample, accumulators, outputs
+            sample = record_inside_step(
+                memory, layout, tip, now, short, here, when, observed, sample, accumulators, outputs
             )
-        greatest = max(greatest, felt_force(law, about.d, about.dv))
+        greatest = max(greatest, felt_force(law, observed.d, observed.dv))
     return greatest, sample
 
 
 @overload(locate_peak_force, jit_options=INLINE_HERE)
 def _locate_peak_force(
-    memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
+    memory, blocks, layout, stages, run, tip, now, step, kinematics1, sample, accumulators, outputs
 ):
     law = tip.types[tip.fields.index("law")]
     chosen = _greatest_force if law.instance_class.owner.rate_dependent else _deepest_point
 
     def implementation(
-        memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
+        memory, blocks, layout, stages, run, tip, now, step, kinematics1, sample, accumulators, outputs
     ):
         return chosen(
-            memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
+            memory, blocks, layout, stages, run, tip, now, step, kinematics1, sample, accumulators, outputs
         )
 
     return implementation
 
 
 # ----------------------------------------------------------------------------------------------------
-# A look inside a free step: what the gap and the centre do between its ends.
+# Samples inside a free step: penetration and centre between its ends.
 
 
 @compiled
-def sample_inside_step(memory, layout, tip, flow, pieces, piece, step, with_center, scratch):
-    """Follow a free step in *pieces* short ones, each one exact linear flow, and note what is seen.
+def sample_inside_step(memory, layout, tip, flow, subintervals, subinterval, step, with_center, scratch):
+    """Sample a free step at the ends of its *subintervals*, each one exact linear flow.
 
     The tension's acceleration, known at both ends of the step, is taken as linear in between: exact
-    enough for signals whose fastest mode the pieces resolve.  Row i of ``scratch.inner_samples`` becomes the penetration, its
+    enough for signals whose fastest mode the subintervals resolve.  Row i of ``scratch.inner_samples`` becomes the penetration, its
     rate, and, if *with_center*, the displacement of the centre from rest and its rate.
     """
     inner_samples, parts = scratch.inner_samples, scratch.parts
     q, p, k, k1 = step.q, step.p, step.k, step.k1
-    propagate_free(memory, layout, layout.contact, flow, pieces, piece, q, p, k, k1, with_center, parts)
+    propagate_free(
+        memory, layout, layout.contact, flow, subintervals, subinterval, q, p, k, k1, with_center, parts
+    )
     size, drive = layout.size, tip.drive
     contact0, contact1 = dot(memory, size, layout.contact, k), dot(memory, size, layout.contact, k1)
     center0, center1 = dot(memory, size, layout.center, k), dot(memory, size, layout.center, k1)
-    turn_sine, turn_cosine = sincos(drive.omega * piece)
+    turn_sine, turn_cosine = sincos(drive.omega * subinterval)
     sine, cosine = sincos(step.phase)
     w, rate, c, c_rate = signals(memory, layout, q, p)
-    # kicks act at the ends of the pieces, half a kick at the first; the rates there lack the remaining half
-    for i in range(pieces + 1):
-        done, remaining = i / pieces, 0.5 * piece
+    # kicks act at the ends of the subintervals, half a kick at the first; the rates there lack the remaining half
+    for i in range(subintervals + 1):
+        done, remaining = i / subintervals, 0.5 * subinterval
         if i == 0:
             remaining = 0.0
         else:
@@ -227,7 +246,7 @@ def sample_inside_step(memory, layout, tip, flow, pieces, piece, step, with_cent
             w, rate = lanes_sum(load(parts, at)), lanes_sum(load(parts, at + WIDTH))
             if with_center:
                 c, c_rate = lanes_sum(load(parts, at + 2 * WIDTH)), lanes_sum(load(parts, at + 3 * WIDTH))
-        argument = step.phase + i * piece * drive.omega
+        argument = step.phase + i * subinterval * drive.omega
         motion, velocity = turned_motion(drive, memory, argument, sine, cosine)
         inner_samples[i, 0] = tip.offset + motion - w
         inner_samples[i, 1] = velocity - rate - remaining * ((1.0 - done) * contact0 + done * contact1)
@@ -246,46 +265,50 @@ _DIVERGED, _STEP_LIMIT = int(RunStatus.DIVERGED), int(RunStatus.STEP_LIMIT)
 
 
 class ContactEvent(NamedTuple):
-    """Whether contact begins or ends in a step, where the step is cut, and how its inside was sampled."""
+    """Whether contact begins or ends in a step, where the step then ends, and how its inside was sampled."""
 
     event: bool
-    cut: int
+    event_ticks: int
     """Ticks; 0: the contact begins with the step."""
-    entry: float
+    onset_time: float
     """Seconds into the step at which the gap closes; negative: it does not."""
     safe_gap: int
     safe_center: int
-    pieces: int
-    piece: float
+    subintervals: int
+    subinterval: float
 
 
 @inlined
-def cut_step(step, run, ticks, length):
+def shortened_step(step, run, ticks, length):
     """*step*, of another length and prepared in the slot for those."""
     return Step(
-        ticks, cut_slot(run), length, step.phase, step.touching, step.q, step.p, step.k,
+        ticks, variable_slot(run), length, step.phase, step.touching, step.q, step.p, step.k,
         step.q1, step.p1, step.k1, step.r
     )  # fmt: skip
 
 
 @inlined
-def detect_contact_event(memory, layout, run, now, tip, step, seen1, scratch):
+def detect_contact_event(memory, layout, run, now, tip, step, kinematics1, scratch):
     """Whether and where a step enters or leaves the contact."""
-    seen, clock, tick = now.seen, run.clock, run.clock.tick
+    kinematics, clock, tick = now.kinematics, run.clock, run.clock.tick
     safe_gap, safe_center = now.control.safe_gap, now.control.safe_center
-    event, cut, entry, pieces, piece = False, step.ticks, -1.0, 0, 0.0
+    event, event_ticks, onset_time, subintervals, subinterval = False, step.ticks, -1.0, 0, 0.0
     after = now.t + step.ticks
     if step.touching:
-        if seen1.d <= 0.0:
+        if kinematics1.d <= 0.0:
             event = True
-            if seen.d > 0.0:
-                fall = first_downcrossing(seen.d, seen.dv, seen1.d, seen1.dv, step.length)
-                cut = max(1, int(fall * step.ticks))
-        slack = zero_force_crossing(tip.law, seen.d, seen.dv, seen1.d, seen1.dv, step.length)
-        if slack >= 0.0 and slack * step.ticks + 1.0 < cut:
-            # the force has an edge there, though the contact goes on
-            event, cut = False, int(slack * step.ticks) + 1
-        return ContactEvent(event, cut, entry, safe_gap, safe_center, pieces, piece)
+            if kinematics.d > 0.0:
+                fall = first_downcrossing(
+                    kinematics.d, kinematics.dv, kinematics1.d, kinematics1.dv, step.length
+                )
+                event_ticks = max(1, int(fall * step.ticks))
+        zero_force_fraction = zero_force_crossing(
+            tip.law, kinematics.d, kinematics.dv, kinematics1.d, kinematics1.dv, step.length
+        )
+        if zero_force_fraction >= 0.0 and zero_force_fraction * step.ticks + 1.0 < event_ticks:
+            # the force begins or ends there, though the contact goes on
+            event, event_ticks = False, int(zero_force_fraction * step.ticks) + 1
+        return ContactEvent(event, event_ticks, onset_time, safe_gap, safe_center, subintervals, subinterval)
     size, known = layout.size, validity_horizon(layout.circuit, run.step_time)
     if after > safe_gap:
         bound = speed_bound(memory, layout, layout.contact, step.q, step.p)
@@ -296,7 +319,7 @@ def detect_contact_event(memory, layout, run, now, tip, step, seen1, scratch):
             memory, size, layout.terms, tip.drive, layout.contact, TRUST * run.step_time, bound
         )
         push = dot(memory, size, layout.contact, step.k)
-        safe_gap = now.t + int(safe_interval(-seen.d, bound, run.tip_speed, push, known) / tick)
+        safe_gap = now.t + int(safe_interval(-kinematics.d, bound, run.tip_speed, push, known) / tick)
     if after > safe_center:
         bound = speed_bound(memory, layout, layout.center, step.q, step.p)
         bound = circuit_speed_bound(
@@ -307,29 +330,33 @@ def detect_contact_event(memory, layout, run, now, tip, step, seen1, scratch):
         )
         push = dot(memory, size, layout.center, step.k)
         safe_center = now.t + int(
-            safe_interval(abs(center_from_divide(layout.terms, seen.c)), bound, 0.0, push, known) / tick
+            safe_interval(abs(center_from_barrier(layout.terms, kinematics.c)), bound, 0.0, push, known)
+            / tick
         )
     safe_gap = limit_safe_interval(memory, layout.others, now.t, safe_gap)
     safe_center = limit_safe_interval(memory, layout.others, now.t, safe_center)
     if after > min(safe_gap, safe_center):
-        look, pieces = look_slot(run), run.step_pieces
-        if step.ticks == 2 * clock.step:
-            pieces *= 2
-        elif step.ticks != clock.step:
-            look += 4 * size
-            pieces = max(2, math.ceil(step.length / run.finest_look))
-            flow_coefficients(memory, layout, step.length / pieces, look)
-        piece = step.length / pieces
+        sampling, subintervals = sampling_slot(run), run.step_subintervals
+        if step.ticks != clock.step:
+            sampling += 4 * size
+            subintervals = max(2, math.ceil(step.length / run.shortest_subinterval))
+            flow_coefficients(memory, layout, step.length / subintervals, sampling)
+        subinterval = step.length / subintervals
         free = with_velocity_dependent(memory, layout, run.spare, step)
-        sample_inside_step(memory, layout, tip, look, pieces, piece, free, after > safe_center, scratch)
+        sample_inside_step(
+            memory, layout, tip, sampling, subintervals, subinterval, free, after > safe_center, scratch
+        )
         if after > safe_gap:
-            entry = first_contact_onset(scratch.inner_samples, pieces, piece)
-            if entry >= 0.0:
-                event, cut = True, min(step.ticks, int(entry / tick))
-    if missed_onset(layout.circuit, layout.terms, event, seen.d, seen1.d):
-        entry = first_upcrossing(seen.d, seen.dv, seen1.d, seen1.dv, step.length) * step.length
-        event, cut = True, min(step.ticks, int(entry / tick))
-    return ContactEvent(event, cut, entry, safe_gap, safe_center, pieces, piece)
+            onset_time = first_contact_onset(scratch.inner_samples, subintervals, subinterval)
+            if onset_time >= 0.0:
+                event, event_ticks = True, min(step.ticks, int(onset_time / tick))
+    if missed_onset(layout.circuit, layout.terms, event, kinematics.d, kinematics1.d):
+        onset_time = (
+            first_upcrossing(kinematics.d, kinematics.dv, kinematics1.d, kinematics1.dv, step.length)
+            * step.length
+        )
+        event, event_ticks = True, min(step.ticks, int(onset_time / tick))
+    return ContactEvent(event, event_ticks, onset_time, safe_gap, safe_center, subintervals, subinterval)
 
 
 @inlined
@@ -340,7 +367,7 @@ def swap_rows(rows):
 
 @inlined
 def monitor_energy(
-    memory, layout, run, now, t, state, seen1, control, event, status, accumulators, kernel_input
+    memory, layout, run, now, t, state, kinematics1, control, event, status, accumulators, kernel_input
 ):
     """Add up the energy of the modes where some count as high, and end the run where its class is certain.
 
@@ -351,15 +378,18 @@ def monitor_energy(
     q, p, k, gq, qr = state
     decides = clock.decide_energy > -math.inf and (steps_since_start & 15) == 0
     decides = (
-        decides and not (event or control.touching) and now.well_sign < 0.0 and seen1.w > clock.decide_reach
+        decides
+        and not (event or control.touching)
+        and now.well_sign < 0.0
+        and kinematics1.w > clock.decide_reach
     )
-    decides = decides and center_from_divide(layout.terms, seen1.c) > 0.0
+    decides = decides and center_from_barrier(layout.terms, kinematics1.c) > 0.0
     linear = 0.0
     if run.high:
         pressed = control.touching and not event
         span, last = (t - last) * clock.tick, t
         linear = sample_energy(
-            memory, layout, run, now.well_sign, (q, p, k), seen1, pressed, accumulators, span
+            memory, layout, run, now.well_sign, (q, p, k), kinematics1, pressed, accumulators, span
         )
     elif decides:
         near = relative_to_nearest_well(memory, layout.size, layout.terms, now.well_sign, run.spare, q)
@@ -384,26 +414,26 @@ def monitor_energy(
 def accept_step(
     memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, outputs
 ):
-    """Where a run stands after a step, cut at the contact's edge if it met one, with its statistics kept.
+    """The state of a run after a step, shortened to an onset or release inside it, with its statistics.
 
     Returns that and the step that was taken.  *outputs* are what is recorded, or None.
     """
     layout, stages, clock, tick = workspace.layout, workspace.stages, run.clock, run.clock.tick
     with_energy = None if outputs is None else True
-    tip = seen_from(run.struck, now.well_sign, run.rest_contact)
+    tip = tip_about_well(run.tip, now.well_sign, run.rest_contact)
     rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center
-    t, seen, touching = now.t, now.seen, now.control.touching
+    t, kinematics, touching = now.t, now.kinematics, now.control.touching
     omega = tip.drive.omega
     done = taken_across(memory, blocks, layout, stages, run, tip, t, step, done, with_energy)
-    about = observe(memory, layout, tip, step.phase + omega * step.length, step.q1, step.p1)
-    if not math.isfinite(about.d + about.dv):
+    observed = observe(memory, layout, tip, step.phase + omega * step.length, step.q1, step.p1)
+    if not math.isfinite(observed.d + observed.dv):
         return (
             IntegratorState(
                 t,
                 now.well_sign,
                 now.stretch,
                 now.rows,
-                seen,
+                kinematics,
                 now.control,
                 now.sample,
                 now.stored_states,
@@ -411,23 +441,23 @@ def accept_step(
             ),
             step,
         )
-    contact_event = detect_contact_event(memory, layout, run, now, tip, step, about, scratch)
+    contact_event = detect_contact_event(memory, layout, run, now, tip, step, observed, scratch)
     there = step.phase + omega * step.length
     observe_further_contacts(memory, layout.size, layout.others, tip.drive, there, step.q1, step.p1)
     edge = first_further_event(
-        memory, layout, layout.others, look_slot(run), run, t, tip.drive, step, scratch
+        memory, layout, layout.others, sampling_slot(run), run, t, tip.drive, step, scratch
     )
-    if edge < contact_event.cut:
+    if edge < contact_event.event_ticks:
         contact_event = ContactEvent(
             False,
             edge,
             -1.0,
             contact_event.safe_gap,
             contact_event.safe_center,
-            contact_event.pieces,
-            contact_event.piece,
+            contact_event.subintervals,
+            contact_event.subinterval,
         )
-    if contact_event.cut < 1:
+    if contact_event.event_ticks < 1:
         if contact_event.event:
             accumulators.touching, accumulators.onset = 1, t
         update_further_contacts(memory, layout.others, 0, t, 0.0, tick, accumulators, outputs)
@@ -440,28 +470,47 @@ def accept_step(
             now.control.steps_since_start,
         )
         return IntegratorState(
-            t, now.well_sign, now.stretch, now.rows, seen, control, now.sample, now.stored_states, status
+            t,
+            now.well_sign,
+            now.stretch,
+            now.rows,
+            kinematics,
+            control,
+            now.sample,
+            now.stored_states,
+            status,
         ), step
-    whole, cut = step.ticks, contact_event.cut
+    whole, event_ticks = step.ticks, contact_event.event_ticks
     corrections = 0 if touching or not contact_event.event else _LOCATIONS if jumps(tip.law) else 1
     due = edge < whole and not contact_event.event
-    while cut != step.ticks:
-        step = cut_step(step, run, cut, cut * tick)
-        prepare(memory, layout, stages, run.struck.drive, step.length, step.at)
+    while event_ticks != step.ticks:
+        step = shortened_step(step, run, event_ticks, event_ticks * tick)
+        prepare(memory, layout, stages, run.tip.drive, step.length, step.at)
         done = take_step(memory, blocks, layout, stages, tip, step, with_energy)
         done = taken_across(memory, blocks, layout, stages, run, tip, t, step, done, with_energy)
         there = step.phase + omega * step.length
-        about = observe(memory, layout, tip, there, step.q1, step.p1)
+        observed = observe(memory, layout, tip, there, step.q1, step.p1)
         observe_further_contacts(memory, layout.size, layout.others, tip.drive, there, step.q1, step.p1)
-        least = (clock.step >> clock.finest) * tick
+        smallest_correction = (clock.step >> clock.max_halvings) * tick
         if corrections > 0:
             corrections -= 1
-            cut = refine_onset(clock, cut, whole, about, 0.5 * tick if jumps(tip.law) else least)
-        cut = refine_further_onsets(memory, layout.others, clock, contact_event.cut, cut, whole, least, due)
+            event_ticks = refine_onset(
+                clock, event_ticks, whole, observed, 0.5 * tick if jumps(tip.law) else smallest_correction
+            )
+        event_ticks = refine_further_onsets(
+            memory,
+            layout.others,
+            clock,
+            contact_event.event_ticks,
+            event_ticks,
+            whole,
+            smallest_correction,
+            due,
+        )
         due = False
     store_further_contacts(memory, layout.others)
-    seen1 = ContactKinematics(
-        about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv
+    kinematics1 = ContactKinematics(
+        observed.w + rest_contact, observed.wv, observed.d, observed.dv, observed.c + rest_center, observed.cv
     )
     sample = now.sample
     if outputs is not None:
@@ -473,7 +522,7 @@ def accept_step(
             memory, blocks, layout, stages, run, tip, t, step, accumulators.deepest
         )
         accumulators.deepest, sample = locate_peak_force(
-            memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
+            memory, blocks, layout, stages, run, tip, now, step, kinematics1, sample, accumulators, outputs
         )
         accumulators.impulse += done.impulse
         accumulators.work += done.work
@@ -485,13 +534,15 @@ def accept_step(
     accumulate_circuit(memory, layout, layout.circuit, step.p1, accumulators, done.circuit, late)
     if outputs is not None:
         accumulators.dissipated += done.dissipated + done.lost
-    accumulate_displacement(accumulators, seen, seen1, step.length)
+    accumulate_displacement(accumulators, kinematics, kinematics1, step.length)
     if touching or t + step.ticks > contact_event.safe_center:
         count_zero_crossings_in_step(
-            accumulators, clock, t, step.length, seen_from_divide(layout.terms, seen), seen_from_divide(layout.terms, seen1),
-            scratch.inner_samples, center_from_divide(layout.terms, rest_center), contact_event.pieces, contact_event.piece,
+            accumulators, clock, t, step.length, kinematics_from_barrier(layout.terms, kinematics), kinematics_from_barrier(layout.terms, kinematics1),
+            scratch.inner_samples, center_from_barrier(layout.terms, rest_center), contact_event.subintervals, contact_event.subinterval,
         )  # fmt: skip
-    observe_extras(kernel_input.extras, accumulators, t * tick, step.length, seen, seen1, touching)
+    observe_extras(
+        kernel_input.extras, accumulators, t * tick, step.length, kinematics, kinematics1, touching
+    )
 
     # accept
     t += step.ticks
@@ -504,11 +555,18 @@ def accept_step(
                 close_impact(accumulators, None, 0, tip.law, t, tick)
             else:
                 close_impact(accumulators, outputs.impacts, outputs.marks[1], tip.law, t, tick)
-            seen1 = ContactKinematics(seen1.w, seen1.wv, min(seen1.d, 0.0), seen1.dv, seen1.c, seen1.cv)
+            kinematics1 = ContactKinematics(
+                kinematics1.w,
+                kinematics1.wv,
+                min(kinematics1.d, 0.0),
+                kinematics1.dv,
+                kinematics1.c,
+                kinematics1.cv,
+            )
         else:
             accumulators.touching, accumulators.onset = 1, t
     update_further_contacts(
-        memory, layout.others, contact_event.cut, t, step.length, tick, accumulators, outputs
+        memory, layout.others, contact_event.event_ticks, t, step.length, tick, accumulators, outputs
     )
     touching = touching != contact_event.event
     control = StepControl(
@@ -522,7 +580,7 @@ def accept_step(
         now,
         t,
         state,
-        seen1,
+        kinematics1,
         control,
         contact_event.event,
         status,
@@ -531,12 +589,20 @@ def accept_step(
     )
     if outputs is not None:
         sample = record_contact(
-            memory, layout, run, tip, now, step, done, seen1, sample, accumulators, outputs
+            memory, layout, run, tip, now, step, done, kinematics1, sample, accumulators, outputs
         )
     stretch = 2.0 * done.gq + done.qr
     return (
         IntegratorState(
-            t, now.well_sign, stretch, swap_rows(now.rows), seen1, control, sample, now.stored_states, status
+            t,
+            now.well_sign,
+            stretch,
+            swap_rows(now.rows),
+            kinematics1,
+            control,
+            sample,
+            now.stored_states,
+            status,
         ),
         step,
     )

@@ -1,11 +1,14 @@
 """Integration on the CPU: two runs at a time, each with steps that follow from its own contacts.
 
-In free flight a trajectory takes steps of a fixed length, or of twice that while its energy is low, as many as
-a bound on the speed of the gap says are safe; near the tip the motion
-is sampled inside each step with a resolution finer than the fastest mode, and a step in which a contact begins is
-shortened to end at the onset.  In contact, steps grow
-from the onset and shrink towards the release, which is located too, so that the edges of the force fall
-between steps.  Time is an integer number of ticks; the argument of the drive comes from that integer alone.
+A step lasts the flight step divided by a power of two.  In free flight this is the flight step itself, halved while the
+beam is stretched far beyond its wells.  While a bound on the speed of the gap excludes a contact, nothing else is done;
+near the tip the motion is sampled inside each step, with a resolution finer than the fastest mode, and a step in which a
+contact begins is shortened to end at the onset.  In contact, steps grow from the onset and shrink towards the release,
+which is located too, so that onset and release of the force fall between steps.  Time is an integer number of ticks; the
+argument of the drive follows from that integer alone.
+
+:func:`propose_step` determines the length of a step, :mod:`snapbeam.solver.cpu.step` takes it, and
+:mod:`snapbeam.solver.cpu.events` locates contacts in it and accepts it.
 
 Each kick depends on the sums of the kick before it, so a single trajectory leaves the processor idle for most of the
 time.  Two trajectories are therefore integrated together, a step of each at a time; when one ends, the next run takes
@@ -28,22 +31,22 @@ from snapbeam.solver.cpu.state import (
     change_energy_origin,
     change_origin,
     close_energy,
-    cut_slot,
     finish,
     phase_at,
     restart_from_state,
     run_of,
+    variable_slot,
 )
 from snapbeam.solver.cpu.step import Step, nothing_done, prepare, take_step, take_two_steps
 from snapbeam.solver.cpu.terms.discontinuities import up_to_discontinuity
 from snapbeam.solver.cpu.terms.further_contact_events import (
     close_further_contacts,
-    further_contacts_step_level,
+    further_contacts_halvings,
     store_contact_states,
 )
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, mirror_further_contacts
-from snapbeam.solver.excitation import seen_from
-from snapbeam.solver.step_control import contact_level, flight_level, time_beyond
+from snapbeam.solver.excitation import tip_about_well
+from snapbeam.solver.step_control import contact_halvings, flight_halvings, time_beyond
 from snapbeam.solver.terms.interface import has_crossed, update_forces
 from snapbeam.util.status_codes import RunStatus
 
@@ -71,13 +74,13 @@ class KernelOutput(NamedTuple):
 def propose_step(memory, blocks, workspace, run, now, accumulators):
     """The next step of a run, and where it stands: about the other well, if it has crossed over."""
     layout, clock, well_sign, stretch, t = workspace.layout, run.clock, now.well_sign, now.stretch, now.t
-    rows, seen, control, energy_tick = now.rows, now.seen, now.control, now.control.energy_tick
+    rows, kinematics, control, energy_tick = now.rows, now.kinematics, now.control, now.control.energy_tick
     r = layout.work + 9 * layout.size
-    crossed = seen.c * (well_sign * run.rest_center) < 0.0
-    if layout.stretch > 0.0 and has_crossed(layout.terms, seen.c, well_sign, crossed):
+    crossed = kinematics.c * (well_sign * run.rest_center) < 0.0
+    if layout.stretch > 0.0 and has_crossed(layout.terms, kinematics.c, well_sign, crossed):
         there = phase_at(run, t)
-        update_forces(memory, layout.size, layout.terms, run.struck.drive, there, rows.q)
-        evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, there, rows.q, 0.0, False)
+        update_forces(memory, layout.size, layout.terms, run.tip.drive, there, rows.q)
+        evaluate_contacts(memory, layout.size, layout.others, run.tip.drive, there, rows.q, 0.0, False)
         mirror_further_contacts(memory, layout.others, -well_sign)
         if run.high:
             close_energy(memory, layout, run, now, accumulators)
@@ -88,18 +91,20 @@ def propose_step(memory, blocks, workspace, run, now, accumulators):
             change_energy_origin(memory, layout, run, now, accumulators, beyond)
         well_sign = -well_sign
     accumulators.steps += 1
-    level = flight_level(clock, stretch, layout.stretch)
+    level = flight_halvings(clock, stretch, layout.stretch)
     if control.touching:
-        left = released_at(run.struck.law, seen.d, seen.dv)
-        level = max(level, contact_level(clock, (t - accumulators.onset) * clock.tick, left, seen.dv))
-    level = further_contacts_step_level(memory, layout.others, clock, t, control.touching, level)
+        left = released_at(run.tip.law, kinematics.d, kinematics.dv)
+        level = max(
+            level, contact_halvings(clock, (t - accumulators.onset) * clock.tick, left, kinematics.dv)
+        )
+    level = further_contacts_halvings(memory, layout.others, clock, t, control.touching, level)
     ticks, at = clock.step >> level, run.coefficients + level * run.slot
     # up to the next state that is handed out, to a jump of the drive's velocity, or to the end
     limit = min((now.stored_states + 1) * clock.output_interval, clock.end)
-    limit = up_to_discontinuity(run.struck.drive, run.phase, clock.period, t, limit)
+    limit = up_to_discontinuity(run.tip.drive, run.phase, clock.period, t, limit)
     if t + ticks > limit:
-        ticks, at = limit - t, cut_slot(run)
-        prepare(memory, layout, workspace.stages, run.struck.drive, ticks * clock.tick, at)
+        ticks, at = limit - t, variable_slot(run)
+        prepare(memory, layout, workspace.stages, run.tip.drive, ticks * clock.tick, at)
     length, phase = ticks * clock.tick, phase_at(run, t)
     step = Step(
         ticks, at, length, phase, control.touching, rows.q, rows.p, rows.k, rows.q1, rows.p1, rows.k1, r
@@ -109,7 +114,7 @@ def propose_step(memory, blocks, workspace, run, now, accumulators):
         well_sign,
         stretch,
         rows,
-        seen,
+        kinematics,
         _with_one_more_step(control, energy_tick),
         now.sample,
         now.stored_states,
@@ -119,7 +124,7 @@ def propose_step(memory, blocks, workspace, run, now, accumulators):
 
 @inlined
 def _with_one_more_step(control, energy_tick):
-    """One step more, and where the energy was last looked at."""
+    """One step more, and the tick at which the energy was last evaluated."""
     return StepControl(
         control.touching,
         control.safe_gap,
@@ -159,14 +164,14 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
 
     *layouts* are two places in memory that share the rows of the structure.
     """
-    place_a, place_b = Workspace(layouts[0], stages), Workspace(layouts[1], stages)
+    workspace_a, workspace_b = Workspace(layouts[0], stages), Workspace(layouts[1], stages)
     accumulators_of_runs, goes_on = kernel_output.accumulators_of_runs, kernel_output.states.shape[1] > 0
     live_a, live_b, following = True, False, 1
     i_a = which[0]
     i_b = i_a
     accumulators_a = accumulators_of_runs[i_a]
     accumulators_b = accumulators_a
-    run_a, now_a = begin(memory, blocks, place_a, kernel_input, i_a, accumulators_a)
+    run_a, now_a = begin(memory, blocks, workspace_a, kernel_input, i_a, accumulators_a)
     run_b, now_b = run_a, now_a
     step_a, step_b = _NO_STEP, _NO_STEP
     done_a, done_b = nothing_done(layouts[0]), nothing_done(layouts[1])
@@ -176,19 +181,19 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
         if not live_a and following < which.size:
             i_a = which[following]
             accumulators_a = accumulators_of_runs[i_a]
-            run_a, now_a = begin(memory, blocks, place_a, kernel_input, i_a, accumulators_a)
+            run_a, now_a = begin(memory, blocks, workspace_a, kernel_input, i_a, accumulators_a)
             live_a, following = True, following + 1
         if not live_b and following < which.size:
             i_b = which[following]
             accumulators_b = accumulators_of_runs[i_b]
-            run_b, now_b = begin(memory, blocks, place_b, kernel_input, i_b, accumulators_b)
+            run_b, now_b = begin(memory, blocks, workspace_b, kernel_input, i_b, accumulators_b)
             live_b, following = True, following + 1
         if live_a:
-            now_a, step_a = propose_step(memory, blocks, place_a, run_a, now_a, accumulators_a)
+            now_a, step_a = propose_step(memory, blocks, workspace_a, run_a, now_a, accumulators_a)
         if live_b:
-            now_b, step_b = propose_step(memory, blocks, place_b, run_b, now_b, accumulators_b)
-        tip_a = seen_from(run_a.struck, now_a.well_sign, run_a.rest_contact)
-        tip_b = seen_from(run_b.struck, now_b.well_sign, run_b.rest_contact)
+            now_b, step_b = propose_step(memory, blocks, workspace_b, run_b, now_b, accumulators_b)
+        tip_a = tip_about_well(run_a.tip, now_a.well_sign, run_a.rest_contact)
+        tip_b = tip_about_well(run_b.tip, now_b.well_sign, run_b.rest_contact)
         if live_a and live_b:
             done_a, done_b = take_two_steps(
                 memory, blocks, stages, layouts[0], tip_a, step_a, layouts[1], tip_b, step_b
@@ -201,7 +206,7 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
             now_a, _ = accept_step_by_law(
                 memory,
                 blocks,
-                place_a,
+                workspace_a,
                 run_a,
                 now_a,
                 step_a,
@@ -223,7 +228,7 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
             now_b, _ = accept_step_by_law(
                 memory,
                 blocks,
-                place_b,
+                workspace_b,
                 run_b,
                 now_b,
                 step_b,
@@ -253,14 +258,14 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
 
 @compiled
 def integrate_recorded(
-    memory, blocks, layout, stages, kernel_input, scratch, accumulators, outputs, aside, budget
+    memory, blocks, layout, stages, kernel_input, scratch, accumulators, outputs, saved_state, budget
 ):
     """Integrate the first run until it ends, *outputs* are full or *budget* steps are taken.
 
-    *aside* is a pair of arrays in which the run is saved; the first integer there, if negative, says that
+    *saved_state* is a pair of arrays in which the run is saved; the first integer there, if negative, says that
     it has not begun.
     """
-    workspace, (marks, reals) = Workspace(layout, stages), aside
+    workspace, (marks, reals) = Workspace(layout, stages), saved_state
     if marks[0] < 0:
         run, now = begin(memory, blocks, workspace, kernel_input, 0, accumulators)
     else:
@@ -270,7 +275,7 @@ def integrate_recorded(
     while now.status == _RUNNING and left > 0 and has_room(now, accumulators, outputs):
         left -= 1
         now, step = propose_step(memory, blocks, workspace, run, now, accumulators)
-        tip = seen_from(run.struck, now.well_sign, run.rest_contact)
+        tip = tip_about_well(run.tip, now.well_sign, run.rest_contact)
         done = take_step(memory, blocks, layout, stages, tip, step, True)
         now, _ = accept_step_by_law(
             memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, outputs

@@ -108,7 +108,7 @@ def pack(
             height = 2 * WIDTH if at + 2 * WIDTH <= stop else WIDTH
             strips.append(full[at : at + height, start : start + columns].T.ravel())
             at += height
-    pieces = {
+    arrays = {
         "omega": padded(omega),
         "omega_squared": padded(omega * omega),
         "omega_damped": padded(omega * np.sqrt(1.0 - zeta * zeta), 1.0),
@@ -126,20 +126,20 @@ def pack(
         found = None if kind is FurtherContacts else kind.build(structure, drive, size, padded)
         if found is not None:
             built[kind] = found
-            pieces |= {
+            arrays |= {
                 f"{kind.__name__}.{name}": values for name, values in (found.shared | found.own).items()
             }
-    if structure.tapped is not None:
-        pieces |= {"tapped": padded(structure.tapped), "rate": np.zeros(WIDTH)}
+    if structure.circuit_row is not None:
+        arrays |= {"circuit_row": padded(structure.circuit_row), "rate": np.zeros(WIDTH)}
     if several is not None:
-        pieces["striker_rows"] = np.zeros(len(several.laws) * size)
-        pieces["strikers"] = np.zeros(len(several.laws) * NUMBERS)
-    starts = np.concatenate(([0], np.cumsum([piece.size for piece in pieces.values()])))
-    placed = dict(zip(pieces, map(int, starts), strict=False))
+        arrays["striker_rows"] = np.zeros(len(several.laws) * size)
+        arrays["strikers"] = np.zeros(len(several.laws) * NUMBERS)
+    starts = np.concatenate(([0], np.cumsum([array.size for array in arrays.values()])))
+    placed = dict(zip(arrays, map(int, starts), strict=False))
     circuit, others = None, None
-    if structure.tapped is not None:
+    if structure.circuit_row is not None:
         element = int(rows[-1]) if structure.circuit else None
-        circuit = Circuit(placed.pop("tapped"), placed.pop("rate"), element)
+        circuit = Circuit(placed.pop("circuit_row"), placed.pop("rate"), element)
     if several is not None:
         others = FurtherContacts(placed.pop("striker_rows"), placed.pop("strikers"), several.numbers_type()())
     terms: list[Any] = []
@@ -168,7 +168,7 @@ def pack(
         body=None if structure.body_mass is None else int(rows[structure.equilibrium.size]),
     )
     return Packed(
-        np.concatenate(list(pieces.values())),
+        np.concatenate(list(arrays.values())),
         np.array(blocks, dtype=np.int64),
         layout,
         rows,
@@ -195,7 +195,7 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
     *extra_rows* are added to the work rows of the first place.
     """
     size, first = packed.layout.size, packed.layout
-    slots = (ensemble.finest + 2) * slot_length(ensemble.order, size) + 8 * size
+    slots = (ensemble.max_halvings + 2) * slot_length(ensemble.order, size) + 8 * size
     work = (WORK_ROWS + extra_rows) * size + slots
     second = first._replace(
         g=first.work + work, contact=first.work + work + size, work=first.work + work + 2 * size

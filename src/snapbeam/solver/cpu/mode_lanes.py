@@ -50,7 +50,7 @@ __all__ = [
 
 
 WORK_ROWS = 11
-"""Working rows of a run: q, p, k at both ends of a step and of a look ahead, G q, and the acceleration of a kick."""
+"""Working rows of a run: q, p, k at both ends of a step and of a trial step inside it, G q, and the acceleration of a kick."""
 
 
 class Layout(NamedTuple):
@@ -377,10 +377,10 @@ def _without_power_of(memory, layout, body, p, k, force, power):
 
 
 @inlined
-def propagate_free(memory, layout, contact, flow, pieces, piece, q, p, k0, k1, center, parts):
-    """A free step in short pieces: signals at the end of each, one mode a lane, into *parts*; c is the row *contact*.
+def propagate_free(memory, layout, contact, flow, subintervals, subinterval, q, p, k0, k1, center, parts):
+    """A free step in short subintervals: signals at the end of each, one mode a lane, into *parts*; c is the row *contact*.
 
-    Row by row of modes, so that a row stays in registers all the way.  At the border of pieces i and i + 1
+    Row by row of modes, so that a row stays in registers all the way.  At the border of subintervals i and i + 1
     stands a kick by the tension's acceleration, linear from k0 to k1 (half a kick at the first).  Piece i
     leaves c.q, c.p and, if *center*, e.q and e.p, each still eight sums, at ``parts[32 i]``.
     """
@@ -391,8 +391,8 @@ def propagate_free(memory, layout, contact, flow, pieces, piece, q, p, k0, k1, c
         a11, a12 = load(memory, flow + row), load(memory, flow + size + row)
         a21, a22 = load(memory, flow + 2 * size + row), load(memory, flow + 3 * size + row)
         c_row, e_row = load(memory, contact + row), load(memory, layout.center + row)
-        for i in range(pieces):
-            done, kick, at = i / pieces, piece if i > 0 else 0.5 * piece, 4 * WIDTH * i
+        for i in range(subintervals):
+            done, kick, at = i / subintervals, subinterval if i > 0 else 0.5 * subinterval, 4 * WIDTH * i
             kicked = fma(kick * done, k1_row, p_row)
             kicked = fma(kick * (1.0 - done), k0_row, kicked)
             p_row = turned(kicked, a22, a21, q_row)

@@ -1,4 +1,4 @@
-"""What a recorded run writes down, and how it is laid aside and taken up again when its buffers are full."""
+"""The records of a run, and how its state is saved and restored when their buffers are full."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from snapbeam.model.drive.combined import MOST_STRIKERS
 from snapbeam.solver.compilation import compiled, inlined
 from snapbeam.solver.contact_force import contact_energy, felt_force
 from snapbeam.solver.cpu.mode_lanes import modal_energy
-from snapbeam.solver.cpu.state import IntegratorState, Rows, StepControl, cut_slot
+from snapbeam.solver.cpu.state import IntegratorState, Rows, StepControl, variable_slot
 from snapbeam.solver.cpu.step import Step, observe, prepare, take_step
 from snapbeam.solver.cpu.sticking import held_for, hold
 from snapbeam.solver.cpu.terms.further_contact_events import any_touches
@@ -24,9 +24,9 @@ __all__ = [
     "VALUES",
     "Outputs",
     "has_room",
-    "record_aside",
     "record_contact",
     "record_held",
+    "record_inside_step",
     "record_instants",
     "restore_state",
     "save_state",
@@ -37,7 +37,7 @@ VALUES = 8 + len(WORKS)
 """Penetration, contact force, beam energy, contact energy, work, dissipation, loss in contact, works of the terms, and
 energy lost in the circuit, of a sample."""
 MARKS, REALS = 24, 10
-"""Integers and floats of a run that was laid aside."""
+"""Number of integers and floats of a saved state."""
 _TOGETHER = ContactKinematics(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _MOST_IN_CONTACT = 96
 """Steps of one contact whose ends are recorded."""
@@ -81,7 +81,7 @@ class _Instant(NamedTuple):
     q: int
     """Where the state stands in memory."""
     p: int
-    seen: ContactKinematics
+    kinematics: ContactKinematics
     energy: float
     """Of the beam, J."""
 
@@ -121,17 +121,17 @@ def _sums_with(terms, accumulators, done):
 @inlined
 def _write(memory, layout, well_sign, law, outputs, sample, instant, sums):
     """One sample, about the first well."""
-    size, seen = layout.size, instant.seen
+    size, kinematics = layout.size, instant.kinematics
     for row in range(size):
         outputs.rows[sample, row] = memory[instant.q + row]
         if well_sign < 0.0:
             outputs.rows[sample, row] += memory[layout.shift + row]
         outputs.rows[sample, size + row] = memory[instant.p + row]
     outputs.at[sample] = instant.when
-    outputs.values[sample, 0] = seen.d
-    outputs.values[sample, 1] = felt_force(law, seen.d, seen.dv)
+    outputs.values[sample, 0] = kinematics.d
+    outputs.values[sample, 1] = felt_force(law, kinematics.d, kinematics.dv)
     outputs.values[sample, 2] = instant.energy
-    outputs.values[sample, 3] = contact_energy(law, seen.d)
+    outputs.values[sample, 3] = contact_energy(law, kinematics.d)
     outputs.values[sample, 4] = sums.work
     outputs.values[sample, 5] = sums.dissipated
     outputs.values[sample, 6] = sums.lost
@@ -150,17 +150,17 @@ def record_instants(memory, blocks, layout, stages, run, tip, now, step, accumul
         if times[done] > (now.t + step.ticks) * clock.tick and now.t + step.ticks < clock.end:
             break
         part = min(max(0.0, times[done] - now.t * clock.tick), step.length)
-        prepare(memory, layout, stages, run.struck.drive, part, cut_slot(run))
+        prepare(memory, layout, stages, run.tip.drive, part, variable_slot(run))
         short = Step(
-            0, cut_slot(run), part, step.phase, step.touching, step.q, step.p, step.k,
+            0, variable_slot(run), part, step.phase, step.touching, step.q, step.p, step.k,
             q2, p2, run.spare + 2 * size, step.r
         )  # fmt: skip
         here = take_step(memory, blocks, layout, stages, tip, short, True)
         here = taken_across(memory, blocks, layout, stages, run, tip, now.t, short, here, True)
-        about = observe(memory, layout, tip, step.phase + tip.drive.omega * part, q2, p2)
+        observed = observe(memory, layout, tip, step.phase + tip.drive.omega * part, q2, p2)
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, here.gq, here.qr)
         energy = add_potential_energy(memory, size, layout.terms, q2, energy)
-        instant = _Instant(times[done], q2, p2, about, energy)
+        instant = _Instant(times[done], q2, p2, observed, energy)
         _write(
             memory,
             layout,
@@ -173,9 +173,9 @@ def record_instants(memory, blocks, layout, stages, run, tip, now, step, accumul
         )
         sample, done = sample + 1, done + 1
     outputs.marks[0] = done
-    # the slot for steps of any length holds the present step again, should it be a cut one
-    if step.at == cut_slot(run):
-        prepare(memory, layout, stages, run.struck.drive, step.length, step.at)
+    # the slot for steps of any length holds the present step again, if it was shortened
+    if step.at == variable_slot(run):
+        prepare(memory, layout, stages, run.tip.drive, step.length, step.at)
     return sample
 
 
@@ -210,13 +210,13 @@ def record_held(memory, blocks, layout, run, tip, now, step, accumulators, outpu
 
 
 @inlined
-def record_aside(memory, layout, tip, now, short, here, when, about, sample, accumulators, outputs):
-    """Write down the end of a look ahead in contact; returns how many samples there are."""
+def record_inside_step(memory, layout, tip, now, short, here, when, observed, sample, accumulators, outputs):
+    """Record the end of a trial step inside a step in contact; returns the number of samples."""
     if not outputs.in_contact:
         return sample
     energy = modal_energy(memory, layout, short.q1, short.p1) + tension_energy(layout.gamma, here.gq, here.qr)
     energy = add_potential_energy(memory, layout.size, layout.terms, short.q1, energy)
-    instant = _Instant(when, short.q1, short.p1, about, energy)
+    instant = _Instant(when, short.q1, short.p1, observed, energy)
     _write(
         memory,
         layout,
@@ -231,7 +231,7 @@ def record_aside(memory, layout, tip, now, short, here, when, about, sample, acc
 
 
 @inlined
-def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, accumulators, outputs):
+def record_contact(memory, layout, run, tip, now, step, done, kinematics1, sample, accumulators, outputs):
     """Write down the end of a step in contact, of the first ones of each; returns how many samples there are."""
     others, now_touching = layout.others, accumulators.touching != 0
     if not outputs.in_contact or not any_touches(memory, others, step.touching or now_touching):
@@ -244,7 +244,7 @@ def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, acc
     outputs.marks[2] += 1
     energy = modal_energy(memory, layout, step.q1, step.p1) + tension_energy(layout.gamma, done.gq, done.qr)
     energy = add_potential_energy(memory, layout.size, layout.terms, step.q1, energy)
-    instant = _Instant(when, step.q1, step.p1, seen1, energy)
+    instant = _Instant(when, step.q1, step.p1, kinematics1, energy)
     _write(
         memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums(layout.terms, accumulators)
     )
@@ -254,7 +254,7 @@ def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, acc
 @compiled
 def save_state(now, marks, reals):
     """Where a run stands, written down."""
-    rows, seen, control = now.rows, now.seen, now.control
+    rows, kinematics, control = now.rows, now.kinematics, now.control
     marks[0], marks[1], marks[2], marks[3] = now.t, now.sample, now.stored_states, now.status
     marks[4], marks[5], marks[6] = rows.q, rows.p, rows.k
     marks[7], marks[8], marks[9] = rows.q1, rows.p1, rows.k1
@@ -266,14 +266,16 @@ def save_state(now, marks, reals):
         control.steps_since_start,
     )
     reals[0], reals[1] = now.well_sign, now.stretch
-    reals[2], reals[3], reals[4] = seen.w, seen.wv, seen.d
-    reals[5], reals[6], reals[7] = seen.dv, seen.c, seen.cv
+    reals[2], reals[3], reals[4] = kinematics.w, kinematics.wv, kinematics.d
+    reals[5], reals[6], reals[7] = kinematics.dv, kinematics.c, kinematics.cv
 
 
 @compiled
 def restore_state(marks, reals):
-    """Where a run stood when it was laid aside."""
+    """The state of a run that was saved."""
     rows = Rows(marks[4], marks[5], marks[6], marks[7], marks[8], marks[9])
-    seen = ContactKinematics(reals[2], reals[3], reals[4], reals[5], reals[6], reals[7])
+    kinematics = ContactKinematics(reals[2], reals[3], reals[4], reals[5], reals[6], reals[7])
     control = StepControl(marks[10] != 0, marks[11], marks[12], marks[13], marks[14])
-    return IntegratorState(marks[0], reals[0], reals[1], rows, seen, control, marks[1], marks[2], marks[3])
+    return IntegratorState(
+        marks[0], reals[0], reals[1], rows, kinematics, control, marks[1], marks[2], marks[3]
+    )

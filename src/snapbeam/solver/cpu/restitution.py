@@ -2,7 +2,7 @@
 
 One mode only.  A hit lasts no time: the relative velocity changes its sign and is multiplied by e.  Hits that follow
 each other ever faster (complete chatter) end in sticking: once the beam would leave the tip by less than can
-be seen, it is carried along, until the force that this takes would have to pull.  What comes after does not depend on
+be resolved, it is carried along, until the force that this takes would have to pull.  What comes after does not depend on
 when exactly the chatter ended, since a beam that is carried forgets how it arrived.
 
 Hits and releases are located on the trajectory itself, to the last bits, between two ticks; from there a free step
@@ -14,22 +14,22 @@ from __future__ import annotations
 import math
 
 from snapbeam.solver.compilation import compiled, inlined
-from snapbeam.solver.cpu.events import cut_step, detect_contact_event, monitor_energy, swap_rows
+from snapbeam.solver.cpu.events import detect_contact_event, monitor_energy, shortened_step, swap_rows
 from snapbeam.solver.cpu.recording import record_held, record_instants
-from snapbeam.solver.cpu.state import IntegratorState, StepControl, cut_slot, phase_at
+from snapbeam.solver.cpu.state import IntegratorState, StepControl, phase_at, variable_slot
 from snapbeam.solver.cpu.step import Step, observe, prepare, take_step
 from snapbeam.solver.cpu.sticking import PANELS, constraint_force, held_for, hold
-from snapbeam.solver.excitation import seen_from
+from snapbeam.solver.excitation import tip_about_well
 from snapbeam.solver.interpolation import cubic, first_upcrossing, root
 from snapbeam.solver.registered_statistics import observe as observe_extras
 from snapbeam.solver.step_control import (
     ContactKinematics,
     accumulate_displacement,
     close_impact,
-    contact_level,
+    contact_halvings,
     count_zero_crossings_in_step,
 )
-from snapbeam.solver.terms.interface import center_from_divide, seen_from_divide
+from snapbeam.solver.terms.interface import center_from_barrier, kinematics_from_barrier
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["accept_step_restitution", "carry"]
@@ -62,23 +62,27 @@ def _release_between(memory, blocks, layout, run, tip, phase, low, high):
 def _release(memory, blocks, layout, run, tip, phase, length):
     """When within *length* the force first has to pull, s; negative if it does not.
 
-    The force is looked at in *PANELS* panels; where it dips between them, its least value is followed.
+    The force is evaluated in *PANELS* panels; where it dips between them, its minimum is located.
     """
-    piece, omega = length / PANELS, tip.drive.omega
+    subinterval, omega = length / PANELS, tip.drive.omega
     before = force = constraint_force(memory, blocks, layout, run, tip, phase)
     if force < 0.0:
         return 0.0
     for i in range(1, PANELS + 1):
-        after = constraint_force(memory, blocks, layout, run, tip, phase + omega * (i * piece))
+        after = constraint_force(memory, blocks, layout, run, tip, phase + omega * (i * subinterval))
         if after < 0.0:
-            return _release_between(memory, blocks, layout, run, tip, phase, (i - 1) * piece, i * piece)
+            return _release_between(
+                memory, blocks, layout, run, tip, phase, (i - 1) * subinterval, i * subinterval
+            )
         if i > 1 and force < before and force <= after:
-            # the least of the parabola through the three
+            # the minimum of the parabola through the three
             bend = before - 2.0 * force + after
             if bend > 0.0:
-                at = (i - 1 + 0.5 * (before - after) / bend) * piece
+                at = (i - 1 + 0.5 * (before - after) / bend) * subinterval
                 if constraint_force(memory, blocks, layout, run, tip, phase + omega * at) < 0.0:
-                    return _release_between(memory, blocks, layout, run, tip, phase, (i - 2) * piece, at)
+                    return _release_between(
+                        memory, blocks, layout, run, tip, phase, (i - 2) * subinterval, at
+                    )
         before, force = force, after
     return -1.0
 
@@ -91,10 +95,10 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
     """
     layout, clock, tick = workspace.layout, run.clock, run.clock.tick
     rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center
-    t, seen, control = now.t, now.seen, now.control
+    t, kinematics, control = now.t, now.kinematics, now.control
     # however strongly it is stretched, a beam that is carried moves no faster than the tip
     left = min((now.stored_states + 1) * clock.output_interval, clock.end) - t
-    ticks = min(clock.step >> contact_level(clock, (t - accumulators.onset) * tick, 0.0, 0.0), left)
+    ticks = min(clock.step >> contact_halvings(clock, (t - accumulators.onset) * tick, 0.0, 0.0), left)
     ticks = max(1, ticks // 4)
     length = ticks * tick
     release = _release(memory, blocks, layout, run, tip, step.phase, length)
@@ -116,15 +120,17 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
     accumulators.dissipated += dissipated
     accumulators.deepest = max(accumulators.deepest, peak)
     _, gq, qr = hold(memory, blocks, layout, tip, there, step.q1, step.p1, step.k1)
-    about = observe(memory, layout, tip, there, step.q1, step.p1)
-    seen1 = ContactKinematics(about.w + rest_contact, about.wv, 0.0, 0.0, about.c + rest_center, about.cv)
-    accumulate_displacement(accumulators, seen, seen1, length)
+    observed = observe(memory, layout, tip, there, step.q1, step.p1)
+    kinematics1 = ContactKinematics(
+        observed.w + rest_contact, observed.wv, 0.0, 0.0, observed.c + rest_center, observed.cv
+    )
+    accumulate_displacement(accumulators, kinematics, kinematics1, length)
     # a carried centre moves as the tip does, slowly enough for one cubic
     count_zero_crossings_in_step(
-        accumulators, clock, t, length, seen_from_divide(layout.terms, seen), seen_from_divide(layout.terms, seen1), scratch.inner_samples,
-        center_from_divide(layout.terms, rest_center), 0, 0.0,
+        accumulators, clock, t, length, kinematics_from_barrier(layout.terms, kinematics), kinematics_from_barrier(layout.terms, kinematics1), scratch.inner_samples,
+        center_from_barrier(layout.terms, rest_center), 0, 0.0,
     )  # fmt: skip
-    observe_extras(kernel_input.extras, accumulators, t * tick, length, seen, seen1, True)
+    observe_extras(kernel_input.extras, accumulators, t * tick, length, kinematics, kinematics1, True)
     t += ticks
     status = _RUNNING_CARRIED if t < clock.end else _OK_CARRIED
     rows, touching = swap_rows(now.rows), True
@@ -132,10 +138,10 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
         touching = False
         after = (t - now.t) * tick - length
         rest = Step(
-            0, cut_slot(run), after, there, False, step.q1, step.p1, step.k1,
+            0, variable_slot(run), after, there, False, step.q1, step.p1, step.k1,
             step.q, step.p, step.k, step.r,
         )  # fmt: skip
-        prepare(memory, layout, workspace.stages, run.struck.drive, after, rest.at)
+        prepare(memory, layout, workspace.stages, run.tip.drive, after, rest.at)
         done = take_step(memory, blocks, layout, workspace.stages, tip, rest, True)
         gq, qr, rows = done.gq, done.qr, now.rows
         accumulators.dissipated += done.dissipated
@@ -143,18 +149,29 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
             close_impact(accumulators, None, 0, tip.law, t, tick)
         else:
             close_impact(accumulators, outputs.impacts, outputs.marks[1], tip.law, t, tick)
-        about = observe(memory, layout, tip, phase_at(run, t), rows.q, rows.p)
-        d = min(about.d, 0.0)
-        seen1 = ContactKinematics(
-            about.w + rest_contact, about.wv, d, about.dv, about.c + rest_center, about.cv
+        observed = observe(memory, layout, tip, phase_at(run, t), rows.q, rows.p)
+        d = min(observed.d, 0.0)
+        kinematics1 = ContactKinematics(
+            observed.w + rest_contact, observed.wv, d, observed.dv, observed.c + rest_center, observed.cv
         )
     next_control = StepControl(touching, t, t, control.energy_tick, control.steps_since_start)
     state = rows.q, rows.p, rows.k, gq, qr
     next_control, status = monitor_energy(
-        memory, layout, run, now, t, state, seen1, next_control, released, status, accumulators, kernel_input
+        memory,
+        layout,
+        run,
+        now,
+        t,
+        state,
+        kinematics1,
+        next_control,
+        released,
+        status,
+        accumulators,
+        kernel_input,
     )
     return IntegratorState(
-        t, now.well_sign, 2.0 * gq + qr, rows, seen1, next_control, sample, now.stored_states, status
+        t, now.well_sign, 2.0 * gq + qr, rows, kinematics1, next_control, sample, now.stored_states, status
     ), step
 
 
@@ -172,20 +189,20 @@ _SOON = 0.05
 
 
 @inlined
-def apply_impact_law(memory, blocks, workspace, run, tip, p, seen, when, phase, accumulators, outputs):
+def apply_impact_law(memory, blocks, workspace, run, tip, p, kinematics, when, phase, accumulators, outputs):
     """Newton's law; *p* is where the mode's velocity stands.  Returns whether the bodies stay together.
 
     They do if the contact presses them together and what is left of the chatter, a geometric series of ever
-    shorter flights, is over soon and too low to be seen.
+    shorter flights, is over soon and too low to be resolved.
     """
     layout = workspace.layout
     c, e = memory[layout.contact], tip.law.coefficient
-    speed = seen.wv + seen.dv
-    impulse = (1.0 + e) * seen.dv / (c * c)
+    speed = kinematics.wv + kinematics.dv
+    impulse = (1.0 + e) * kinematics.dv / (c * c)
     memory[p] += c * impulse
     accumulators.work += impulse * speed
     accumulators.gross_work += abs(impulse * speed)
-    lost = 0.5 * (1.0 - e * e) * seen.dv * seen.dv / (c * c)
+    lost = 0.5 * (1.0 - e * e) * kinematics.dv * kinematics.dv / (c * c)
     accumulators.dissipated += lost
     accumulators.lost += lost
     accumulators.total_impulse += impulse
@@ -198,7 +215,7 @@ def apply_impact_law(memory, blocks, workspace, run, tip, p, seen, when, phase, 
             outputs.impacts[at, 3] = impulse
     accumulators.impacts += 1
     spare, size = run.spare, layout.size
-    away = e * seen.dv
+    away = e * kinematics.dv
     force, _, _ = hold(memory, blocks, layout, tip, phase, spare, spare + size, spare + 2 * size)
     pressed = force * c * c
     if not pressed > 0.0:
@@ -218,12 +235,12 @@ def apply_impact_law(memory, blocks, workspace, run, tip, p, seen, when, phase, 
 
 
 @inlined
-def _stuck(memory, workspace, run, seen, p, accumulators):
+def _stuck(memory, workspace, run, kinematics, p, accumulators):
     """What is left of the relative velocity after the last hit of a chatter is lost; begins the record of accumulators of a contact."""
     c = memory[workspace.layout.contact]
-    away = run.struck.law.coefficient * seen.dv
+    away = run.tip.law.coefficient * kinematics.dv
     accumulators.impulse = -away / (c * c)
-    accumulators.work += accumulators.impulse * (seen.wv + seen.dv)
+    accumulators.work += accumulators.impulse * (kinematics.wv + kinematics.dv)
     lost = 0.5 * away * away / (c * c)
     accumulators.dissipated += lost
     accumulators.lost += lost
@@ -232,49 +249,52 @@ def _stuck(memory, workspace, run, seen, p, accumulators):
 
 
 @compiled
-def _rises(inner_samples, pieces, piece, still, still_speed):
+def _rises(inner_samples, subintervals, subinterval, still, still_speed):
     """When the penetration first becomes positive in a step that begins in touch; -1 if it does not.
 
-    As long as the gap is rounding (*still*) nothing has happened yet: the bodies part more slowly than can be seen.
+    As long as the gap is rounding (*still*) nothing has happened yet: the bodies part more slowly than can be resolved.
     """
     i = 0
     if abs(inner_samples[0, 1]) <= still_speed:
-        while i < pieces and abs(inner_samples[i + 1, 0]) <= still:
+        while i < subintervals and abs(inner_samples[i + 1, 0]) <= still:
             i += 1
-        if i < pieces and inner_samples[i + 1, 0] > still:
-            return i * piece
+        if i < subintervals and inner_samples[i + 1, 0] > still:
+            return i * subinterval
         i += 1
-    while i < pieces:
+    while i < subintervals:
         rise = _rise(
             min(inner_samples[i, 0], 0.0),
             inner_samples[i, 1],
             inner_samples[i + 1, 0],
             inner_samples[i + 1, 1],
-            piece,
+            subinterval,
         )
         if rise >= 0.0:
-            return (i + rise) * piece
+            return (i + rise) * subinterval
         i += 1
     return -1.0
 
 
 @inlined
-def _mend(inner_samples, pieces, length, about):
-    """Bend what was seen inside a step to what is seen at its end.
+def _mend(inner_samples, subintervals, length, observed):
+    """Correct the samples inside a step so that they agree with its end.
 
-    It was seen by linear modes under a tension that changes evenly, and a hit of a beam that passes the tip by a
+    They follow from linear modes under a tension that changes evenly, and a hit of a beam that passes the tip by a
     billionth of b is one all the same.  The bend is the cubic that begins with neither value nor slope.
     """
-    off, slope = about.d - inner_samples[pieces, 0], (about.dv - inner_samples[pieces, 1]) * length
-    for i in range(1, pieces + 1):
-        u = i / pieces
+    off, slope = (
+        observed.d - inner_samples[subintervals, 0],
+        (observed.dv - inner_samples[subintervals, 1]) * length,
+    )
+    for i in range(1, subintervals + 1):
+        u = i / subintervals
         inner_samples[i, 0] += u * u * (off * (3.0 - 2.0 * u) + slope * (u - 1.0))
         inner_samples[i, 1] += u * (off * 6.0 * (1.0 - u) + slope * (3.0 * u - 2.0)) / length
 
 
 @inlined
 def _turns(u0, v0, u1, v1, h):
-    """Where in [0, 1] the cubic has its least and its maximum value between two falls; -1 and -1 if it only falls."""
+    """Where in [0, 1] the cubic has its minimum and its maximum between two falls; -1 and -1 if it only falls."""
     _, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
     inside = c2 * c2 - 3.0 * c1 * c3
     if not (c3 < 0.0 and inside > 0.0):
@@ -301,44 +321,48 @@ def _rise(u0, v0, u1, v1, h):
 
 
 @compiled
-def _entry(inner_samples, pieces, piece):
+def _onset_time(inner_samples, subintervals, subinterval):
     """When the penetration first becomes positive; -1 if it does not."""
-    for i in range(pieces):
+    for i in range(subintervals):
         rise = _rise(
-            inner_samples[i, 0], inner_samples[i, 1], inner_samples[i + 1, 0], inner_samples[i + 1, 1], piece
+            inner_samples[i, 0],
+            inner_samples[i, 1],
+            inner_samples[i + 1, 0],
+            inner_samples[i + 1, 1],
+            subinterval,
         )
         if rise >= 0.0:
-            return (i + rise) * piece
+            return (i + rise) * subinterval
     return -1.0
 
 
 @compiled
-def _top(inner_samples, pieces, piece, entry):
-    """When the penetration is maximum first after *entry*; the end of the step if it only grows."""
-    for i in range(min(int(entry / piece), pieces - 1), pieces):
+def _top(inner_samples, subintervals, subinterval, onset_time):
+    """When the penetration is maximum first after *onset_time*; the end of the step if it only grows."""
+    for i in range(min(int(onset_time / subinterval), subintervals - 1), subintervals):
         v0, v1 = inner_samples[i, 1], inner_samples[i + 1, 1]
         if v1 < 0.0:
             if v0 > 0.0:
-                return (i + v0 / (v0 - v1)) * piece
-            _, top = _turns(inner_samples[i, 0], v0, inner_samples[i + 1, 0], v1, piece)
-            if (i + top) * piece > entry:
-                return (i + top) * piece
-    return pieces * piece
+                return (i + v0 / (v0 - v1)) * subinterval
+            _, top = _turns(inner_samples[i, 0], v0, inner_samples[i + 1, 0], v1, subinterval)
+            if (i + top) * subinterval > onset_time:
+                return (i + top) * subinterval
+    return subintervals * subinterval
 
 
 @inlined
-def _cut_at(memory, blocks, workspace, run, tip, step, length):
-    """A step cut to *length*; what it gave, and what is seen there."""
-    cut = cut_step(step, run, 0, length)
-    prepare(memory, workspace.layout, workspace.stages, run.struck.drive, cut.length, cut.at)
-    done = take_step(memory, blocks, workspace.layout, workspace.stages, tip, cut, True)
-    phase = step.phase + tip.drive.omega * cut.length
-    return cut, done, observe(memory, workspace.layout, tip, phase, step.q1, step.p1)
+def _step_to(memory, blocks, workspace, run, tip, step, length):
+    """A step of *length*; its results, and the kinematics there."""
+    shortened = shortened_step(step, run, 0, length)
+    prepare(memory, workspace.layout, workspace.stages, run.tip.drive, shortened.length, shortened.at)
+    done = take_step(memory, blocks, workspace.layout, workspace.stages, tip, shortened, True)
+    phase = step.phase + tip.drive.omega * shortened.length
+    return shortened, done, observe(memory, workspace.layout, tip, phase, step.q1, step.p1)
 
 
 @inlined
-def _located(memory, blocks, workspace, run, tip, step, entry, top, at_end, still_speed):
-    """The step cut at the hit itself, by Newton's method on the trajectory; what it gave, and what is seen there.
+def _located(memory, blocks, workspace, run, tip, step, onset_time, top, at_end, still_speed):
+    """The step that ends at the impact itself, by Newton's method on the trajectory; its results, and the kinematics there.
 
     *top* is where the penetration is maximum if it falls again within the step, *at_end* that at the end of the
     whole step.  The last value says whether there is a hit at all: whether the bodies meet within the step, and do not
@@ -346,32 +370,32 @@ def _located(memory, blocks, workspace, run, tip, step, entry, top, at_end, stil
     """
     before, low, high = math.inf, 0.0, step.length
     if at_end < 0.0 and top < step.length:
-        cut, done, about = _cut_at(memory, blocks, workspace, run, tip, step, top)
-        if about.d <= 0.0:
-            return cut, done, about, False
-        high, at_end = top, about.d
-    cut, done, about = _cut_at(memory, blocks, workspace, run, tip, step, entry)
+        shortened, done, observed = _step_to(memory, blocks, workspace, run, tip, step, top)
+        if observed.d <= 0.0:
+            return shortened, done, observed, False
+        high, at_end = top, observed.d
+    shortened, done, observed = _step_to(memory, blocks, workspace, run, tip, step, onset_time)
     for _ in range(_LOCATIONS):
-        if about.dv <= still_speed and not (at_end > 0.0 and about.d > 0.0):
+        if observed.dv <= still_speed and not (at_end > 0.0 and observed.d > 0.0):
             break
-        change = -about.d / about.dv if about.dv > still_speed else -math.inf
+        change = -observed.d / observed.dv if observed.dv > still_speed else -math.inf
         if abs(change) >= 0.5 * before and before < math.inf:
             break
-        wanted = cut.length + change
-        if about.d < 0.0:
-            low = cut.length
+        wanted = shortened.length + change
+        if observed.d < 0.0:
+            low = shortened.length
         else:
-            high = cut.length
+            high = shortened.length
         if wanted >= high and at_end < 0.0:
-            return cut, done, about, False  # they meet in the next step
+            return shortened, done, observed, False  # they meet in the next step
         if wanted < low or wanted > high:
             # the way is bent: halve what is known to hold the hit
             if high - low <= 4e-16 * step.length:
                 break
             wanted, change = 0.5 * (low + high), math.inf
         before = abs(change)
-        cut, done, about = _cut_at(memory, blocks, workspace, run, tip, step, wanted)
-    return cut, done, about, about.dv > still_speed
+        shortened, done, observed = _step_to(memory, blocks, workspace, run, tip, step, wanted)
+    return shortened, done, observed, observed.dv > still_speed
 
 
 @inlined
@@ -382,8 +406,8 @@ def _moved_on(memory, blocks, workspace, run, tip, step, q, p, k, after, phase, 
         there = phase + tip.drive.omega * after
         _, gq, qr = hold(memory, blocks, layout, tip, there, step.q, step.p, step.k)
         return gq, qr
-    rest = Step(0, cut_slot(run), after, phase, False, q, p, k, step.q, step.p, step.k, step.r)
-    prepare(memory, layout, stages, run.struck.drive, after, rest.at)
+    rest = Step(0, variable_slot(run), after, phase, False, q, p, k, step.q, step.p, step.k, step.r)
+    prepare(memory, layout, stages, run.tip.drive, after, rest.at)
     done = take_step(memory, blocks, layout, stages, tip, rest, True)
     return done.gq, done.qr
 
@@ -394,29 +418,29 @@ def accept_step_restitution(
 ):
     """As :func:`snapbeam.solver.cpu.events.accept_step`, of a run whose impacts last no time."""
     layout, clock, tick = workspace.layout, run.clock, run.clock.tick
-    tip = seen_from(run.struck, now.well_sign, run.rest_contact)
+    tip = tip_about_well(run.tip, now.well_sign, run.rest_contact)
     rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center
-    t, seen, control = now.t, now.seen, now.control
+    t, kinematics, control = now.t, now.kinematics, now.control
     if control.touching:
         return carry(
             memory, blocks, workspace, run, tip, now, step, scratch, accumulators, kernel_input, outputs
         )
-    still_speed = _NOISE * (run.tip_speed + abs(seen.wv))
-    if seen.d >= 0.0 and seen.dv > still_speed:
+    still_speed = _NOISE * (run.tip_speed + abs(kinematics.wv))
+    if kinematics.d >= 0.0 and kinematics.dv > still_speed:
         # in touch and closing before any step
         q, p, k = now.rows.q, now.rows.p, now.rows.k
         together = apply_impact_law(
-            memory, blocks, workspace, run, tip, p, seen, t * tick, step.phase, accumulators, outputs
+            memory, blocks, workspace, run, tip, p, kinematics, t * tick, step.phase, accumulators, outputs
         )
         if together:
-            _stuck(memory, workspace, run, seen, p, accumulators)
+            _stuck(memory, workspace, run, kinematics, p, accumulators)
             accumulators.onset = t
             hold(memory, blocks, layout, tip, step.phase, q, p, k)
         status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
-        away = 0.0 if together else tip.law.coefficient * seen.dv
-        wv = seen.wv + seen.dv + away
+        away = 0.0 if together else tip.law.coefficient * kinematics.dv
+        wv = kinematics.wv + kinematics.dv + away
         next_control = StepControl(together, t, t, control.energy_tick, control.steps_since_start)
-        after = ContactKinematics(seen.w, wv, 0.0, -away, seen.c, memory_rate(memory, layout, p))
+        after = ContactKinematics(kinematics.w, wv, 0.0, -away, kinematics.c, memory_rate(memory, layout, p))
         return IntegratorState(
             t,
             now.well_sign,
@@ -429,15 +453,15 @@ def accept_step_restitution(
             status,
         ), step
 
-    about = observe(memory, layout, tip, step.phase + tip.drive.omega * step.length, step.q1, step.p1)
-    if not math.isfinite(about.d + about.dv):
+    observed = observe(memory, layout, tip, step.phase + tip.drive.omega * step.length, step.q1, step.p1)
+    if not math.isfinite(observed.d + observed.dv):
         return (
             IntegratorState(
                 t,
                 now.well_sign,
                 now.stretch,
                 now.rows,
-                seen,
+                kinematics,
                 control,
                 now.sample,
                 now.stored_states,
@@ -445,20 +469,24 @@ def accept_step_restitution(
             ),
             step,
         )
-    contact_event = detect_contact_event(memory, layout, run, now, tip, step, about, scratch)
-    entry = contact_event.entry
-    if contact_event.pieces > 0:
-        _mend(scratch.inner_samples, contact_event.pieces, step.length, about)
+    contact_event = detect_contact_event(memory, layout, run, now, tip, step, observed, scratch)
+    onset_time = contact_event.onset_time
+    if contact_event.subintervals > 0:
+        _mend(scratch.inner_samples, contact_event.subintervals, step.length, observed)
         if t + step.ticks > contact_event.safe_gap:
-            entry = _entry(scratch.inner_samples, contact_event.pieces, contact_event.piece)
-    if seen.d > -still_speed * run.step_time and contact_event.pieces > 0:
+            onset_time = _onset_time(
+                scratch.inner_samples, contact_event.subintervals, contact_event.subinterval
+            )
+    if kinematics.d > -still_speed * run.step_time and contact_event.subintervals > 0:
         still = still_speed * run.step_time
-        entry = _rises(scratch.inner_samples, contact_event.pieces, contact_event.piece, still, still_speed)
+        onset_time = _rises(
+            scratch.inner_samples, contact_event.subintervals, contact_event.subinterval, still, still_speed
+        )
     hit, ticks = False, step.ticks
-    if entry >= 0.0:
-        top = _top(scratch.inner_samples, contact_event.pieces, contact_event.piece, entry)
-        located, done, about, hit = _located(
-            memory, blocks, workspace, run, tip, step, entry, top, about.d, still_speed
+    if onset_time >= 0.0:
+        top = _top(scratch.inner_samples, contact_event.subintervals, contact_event.subinterval, onset_time)
+        located, done, observed, hit = _located(
+            memory, blocks, workspace, run, tip, step, onset_time, top, observed.d, still_speed
         )
         ticks = min(max(1, math.ceil(located.length / tick)), step.ticks)
         if hit:
@@ -467,12 +495,14 @@ def accept_step_restitution(
                 step.k1, step.r,
             )  # fmt: skip
         else:
-            step = cut_step(step, run, ticks, ticks * tick)
-            prepare(memory, layout, workspace.stages, run.struck.drive, step.length, step.at)
+            step = shortened_step(step, run, ticks, ticks * tick)
+            prepare(memory, layout, workspace.stages, run.tip.drive, step.length, step.at)
             done = take_step(memory, blocks, layout, workspace.stages, tip, step, True)
-            about = observe(memory, layout, tip, step.phase + tip.drive.omega * step.length, step.q1, step.p1)
-    seen1 = ContactKinematics(
-        about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv
+            observed = observe(
+                memory, layout, tip, step.phase + tip.drive.omega * step.length, step.q1, step.p1
+            )
+    kinematics1 = ContactKinematics(
+        observed.w + rest_contact, observed.wv, observed.d, observed.dv, observed.c + rest_center, observed.cv
     )
     sample = now.sample
     if outputs is not None:
@@ -480,13 +510,13 @@ def accept_step_restitution(
             memory, blocks, layout, workspace.stages, run, tip, now, step, accumulators, outputs
         )
     accumulators.dissipated += done.dissipated
-    accumulate_displacement(accumulators, seen, seen1, step.length)
+    accumulate_displacement(accumulators, kinematics, kinematics1, step.length)
     if hit or t + step.ticks > contact_event.safe_center:
         count_zero_crossings_in_step(
-            accumulators, clock, t, step.length, seen_from_divide(layout.terms, seen), seen_from_divide(layout.terms, seen1),
-            scratch.inner_samples, center_from_divide(layout.terms, rest_center), contact_event.pieces, contact_event.piece,
+            accumulators, clock, t, step.length, kinematics_from_barrier(layout.terms, kinematics), kinematics_from_barrier(layout.terms, kinematics1),
+            scratch.inner_samples, center_from_barrier(layout.terms, rest_center), contact_event.subintervals, contact_event.subinterval,
         )  # fmt: skip
-    observe_extras(kernel_input.extras, accumulators, t * tick, step.length, seen, seen1, False)
+    observe_extras(kernel_input.extras, accumulators, t * tick, step.length, kinematics, kinematics1, False)
 
     t += step.ticks
     status = _RUNNING if t < clock.end else _OK
@@ -494,29 +524,33 @@ def accept_step_restitution(
     if hit:
         when, phase = now.t * tick + step.length, step.phase + tip.drive.omega * step.length
         together = apply_impact_law(
-            memory, blocks, workspace, run, tip, step.p1, seen1, when, phase, accumulators, outputs
+            memory, blocks, workspace, run, tip, step.p1, kinematics1, when, phase, accumulators, outputs
         )
         if together:
-            _stuck(memory, workspace, run, seen1, step.p1, accumulators)
+            _stuck(memory, workspace, run, kinematics1, step.p1, accumulators)
             accumulators.onset = t
         gq, qr = _moved_on(
             memory, blocks, workspace, run, tip, step, step.q1, step.p1, step.k1,
             (t - now.t) * tick - step.length, phase, together,
         )  # fmt: skip
         rows = now.rows
-        about = observe(memory, layout, tip, phase_at(run, t), rows.q, rows.p)
-        d, dv = (0.0, 0.0) if together else (min(about.d, 0.0), about.dv)
-        seen1 = ContactKinematics(about.w + rest_contact, about.wv, d, dv, about.c + rest_center, about.cv)
-    safe_gap, safe_center = (t, t) if entry >= 0.0 else (contact_event.safe_gap, contact_event.safe_center)
+        observed = observe(memory, layout, tip, phase_at(run, t), rows.q, rows.p)
+        d, dv = (0.0, 0.0) if together else (min(observed.d, 0.0), observed.dv)
+        kinematics1 = ContactKinematics(
+            observed.w + rest_contact, observed.wv, d, dv, observed.c + rest_center, observed.cv
+        )
+    safe_gap, safe_center = (
+        (t, t) if onset_time >= 0.0 else (contact_event.safe_gap, contact_event.safe_center)
+    )
     next_control = StepControl(
         together, safe_gap, safe_center, control.energy_tick, control.steps_since_start
     )
     state = rows.q, rows.p, rows.k, gq, qr
     next_control, status = monitor_energy(
-        memory, layout, run, now, t, state, seen1, next_control, hit, status, accumulators, kernel_input
+        memory, layout, run, now, t, state, kinematics1, next_control, hit, status, accumulators, kernel_input
     )
     return IntegratorState(
-        t, now.well_sign, 2.0 * gq + qr, rows, seen1, next_control, sample, now.stored_states, status
+        t, now.well_sign, 2.0 * gq + qr, rows, kinematics1, next_control, sample, now.stored_states, status
     ), step
 
 

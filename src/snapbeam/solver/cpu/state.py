@@ -26,11 +26,11 @@ from snapbeam.solver.cpu.terms.further_contact_events import (
     restart_further_contacts,
 )
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, with_further_contact_energy
-from snapbeam.solver.excitation import Tip, drive_rate, numbers_of, seen_from
+from snapbeam.solver.excitation import Tip, drive_rate, numbers_of, tip_about_well
 from snapbeam.solver.physics import tension_energy, tension_factors
 from snapbeam.solver.splitting import TURNS, Stages
 from snapbeam.solver.step_control import (
-    PIECES,
+    SUBINTERVALS,
     Clock,
     ContactKinematics,
     accumulate_energy,
@@ -44,8 +44,8 @@ from snapbeam.solver.terms.interface import (
     add_potential_energy,
     add_to_tension,
     enter_well,
+    kinematics_from_barrier,
     relative_to_nearest_well,
-    seen_from_divide,
     update_forces,
 )
 from snapbeam.util.status_codes import RunStatus
@@ -102,7 +102,7 @@ class Workspace(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """What a thread works in beside memory: what a look inside a step saw, and partial sums."""
+    """What a thread works in beside memory: the samples inside a step, and partial sums."""
 
     inner_samples: Any
     parts: Any
@@ -128,7 +128,7 @@ class StepControl(NamedTuple):
     safe_center: int
     """Until this tick the centre cannot cross."""
     energy_tick: int
-    """Tick at which the energy was last looked at."""
+    """Tick at which the energy was last evaluated."""
     steps_since_start: int
     """Steps since the run began or was stored."""
 
@@ -136,29 +136,29 @@ class StepControl(NamedTuple):
 class Run(NamedTuple):
     """What stays the same in a run."""
 
-    struck: Tip
-    """The tip as seen from the well that the run's rests are measured in."""
+    tip: Tip
+    """The tip relative to the well from which the run's displacements are measured."""
     clock: Clock
     phase: float
     """Argument of the drive at the start."""
     rest_contact: float
-    """Displacement of the contact point in that well, seen from the striker's side."""
+    """Displacement of the contact point in that well, positive as the striker pushes."""
     rest_center: float
     tip_speed: float
-    finest_look: float
-    """Longest piece that a step is looked into by, s."""
-    step_pieces: int
-    """Such pieces in a flight step."""
+    shortest_subinterval: float
+    """Longest subinterval in which a step is sampled, s."""
+    step_subintervals: int
+    """Such subintervals in a flight step."""
     step_time: float
     """Of the flight step, s."""
     coefficients: int
-    """Where the prepared steps begin, one for each level from -1 on."""
+    """Where the prepared steps begin, one for each number of halvings from 0 on."""
     slot: int
     """Length of one."""
     spare: int
-    """Rows for a look ahead: q, p, k."""
+    """Rows for a trial step inside a step: q, p, k."""
     lowest: float
-    """Height of a flight that is too low to be seen, m: under Newton's law, where chatter ends."""
+    """Height of a flight that is too low to be resolved, m: under Newton's law, where chatter ends."""
     high: bool
     """Whether some modes count as high, so that the energy of the modes is added up."""
 
@@ -173,7 +173,7 @@ class IntegratorState(NamedTuple):
     stretch: float
     """Squared slopes beyond those of the well."""
     rows: Rows
-    seen: ContactKinematics
+    kinematics: ContactKinematics
     control: StepControl
     sample: int
     """Instants recorded so far."""
@@ -183,15 +183,15 @@ class IntegratorState(NamedTuple):
 
 
 @inlined
-def cut_slot(run):
+def variable_slot(run):
     """Where a step of any other length is prepared."""
-    return run.coefficients + (run.clock.finest + 1) * run.slot
+    return run.coefficients + (run.clock.max_halvings + 1) * run.slot
 
 
 @inlined
-def look_slot(run):
-    """Where the flow over one piece of a flight step stands, and after it that over any other piece."""
-    return cut_slot(run) + run.slot
+def sampling_slot(run):
+    """Where the flow over one subinterval of a flight step stands, and after it that over any other subinterval."""
+    return variable_slot(run) + run.slot
 
 
 @inlined
@@ -205,7 +205,7 @@ def run_of(memory, layout, stages, kernel_input, i):
     """What stays the same in run *i*; its prepared steps go into memory."""
     record = kernel_input.runs[i]
     size, work = layout.size, layout.work
-    struck = Tip(
+    tip = Tip(
         record.offset,
         numbers_of(kernel_input.law, kernel_input.law_numbers, i),
         numbers_of(kernel_input.drive, kernel_input.drive_numbers, i),
@@ -213,23 +213,23 @@ def run_of(memory, layout, stages, kernel_input, i):
     clock = clock_of(record, kernel_input.max_steps)
     coefficients, slot = work + WORK_ROWS * size, (stages.flows + 1) // 2 * 4 * size + 2 * TURNS
     step_time = clock.step * clock.tick
-    for level in range(clock.finest + 1):
+    for level in range(clock.max_halvings + 1):
         length, at = step_time / (1 << level), coefficients + level * slot
-        prepare(memory, layout, stages, struck.drive, length, at)
-    fastest = drive_rate(struck.drive)
+        prepare(memory, layout, stages, tip.drive, length, at)
+    fastest = drive_rate(tip.drive)
     for row in range(size):
         fastest = max(fastest, memory[layout.omega + row])
-    finest_look = _TWO_PI / (PIECES * fastest)
-    step_pieces = max(4, math.ceil(step_time / finest_look))
+    shortest_subinterval = _TWO_PI / (SUBINTERVALS * fastest)
+    step_subintervals = max(4, math.ceil(step_time / shortest_subinterval))
     run = Run(
-        struck,
+        tip,
         clock,
         record.phase,
         record.rest_contact,
         record.rest_center,
         record.tip_speed,
-        finest_look,
-        step_pieces,
+        shortest_subinterval,
+        step_subintervals,
         step_time,
         coefficients,
         slot,
@@ -237,19 +237,19 @@ def run_of(memory, layout, stages, kernel_input, i):
         record.lowest,
         kernel_input.high,
     )
-    flow_coefficients(memory, layout, step_time / step_pieces, look_slot(run))
+    flow_coefficients(memory, layout, step_time / step_subintervals, sampling_slot(run))
     return run
 
 
 @inlined
-def _energies_at(memory, layout, run, well_sign, rows, seen, touching):
+def _energies_at(memory, layout, run, well_sign, rows, kinematics, touching):
     """Energy of all linear modes, of those of the beam, of the high ones, and the rates of the last two.
 
     *rows* are the locations of q, p and k.  Modes are those about the well that the beam is near.
     """
     q, p, k = rows
     near = relative_to_nearest_well(memory, layout.size, layout.terms, well_sign, run.spare, q)
-    force = felt_force(run.struck.law, seen.d, seen.dv) if touching else 0.0
+    force = felt_force(run.tip.law, kinematics.d, kinematics.dv) if touching else 0.0
     linear, high, power, high_power = modal_energies(memory, layout, q, near, p, k, force)
     whole = beam_energy(memory, layout, near, p, linear)
     power, high_power = beam_power(memory, layout, p, k, force, power, high_power)
@@ -257,10 +257,10 @@ def _energies_at(memory, layout, run, well_sign, rows, seen, touching):
 
 
 @inlined
-def sample_energy(memory, layout, run, well_sign, rows, seen, touching, accumulators, span):
+def sample_energy(memory, layout, run, well_sign, rows, kinematics, touching, accumulators, span):
     """Add to the energy of the modes over time, up to where q, p and k stand; returns that of all linear modes."""
     linear, whole, high, power, high_power = _energies_at(
-        memory, layout, run, well_sign, rows, seen, touching
+        memory, layout, run, well_sign, rows, kinematics, touching
     )
     accumulate_energy(accumulators, whole, high, power, high_power, span)
     return linear
@@ -272,7 +272,9 @@ def close_energy(memory, layout, run, now, accumulators):
     rows, control = now.rows, now.control
     span = (now.t - control.energy_tick) * run.clock.tick
     places = rows.q, rows.p, rows.k
-    sample_energy(memory, layout, run, now.well_sign, places, now.seen, control.touching, accumulators, span)
+    sample_energy(
+        memory, layout, run, now.well_sign, places, now.kinematics, control.touching, accumulators, span
+    )
 
 
 @called
@@ -280,7 +282,7 @@ def change_energy_origin(memory, layout, run, now, accumulators, span):
     """Begin to add up the energy of the modes about the other well, which was entered *span* ago."""
     rows = now.rows.q, now.rows.p, now.rows.k
     _, whole, high, power, high_power = _energies_at(
-        memory, layout, run, -now.well_sign, rows, now.seen, now.control.touching
+        memory, layout, run, -now.well_sign, rows, now.kinematics, now.control.touching
     )
     begin_other_well(accumulators, whole, high, power, high_power, span)
 
@@ -289,24 +291,26 @@ def change_energy_origin(memory, layout, run, now, accumulators, span):
 def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching, stored, sample):
     """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from an output state."""
     q, p, k, r = rows.q, rows.p, rows.k, layout.work + 9 * layout.size
-    update_forces(memory, layout.size, layout.terms, run.struck.drive, phase_at(run, t), q)
-    evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, phase_at(run, t), q, 0.0, False)
-    restart_further_contacts(memory, layout.size, layout.others, run.struck.drive, phase_at(run, t), t, q)
+    update_forces(memory, layout.size, layout.terms, run.tip.drive, phase_at(run, t), q)
+    evaluate_contacts(memory, layout.size, layout.others, run.tip.drive, phase_at(run, t), q, 0.0, False)
+    restart_further_contacts(memory, layout.size, layout.others, run.tip.drive, phase_at(run, t), t, q)
     gq, qr = tension_rows(memory, blocks, layout, q, r)
     along_g, along_r = tension_factors(layout.gamma, gq, qr)
     along_g, along_r = add_to_tension(memory, layout.terms, along_g, along_r)
     acceleration_rows(memory, layout, along_g, along_r, r, k)
-    tip = seen_from(run.struck, well_sign, run.rest_contact)
-    about = observe(memory, layout, tip, phase_at(run, t), q, p)
+    tip = tip_about_well(run.tip, well_sign, run.rest_contact)
+    observed = observe(memory, layout, tip, phase_at(run, t), q, p)
     rest_contact, rest_center = well_sign * run.rest_contact, well_sign * run.rest_center
-    seen = ContactKinematics(
-        about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv
+    kinematics = ContactKinematics(
+        observed.w + rest_contact, observed.wv, observed.d, observed.dv, observed.c + rest_center, observed.cv
     )
     energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
     energy = add_potential_energy(memory, layout.size, layout.terms, q, energy)
     status = _RUNNING if t < run.clock.end else _OK
     control = StepControl(touching, t, t, t, 0)
-    return IntegratorState(t, well_sign, 2.0 * gq + qr, rows, seen, control, sample, stored, status), energy
+    return IntegratorState(
+        t, well_sign, 2.0 * gq + qr, rows, kinematics, control, sample, stored, status
+    ), energy
 
 
 @compiled
@@ -329,7 +333,7 @@ def begin(memory, blocks, workspace, kernel_input, i, accumulators):
         memory,
         size,
         layout.others,
-        run.struck.drive,
+        run.tip.drive,
         kernel_input,
         i,
         run.clock.tick,
@@ -338,24 +342,26 @@ def begin(memory, blocks, workspace, kernel_input, i, accumulators):
         work,
     )
     now, energy = restart_from_state(memory, blocks, layout, run, 0, record.well_sign, rows, False, 0, 0)
-    seen, since = now.seen, record.contact_time
+    kinematics, since = now.kinematics, record.contact_time
     touching = since >= 0.0
     if not math.isfinite(since):
         # under a law whose impacts last no time, what is in touch and closing is about to hit
-        pressed = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
-        touching = pressed and not is_impulsive(run.struck.law)
+        pressed = kinematics.d > 0.0 or (kinematics.d == 0.0 and kinematics.dv > 0.0)
+        touching = pressed and not is_impulsive(run.tip.law)
     accumulators.touching, accumulators.onset = int(touching), 0
     if math.isfinite(since) and since > 0.0:
         accumulators.onset = -int(since / run.clock.tick + 0.5)
     begin_statistics(
         accumulators,
-        seen_from_divide(layout.terms, seen).c,
-        seen,
-        run.struck.law,
-        with_further_contact_energy(memory, layout.others, energy + contact_energy(run.struck.law, seen.d)),
+        kinematics_from_barrier(layout.terms, kinematics).c,
+        kinematics,
+        run.tip.law,
+        with_further_contact_energy(
+            memory, layout.others, energy + contact_energy(run.tip.law, kinematics.d)
+        ),
     )
     control = StepControl(touching, 0, 0, 0, 0)
-    begun = IntegratorState(0, now.well_sign, now.stretch, rows, seen, control, 0, 0, now.status)
+    begun = IntegratorState(0, now.well_sign, now.stretch, rows, kinematics, control, 0, 0, now.status)
     if run.high:
         close_energy(memory, layout, run, begun, accumulators)
     return run, begun
@@ -388,9 +394,9 @@ def finish(memory, blocks, layout, run, now, accumulators, impacts, before, goes
     q, p, tick = now.rows.q, now.rows.p, run.clock.tick
     if now.control.touching:
         if goes_on:
-            accumulate_open_contact(accumulators, run.struck.law, now.t, tick)
+            accumulate_open_contact(accumulators, run.tip.law, now.t, tick)
         else:
-            close_impact(accumulators, impacts, before, run.struck.law, now.t, tick)
+            close_impact(accumulators, impacts, before, run.tip.law, now.t, tick)
     if goes_on:
         accumulate_open_further_contacts(memory, layout.others, accumulators, now.t, tick)
     if now.status == _EARLY_STOP:
@@ -400,9 +406,9 @@ def finish(memory, blocks, layout, run, now, accumulators, impacts, before, goes
     gq, qr = tension_rows(memory, blocks, layout, q, layout.work + 9 * layout.size)
     stored = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
     stored = add_potential_energy(memory, layout.size, layout.terms, q, stored)
-    stored = stored + contact_energy(run.struck.law, now.seen.d)
+    stored = stored + contact_energy(run.tip.law, now.kinematics.d)
     accumulators.energy = with_further_contact_energy(memory, layout.others, stored)
-    accumulators.displacement, accumulators.center = now.seen.w, now.seen.c
+    accumulators.displacement, accumulators.center = now.kinematics.w, now.kinematics.c
     if now.well_sign < 0.0:
         # the place in memory is left as it was found
         for row in range(layout.size):

@@ -145,7 +145,7 @@ def observe(memory, layout, tip, phase, q, p):
 
 @inlined
 def with_velocity_dependent(memory, layout, spare, step):
-    """A free step as it is looked into: with the velocity-dependent forces in the accelerations of its ends."""
+    """A free step for the samples inside it: with the velocity-dependent forces in the accelerations of its ends."""
     size, terms = layout.size, layout.terms
     k, k1 = circuit_acceleration_rows(memory, size, layout.circuit, spare, step)
     if depends_on_velocity(terms):

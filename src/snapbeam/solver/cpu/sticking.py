@@ -11,7 +11,7 @@ __all__ = ["PANELS", "constraint_force", "held_for", "hold"]
 
 
 PANELS = 8
-"""Of a step: the force is integrated over each by Simpson's rule, and looked at for a release."""
+"""Of a step: the force is integrated over each by Simpson's rule, and checked for a release."""
 
 
 @compiled

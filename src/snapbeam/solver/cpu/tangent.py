@@ -18,14 +18,14 @@ from snapbeam.solver.cpu.contact_dispatch import accept_step_by_law
 from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.integrate import propose_step, store_state
 from snapbeam.solver.cpu.mode_lanes import acceleration_rows, flow_rows, kick_rows, tension_rows
-from snapbeam.solver.cpu.state import Workspace, begin, cut_slot, finish
+from snapbeam.solver.cpu.state import Workspace, begin, finish, variable_slot
 from snapbeam.solver.cpu.step import prepare, take_step
 from snapbeam.solver.cpu.terms.further_contacts import (
     kick_tangent_by_further_contacts,
     linearise_further_contacts,
     note_touching,
 )
-from snapbeam.solver.excitation import seen_from, tip_motion
+from snapbeam.solver.excitation import tip_about_well, tip_motion
 from snapbeam.solver.physics import tension_factors
 from snapbeam.solver.simd import WIDTH, fma, load, store
 from snapbeam.solver.terms.interface import add_to_tension, update_forces
@@ -57,8 +57,8 @@ def _kick_tangent(memory, layout, weight, along_r, slope, r, dq, dp, dr, gdq, rd
 def carry_tangents(memory, blocks, workspace, run, tip, step, first, count):
     """Go through a step again, with the *count* tangents that stand from row *first* on."""
     layout, stages, size = workspace.layout, workspace.stages, workspace.layout.size
-    if step.at == cut_slot(run):
-        prepare(memory, layout, stages, run.struck.drive, step.length, step.at)
+    if step.at == variable_slot(run):
+        prepare(memory, layout, stages, run.tip.drive, step.length, step.at)
     q, p, k, r = first - 4 * size, first - 3 * size, first - 2 * size, first - size
     dr = first - 5 * size
     for row in range(size):
@@ -116,7 +116,7 @@ def integrate_tangent(
             now, step = propose_step(memory, blocks, workspace, run, now, accumulators)
             note_touching(memory, layout.others)
             well_sign = now.well_sign
-            tip = seen_from(run.struck, well_sign, run.rest_contact)
+            tip = tip_about_well(run.tip, well_sign, run.rest_contact)
             done = take_step(memory, blocks, layout, stages, tip, step, None)
             now, step = accept_step_by_law(
                 memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, None

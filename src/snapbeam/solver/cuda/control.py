@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from snapbeam.solver.cuda.layout import device, shared
 from snapbeam.solver.cuda.state import Held, Standing, energies_function
 from snapbeam.solver.cuda.step import Functions
-from snapbeam.solver.excitation import seen_from
+from snapbeam.solver.excitation import tip_about_well
 from snapbeam.solver.interpolation import first_downcrossing, turning_point, update_extrema
 from snapbeam.solver.physics import tension_acceleration, tension_energy, tension_factors
 from snapbeam.solver.step_control import (
@@ -17,10 +17,10 @@ from snapbeam.solver.step_control import (
     accumulate_energy,
     begin_other_well,
     close_impact,
-    contact_level,
+    contact_halvings,
     count_zero_crossings_in_step,
     first_contact_onset,
-    flight_level,
+    flight_halvings,
     refine_onset,
     safe_interval,
     time_beyond,
@@ -49,7 +49,11 @@ _close_impact, _accumulate_displacement, _accumulate_energy, _begin_other_well =
 )
 _time_beyond = shared(time_beyond)
 _safe_interval = shared(safe_interval)
-_flight_level, _contact_level, _seen_from = shared(flight_level), shared(contact_level), shared(seen_from)
+_flight_halvings, _contact_halvings, _tip_about_well = (
+    shared(flight_halvings),
+    shared(contact_halvings),
+    shared(tip_about_well),
+)
 _first_downcrossing, _turning_point, _update_extrema = (
     shared(first_downcrossing),
     shared(turning_point),
@@ -58,10 +62,10 @@ _first_downcrossing, _turning_point, _update_extrema = (
 
 
 class Taken(NamedTuple):
-    """A step: its results, where it was cut, and the samples inside it."""
+    """A step: its results, its length in ticks if shortened, and the samples inside it."""
 
     own: Standing
-    seen: ContactKinematics
+    kinematics: ContactKinematics
     span: int
     length: float
     event: bool
@@ -70,8 +74,8 @@ class Taken(NamedTuple):
     deepest: float
     safe_gap: int
     safe_center: int
-    pieces: int
-    piece: float
+    subintervals: int
+    subinterval: float
     impulse: float
     work: float
     gross: float
@@ -87,13 +91,13 @@ def _look_ahead_functions(functions: Functions) -> tuple[Any, Any, Any]:
     def change_well(block, fixed, held, accumulators):
         """The other well becomes the origin, if the centre has crossed over; see change_well.
 
-        Returns the state, the well, and the tick at which the energy was last looked at.
+        Returns the state, the well, and the tick at which the energy was last evaluated.
         """
         own, well_sign = held.own, held.well_sign
-        if not (fixed.rest_stretch > 0.0 and held.seen.c * (well_sign * fixed.rest_center) < 0.0):
+        if not (fixed.rest_stretch > 0.0 and held.kinematics.c * (well_sign * fixed.rest_center) < 0.0):
             return own, well_sign, held.energy_tick
-        pressed, seen = held.touching, held.seen
-        linear, high, power, high_power = energies(block, fixed, own, seen, pressed)
+        pressed, kinematics = held.touching, held.kinematics
+        linear, high, power, high_power = energies(block, fixed, own, kinematics, pressed)
         if block.lane == 0 and fixed.high:
             span = (held.t - held.energy_tick) * fixed.clock.tick
             _accumulate_energy(accumulators, linear, high, power, high_power, span)
@@ -102,7 +106,7 @@ def _look_ahead_functions(functions: Functions) -> tuple[Any, Any, Any]:
         gq, qr, _, _ = sum_four(block, g * q, r * q, 0.0, 0.0)
         along_g, along_r = tension_factors(fixed.gamma, gq, qr)
         own = Standing(q, own.p, tension_acceleration(along_g, along_r, g, r), gq, qr)
-        linear, high, power, high_power = energies(block, fixed, own, seen, pressed)
+        linear, high, power, high_power = energies(block, fixed, own, kinematics, pressed)
         if block.lane == 0 and fixed.high:
             crossing = accumulators.last_zero_crossing
             span = _time_beyond(held.t * fixed.clock.tick, crossing, fixed.step_time)
@@ -111,7 +115,7 @@ def _look_ahead_functions(functions: Functions) -> tuple[Any, Any, Any]:
 
     @device
     def safe_until(block, fixed, held, own, after):
-        """Until when the gap cannot close and the centre cannot cross, looked at again where it is needed."""
+        """Until when the gap cannot close and the centre cannot cross, computed again where it is needed."""
         safe_gap, safe_center = held.safe_gap, held.safe_center
         if after > min(safe_gap, safe_center):
             mode, clock = fixed.mode, fixed.clock
@@ -124,111 +128,134 @@ def _look_ahead_functions(functions: Functions) -> tuple[Any, Any, Any]:
                 mode.center * own.k,
             )
             if after > safe_gap:
-                safe = _safe_interval(-held.seen.d, gap_bound, fixed.tip_speed, gap_push, fixed.step_time)
+                safe = _safe_interval(
+                    -held.kinematics.d, gap_bound, fixed.tip_speed, gap_push, fixed.step_time
+                )
                 safe_gap = held.t + int(safe / clock.tick)
             if after > safe_center:
-                safe = _safe_interval(abs(held.seen.c), center_bound, 0.0, center_push, fixed.step_time)
+                safe = _safe_interval(abs(held.kinematics.c), center_bound, 0.0, center_push, fixed.step_time)
                 safe_center = held.t + int(safe / clock.tick)
         return safe_gap, safe_center
 
     @device
     def inner_samples(block, fixed, tip, own, k1, phase, span, length):
-        """Look inside a free step; in how many pieces of which length."""
-        look, pieces, step = fixed.whole_look, fixed.step_pieces, fixed.clock.step
-        if span == 2 * step:
-            pieces *= 2
-        elif span != step:
-            look += 1
-            pieces = max(2, math.ceil(length / fixed.finest_look))
-            flow_into(block, fixed.mode, length / pieces, look)
-        piece = length / pieces
-        sample_inside_step(block, fixed.mode, tip, look, pieces, piece, phase, own.q, own.p, own.k, k1)
-        return pieces, piece
+        """Sample a free step inside; returns the number and the length of its subintervals."""
+        sampling, subintervals, step = fixed.step_sampling_slot, fixed.step_subintervals, fixed.clock.step
+        if span != step:
+            sampling += 1
+            subintervals = max(2, math.ceil(length / fixed.shortest_subinterval))
+            flow_into(block, fixed.mode, length / subintervals, sampling)
+        subinterval = length / subintervals
+        sample_inside_step(
+            block, fixed.mode, tip, sampling, subintervals, subinterval, phase, own.q, own.p, own.k, k1
+        )
+        return subintervals, subinterval
 
     return change_well, safe_until, inner_samples
 
 
 def _step_and_cut_function(functions: Functions, safe_until: Any, inner_samples: Any) -> Any:
-    """The device function that takes a step and cuts it short."""
+    """The device function that takes a step and shortens it to an event."""
     observe, take_step, prepare = functions.observe, functions.take_step, functions.prepare
 
     @device
     def take_and_cut_step(block, fixed, held, own, well_sign, span, slot, phase):
-        """Take a step, cut it short at an event, and look for the deepest point: one text for all three."""
-        clock, seen, touching = fixed.clock, held.seen, held.touching
-        tip = _seen_from(fixed.struck, well_sign, fixed.rest_contact)
+        """Take a step, shorten it to an event, and locate the maximum penetration: one text for all three."""
+        clock, kinematics, touching = fixed.clock, held.kinematics, held.touching
+        tip = _tip_about_well(fixed.tip, well_sign, fixed.rest_contact)
         g, tick = well_sign * fixed.g, clock.tick
         length = span * tick
         here, purpose = length, _WHOLE
         event, entered, failed, deepest = False, False, False, held.deepest
-        pieces, piece = 0, 0.0
+        subintervals, subinterval = 0, 0.0
         whole, found = span, touching
         safe_gap, safe_center = held.safe_gap, held.safe_center
-        own1, seen1, impulse, work, gross = own, seen, 0.0, 0.0, 0.0
+        own1, kinematics1, impulse, work, gross = own, kinematics, 0.0, 0.0, 0.0
         while True:
-            if slot == fixed.cut_slot:
-                prepare(block, fixed.mode, fixed.struck.drive.omega, here, slot)
+            if slot == fixed.variable_slot:
+                prepare(block, fixed.mode, fixed.tip.drive.omega, here, slot)
             q2, p2, k2, gq2, qr2, impulse2, work2, gross2 = take_step(
                 block, fixed.mode, g, fixed.gamma, tip, slot, here, phase, touching, own.q, own.p, own.k
             )
-            about = observe(block, fixed.mode, tip, phase + tip.drive.omega * here, q2, p2)
+            observed = observe(block, fixed.mode, tip, phase + tip.drive.omega * here, q2, p2)
             if purpose == _DEEPEST:
-                deepest = max(deepest, about.d)
+                deepest = max(deepest, observed.d)
                 break
             own1 = Standing(q2, p2, k2, gq2, qr2)
-            seen1 = ContactKinematics(
-                about.w + well_sign * fixed.rest_contact, about.wv, about.d, about.dv,
-                about.c + well_sign * fixed.rest_center, about.cv,
+            kinematics1 = ContactKinematics(
+                observed.w + well_sign * fixed.rest_contact, observed.wv, observed.d, observed.dv,
+                observed.c + well_sign * fixed.rest_center, observed.cv,
             )  # fmt: skip
             impulse, work, gross = impulse2, work2, gross2
             if purpose == _WHOLE:
-                if not math.isfinite(seen1.d + seen1.dv):
+                if not math.isfinite(kinematics1.d + kinematics1.dv):
                     failed = True
                     break
-                cut = span
+                event_ticks = span
                 if touching:
-                    if seen1.d <= 0.0:
+                    if kinematics1.d <= 0.0:
                         event = True
-                        if seen.d > 0.0:
-                            cut = max(
-                                1, int(_first_downcrossing(seen.d, seen.dv, seen1.d, seen1.dv, length) * span)
+                        if kinematics.d > 0.0:
+                            event_ticks = max(
+                                1,
+                                int(
+                                    _first_downcrossing(
+                                        kinematics.d, kinematics.dv, kinematics1.d, kinematics1.dv, length
+                                    )
+                                    * span
+                                ),
                             )
                 else:
                     after = held.t + span
                     safe_gap, safe_center = safe_until(block, fixed, held, own, after)
                     if after > min(safe_gap, safe_center):
-                        pieces, piece = inner_samples(block, fixed, tip, own, k2, phase, span, length)
+                        subintervals, subinterval = inner_samples(
+                            block, fixed, tip, own, k2, phase, span, length
+                        )
                         if after > safe_gap:
-                            entry = _first_contact_onset(block.seen, pieces, piece)
-                            if entry >= 0.0:
-                                event, cut = True, min(span, int(entry / tick))
-                                entered = cut < 1
+                            onset_time = _first_contact_onset(block.kinematics, subintervals, subinterval)
+                            if onset_time >= 0.0:
+                                event, event_ticks = True, min(span, int(onset_time / tick))
+                                entered = event_ticks < 1
                 if entered:
                     break
-                if cut < span:
-                    span, length = cut, cut * tick
-                    here, slot, purpose = length, fixed.cut_slot, _CUT
+                if event_ticks < span:
+                    span, length = event_ticks, event_ticks * tick
+                    here, slot, purpose = length, fixed.variable_slot, _CUT
                     continue
             if event and not found:
-                cut, found = (
-                    _refine_onset(clock, span, whole, seen1, (clock.step >> clock.finest) * tick),
+                event_ticks, found = (
+                    _refine_onset(clock, span, whole, kinematics1, (clock.step >> clock.max_halvings) * tick),
                     True,
                 )
-                if cut != span:
-                    span, length = cut, cut * tick
-                    here, slot, purpose = length, fixed.cut_slot, _CUT
+                if event_ticks != span:
+                    span, length = event_ticks, event_ticks * tick
+                    here, slot, purpose = length, fixed.variable_slot, _CUT
                     continue
             if touching:
-                deepest = max(deepest, seen1.d)
-                turn = _turning_point(seen.d, seen.dv, seen1.d, seen1.dv, length) if seen.dv > 0.0 else -1.0
+                deepest = max(deepest, kinematics1.d)
+                turn = (
+                    _turning_point(kinematics.d, kinematics.dv, kinematics1.d, kinematics1.dv, length)
+                    if kinematics.dv > 0.0
+                    else -1.0
+                )
                 if turn > 0.0 and (
-                    _update_extrema(seen.d, deepest, seen.d, seen.dv, seen1.d, seen1.dv, length)[1] > deepest
+                    _update_extrema(
+                        kinematics.d,
+                        deepest,
+                        kinematics.d,
+                        kinematics.dv,
+                        kinematics1.d,
+                        kinematics1.dv,
+                        length,
+                    )[1]
+                    > deepest
                 ):
-                    here, slot, purpose = turn * length, fixed.cut_slot, _DEEPEST
+                    here, slot, purpose = turn * length, fixed.variable_slot, _DEEPEST
                     continue
             break
         return Taken(
-            own1, seen1, span, length, event, entered, failed, deepest, safe_gap, safe_center, pieces, piece,
+            own1, kinematics1, span, length, event, entered, failed, deepest, safe_gap, safe_center, subintervals, subinterval,
             impulse, work, gross,
         )  # fmt: skip
 
@@ -248,11 +275,11 @@ def _acceptance_functions(functions: Functions) -> tuple[Any, Any]:
                 accumulators.work += step.work
                 accumulators.gross_work += step.gross
                 accumulators.deepest = step.deepest
-            _accumulate_displacement(accumulators, held.seen, step.seen, step.length)
+            _accumulate_displacement(accumulators, held.kinematics, step.kinematics, step.length)
             if counted:
                 _count_zero_crossings_in_step(
-                    accumulators, fixed.clock, held.t, step.length, held.seen, step.seen, block.seen,
-                    well_sign * fixed.rest_center, step.pieces, step.piece,
+                    accumulators, fixed.clock, held.t, step.length, held.kinematics, step.kinematics, block.kinematics,
+                    well_sign * fixed.rest_center, step.subintervals, step.subinterval,
                 )  # fmt: skip
 
     @device
@@ -260,11 +287,11 @@ def _acceptance_functions(functions: Functions) -> tuple[Any, Any]:
         """Add up the energy of the modes; every sixteenth step it decides about an early end."""
         own = step.own
         pressed = touching and not step.event
-        linear, high, power, high_power = energies(block, fixed, own, step.seen, pressed)
+        linear, high, power, high_power = energies(block, fixed, own, step.kinematics, pressed)
         if block.lane == 0 and fixed.high:
             span = (t - held.energy_tick) * fixed.clock.tick
             _accumulate_energy(accumulators, linear, high, power, high_power, span)
-        far = well_sign < 0.0 and step.seen.w > fixed.clock.decide_reach and step.seen.c > 0.0
+        far = well_sign < 0.0 and step.kinematics.w > fixed.clock.decide_reach and step.kinematics.c > 0.0
         if far and not (touching or step.event) and (held.steps & 15) == 0:
             energy = linear + tension_energy(fixed.gamma, own.gq, own.qr)
             if energy < fixed.clock.decide_energy:
@@ -287,13 +314,13 @@ def step_function(functions: Functions) -> Any:
         clock = fixed.clock
         own, well_sign, energy_tick = change_well(block, fixed, held, accumulators)
         steps = held.steps + 1
-        level = _flight_level(clock, 2.0 * own.gq + own.qr, fixed.rest_stretch)
+        level = _flight_halvings(clock, 2.0 * own.gq + own.qr, fixed.rest_stretch)
         if held.touching:
             elapsed = (held.t - held.onset) * clock.tick
-            level = max(level, _contact_level(clock, elapsed, held.seen.d, held.seen.dv))
+            level = max(level, _contact_halvings(clock, elapsed, held.kinematics.d, held.kinematics.dv))
         span, slot = clock.step >> level, level
         if held.t + span > clock.end:
-            span, slot = clock.end - held.t, fixed.cut_slot
+            span, slot = clock.end - held.t, fixed.variable_slot
         phase = fixed.phase + _TWO_PI * ((held.t % clock.period) / clock.period)
         step = take_and_cut_step(block, fixed, held, own, well_sign, span, slot, phase)
         if step.failed or step.entered:
@@ -302,12 +329,12 @@ def step_function(functions: Functions) -> Any:
             if block.lane == 0 and step.entered:
                 accumulators.touching, accumulators.onset = 1, held.t
             return Held(
-                held.t, well_sign, own, held.seen, held.touching or step.entered, step.safe_gap,
+                held.t, well_sign, own, held.kinematics, held.touching or step.entered, step.safe_gap,
                 step.safe_center, onset, held.deepest, energy_tick, steps, status,
             )  # fmt: skip
         counted = held.touching or held.t + step.span > step.safe_center
         accumulate_step(block, fixed, held, well_sign, step, counted, accumulators)
-        t, seen = held.t + step.span, step.seen
+        t, kinematics = held.t + step.span, step.kinematics
         status = _RUNNING if t < clock.end else _OK
         touching, onset, deepest = held.touching != step.event, held.onset, step.deepest
         safe_gap, safe_center = step.safe_gap, step.safe_center
@@ -315,15 +342,22 @@ def step_function(functions: Functions) -> Any:
             safe_gap, safe_center = t, t
             if held.touching:
                 if block.lane == 0:
-                    _close_impact(accumulators, None, 0, fixed.struck.law, t, clock.tick)
+                    _close_impact(accumulators, None, 0, fixed.tip.law, t, clock.tick)
                 deepest = 0.0
-                seen = ContactKinematics(seen.w, seen.wv, min(seen.d, 0.0), seen.dv, seen.c, seen.cv)
+                kinematics = ContactKinematics(
+                    kinematics.w,
+                    kinematics.wv,
+                    min(kinematics.d, 0.0),
+                    kinematics.dv,
+                    kinematics.c,
+                    kinematics.cv,
+                )
             else:
                 onset = t
                 if block.lane == 0:
                     accumulators.touching, accumulators.onset = 1, t
         counting = Held(
-            held.t, held.well_sign, held.own, held.seen, held.touching, held.safe_gap, held.safe_center,
+            held.t, held.well_sign, held.own, held.kinematics, held.touching, held.safe_gap, held.safe_center,
             held.onset, held.deepest, energy_tick, steps, held.status,
         )  # fmt: skip
         energy_tick, status = monitor_energy(
@@ -339,7 +373,7 @@ def step_function(functions: Functions) -> Any:
             t,
             well_sign,
             step.own,
-            seen,
+            kinematics,
             touching,
             safe_gap,
             safe_center,

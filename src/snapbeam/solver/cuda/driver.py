@@ -27,7 +27,7 @@ from snapbeam.solver.cuda.layout import (
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.splitting import COMPOSITIONS, TURNS
 from snapbeam.solver.statistics import OutputStates, Recorded, empty_accumulators, updated
-from snapbeam.solver.step_control import PIECES
+from snapbeam.solver.step_control import SUBINTERVALS
 from snapbeam.util.validation import InputError
 
 __all__ = [
@@ -88,10 +88,10 @@ def refusal(modes: int, law: type[ContactLaw] | None = None, drive: type[Drive] 
     return _unusable()
 
 
-def _most_pieces(ensemble: Ensemble) -> int:
-    """Room for what is seen inside a step of any run."""
+def _most_subintervals(ensemble: Ensemble) -> int:
+    """The most subintervals in which a step of any run is sampled."""
     step_time = float(ensemble.step_times.max())
-    return 2 * (max(4, math.ceil(step_time * PIECES * ensemble.fastest / (2.0 * math.pi))) + 2)
+    return max(4, math.ceil(step_time * SUBINTERVALS * ensemble.fastest / (2.0 * math.pi))) + 2
 
 
 class Options(NamedTuple):
@@ -116,12 +116,12 @@ class _Launch:
         from snapbeam.solver.cuda.integrate import integrate_kernel
 
         self.ensemble = ensemble
-        self.finest = ensemble.finest
+        self.max_halvings = ensemble.max_halvings
         self.structure = device_structure(
             ensemble, options.fewest_threads or (1 if simulated() else FEWEST_THREADS)
         )
         self.kernel = integrate_kernel(
-            ensemble.order, self.structure.threads, self.structure.columns, self.finest,
+            ensemble.order, self.structure.threads, self.structure.columns, self.max_halvings,
             options.warps or RESIDENT_WARPS,
         )  # fmt: skip
         self.fixed = (
@@ -131,7 +131,7 @@ class _Launch:
         )
         self.contact_rows = cuda.to_device(self.structure.across(ensemble.contact_rows))
         self.starts = cuda.to_device(self.structure.across(ensemble.starts))
-        self.pieces = _most_pieces(ensemble)
+        self.subintervals = _most_subintervals(ensemble)
         self.blocks = 1
         self.kernel_output, self.work = self._room()
         # a launch of no steps: the kernel is compiled, and the driver knows how many blocks fit
@@ -154,7 +154,7 @@ class _Launch:
 
         threads, blocks = self.structure.threads, self.blocks
         distinct = (COMPOSITIONS[self.ensemble.order].flow.size + 1) // 2
-        flows = (self.finest + 2) * distinct + 2
+        flows = (self.max_halvings + 2) * distinct + 2
         kernel_output = DeviceState(
             cuda.to_device(np.full(blocks, -1, dtype=np.int64)),
             cuda.to_device(np.zeros((blocks, MARKS), dtype=np.int64)),
@@ -163,8 +163,8 @@ class _Launch:
         )
         work = DeviceWorkspace(
             cuda.device_array((blocks, flows, 4, threads), dtype=np.float64),
-            cuda.device_array((blocks, self.finest + 2, 2, TURNS), dtype=np.float64),
-            cuda.device_array((blocks, self.pieces + 1, 4), dtype=np.float64),
+            cuda.device_array((blocks, self.max_halvings + 2, 2, TURNS), dtype=np.float64),
+            cuda.device_array((blocks, self.subintervals + 1, 4), dtype=np.float64),
         )
         return kernel_output, work
 

@@ -64,15 +64,17 @@ class DeviceWorkspace(NamedTuple):
 
     flows: Any
     turns: Any
-    seen: Any
+    kinematics: Any
 
 
 @cache
-def integrate_kernel(order: int, threads: int, columns: int, finest: int, warps: int = RESIDENT_WARPS) -> Any:
+def integrate_kernel(
+    order: int, threads: int, columns: int, max_halvings: int, warps: int = RESIDENT_WARPS
+) -> Any:
     """The kernel for a composition, a number of threads, of coupled modes (at most) and of halvings."""
     step_functions = functions(order, threads, columns)
     run_constants_of, begin, restore_state, save_state, finish = run_functions(
-        step_functions, threads, finest
+        step_functions, threads, max_halvings
     )
     advance_one_step, synchronise = step_function(step_functions), step_functions.synchronise
     stride, partial, scratch = stride_of(threads), 4 * PARTS, 2 * threads + columns
@@ -108,7 +110,7 @@ def integrate_kernel(order: int, threads: int, columns: int, finest: int, warps:
         block = Block(
             lane, terms[lane:], terms[lane % partial // PARTS * stride + lane % PARTS :], parts,
             values[places[0, lane] :], values[places[1, lane] :], column,
-            work.flows[index], work.turns[index], work.seen[index],
+            work.flows[index], work.turns[index], work.kinematics[index],
         )  # fmt: skip
         run = kernel_output.slots[index]
         left = budget

@@ -58,7 +58,7 @@ _REGISTER_COLUMNS = 16
 
 
 def launch_bounds(threads: int, columns: int, warps: int = RESIDENT_WARPS) -> tuple[int, int]:
-    """Threads of a block, and how many blocks a multiprocessor is to hold, which the registers are cut for."""
+    """Threads of a block, and how many blocks a multiprocessor is to hold, which limits the registers of a thread."""
     if columns > _REGISTER_COLUMNS:
         return threads, 1
     return threads, max(1, warps * WARP // max(threads, WARP))
@@ -187,8 +187,8 @@ class Block(NamedTuple):
     """Flows of all modes over the parts of each length of step, shape (flows, 4, threads)."""
     turns: Any
     """Sine and cosine of the drive's turn at each kick, for each length of step, shape (slots, 2, TURNS)."""
-    seen: Any
-    """What a look inside a step saw, shape (pieces + 1, 4)."""
+    kinematics: Any
+    """Samples inside a step, shape (subintervals + 1, 4)."""
 
 
 def synchroniser(threads: int) -> Any:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from snapbeam.solver.contact_force import contact_energy, contact_force
 from snapbeam.solver.cuda.layout import device, shared
 from snapbeam.solver.cuda.step import Functions, Mode
-from snapbeam.solver.excitation import Tip, numbers_of, seen_from
+from snapbeam.solver.excitation import Tip, numbers_of, tip_about_well
 from snapbeam.solver.physics import (
     mode_energy,
     mode_power,
@@ -17,7 +17,7 @@ from snapbeam.solver.physics import (
     tension_factors,
 )
 from snapbeam.solver.step_control import (
-    PIECES,
+    SUBINTERVALS,
     Clock,
     ContactKinematics,
     accumulate_energy,
@@ -35,20 +35,20 @@ _TWO_PI = 2.0 * math.pi
 
 _close_impact, _begin_statistics = shared(close_impact), shared(begin_statistics)
 _accumulate_energy = shared(accumulate_energy)
-_clock_of, _seen_from = shared(clock_of), shared(seen_from)
+_clock_of, _tip_about_well = shared(clock_of), shared(tip_about_well)
 
 
 class Fixed(NamedTuple):
     """What stays the same in a run."""
 
-    struck: Tip
+    tip: Tip
     clock: Clock
     phase: float
     rest_contact: float
     rest_center: float
     tip_speed: float
-    finest_look: float
-    step_pieces: int
+    shortest_subinterval: float
+    step_subintervals: int
     step_time: float
     mode: Mode
     g: float
@@ -56,8 +56,8 @@ class Fixed(NamedTuple):
     shift: float
     gamma: float
     rest_stretch: float
-    cut_slot: int
-    whole_look: int
+    variable_slot: int
+    step_sampling_slot: int
     high: bool
     """Whether some modes count as high, so that the energy of the modes is added up."""
 
@@ -78,7 +78,7 @@ class Held(NamedTuple):
     t: int
     well_sign: float
     own: Standing
-    seen: ContactKinematics
+    kinematics: ContactKinematics
     touching: bool
     safe_gap: int
     safe_center: int
@@ -94,8 +94,8 @@ def energies_function(functions: Functions) -> Any:
     sum_four = functions.sum_four
 
     @device
-    def energies(block, fixed, own, seen, pressed):
-        force = contact_force(fixed.struck.law, seen.d) if pressed else 0.0
+    def energies(block, fixed, own, kinematics, pressed):
+        force = contact_force(fixed.tip.law, kinematics.d) if pressed else 0.0
         energy = mode_energy(fixed.mode.omega, own.q, own.p)
         power = mode_power(fixed.mode.damping, own.k, fixed.mode.contact, force, own.p)
         return sum_four(block, energy, fixed.mode.high * energy, power, fixed.mode.high * power)
@@ -103,15 +103,15 @@ def energies_function(functions: Functions) -> Any:
     return energies
 
 
-def run_functions(functions: Functions, threads: int, finest: int) -> tuple[Any, Any, Any, Any, Any]:
+def run_functions(functions: Functions, threads: int, max_halvings: int) -> tuple[Any, Any, Any, Any, Any]:
     """Device functions: run_constants_of, begin, restore_state, save_state, finish."""
     begin, finish = _begin_and_finish_functions(functions)
     restore_state, save_state = _save_and_restore_functions()
 
-    return _run_constants_function(functions, threads, finest), begin, restore_state, save_state, finish
+    return _run_constants_function(functions, threads, max_halvings), begin, restore_state, save_state, finish
 
 
-def _run_constants_function(functions: Functions, threads: int, finest: int) -> Any:
+def _run_constants_function(functions: Functions, threads: int, max_halvings: int) -> Any:
     """The device function of what stays the same in a run."""
     prepare, flow_into, distinct = functions.prepare, functions.flow_into, functions.distinct
 
@@ -123,27 +123,27 @@ def _run_constants_function(functions: Functions, threads: int, finest: int) -> 
             structure[0, lane], structure[1, lane], structure[2, lane], structure[3, lane],
             structure[5, lane], kernel_input.contact_rows[record.contact_row, lane], structure[7, lane],
         )  # fmt: skip
-        struck = Tip(
+        tip = Tip(
             record.offset,
             numbers_of(kernel_input.law, kernel_input.law_numbers, i),
             numbers_of(kernel_input.drive, kernel_input.drive_numbers, i),
         )
         clock = _clock_of(record, kernel_input.max_steps)
         step_time = clock.step * clock.tick
-        fastest = struck.drive.omega
+        fastest = tip.drive.omega
         for j in range(threads):
             fastest = max(fastest, structure[0, j])
-        finest_look = _TWO_PI / (PIECES * fastest)
-        step_pieces = max(4, math.ceil(step_time / finest_look))
-        whole_look = (finest + 2) * distinct
+        shortest_subinterval = _TWO_PI / (SUBINTERVALS * fastest)
+        step_subintervals = max(4, math.ceil(step_time / shortest_subinterval))
+        step_sampling_slot = (max_halvings + 2) * distinct
         if fresh:
-            for level in range(clock.finest + 1):
-                prepare(block, mode, struck.drive.omega, step_time / (1 << level), level)
-            flow_into(block, mode, step_time / step_pieces, whole_look)
+            for level in range(clock.max_halvings + 1):
+                prepare(block, mode, tip.drive.omega, step_time / (1 << level), level)
+            flow_into(block, mode, step_time / step_subintervals, step_sampling_slot)
         return Fixed(
-            struck, clock, record.phase, record.rest_contact, record.rest_center, record.tip_speed,
-            finest_look, step_pieces, step_time, mode, structure[4, lane], structure[6, lane],
-            kernel_input.gamma, kernel_input.stretch, finest + 1, whole_look, kernel_input.high,
+            tip, clock, record.phase, record.rest_contact, record.rest_center, record.tip_speed,
+            shortest_subinterval, step_subintervals, step_time, mode, structure[4, lane], structure[6, lane],
+            kernel_input.gamma, kernel_input.stretch, max_halvings + 1, step_sampling_slot, kernel_input.high,
         )  # fmt: skip
 
     return run_constants_of
@@ -169,35 +169,35 @@ def _begin_and_finish_functions(functions: Functions) -> tuple[Any, Any]:
         q, p = kernel_input.starts[record.start_row, 0, lane], kernel_input.starts[record.start_row, 1, lane]
         well_sign = record.well_sign
         own = with_tension(block, fixed, well_sign, q, p)
-        tip = _seen_from(fixed.struck, well_sign, fixed.rest_contact)
-        about = observe(block, fixed.mode, tip, fixed.phase, q, p)
-        seen = ContactKinematics(
-            about.w + well_sign * fixed.rest_contact, about.wv, about.d, about.dv,
-            about.c + well_sign * fixed.rest_center, about.cv,
+        tip = _tip_about_well(fixed.tip, well_sign, fixed.rest_contact)
+        observed = observe(block, fixed.mode, tip, fixed.phase, q, p)
+        kinematics = ContactKinematics(
+            observed.w + well_sign * fixed.rest_contact, observed.wv, observed.d, observed.dv,
+            observed.c + well_sign * fixed.rest_center, observed.cv,
         )  # fmt: skip
         energy = sum_one(block, mode_energy(fixed.mode.omega, q, p)) + tension_energy(
             fixed.gamma, own.gq, own.qr
         )
-        touching = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
-        linear, high, power, high_power = energies(block, fixed, own, seen, touching)
+        touching = kinematics.d > 0.0 or (kinematics.d == 0.0 and kinematics.dv > 0.0)
+        linear, high, power, high_power = energies(block, fixed, own, kinematics, touching)
         if lane == 0:
             if fixed.high:
                 _accumulate_energy(accumulators, linear, high, power, high_power, 0.0)
             accumulators.status, accumulators.touching, accumulators.onset = _RUNNING, int(touching), 0
             _begin_statistics(
                 accumulators,
-                seen.c,
-                seen,
-                fixed.struck.law,
-                energy + contact_energy(fixed.struck.law, seen.d),
+                kinematics.c,
+                kinematics,
+                fixed.tip.law,
+                energy + contact_energy(fixed.tip.law, kinematics.d),
             )
-        return Held(0, well_sign, own, seen, touching, 0, 0, 0, max(seen.d, 0.0), 0, 0, _RUNNING)
+        return Held(0, well_sign, own, kinematics, touching, 0, 0, 0, max(kinematics.d, 0.0), 0, 0, _RUNNING)
 
     @device
     def finish(block, fixed, held, accumulators):
-        linear, high, power, high_power = energies(block, fixed, held.own, held.seen, held.touching)
+        linear, high, power, high_power = energies(block, fixed, held.own, held.kinematics, held.touching)
         if block.lane == 0:
-            clock, law = fixed.clock, fixed.struck.law
+            clock, law = fixed.clock, fixed.tip.law
             span = (held.t - held.energy_tick) * clock.tick
             if fixed.high:
                 _accumulate_energy(accumulators, linear, high, power, high_power, span)
@@ -208,9 +208,9 @@ def _begin_and_finish_functions(functions: Functions) -> tuple[Any, Any]:
             accumulators.energy = (
                 linear
                 + tension_energy(fixed.gamma, held.own.gq, held.own.qr)
-                + contact_energy(law, held.seen.d)
+                + contact_energy(law, held.kinematics.d)
             )
-            accumulators.displacement, accumulators.center = held.seen.w, held.seen.c
+            accumulators.displacement, accumulators.center = held.kinematics.w, held.kinematics.c
             accumulators.time, accumulators.status, accumulators.steps = held.t, held.status, held.steps
 
     return begin, finish
@@ -230,7 +230,7 @@ def _save_and_restore_functions() -> tuple[Any, Any]:
             reals[index, 6],
             reals[index, 7],
         )
-        seen = ContactKinematics(
+        kinematics = ContactKinematics(
             reals[index, 0],
             reals[index, 1],
             reals[index, 2],
@@ -239,14 +239,14 @@ def _save_and_restore_functions() -> tuple[Any, Any]:
             reals[index, 5],
         )
         return Held(
-            accumulators.time, float(marks[index, 2]), own, seen, accumulators.touching != 0,
+            accumulators.time, float(marks[index, 2]), own, kinematics, accumulators.touching != 0,
             marks[index, 0], marks[index, 1], accumulators.onset, reals[index, 8], marks[index, 3], accumulators.steps, _RUNNING,
         )  # fmt: skip
 
     @device
     def save_state(block, index, kernel_output, accumulators, held):
         lane = block.lane
-        own, seen = held.own, held.seen
+        own, kinematics = held.own, held.kinematics
         (
             kernel_output.modes[index, 0, lane],
             kernel_output.modes[index, 1, lane],
@@ -264,8 +264,8 @@ def _save_and_restore_functions() -> tuple[Any, Any]:
                 int(held.well_sign),
             )
             marks[index, 3] = held.energy_tick
-            reals[index, 0], reals[index, 1], reals[index, 2] = seen.w, seen.wv, seen.d
-            reals[index, 3], reals[index, 4], reals[index, 5] = seen.dv, seen.c, seen.cv
+            reals[index, 0], reals[index, 1], reals[index, 2] = kinematics.w, kinematics.wv, kinematics.d
+            reals[index, 3], reals[index, 4], reals[index, 5] = kinematics.dv, kinematics.c, kinematics.cv
             reals[index, 6], reals[index, 7], reals[index, 8] = own.gq, own.qr, held.deepest
             accumulators.time, accumulators.status, accumulators.steps = held.t, held.status, held.steps
             accumulators.touching, accumulators.onset = int(held.touching), held.onset

@@ -1,4 +1,4 @@
-"""One step of one trajectory on a CUDA device, and a look inside it: a thread a mode, a block a trajectory.
+"""One step of one trajectory on a CUDA device, and samples inside it: a thread a mode, a block a trajectory.
 
 What belongs to a mode (its state, its row of the tension matrix, the flow of its oscillator) stays with its
 thread.  Whatever belongs to the trajectory comes out of sums over the block, which every thread reads back
@@ -247,27 +247,29 @@ def functions(order: int, threads: int, columns: int) -> Functions:
         return ContactKinematics(w, rate, tip.offset + motion - w, velocity - rate, c, c_rate)
 
     @device
-    def sample_inside_step(block, mode, tip, at, pieces, piece, phase, q, p, k, k1):
-        """As :func:`snapbeam.solver.cpu.events.sample_inside_step`; *at* is the flow over one piece."""
+    def sample_inside_step(block, mode, tip, at, subintervals, subinterval, phase, q, p, k, k1):
+        """As :func:`snapbeam.solver.cpu.events.sample_inside_step`; *at* is the flow over one subinterval."""
         contact0, contact1, center0, center1 = sum_four(
             block, mode.contact * k, mode.contact * k1, mode.center * k, mode.center * k1
         )
-        turn_sine, turn_cosine = sincos(tip.drive.omega * piece)
+        turn_sine, turn_cosine = sincos(tip.drive.omega * subinterval)
         sine, cosine = sincos(phase)
-        flow, half = block.flows[at], 0.5 * piece
-        for i in range(pieces + 1):
+        flow, half = block.flows[at], 0.5 * subinterval
+        for i in range(subintervals + 1):
             w, rate, c, c_rate = sum_four(
                 block, mode.contact * q, mode.contact * p, mode.center * q, mode.center * p
             )
-            done = i / pieces
+            done = i / subintervals
             if block.lane == 0:
                 remaining = half if i > 0 else 0.0
                 motion, velocity = shaker_motion(tip.drive.amplitude, tip.drive.omega, sine, cosine)
-                block.seen[i, 0] = tip.offset + motion - w
-                block.seen[i, 1] = velocity - rate - remaining * ((1.0 - done) * contact0 + done * contact1)
-                block.seen[i, 2] = c
-                block.seen[i, 3] = c_rate + remaining * ((1.0 - done) * center0 + done * center1)
-            kick = piece if i > 0 else half
+                block.kinematics[i, 0] = tip.offset + motion - w
+                block.kinematics[i, 1] = (
+                    velocity - rate - remaining * ((1.0 - done) * contact0 + done * contact1)
+                )
+                block.kinematics[i, 2] = c
+                block.kinematics[i, 3] = c_rate + remaining * ((1.0 - done) * center0 + done * center1)
+            kick = subinterval if i > 0 else half
             p = fma(kick * (1.0 - done), k, fma(kick * done, k1, p))
             moved = turned(q, flow[0, block.lane], flow[1, block.lane], p)
             p = turned(p, flow[3, block.lane], flow[2, block.lane], q)

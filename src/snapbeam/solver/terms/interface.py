@@ -16,7 +16,7 @@ Beside operations, a class has
     Its work in a kick of *weight* seconds, J, exact: the row *kick* is the whole acceleration of the kick, contact
     included, and p the row of the velocities before it.  With it, the name and long name of the statistic of the work.
 ``may_hide_onset``
-    True if the term changes the motion within a step more than the look-ahead expects.
+    True if the term changes the motion within a step more than the interval without contact allows for.
 ``needs_tension_product``
     True if ``kick_work`` reads r = G q at the first kick of a step too.
 """
@@ -47,17 +47,17 @@ __all__ = [
     "add_velocity_dependent",
     "add_work",
     "begin_exchange",
-    "center_from_divide",
+    "center_from_barrier",
     "depends_on_velocity",
     "does_work",
     "end_exchange",
     "enter_well",
     "has_crossed",
+    "kinematics_from_barrier",
     "may_hide_onset",
     "needs_tension_product",
     "no_external_work",
     "relative_to_nearest_well",
-    "seen_from_divide",
     "total_work",
     "update_forces",
     "wells_differ",
@@ -171,7 +171,7 @@ def add_to_tension(memory: Any, terms: Any, along_g: Any, along_r: Any) -> Any:
 def add_to_speed_bound(
     memory: Any, size: int, terms: Any, drive: Any, along: int, horizon: float, bound: Any
 ) -> Any:
-    """Add to a *bound* of the speed along a row what the term can change within a time, for the look-ahead."""
+    """Add to a *bound* of the speed along a row what the term can change within a time, for the interval without contact."""
     raise _of_kernels()
 
 
@@ -232,7 +232,7 @@ def acceleration_about_nearest_well(
 
 
 @_operation()
-def center_from_divide(terms: Any, center: Any) -> Any:
+def center_from_barrier(terms: Any, center: Any) -> Any:
     """The displacement of the centre from the height that divides the wells, m."""
     raise _of_kernels()
 
@@ -244,9 +244,16 @@ def has_crossed(terms: Any, center: float, well_sign: float, crossed: Any) -> An
 
 
 @inlined
-def seen_from_divide(terms, seen):
-    """What is seen, the centre from the height that divides the wells."""
-    return ContactKinematics(seen.w, seen.wv, seen.d, seen.dv, center_from_divide(terms, seen.c), seen.cv)
+def kinematics_from_barrier(terms, kinematics):
+    """The kinematics, with the centre measured from the barrier between the wells."""
+    return ContactKinematics(
+        kinematics.w,
+        kinematics.wv,
+        kinematics.d,
+        kinematics.dv,
+        center_from_barrier(terms, kinematics.c),
+        kinematics.cv,
+    )
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -287,7 +294,7 @@ def depends_on_velocity(terms: Any) -> bool:
 
 
 def may_hide_onset(terms: Any) -> bool:
-    """Whether a term may change the motion so much within a step that the look-ahead misses a contact."""
+    """Whether a term may change the motion so much within a step that the interval without contact misses one."""
     raise _of_kernels()
 
 

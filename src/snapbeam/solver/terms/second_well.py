@@ -98,7 +98,7 @@ class SecondWell(NamedTuple):
 
     @staticmethod
     @inlined
-    def center_from_divide(term, center):
+    def center_from_barrier(term, center):
         """The wells are divided at a level."""
         return center - term.level
 

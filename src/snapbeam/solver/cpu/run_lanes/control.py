@@ -54,7 +54,7 @@ from snapbeam.solver.simd import (
 from snapbeam.solver.step_control import (
     GRADING,
     RELEASE,
-    STRETCHED,
+    STRETCH_LIMIT,
     ContactKinematics,
     clock_of,
     close_impact,
@@ -105,30 +105,30 @@ def _change_wells(m, n, shape, lane_settings, kernel_input, which):
 
 
 @inlined
-def _flight_level(m, n, lane_settings):
+def _flight_halvings(m, n, lane_settings):
     """Halvings of the flight step in free flight."""
     level = splat(0.0)
     if lane_settings.stretch > 0.0:
-        far = halvings(vabs(load(m, at.STRETCH)), splat(STRETCHED * lane_settings.stretch))
-        level = vmin(vmax(far, level), load(m, at.FINEST))
+        far = halvings(vabs(load(m, at.STRETCH)), splat(STRETCH_LIMIT * lane_settings.stretch))
+        level = vmin(vmax(far, level), load(m, at.MAX_HALVINGS))
     return level
 
 
 @inlined
-def _contact_level(m, level, touching):
+def _contact_halvings(m, level, touching):
     """The same of the lanes in contact: graded from the onset and towards the release."""
     dv = load(m, at.DV)
     want = GRADING * ((load(m, at.T) - load(m, at.ONSET)) * load(m, at.TICK))
     left = -RELEASE * load(m, at.D) / dv
     want = vmax(pick(less(dv, 0.0), vmin(want, left), want), splat(0.0))
     graded = vmax(halvings(load(m, at.STEP_TIME), want), load(m, at.COARSEST))
-    return pick(mask_of(touching), vmax(level, vmin(graded, load(m, at.FINEST))), level)
+    return pick(mask_of(touching), vmax(level, vmin(graded, load(m, at.MAX_HALVINGS))), level)
 
 
 @inlined
 def propose_step(m, n, shape, lane_settings, kernel_input):
     """The length of the next step of every lane that begins one; returns those."""
-    fresh = n[at.LIVE] & ~(n[at.CUTTING] | n[at.ASIDE] | n[at.PROBED])
+    fresh = n[at.LIVE] & ~(n[at.SHORTENED] | n[at.INSIDE] | n[at.PROBED])
     if lane_settings.stretch > 0.0:
         across = load(m, at.C) * (load(m, at.WELL_SIGN) * load(m, at.REST_CENTER))
         crossed = bits(less(across, 0.0)) & fresh
@@ -138,9 +138,9 @@ def propose_step(m, n, shape, lane_settings, kernel_input):
     one = pick(which, splat(1.0), splat(0.0))
     store(m, at.STEPS, load(m, at.STEPS) + one)
     store(m, at.STEPS_SINCE_START, load(m, at.STEPS_SINCE_START) + one)
-    level = _flight_level(m, n, lane_settings)
+    level = _flight_halvings(m, n, lane_settings)
     if n[at.TOUCHING] & fresh:
-        level = _contact_level(m, level, n[at.TOUCHING] & fresh)
+        level = _contact_halvings(m, level, n[at.TOUCHING] & fresh)
     ticks = load(m, at.STEP) * power_of_two(0.0 - level)
     t, limit = load(m, at.T), load(m, at.LIMIT)
     over = bits(less(limit, t + ticks)) & fresh
@@ -149,7 +149,7 @@ def propose_step(m, n, shape, lane_settings, kernel_input):
     ticks = pick(which, ticks, load(m, at.TICKS))
     store(m, at.TICKS, ticks)
     store(m, at.LEVEL, pick(which, level, load(m, at.LEVEL)))
-    store(m, at.LENGTH, pick(mask_of(n[at.ASIDE]), load(m, at.LENGTH), ticks * load(m, at.TICK)))
+    store(m, at.LENGTH, pick(mask_of(n[at.INSIDE]), load(m, at.LENGTH), ticks * load(m, at.TICK)))
     phase = load(m, at.PHASE0) + TWO_PI * (load(m, at.WITHIN) / load(m, at.PERIOD))
     sine, cosine = sincos(phase)
     store(m, at.PHASE, phase)
@@ -173,7 +173,7 @@ def _prepare_any_length(m, shape, lane_settings, odd):
 @inlined
 def load_flows(m, n, shape, lane_settings):
     """Have the flows of every lane's step at hand."""
-    odd = (n[at.ODD] | n[at.ASIDE]) & n[at.LIVE]
+    odd = (n[at.ODD] | n[at.INSIDE]) & n[at.LIVE]
     level, key = load(m, at.LEVEL), load(m, at.KEY)
     other = (bits(less(level, key)) | bits(less(key, level))) & n[at.LIVE] & ~odd
     while other:
@@ -186,11 +186,11 @@ def load_flows(m, n, shape, lane_settings):
 
 
 # ----------------------------------------------------------------------------------------------------
-# After a step of every lane: which enter or leave the contact in it, and where such steps are cut.
+# After a step of every lane: which contacts begin or end in it, and where such steps then end.
 
 
 class About(NamedTuple):
-    """What is seen at the ends of the steps, eight of each: beam at striker and centre from rest, the penetration."""
+    """The kinematics at the ends of the steps, eight of each: beam at striker and centre from rest, the penetration."""
 
     w: Any
     wv: Any
@@ -201,13 +201,13 @@ class About(NamedTuple):
 
 
 @compiled
-def inner_samples_of(m, look, lane, inner_samples):
-    """What was seen inside the step of a lane, as the scalar functions have it; returns how many pieces."""
-    pieces = int(m[at.LOOK_PIECES + lane])
-    for i in range(pieces + 1):
+def inner_samples_of(m, sampling, lane, inner_samples):
+    """Copy the samples inside the step of a lane to the layout of the scalar functions; returns the number of subintervals."""
+    subintervals = int(m[at.SUBINTERVALS + lane])
+    for i in range(subintervals + 1):
         for j in range(4):
-            inner_samples[i, j] = m[look + (4 * i + j) * WIDTH + lane]
-    return pieces
+            inner_samples[i, j] = m[sampling + (4 * i + j) * WIDTH + lane]
+    return subintervals
 
 
 @inlined
@@ -223,42 +223,39 @@ def _update_safe_intervals(m, shape, late, early_center):
 
 
 @inlined
-def _sample_inside_steps(m, shape, lane_settings, lookers, with_center):
-    """Look into the free steps of some lanes; returns where the penetration may have been positive."""
-    which, ticks, step = mask_of(lookers), load(m, at.TICKS), load(m, at.STEP)
-    length, pieces = load(m, at.LENGTH), load(m, at.PIECES)
-    single = ~(bits(less(ticks, step)) | bits(less(step, ticks)))
-    double = ~(bits(less(ticks, 2.0 * step)) | bits(less(2.0 * step, ticks)))
-    usual = single | double
-    other = vmax(splat(2.0), 0.0 - vfloor(0.0 - length / load(m, at.FINEST_LOOK)))
-    pieces = pick(mask_of(double), 2.0 * pieces, pieces)
-    pieces = pick(mask_of(usual), pieces, other)
-    store(m, at.LOOK_PIECES, pick(which, pieces, load(m, at.LOOK_PIECES)))
-    store(m, at.LOOK_PIECE, pick(which, length / pieces, load(m, at.LOOK_PIECE)))
-    key, had = pick(mask_of(usual), splat(0.0), ticks), load(m, at.LOOK_KEY)
-    stale = (bits(less(key, had)) | bits(less(had, key))) & lookers
+def _sample_inside_steps(m, shape, lane_settings, sampled, with_center):
+    """Sample the free steps of some lanes inside; returns where the penetration may have been positive."""
+    which, ticks, step = mask_of(sampled), load(m, at.TICKS), load(m, at.STEP)
+    length, subintervals = load(m, at.LENGTH), load(m, at.STEP_SUBINTERVALS)
+    usual = ~(bits(less(ticks, step)) | bits(less(step, ticks)))
+    other = vmax(splat(2.0), 0.0 - vfloor(0.0 - length / load(m, at.SHORTEST_SUBINTERVAL)))
+    subintervals = pick(mask_of(usual), subintervals, other)
+    store(m, at.SUBINTERVALS, pick(which, subintervals, load(m, at.SUBINTERVALS)))
+    store(m, at.SUBINTERVAL, pick(which, length / subintervals, load(m, at.SUBINTERVAL)))
+    key, had = pick(mask_of(usual), splat(0.0), ticks), load(m, at.FLOW_KEY)
+    stale = (bits(less(key, had)) | bits(less(had, key))) & sampled
     if stale:
-        flows_over(m, shape, load(m, at.LOOK_PIECE), at.LOOK, mask_of(stale))
-        store(m, at.LOOK_KEY, pick(mask_of(stale), key, had))
-    most, left = 0, lookers
+        flows_over(m, shape, load(m, at.SUBINTERVAL), at.SAMPLING_FLOW, mask_of(stale))
+        store(m, at.FLOW_KEY, pick(mask_of(stale), key, had))
+    most, left = 0, sampled
     while left:
-        most = max(most, int(m[at.LOOK_PIECES + lowest(left)]))
+        most = max(most, int(m[at.SUBINTERVALS + lowest(left)]))
         left &= left - 1
-    return bits(less(0.0, propagate_free(m, shape, lane_settings.look, which, with_center, most)))
+    return bits(less(0.0, propagate_free(m, shape, lane_settings.sampling, which, with_center, most)))
 
 
 @inlined
-def _cut(m, n, lane, cut):
-    """End the step of a lane after *cut* ticks, in another pass."""
+def _end_step(m, n, lane, event_ticks):
+    """End the step of a lane after *event_ticks* ticks, in another pass."""
     bit = 1 << lane
-    n[at.CUTTING] |= bit
+    n[at.SHORTENED] |= bit
     n[at.ODD] |= bit
     m[at.WHOLE + lane] = m[at.TICKS + lane]
-    m[at.TICKS + lane] = cut
+    m[at.TICKS + lane] = event_ticks
 
 
 @compiled
-def _cut_at_release(m, n, about_d, about_dv, leaving):
+def _end_at_release(m, n, about_d, about_dv, leaving):
     """Cut the steps in which the penetration falls below zero; returns the lanes whose steps end there as they are."""
     store(m, at.TEMP, about_d)
     store(m, at.TEMP1, about_dv)
@@ -268,48 +265,48 @@ def _cut_at_release(m, n, about_d, about_dv, leaving):
         leaving &= leaving - 1
         n[at.EVENT] |= 1 << lane
         ticks, d = int(m[at.TICKS + lane]), m[at.D + lane]
-        cut = ticks
+        event_ticks = ticks
         if d > 0.0:
             fall = first_downcrossing(
                 d, m[at.DV + lane], m[at.TEMP + lane], m[at.TEMP1 + lane], m[at.LENGTH + lane]
             )
-            cut = max(1, int(fall * ticks))
-        if cut != ticks:
-            _cut(m, n, lane, cut)
+            event_ticks = max(1, int(fall * ticks))
+        if event_ticks != ticks:
+            _end_step(m, n, lane, event_ticks)
         else:
             whole |= 1 << lane
     return whole
 
 
 @compiled
-def _cut_at_onset(m, n, look, rising, inner_samples):
+def _end_at_onset(m, n, sampling, rising, inner_samples):
     """Cut the steps in which the gap closes; returns those that end as they are, and those that touch at once."""
     on, at_once = 0, 0
     while rising:
         lane = lowest(rising)
         rising &= rising - 1
         bit = 1 << lane
-        pieces = inner_samples_of(m, look, lane, inner_samples)
-        entry = first_contact_onset(inner_samples, pieces, m[at.LOOK_PIECE + lane])
-        if entry < 0.0:
+        subintervals = inner_samples_of(m, sampling, lane, inner_samples)
+        onset_time = first_contact_onset(inner_samples, subintervals, m[at.SUBINTERVAL + lane])
+        if onset_time < 0.0:
             on |= bit
             continue
         ticks = int(m[at.TICKS + lane])
-        cut = min(ticks, int(entry / m[at.TICK + lane]))
-        if cut < 1:
+        event_ticks = min(ticks, int(onset_time / m[at.TICK + lane]))
+        if event_ticks < 1:
             at_once |= bit
             continue
         n[at.EVENT] |= bit
-        if cut != ticks:
-            n[at.LOOKS] |= bit
-            _cut(m, n, lane, cut)
+        if event_ticks != ticks:
+            n[at.REFINING] |= bit
+            _end_step(m, n, lane, event_ticks)
         else:
             on |= bit
     return on, at_once
 
 
 @inlined
-def detect_contact_events(m, n, shape, lane_settings, about, whole, inner_samples):
+def detect_contact_events(m, n, shape, lane_settings, observed, whole, inner_samples):
     """Contact events in the steps of the lanes *whole*; returns the lanes whose steps end as they are, and those in contact at once."""
     if whole == 0:
         return 0, 0
@@ -317,9 +314,9 @@ def detect_contact_events(m, n, shape, lane_settings, about, whole, inner_sample
     free = whole & ~touching
     ends, at_once = whole, 0
     if touching:
-        leaving = touching & ~bits(less(0.0, about.d))
+        leaving = touching & ~bits(less(0.0, observed.d))
         if leaving:
-            ends = (ends & ~leaving) | _cut_at_release(m, n, about.d, about.dv, leaving)
+            ends = (ends & ~leaving) | _end_at_release(m, n, observed.d, observed.dv, leaving)
     if free:
         after = load(m, at.T) + load(m, at.TICKS)
         late, early = bits(less(load(m, at.SAFE_GAP), after)), bits(less(load(m, at.SAFE_CENTER), after))
@@ -330,7 +327,7 @@ def detect_contact_events(m, n, shape, lane_settings, about, whole, inner_sample
             if late | early:
                 rising = _sample_inside_steps(m, shape, lane_settings, late | early, early != 0) & late
                 if rising:
-                    on, at_once = _cut_at_onset(m, n, lane_settings.look, rising, inner_samples)
+                    on, at_once = _end_at_onset(m, n, lane_settings.sampling, rising, inner_samples)
                     ends = (ends & ~rising) | on
     return ends, at_once
 
@@ -344,14 +341,14 @@ def refine_onsets(m, n, kernel_input, d, dv, which):
     while which:
         lane = lowest(which)
         which &= which - 1
-        n[at.LOOKS] &= ~(1 << lane)
+        n[at.REFINING] &= ~(1 << lane)
         clock = clock_of(kernel_input.runs[n[at.RUNS + lane]], kernel_input.max_steps)
-        seen = ContactKinematics(0.0, 0.0, m[at.TEMP + lane], m[at.TEMP1 + lane], 0.0, 0.0)
-        least = (clock.step >> clock.finest) * clock.tick
+        kinematics = ContactKinematics(0.0, 0.0, m[at.TEMP + lane], m[at.TEMP1 + lane], 0.0, 0.0)
+        least = (clock.step >> clock.max_halvings) * clock.tick
         ticks = int(m[at.TICKS + lane])
-        cut = refine_onset(clock, ticks, int(m[at.WHOLE + lane]), seen, least)
-        if cut != ticks:
-            m[at.TICKS + lane] = cut
+        event_ticks = refine_onset(clock, ticks, int(m[at.WHOLE + lane]), kinematics, least)
+        if event_ticks != ticks:
+            m[at.TICKS + lane] = event_ticks
             again |= 1 << lane
     return again
 
@@ -371,7 +368,7 @@ def detect_deepest_points(m, n, d, dv, turning):
         if turn > 0.0 and update_extrema(d0, deepest, d0, v0, d1, v1, length)[1] > deepest:
             m[at.DEEPEST + lane] = deepest
             m[at.LENGTH + lane] = turn * length
-            n[at.ASIDE] |= 1 << lane
+            n[at.INSIDE] |= 1 << lane
             found |= 1 << lane
     return found
 
@@ -415,20 +412,20 @@ def _add(m, row, which, more):
 
 
 @inlined
-def _accumulate_displacement(m, seen1, length, which):
+def _accumulate_displacement(m, kinematics1, length, which):
     """Extremes and mean squares, as :func:`~snapbeam.solver.step_control.accumulate_displacement` keeps them."""
-    _accumulate_extremes(m, at.MIN_W, at.MAX_W, at.W, at.WV, seen1.w, seen1.wv, length, which)
-    _accumulate_extremes(m, at.MIN_C, at.MAX_C, at.C, at.CV, seen1.c, seen1.cv, length, which)
+    _accumulate_extremes(m, at.MIN_W, at.MAX_W, at.W, at.WV, kinematics1.w, kinematics1.wv, length, which)
+    _accumulate_extremes(m, at.MIN_C, at.MAX_C, at.C, at.CV, kinematics1.c, kinematics1.cv, length, which)
     mask = mask_of(which)
     peak, center_peak = load(m, at.PEAK_WV), load(m, at.PEAK_CV)
-    store(m, at.PEAK_WV, pick(mask, vmax(peak, vabs(seen1.wv)), peak))
-    store(m, at.PEAK_CV, pick(mask, vmax(center_peak, vabs(seen1.cv)), center_peak))
+    store(m, at.PEAK_WV, pick(mask, vmax(peak, vabs(kinematics1.wv)), peak))
+    store(m, at.PEAK_CV, pick(mask, vmax(center_peak, vabs(kinematics1.cv)), center_peak))
     w, wv, c, cv = load(m, at.W), load(m, at.WV), load(m, at.C), load(m, at.CV)
     inverse = 1.0 / length
-    _add(m, at.SQUARE_W, mask, square_of_signal(w, wv, seen1.w, seen1.wv, length))
-    _add(m, at.SQUARE_C, mask, square_of_signal(c, cv, seen1.c, seen1.cv, length))
-    _add(m, at.SQUARE_WV, mask, square_of_rate(w, wv, seen1.w, seen1.wv, length, inverse))
-    _add(m, at.SQUARE_CV, mask, square_of_rate(c, cv, seen1.c, seen1.cv, length, inverse))
+    _add(m, at.SQUARE_W, mask, square_of_signal(w, wv, kinematics1.w, kinematics1.wv, length))
+    _add(m, at.SQUARE_C, mask, square_of_signal(c, cv, kinematics1.c, kinematics1.cv, length))
+    _add(m, at.SQUARE_WV, mask, square_of_rate(w, wv, kinematics1.w, kinematics1.wv, length, inverse))
+    _add(m, at.SQUARE_CV, mask, square_of_rate(c, cv, kinematics1.c, kinematics1.cv, length, inverse))
 
 
 @compiled
@@ -443,15 +440,24 @@ def _count_zero_crossings(
         which &= which - 1
         i = n[at.RUNS + lane]
         accumulators, clock = accumulators_of_runs[i], clock_of(kernel_input.runs[i], kernel_input.max_steps)
-        pieces = 0
+        subintervals = 0
         if not n[at.TOUCHING] & (1 << lane):
-            pieces = inner_samples_of(m, lane_settings.look, lane, inner_samples)
-        seen = ContactKinematics(0.0, 0.0, 0.0, 0.0, m[at.C + lane], m[at.CV + lane])
-        seen1 = ContactKinematics(0.0, 0.0, 0.0, 0.0, m[at.TEMP + lane], m[at.TEMP1 + lane])
+            subintervals = inner_samples_of(m, lane_settings.sampling, lane, inner_samples)
+        kinematics = ContactKinematics(0.0, 0.0, 0.0, 0.0, m[at.C + lane], m[at.CV + lane])
+        kinematics1 = ContactKinematics(0.0, 0.0, 0.0, 0.0, m[at.TEMP + lane], m[at.TEMP1 + lane])
         rest = m[at.WELL_SIGN + lane] * m[at.REST_CENTER + lane]
-        start, length, piece = int(m[at.T + lane]), m[at.LENGTH + lane], m[at.LOOK_PIECE + lane]
+        start, length, subinterval = int(m[at.T + lane]), m[at.LENGTH + lane], m[at.SUBINTERVAL + lane]
         count_zero_crossings_in_step(
-            accumulators, clock, start, length, seen, seen1, inner_samples, rest, pieces, piece
+            accumulators,
+            clock,
+            start,
+            length,
+            kinematics,
+            kinematics1,
+            inner_samples,
+            rest,
+            subintervals,
+            subinterval,
         )
         m[at.SIDE + lane], m[at.CROSSINGS_LAST_QUARTER + lane] = (
             accumulators.side,
@@ -462,18 +468,26 @@ def _count_zero_crossings(
 
 @inlined
 def _accumulate_zero_crossings(
-    m, n, lane_settings, kernel_input, accumulators_of_runs, seen1, length, after, which, inner_samples
+    m, n, lane_settings, kernel_input, accumulators_of_runs, kinematics1, length, after, which, inner_samples
 ):
     """Where the centre may have crossed, have it counted."""
     touching = which & n[at.TOUCHING]
     near = bits(less(load(m, at.SAFE_CENTER), after)) & which & ~touching
     if touching:
         side = load(m, at.SIDE)
-        clear = vmin(side * load(m, at.C), side * seen1.c)
-        near |= touching & ~bits(less(hermite_overshoot_bound(load(m, at.CV), seen1.cv, length), clear))
+        clear = vmin(side * load(m, at.C), side * kinematics1.c)
+        near |= touching & ~bits(less(hermite_overshoot_bound(load(m, at.CV), kinematics1.cv, length), clear))
     if near:
         _count_zero_crossings(
-            m, n, lane_settings, kernel_input, accumulators_of_runs, seen1.c, seen1.cv, near, inner_samples
+            m,
+            n,
+            lane_settings,
+            kernel_input,
+            accumulators_of_runs,
+            kinematics1.c,
+            kinematics1.cv,
+            near,
+            inner_samples,
         )
 
 
@@ -510,16 +524,18 @@ def _every(steps, share, many):
 
 
 @inlined
-def _monitor_energy(m, n, shape, lane_settings, kernel_input, law, seen1, events, which):
+def _monitor_energy(m, n, shape, lane_settings, kernel_input, law, kinematics1, events, which):
     """Add up the energy of the modes, and every sixteenth step return the lanes whose future is certain."""
     linear = splat(0.0)
     if kernel_input.high:
         pressed = n[at.TOUCHING] & which & ~events
-        linear = sample_energy(m, shape, law, at.Q1, at.P1, at.K1, seen1.d, pressed, load(m, at.T), which)
+        linear = sample_energy(
+            m, shape, law, at.Q1, at.P1, at.K1, kinematics1.d, pressed, load(m, at.T), which
+        )
     decides = which & ~(n[at.TOUCHING] | events) & _every(load(m, at.STEPS_SINCE_START), 0.0625, 16.0)
     decides &= bits(less(splat(-math.inf), load(m, at.DECIDE_ENERGY)))
     decides &= bits(less(load(m, at.WELL_SIGN), 0.0))
-    decides &= bits(less(load(m, at.DECIDE_REACH), seen1.w)) & bits(less(0.0, seen1.c))
+    decides &= bits(less(load(m, at.DECIDE_REACH), kinematics1.w)) & bits(less(0.0, kinematics1.c))
     if decides == 0:
         return 0
     if not kernel_input.high:
@@ -530,28 +546,47 @@ def _monitor_energy(m, n, shape, lane_settings, kernel_input, law, seen1, events
 
 @inlined
 def accept_steps(
-    m, n, shape, lane_settings, kernel_input, accumulators_of_runs, law, about, contact, which, inner_samples
+    m,
+    n,
+    shape,
+    lane_settings,
+    kernel_input,
+    accumulators_of_runs,
+    law,
+    observed,
+    contact,
+    which,
+    inner_samples,
 ):
     """Accept the steps of the lanes *which*; returns those that are decided."""
     mask, length = mask_of(which), load(m, at.LENGTH)
     well_sign = load(m, at.WELL_SIGN)
-    seen1 = ContactKinematics(
-        about.w + well_sign * load(m, at.REST_CONTACT), about.wv, about.d, about.dv,
-        about.c + well_sign * load(m, at.REST_CENTER), about.cv,
+    kinematics1 = ContactKinematics(
+        observed.w + well_sign * load(m, at.REST_CONTACT), observed.wv, observed.d, observed.dv,
+        observed.c + well_sign * load(m, at.REST_CENTER), observed.cv,
     )  # fmt: skip
     touching = which & n[at.TOUCHING]
     if touching:
         pressed = mask_of(touching)
         deepest = load(m, at.DEEPEST)
-        store(m, at.DEEPEST, pick(pressed, vmax(deepest, about.d), deepest))
+        store(m, at.DEEPEST, pick(pressed, vmax(deepest, observed.d), deepest))
         _add(m, at.IMPULSE, pressed, contact.impulse)
         _add(m, at.WORK, pressed, contact.work)
         _add(m, at.GROSS, pressed, contact.gross)
-    _accumulate_displacement(m, seen1, length, which)
+    _accumulate_displacement(m, kinematics1, length, which)
     ticks, period = load(m, at.TICKS), load(m, at.PERIOD)
     after = load(m, at.T) + ticks
     _accumulate_zero_crossings(
-        m, n, lane_settings, kernel_input, accumulators_of_runs, seen1, length, after, which, inner_samples
+        m,
+        n,
+        lane_settings,
+        kernel_input,
+        accumulators_of_runs,
+        kinematics1,
+        length,
+        after,
+        which,
+        inner_samples,
     )
     store(m, at.T, pick(mask, after, load(m, at.T)))
     within = load(m, at.WITHIN)
@@ -562,9 +597,9 @@ def accept_steps(
     released = events & touching
     if events:
         _begin_and_end_contacts(m, n, kernel_input, accumulators_of_runs, events)
-    for bit in (at.CUTTING, at.EVENT, at.LOOKS, at.PROBED):
+    for bit in (at.SHORTENED, at.EVENT, at.REFINING, at.PROBED):
         n[bit] &= ~which
-    sure = _monitor_energy(m, n, shape, lane_settings, kernel_input, law, seen1, events, which)
+    sure = _monitor_energy(m, n, shape, lane_settings, kernel_input, law, kinematics1, events, which)
     many = load(m, at.DECIDE_CROSSINGS)
     sure |= bits(less(-0.5, many)) & bits(less(many, load(m, at.CROSSINGS_LAST_QUARTER))) & which
     for i in range(modes_of(shape)):
@@ -572,12 +607,12 @@ def accept_steps(
         for field in range(at.Q, at.K + WIDTH, WIDTH):
             new = load(m, mode + field + at.Q1 - at.Q)
             store(m, mode + field, pick(mask, new, load(m, mode + field)))
-    d = pick(mask_of(released), vmin(seen1.d, splat(0.0)), seen1.d)
-    store(m, at.W, pick(mask, seen1.w, load(m, at.W)))
-    store(m, at.WV, pick(mask, seen1.wv, load(m, at.WV)))
+    d = pick(mask_of(released), vmin(kinematics1.d, splat(0.0)), kinematics1.d)
+    store(m, at.W, pick(mask, kinematics1.w, load(m, at.W)))
+    store(m, at.WV, pick(mask, kinematics1.wv, load(m, at.WV)))
     store(m, at.D, pick(mask, d, load(m, at.D)))
-    store(m, at.DV, pick(mask, seen1.dv, load(m, at.DV)))
-    store(m, at.C, pick(mask, seen1.c, load(m, at.C)))
-    store(m, at.CV, pick(mask, seen1.cv, load(m, at.CV)))
+    store(m, at.DV, pick(mask, kinematics1.dv, load(m, at.DV)))
+    store(m, at.C, pick(mask, kinematics1.c, load(m, at.C)))
+    store(m, at.CV, pick(mask, kinematics1.cv, load(m, at.CV)))
     store(m, at.STRETCH, pick(mask, 2.0 * load(m, at.GQ) + load(m, at.QR), load(m, at.STRETCH)))
     return sure

@@ -1,7 +1,7 @@
 """Integration of few modes: eight runs in a register, each with its own time, step, contact and well.
 
-In every pass each lane takes a step of its own.  One that is to be cut where the contact begins or ends takes that
-step in the next pass, while the others go on; so does one that has to be looked into for the deepest point of a
+In every pass each lane takes a step of its own.  One that must end where the contact begins or ends takes that shorter
+step in the next pass, while the others go on; so does one that must be sampled for the maximum penetration of a
 contact.  A lane whose run has ended takes the next one.  Nothing passes from lane to lane, and every sum is taken in
 the order in which the other layout takes it: results are the same to the bit, whatever a run is integrated with.
 """
@@ -52,7 +52,7 @@ _DIVERGED, _STEP_LIMIT = int(RunStatus.DIVERGED), int(RunStatus.STEP_LIMIT)
 
 @inlined
 def _observe(m, shape):
-    """What is seen at the ends of the steps."""
+    """The kinematics at the ends of the steps."""
     well_sign = load(m, at.WELL_SIGN)
     offset = load(m, at.OFFSET) + (1.0 - well_sign) * load(m, at.REST_CONTACT)
     omega = load(m, at.OMEGA)
@@ -129,29 +129,29 @@ def _pass(m, n, shape, lane_settings, kernel_input, accumulators_of_runs, inner_
     contact = take_step(
         m, shape, lane_settings.stages, lane_settings.gamma, touching != 0, mask_of(touching), law
     )
-    about = _observe(m, shape)
+    observed = _observe(m, shape)
     going = live
-    aside = n[at.ASIDE] & live
-    if aside:
+    inside = n[at.INSIDE] & live
+    if inside:
         deepest = load(m, at.DEEPEST)
-        store(m, at.DEEPEST, pick(mask_of(aside), vmax(deepest, about.d), deepest))
-        n[at.ASIDE] &= ~aside
-        n[at.PROBED] |= aside
-        going &= ~aside
-    failed = going & ~bits(less(vabs(about.d + about.dv), math.inf))
+        store(m, at.DEEPEST, pick(mask_of(inside), vmax(deepest, observed.d), deepest))
+        n[at.INSIDE] &= ~inside
+        n[at.PROBED] |= inside
+        going &= ~inside
+    failed = going & ~bits(less(vabs(observed.d + observed.dv), math.inf))
     going &= ~failed
-    looks = n[at.LOOKS] & n[at.CUTTING] & going
-    ends, at_once = detect_contact_events(m, n, shape, lane_settings, about, fresh & going, inner_samples)
+    refining = n[at.REFINING] & n[at.SHORTENED] & going
+    ends, at_once = detect_contact_events(m, n, shape, lane_settings, observed, fresh & going, inner_samples)
     going = (going & ~fresh) | ends
-    if looks:
-        going &= ~refine_onsets(m, n, kernel_input, about.d, about.dv, looks)
+    if refining:
+        going &= ~refine_onsets(m, n, kernel_input, observed.d, observed.dv, refining)
     if at_once:
         _begin_at_once(m, n, accumulators_of_runs, at_once)
     pressed = going & n[at.TOUCHING] & ~n[at.PROBED]
     if pressed:
-        turning = bits(less(load(m, at.DV) * about.dv, 0.0)) & bits(less(0.0, load(m, at.DV))) & pressed
+        turning = bits(less(load(m, at.DV) * observed.dv, 0.0)) & bits(less(0.0, load(m, at.DV))) & pressed
         if turning:
-            going &= ~detect_deepest_points(m, n, about.d, about.dv, turning)
+            going &= ~detect_deepest_points(m, n, observed.d, observed.dv, turning)
     sure, over = 0, 0
     if going:
         sure = accept_steps(
@@ -162,7 +162,7 @@ def _pass(m, n, shape, lane_settings, kernel_input, accumulators_of_runs, inner_
             kernel_input,
             accumulators_of_runs,
             law,
-            about,
+            observed,
             contact,
             going,
             inner_samples,

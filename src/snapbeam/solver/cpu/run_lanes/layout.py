@@ -26,7 +26,7 @@ FLOWS = 6
 (
     T, WITHIN, PERIOD, TICK, OUTPUT_INTERVAL, LIMIT, END, TICKS, LENGTH, KEY, WHOLE, LEVEL, PHASE0, PHASE, SINE, COSINE, WELL_SIGN,
     STRETCH, OFFSET, OMEGA, AMPLITUDE, REST_CONTACT, REST_CENTER, TIP_SPEED, STEP_TIME, STEP, COARSEST,
-    COARSE_TICKS, FINEST, PIECES, LOOK_KEY, FINEST_LOOK, LOOK_PIECES, LOOK_PIECE, SAFE_GAP, SAFE_CENTER,
+    COARSE_TICKS, MAX_HALVINGS, STEP_SUBINTERVALS, FLOW_KEY, SHORTEST_SUBINTERVAL, SUBINTERVALS, SUBINTERVAL, SAFE_GAP, SAFE_CENTER,
     ENERGY_TICK, STEPS_SINCE_START, ONSET, SIDE, DECIDE_REACH, DECIDE_ENERGY, DECIDE_CROSSINGS, CROSSINGS_LAST_QUARTER, STEPS, MAX_STEPS, W, WV, D,
     DV, C, CV, MIN_W, MAX_W, MIN_C, MAX_C, PEAK_WV, PEAK_CV, SQUARE_W, SQUARE_C, SQUARE_WV, SQUARE_CV,
     ENERGY_TIME, HIGH_TIME, ENERGY, HIGH_ENERGY, POWER, HIGH_POWER, CROSSING, IMPULSE, WORK, GROSS, DEEPEST, TEMP, TEMP1, TEMP2,
@@ -48,8 +48,8 @@ MODE = PAIRS + MOST * FLOWS * 4
 # Of each mode, plain numbers:
 OMEGA_I, OMEGA_SQUARED, OMEGA_DAMPED, DAMPING, CENTER, SHIFT, HIGH, WELL = range(8)
 # and rows.
-Q, P, K, Q1, P1, K1, SEEN_WELL, CONTACT, LOOK = (WIDTH * i for i in range(1, 10))
-FLOW = LOOK + 4 * WIDTH
+Q, P, K, Q1, P1, K1, SEEN_WELL, CONTACT, SAMPLING_FLOW = (WIDTH * i for i in range(1, 10))
+FLOW = SAMPLING_FLOW + 4 * WIDTH
 """a11 - 1, a12, a21, a22 - 1 of each distinct flow of the step at hand."""
 MODE_ROWS = FLOW + FLOWS * 4 * WIDTH
 TABLES = MODE + MOST * MODE_ROWS
@@ -66,20 +66,20 @@ def slot_size(modes: int, distinct: int) -> int:
     return groups(modes, distinct) * 4 * WIDTH + 2 * TURNS
 
 
-def sizes(modes: int, distinct: int, pieces: int) -> tuple[int, int]:
-    """Where the rows of a look begin, and the length of the memory, for so many *pieces* of a step."""
-    look = TABLES + WIDTH * (LEVELS + 1) * slot_size(modes, distinct)
-    return look, look + 4 * WIDTH * (pieces + 1)
+def sizes(modes: int, distinct: int, subintervals: int) -> tuple[int, int]:
+    """Where the rows of the samples begin, and the length of the memory, for so many *subintervals* of a step."""
+    sampling = TABLES + WIDTH * (LEVELS + 1) * slot_size(modes, distinct)
+    return sampling, sampling + 4 * WIDTH * (subintervals + 1)
 
 
 # Whole numbers: which of the eight lanes, a bit a lane.
 (
     LIVE,  # hold a run
     TOUCHING,
-    CUTTING,  # take a step that was cut where the contact begins or ends
+    SHORTENED,  # take a step shortened to where the contact begins or ends
     EVENT,  # and do so at the end of the step at hand
-    LOOKS,  # look once more where they enter
-    ASIDE,  # look for the deepest point of a contact, inside the step at hand
+    REFINING,  # locate the onset once more
+    INSIDE,  # locate the maximum penetration of a contact, inside the present step
     PROBED,  # have done so
     ODD,  # take a step of a length that is not prepared
 ) = range(8)

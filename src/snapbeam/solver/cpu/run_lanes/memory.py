@@ -46,27 +46,27 @@ def suits(ensemble: Ensemble, packed: Packed, most: int = at.MOST) -> bool:
     return (
         packed.rows.size <= most
         and not packed.layout.terms
-        and ensemble.structure.tapped is None
+        and ensemble.structure.circuit_row is None
         and ensemble.size > 1
         and ensemble.drive.harmonic
         and law.vectorizable
         and not (law.rate_dependent or law.impulsive)
         and ensemble.law_numbers.shape[1] <= _LAW_NUMBERS
-        and ensemble.finest + 1 <= at.LEVELS
+        and ensemble.max_halvings + 1 <= at.LEVELS
         and 2.0 * flow * longest < packed.layout.gentle
         and float(ensemble.runs["end"].max()) + 2.0 * float(ensemble.runs["period"].max()) < _MOST_TICKS
         and not type(extras_of_table()).owner.rows
     )
 
 
-def lay_out_few(ensemble: Ensemble, packed: Packed, pieces: int) -> FewMemory:
-    """Memory for eight runs, with the structure and the composition in it; a look has *pieces* at most."""
+def lay_out_few(ensemble: Ensemble, packed: Packed, subintervals: int) -> FewMemory:
+    """Memory for eight runs, with the structure and the composition in it; a step has *subintervals* at most."""
     structure, order = ensemble.structure, np.argsort(packed.rows)
     modes = order.size
     stages, weights = in_memory(ensemble.order, at.STAGES)
     distinct = (stages.flows + 1) // 2
     slot = at.slot_size(modes, distinct)
-    look, length = at.sizes(modes, distinct, pieces)
+    sampling, length = at.sizes(modes, distinct, subintervals)
     raw = np.zeros(length + _ALIGNMENT // 8)
     skipped = (-raw.ctypes.data % _ALIGNMENT) // 8
     m: _Array = raw[skipped : skipped + length]
@@ -97,7 +97,7 @@ def lay_out_few(ensemble: Ensemble, packed: Packed, pieces: int) -> FewMemory:
     body = None
     if structure.body_mass is not None:
         body = int(np.flatnonzero(order == structure.equilibrium.size)[0])
-    lane_settings = LaneSettings(stages, structure.nonlinear_stiffness, structure.stretch, slot, look)
+    lane_settings = LaneSettings(stages, structure.nonlinear_stiffness, structure.stretch, slot, sampling)
     return FewMemory(
         m, np.zeros(at.RUNS + 8, dtype=np.int64), shape_of(blocks, stages.flows, body), lane_settings
     )

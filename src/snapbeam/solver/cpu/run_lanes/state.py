@@ -29,7 +29,7 @@ from snapbeam.solver.physics import (
 )
 from snapbeam.solver.simd import WIDTH, broadcast_load, lanes_tuple, load, mask_of, pick, splat, store
 from snapbeam.solver.splitting import TURNS, Stages
-from snapbeam.solver.step_control import PIECES, TWELFTH, ContactKinematics, begin_statistics
+from snapbeam.solver.step_control import SUBINTERVALS, TWELFTH, ContactKinematics, begin_statistics
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = [
@@ -59,8 +59,8 @@ class LaneSettings(NamedTuple):
     """Squared slopes in a well; 0 if there is one well only."""
     slot: int
     """Plain numbers of a prepared step."""
-    look: int
-    """Where in memory what a look inside a step sees begins."""
+    sampling: int
+    """Where in memory the samples inside a step begin."""
 
 
 @inlined
@@ -132,7 +132,7 @@ def _prepare_all(m, shape, lane_settings, lane, levels):
 
 @compiled
 def observe_run(m, shape, lane_settings, lane):
-    """What is seen of a lane that stands where Q and P say, and its tension; returns its energy without the contact."""
+    """The kinematics of a lane at the state Q, P, and its tension; returns its energy without the contact."""
     which = mask_of(1 << lane)
     gq, qr = tension(m, shape, lane_settings.gamma, which, at.Q)
     w, wv, c, cv = signals(m, shape, at.Q, at.P)
@@ -229,8 +229,8 @@ def _constants(m, shape, kernel_input, lane, i):
     m[at.PERIOD + lane], m[at.OUTPUT_INTERVAL + lane] = record.period, record.output_interval
     m[at.END + lane] = record.end
     m[at.LIMIT + lane] = min(record.output_interval, record.end)
-    m[at.COARSEST + lane], m[at.FINEST + lane] = record.coarsest, record.finest
-    m[at.COARSE_TICKS + lane] = record.step >> record.coarsest
+    m[at.COARSEST + lane], m[at.MAX_HALVINGS + lane] = record.min_contact_halvings, record.max_halvings
+    m[at.COARSE_TICKS + lane] = record.step >> record.min_contact_halvings
     m[at.PHASE0 + lane], m[at.OFFSET + lane], m[at.WELL_SIGN + lane] = (
         record.phase,
         record.offset,
@@ -248,8 +248,11 @@ def _constants(m, shape, kernel_input, lane, i):
         m[mode + at.Q + lane] = kernel_input.starts[record.start_row, 0, j]
         m[mode + at.P + lane] = kernel_input.starts[record.start_row, 1, j]
         m[mode + at.SEEN_WELL + lane] = record.well_sign * m[mode + at.WELL]
-    finest_look = TWO_PI / (PIECES * fastest)
-    m[at.FINEST_LOOK + lane], m[at.PIECES + lane] = finest_look, max(4, math.ceil(step_time / finest_look))
+    shortest_subinterval = TWO_PI / (SUBINTERVALS * fastest)
+    m[at.SHORTEST_SUBINTERVAL + lane], m[at.STEP_SUBINTERVALS + lane] = (
+        shortest_subinterval,
+        max(4, math.ceil(step_time / shortest_subinterval)),
+    )
 
 
 @compiled
@@ -258,23 +261,23 @@ def begin_run(m, n, shape, lane_settings, kernel_input, lane, i, accumulators):
     record, bit = kernel_input.runs[i], 1 << lane
     n[at.RUNS + lane] = i
     _constants(m, shape, kernel_input, lane, i)
-    _prepare_all(m, shape, lane_settings, lane, record.finest + 1)
-    m[at.KEY + lane], m[at.LOOK_KEY + lane], m[at.LOOK_PIECES + lane] = -99.0, -1.0, 0.0
+    _prepare_all(m, shape, lane_settings, lane, record.max_halvings + 1)
+    m[at.KEY + lane], m[at.FLOW_KEY + lane], m[at.SUBINTERVALS + lane] = -99.0, -1.0, 0.0
     m[at.T + lane] = m[at.WITHIN + lane] = 0.0
     energy = observe_run(m, shape, lane_settings, lane)
-    seen = ContactKinematics(
+    kinematics = ContactKinematics(
         m[at.W + lane], m[at.WV + lane], m[at.D + lane], m[at.DV + lane], m[at.C + lane], m[at.CV + lane]
     )
     law = numbers_of(kernel_input.law, kernel_input.law_numbers, i)
     since = record.contact_time
     touching = since >= 0.0
     if not math.isfinite(since):
-        pressed = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
+        pressed = kinematics.d > 0.0 or (kinematics.d == 0.0 and kinematics.dv > 0.0)
         touching = pressed and not is_impulsive(law)
     accumulators.touching, accumulators.onset = int(touching), 0
     if math.isfinite(since) and since > 0.0:
         accumulators.onset = -int(since / record.tick + 0.5)
-    begin_statistics(accumulators, seen.c, seen, law, energy + contact_energy(law, seen.d))
+    begin_statistics(accumulators, kinematics.c, kinematics, law, energy + contact_energy(law, kinematics.d))
     m[at.ONSET + lane], m[at.SIDE + lane], m[at.DEEPEST + lane] = (
         accumulators.onset,
         accumulators.side,

@@ -386,14 +386,14 @@ def _energies_and_powers(modes: Modes) -> list[str]:
 
 
 def _free_propagation(modes: Modes) -> list[str]:
-    """A free step in short pieces, as the other layout's :func:`~snapbeam.solver.cpu.events.sample_inside_step`.
+    """A free step in short subintervals, as the other layout's :func:`~snapbeam.solver.cpu.events.sample_inside_step`.
 
-    Row i of a look is the penetration, its rate, the displacement of the centre and its rate; only lanes of *which*
-    that have so many pieces are written.  Returns, for each lane, the maximum value that the penetration may have
+    Row i of the samples is the penetration, its rate, the displacement of the centre and its rate; only lanes of *which*
+    that have so many subintervals are written.  Returns, for each lane, the maximum value that the penetration may have
     had: its cubics stay below.
     """
-    head = ["def glide(m, shape, look, which, with_center, most):"]
-    body = [f"pieces, piece = load(m, {at.LOOK_PIECES}), load(m, {at.LOOK_PIECE})"]
+    head = ["def glide(m, shape, sampling, which, with_center, most):"]
+    body = [f"subintervals, subinterval = load(m, {at.SUBINTERVALS}), load(m, {at.SUBINTERVAL})"]
     body += [f"amplitude, omega = load(m, {at.AMPLITUDE}), load(m, {at.OMEGA})"]
     body += [f"offset = load(m, {at.OFFSET}) + (1.0 - load(m, {at.WELL_SIGN})) * load(m, {at.REST_CONTACT})"]
     for i in modes.each():
@@ -410,33 +410,33 @@ def _free_propagation(modes: Modes) -> list[str]:
         f"center1 = {total(lambda i: (f'e{i}', f'l{i}'))}",
     ]
     body += [
-        "turn_sine, turn_cosine = sincos(omega * piece)",
+        "turn_sine, turn_cosine = sincos(omega * subinterval)",
         f"sine, cosine = load(m, {at.SINE}), load(m, {at.COSINE})",
     ]
     cq, cp = total(lambda i: (f"c{i}", f"q{i}")), total(lambda i: (f"c{i}", f"p{i}"))
     eq, ep = total(lambda i: (f"e{i}", f"q{i}")), total(lambda i: (f"e{i}", f"p{i}"))
     body += ["before, before_rate, begun, greatest = splat(0.0), splat(0.0), splat(0.0), splat(-1.0)"]
     body += ["for i in range(most + 1):"]
-    step = ["done = i / pieces", "if i > 0:"]
-    # the piece that ends here, after the kick at its beginning
+    step = ["done = i / subintervals", "if i > 0:"]
+    # the subinterval that ends here, after the kick at its beginning
     step += [
-        "    begun = (i - 1) / pieces",
-        "    kick = piece",
+        "    begun = (i - 1) / subintervals",
+        "    kick = subinterval",
         "    if i == 1:",
-        "        kick = 0.5 * piece",
+        "        kick = 0.5 * subinterval",
     ]
     for i in modes.each():
-        a11, a12, a21, a22 = (modes.row(i, at.LOOK + c * WIDTH) for c in range(4))
+        a11, a12, a21, a22 = (modes.row(i, at.SAMPLING_FLOW + c * WIDTH) for c in range(4))
         step += [f"    kicked = fma(kick * begun, l{i}, p{i})"]
         step += [f"    kicked = fma(kick * (1.0 - begun), k{i}, kicked)"]
         step += [f"    p{i} = turned(kicked, {a22}, {a21}, q{i})"]
         step += [f"    q{i} = turned(q{i}, {a11}, {a12}, kicked)"]
-    step += ["owed = 0.5 * piece", "if i == 0:", "    owed = splat(0.0)"]
+    step += ["owed = 0.5 * subinterval", "if i == 0:", "    owed = splat(0.0)"]
     step += ["motion, velocity = shaker_motion(amplitude, omega, sine, cosine)"]
     step += [f"d = offset + motion - {cq}"]
     step += [f"dv = velocity - {cp} - owed * ((1.0 - done) * contact0 + done * contact1)"]
-    step += [f"row = look + {4 * WIDTH} * i"]
-    step += ["written = both(which, less(i - 0.5, pieces))"]
+    step += [f"row = sampling + {4 * WIDTH} * i"]
+    step += ["written = both(which, less(i - 0.5, subintervals))"]
     step += ["store(m, row, pick(written, d, load(m, row)))"]
     step += [f"store(m, row + {WIDTH}, pick(written, dv, load(m, row + {WIDTH})))"]
     step += ["if with_center:"]
@@ -444,7 +444,7 @@ def _free_propagation(modes: Modes) -> list[str]:
     step += [f"    store(m, row + {2 * WIDTH}, pick(written, c, load(m, row + {2 * WIDTH})))"]
     step += [f"    store(m, row + {3 * WIDTH}, pick(written, cv, load(m, row + {3 * WIDTH})))"]
     step += ["if i > 0:"]
-    step += ["    reach = vmax(before, d) + hermite_overshoot_bound(before_rate, dv, piece)"]
+    step += ["    reach = vmax(before, d) + hermite_overshoot_bound(before_rate, dv, subinterval)"]
     step += ["    greatest = pick(written, vmax(greatest, reach), greatest)"]
     step += ["before, before_rate, begun = d, dv, done"]
     step += [
@@ -597,15 +597,17 @@ def _energies_of(m, shape, q, p, k, force):
     return lambda m, shape, q, p, k, force: written(m, shape, q, p, k, force)
 
 
-def propagate_free(m: Any, shape: Any, look: int, which: Any, with_center: bool, most: int) -> Any:
-    """A free step in pieces, noted from *look* on; returns what the penetration cannot exceed after the start."""
+def propagate_free(m: Any, shape: Any, sampling: int, which: Any, with_center: bool, most: int) -> Any:
+    """A free step in subintervals, noted from *sampling* on; returns what the penetration cannot exceed after the start."""
     raise TypeError("propagate_free runs in compiled code only")
 
 
 @overload(propagate_free, jit_options=INLINE_HERE)
-def _propagate_free_of(m, shape, look, which, with_center, most):
+def _propagate_free_of(m, shape, sampling, which, with_center, most):
     written = _function("glide", shape.instance_class)
-    return lambda m, shape, look, which, with_center, most: written(m, shape, look, which, with_center, most)
+    return lambda m, shape, sampling, which, with_center, most: written(
+        m, shape, sampling, which, with_center, most
+    )
 
 
 def modes_of(shape: Any) -> int:

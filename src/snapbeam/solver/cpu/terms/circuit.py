@@ -240,7 +240,7 @@ def circuit_speed_bound(memory, size, omega, circuit, along, q, p, bound, horizo
 
 @inlined
 def validity_horizon(circuit, horizon):
-    """For how long what is seen of a free flight is relied on: a circuit stiffens the beam, and changes it soon."""
+    """For how long the bound of a free flight is valid: a circuit stiffens the beam, and its state changes soon."""
     if circuit is None:
         return horizon
     return 0.25 * horizon

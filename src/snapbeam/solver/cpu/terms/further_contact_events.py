@@ -1,7 +1,7 @@
 """When the strikers beside the first one meet the beam and leave it, and what is kept of their contacts.
 
-Each is watched as the first one is: near the beam a free step is looked into, a step that would pass an edge of some
-contact is cut there, and steps in contact are graded.  A step ends at the first edge of all.
+Each is watched as the first one is: near the beam a free step is sampled inside, a step that would pass an onset or release of
+a contact ends there, and steps in contact are graded.  A step ends at the first onset or release of all.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from snapbeam.solver.cpu.step import with_velocity_dependent
 from snapbeam.solver.cpu.terms.circuit import circuit_speed_bound, validity_horizon
 from snapbeam.solver.cpu.terms.further_contacts import block, mirror_further_contacts, penetration_of
 from snapbeam.solver.further_contacts import (
-    CUT,
     DEEPEST,
     DEPTH,
     DEPTH1,
+    EVENT_TICKS,
     HERE,
     IMPULSE,
     KEPT,
@@ -42,7 +42,13 @@ from snapbeam.solver.further_contacts import (
 from snapbeam.solver.interpolation import first_downcrossing, first_upcrossing, update_extrema
 from snapbeam.solver.simd import WIDTH, lanes_sum, load
 from snapbeam.solver.statistics import OTHER_IMPACTS, OTHER_IMPULSE, OTHER_PEAK, OTHER_WORK
-from snapbeam.solver.step_control import TRUST, ContactKinematics, contact_level, refine_onset, safe_interval
+from snapbeam.solver.step_control import (
+    TRUST,
+    ContactKinematics,
+    contact_halvings,
+    refine_onset,
+    safe_interval,
+)
 from snapbeam.solver.terms.interface import add_to_speed_bound
 
 __all__ = [
@@ -53,7 +59,7 @@ __all__ = [
     "begin_further_contacts",
     "close_further_contacts",
     "first_further_event",
-    "further_contacts_step_level",
+    "further_contacts_halvings",
     "limit_safe_interval",
     "observe_further_contacts",
     "refine_further_onsets",
@@ -135,7 +141,7 @@ def limit_safe_interval(memory, others, t, until):
 
 
 @inlined
-def further_contacts_step_level(memory, others, clock, t, touching, level):
+def further_contacts_halvings(memory, others, clock, t, touching, level):
     """The level of a step, made finer for those that touch, and finer still where more than one contact lasts.
 
     A beam that is pressed from several sides has the stiffness of all contacts, whose rates add as squares: of two
@@ -149,9 +155,9 @@ def further_contacts_step_level(memory, others, clock, t, touching, level):
         if memory[at + TOUCHING] != 0.0:
             count += 1
             elapsed = (t - memory[at + ONSET]) * clock.tick
-            level = max(level, contact_level(clock, elapsed, memory[at + DEPTH], memory[at + RATE]))
+            level = max(level, contact_halvings(clock, elapsed, memory[at + DEPTH], memory[at + RATE]))
     if count > 1:
-        level = max(level, min(clock.coarsest + 1, clock.finest))
+        level = max(level, min(clock.min_contact_halvings + 1, clock.max_halvings))
     return level
 
 
@@ -168,44 +174,46 @@ def observe_further_contacts(memory, size, others, drive, argument, q, p):
 
 
 @called
-def _entry(memory, layout, others, drive, flow, pieces, piece, step, j, scratch):
+def _onset_time(memory, layout, others, drive, flow, subintervals, subinterval, step, j, scratch):
     """When within a free step the gap of striker j closes, s; -1 if it does not."""
     size, row, parts = layout.size, others.rows + j * layout.size, scratch.parts
     sign, here = memory[block(others, j) + SIGN], memory[block(others, j) + HERE]
-    propagate_free(memory, layout, row, flow, pieces, piece, step.q, step.p, step.k, step.k1, False, parts)
+    propagate_free(
+        memory, layout, row, flow, subintervals, subinterval, step.q, step.p, step.k, step.k1, False, parts
+    )
     push0, push1 = dot(memory, size, row, step.k), dot(memory, size, row, step.k1)
     before, rate_before = 0.0, 0.0
-    for i in range(pieces + 1):
-        done, owed = i / pieces, 0.5 * piece
+    for i in range(subintervals + 1):
+        done, owed = i / subintervals, 0.5 * subinterval
         if i == 0:
             owed = 0.0
             w, rate = dot(memory, size, row, step.q), dot(memory, size, row, step.p)
         else:
             at = 4 * WIDTH * (i - 1)
             w, rate = lanes_sum(load(parts, at)), lanes_sum(load(parts, at + WIDTH))
-        motion, velocity = motion_of(drive, memory, step.phase + i * piece * drive.omega, j, sign)
+        motion, velocity = motion_of(drive, memory, step.phase + i * subinterval * drive.omega, j, sign)
         depth = here + motion - w
         closing = velocity - rate - owed * ((1.0 - done) * push0 + done * push1)
         if i > 0:
-            rise = first_upcrossing(before, rate_before, depth, closing, piece)
+            rise = first_upcrossing(before, rate_before, depth, closing, subinterval)
             if rise >= 0.0:
-                return (i - 1 + rise) * piece
+                return (i - 1 + rise) * subinterval
         before, rate_before = depth, closing
     return -1.0
 
 
 @inlined
-def _looked_for(memory, layout, others, slot, run, drive, step, j, scratch):
-    """The same, in pieces as short as the fastest mode asks for."""
-    look, pieces = slot, run.step_pieces
-    if step.ticks == 2 * run.clock.step:
-        pieces *= 2
-    elif step.ticks != run.clock.step:
-        look += 4 * layout.size
-        pieces = max(2, math.ceil(step.length / run.finest_look))
-        flow_coefficients(memory, layout, step.length / pieces, look)
+def _sampled_onset(memory, layout, others, slot, run, drive, step, j, scratch):
+    """The same, in subintervals that resolve the fastest mode."""
+    sampling, subintervals = slot, run.step_subintervals
+    if step.ticks != run.clock.step:
+        sampling += 4 * layout.size
+        subintervals = max(2, math.ceil(step.length / run.shortest_subinterval))
+        flow_coefficients(memory, layout, step.length / subintervals, sampling)
     free = with_velocity_dependent(memory, layout, run.spare, step)
-    return _entry(memory, layout, others, drive, look, pieces, step.length / pieces, free, j, scratch)
+    return _onset_time(
+        memory, layout, others, drive, sampling, subintervals, step.length / subintervals, free, j, scratch
+    )
 
 
 @called
@@ -216,15 +224,15 @@ def _edge(memory, layout, others, slot, run, t, drive, step, scratch):
     # a contact changes how fast the others may close: nothing that was known in free flight holds while one lasts
     busy = any_touches(memory, others, step.touching)
     for j in range(count_of(others.kinds)):
-        at, row, cut = block(others, j), others.rows + j * size, -1
+        at, row, event_ticks = block(others, j), others.rows + j * size, -1
         depth, rate, depth1, rate1 = (
             memory[at + DEPTH], memory[at + RATE], memory[at + DEPTH1], memory[at + RATE1]
         )  # fmt: skip
         if memory[at + TOUCHING] != 0.0:
             if depth1 <= 0.0:
-                cut = step.ticks
+                event_ticks = step.ticks
                 if depth > 0.0:
-                    cut = max(
+                    event_ticks = max(
                         1, int(first_downcrossing(depth, rate, depth1, rate1, step.length) * step.ticks)
                     )
         else:
@@ -244,20 +252,20 @@ def _edge(memory, layout, others, slot, run, t, drive, step, scratch):
                 push = dot(memory, size, row, step.k)
                 safe = safe_interval(-depth, bound, memory[at + SPEED], push, known)
                 memory[at + SAFE] = t + int(safe / tick)
-            entry = -1.0
+            onset_time = -1.0
             if after > memory[at + SAFE]:
                 if step.touching:
-                    # what is looked into knows nothing of the first contact's force; the ends of the step do
-                    entry = first_upcrossing(depth, rate, depth1, rate1, step.length) * step.length
+                    # the samples do not include the first contact's force; the ends of the step do
+                    onset_time = first_upcrossing(depth, rate, depth1, rate1, step.length) * step.length
                 else:
-                    entry = _looked_for(memory, layout, others, slot, run, drive, step, j, scratch)
-            if entry >= 0.0:
-                cut = min(step.ticks, int(entry / tick))
+                    onset_time = _sampled_onset(memory, layout, others, slot, run, drive, step, j, scratch)
+            if onset_time >= 0.0:
+                event_ticks = min(step.ticks, int(onset_time / tick))
             elif depth1 > 0.0:
-                cut = step.ticks
-        memory[at + CUT] = cut
-        if cut >= 0:
-            earliest = min(earliest, cut)
+                event_ticks = step.ticks
+        memory[at + EVENT_TICKS] = event_ticks
+        if event_ticks >= 0:
+            earliest = min(earliest, event_ticks)
     return earliest
 
 
@@ -265,7 +273,7 @@ def _edge(memory, layout, others, slot, run, t, drive, step, scratch):
 def first_further_event(memory, layout, others, slot, run, t, drive, step, scratch):
     """The tick within a step at which the first of the other strikers meets or leaves the beam; its end if none does.
 
-    *slot* is where the flow over a piece of a look stands.
+    *slot* is where the flow over a subinterval is stored.
     """
     if others is None:
         return step.ticks
@@ -273,25 +281,25 @@ def first_further_event(memory, layout, others, slot, run, t, drive, step, scrat
 
 
 @inlined
-def refine_further_onsets(memory, others, clock, edge, cut, whole, least, due):
-    """Where a step that was cut at *cut* is to be cut, knowing better how far the gap of one that enters there is.
+def refine_further_onsets(memory, others, clock, edge, event_ticks, whole, smallest_correction, due):
+    """Where a step that was shortened to *event_ticks* should end, from the gap of the contact that begins there.
 
-    Nothing new unless it is *due*: the *edge* at which the step was cut first is one of theirs.
+    Nothing new unless it is *due*: the *edge* to which the step was shortened first is one of theirs.
     """
     if others is None:
-        return cut
+        return event_ticks
     if due:
         for j in range(count_of(others.kinds)):
             at = block(others, j)
-            if memory[at + TOUCHING] == 0.0 and memory[at + CUT] == edge:
-                seen = ContactKinematics(0.0, 0.0, memory[at + DEPTH1], memory[at + RATE1], 0.0, 0.0)
-                return refine_onset(clock, cut, whole, seen, least)
-    return cut
+            if memory[at + TOUCHING] == 0.0 and memory[at + EVENT_TICKS] == edge:
+                kinematics = ContactKinematics(0.0, 0.0, memory[at + DEPTH1], memory[at + RATE1], 0.0, 0.0)
+                return refine_onset(clock, event_ticks, whole, kinematics, smallest_correction)
+    return event_ticks
 
 
 @inlined
 def store_further_contacts(memory, others):
-    """Keep what the accepted step gave: a look ahead that follows writes over it."""
+    """Keep what the accepted step gave: a trial step that follows writes over it."""
     if others is None:
         return
     for j in range(count_of(others.kinds)):
@@ -367,7 +375,7 @@ def _turn(memory, others, edge, t, length, tick, accumulators, outputs):
             memory[at + PUSHED] += memory[at + KEPT]
         if length > 0.0:
             memory[at + DEPTH], memory[at + RATE] = depth1, rate1
-        if memory[at + CUT] >= 0.0 and memory[at + CUT] <= edge:
+        if memory[at + EVENT_TICKS] >= 0.0 and memory[at + EVENT_TICKS] <= edge:
             memory[at + SAFE] = t
             if touching:
                 _leave(memory, others, j, accumulators, outputs, t, tick)

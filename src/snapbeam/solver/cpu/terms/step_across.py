@@ -12,7 +12,7 @@ from numba.extending import overload
 from snapbeam.solver.compilation import INLINE_HERE, called
 from snapbeam.solver.contact_force import mark_of
 from snapbeam.solver.cpu.mode_lanes import acceleration_rows
-from snapbeam.solver.cpu.state import cut_slot
+from snapbeam.solver.cpu.state import variable_slot
 from snapbeam.solver.cpu.step import Step, StepIncrement, observe, prepare, take_step
 from snapbeam.solver.cpu.terms.circuit import CircuitIncrement
 from snapbeam.solver.cpu.terms.discontinuities import APART, discontinuity_within, jumps_of
@@ -35,7 +35,7 @@ _NEAR = 0.5
 @called
 def _in_two_parts(memory, blocks, layout, stages, run, tip, step, length, with_energy):
     """The *step* as a part of *length* seconds, which ends at the jump, and the rest."""
-    drive, at = run.struck.drive, cut_slot(run)
+    drive, at = run.tip.drive, variable_slot(run)
     to_jump = Step(
         0, at, length, step.phase - APART, step.touching, step.q, step.p, step.k, step.q1, step.p1, step.k1, step.r
     )  # fmt: skip
@@ -104,11 +104,11 @@ def mark_at_jump(
 
 @called
 def _mark(memory, blocks, layout, stages, run, tip, step, length, deepest):
-    q, p, at = run.spare, run.spare + layout.size, cut_slot(run)
+    q, p, at = run.spare, run.spare + layout.size, variable_slot(run)
     to_jump = Step(
         0, at, length, step.phase - APART, step.touching, step.q, step.p, step.k, q, p, run.spare + 2 * layout.size, step.r
     )  # fmt: skip
-    prepare(memory, layout, stages, run.struck.drive, length, at)
+    prepare(memory, layout, stages, run.tip.drive, length, at)
     take_step(memory, blocks, layout, stages, tip, to_jump, None)
     phase = step.phase + tip.drive.omega * length
     before = observe(memory, layout, tip, phase - APART, q, p)
