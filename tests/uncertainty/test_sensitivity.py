@@ -109,3 +109,39 @@ def test_refusals() -> None:
         sb.uncertainty.sobol_indices_from_samples(np.zeros((10, 2)), np.zeros(10))
     with pytest.raises(InputError, match="power of 2"):
         sb.uncertainty.sobol_indices(ishigami, 3, 100)
+
+
+@pytest.mark.parametrize("value", [0.0, 192.53, -1e-9, 1e12])
+def test_constant_output_has_no_indices(value):
+    """A constant has no variance to share; its rounding errors (5.7e-14 of 192.53) are none of it either."""
+    x = np.random.default_rng(1).uniform(size=(1000, 2))
+    for noise in (0.0, 1e-17):
+        output = value * (1.0 + noise * np.arange(1000))
+        with pytest.raises(InputError, match=r"output: is constant"):
+            sb.uncertainty.sobol_indices_from_samples(x, output)
+    with pytest.raises(InputError, match=r"function: is constant"):
+        sb.uncertainty.sobol_indices(lambda ranks: np.full(ranks.shape[1], value), 2, 64)
+
+
+def test_small_variation_has_indices():
+    """Variation far above rounding counts, however small it is beside the mean."""
+    x = np.random.default_rng(1).uniform(size=(4000, 2))
+    found = sb.uncertainty.sobol_indices_from_samples(x, 192.53 + 1e-9 * x[:, 0])
+    assert found.estimate[0] > 0.95
+    assert abs(found.estimate[1]) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (lambda ranks: ranks, "dimension"),
+        (lambda ranks: ranks[0, :-1], "must have one for each of the 1024 points"),
+        (lambda ranks: ranks[0] * np.nan, "must be finite"),
+        (lambda ranks: ["a"] * ranks.shape[1], "array of numbers"),
+        (lambda ranks: 1.0, "dimension"),
+    ],
+)
+def test_result_of_a_function_is_checked(function, message):
+    """A function of the wrong result is refused by name."""
+    with pytest.raises(InputError, match=message):
+        sb.uncertainty.sobol_indices(function, 2, 64)

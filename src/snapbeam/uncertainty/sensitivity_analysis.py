@@ -103,7 +103,7 @@ def sobol_indices_from_samples(
     Raises
     ------
     InputError
-        For fewer than 200 runs, or an output that does not vary.
+        For fewer than 200 runs, or an output that is constant up to rounding.
 
     Examples
     --------
@@ -119,8 +119,7 @@ def sobol_indices_from_samples(
         raise InputError(f"inputs of shape {x.shape} with output of shape {y.shape}: must have as many runs")
     if y.size < 200:
         raise InputError(f"output of {y.size} runs: must be at least 200 to be cut into bins")
-    if not y.std() > 0.0:
-        raise InputError("output: does not vary, so nothing moves it")
+    _check_variation("output", y)
     within("confidence", confidence, 0.0, 1.0)
     count = int(np.clip(y.size // 40, 5, 100)) if bins is None else integer("bins", bins, 2, y.size // 10)
     generator = np.random.Generator(np.random.Philox(key=[seed_of(rng), 0]))
@@ -132,6 +131,19 @@ def sobol_indices_from_samples(
     error = pseudo.std(axis=0, ddof=1) / np.sqrt(_GROUPS)
     reach = float(stats.t.ppf(0.5 * (1.0 + confidence), _GROUPS - 1)) * error
     return Indices(whole, whole - reach, whole + reach)
+
+
+_ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
+"""Range of an output over its maximum magnitude, up to which it is constant but for rounding."""
+
+
+def _check_variation(name: str, values: _Array) -> None:
+    """Refuse an output that is constant up to rounding: its variance has no shares."""
+    extent = float(np.ptp(values))
+    if extent <= _ROUNDING * float(np.abs(values).max()):
+        raise InputError(
+            f"{name}: is constant, {values.flat[0]:.12g} within {extent:.1g}; must vary with the inputs"
+        )
 
 
 def _bins(x: _Array, count: int) -> NDArray[np.int64]:
@@ -199,7 +211,7 @@ def sobol_indices(
     Raises
     ------
     InputError
-        For bad input, or a function that does not vary.
+        For bad input, a result of another shape, or one that is constant up to rounding.
 
     Examples
     --------
@@ -216,12 +228,15 @@ def sobol_indices(
     if integer("samples", samples, 2, 2**24) & (samples - 1):
         raise InputError(f"samples = {samples}: must be a power of 2")
     blocks = np.concatenate([_matrices(inputs, samples, seed, r) for r in range(replicates)], axis=1)
-    values = np.asarray(function(blocks), dtype=np.float64)
+    values = finite_array("the result of function", function(blocks), 1)
+    if values.size != blocks.shape[1]:
+        raise InputError(
+            f"function: its result has {values.size} numbers; must have one for each of the {blocks.shape[1]} points, "
+            f"the columns of its argument of shape {blocks.shape}"
+        )
     table = values.reshape(replicates, inputs + 2, samples)
-    if not np.isfinite(table).all():
-        raise InputError("function: gave numbers that are not finite")
-    if not (table[:, :2].reshape(replicates, -1).std(axis=1) > 0.0).all():
-        raise InputError("function: does not vary over the inputs, so there is nothing to share out")
+    for each in table[:, :2]:
+        _check_variation("function", each)
     found = [
         stats.sobol_indices(func={"f_A": row[None, 0], "f_B": row[None, 1], "f_AB": row[2:, None]}, n=samples)
         for row in table
