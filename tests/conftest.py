@@ -6,7 +6,10 @@ import os
 import signal
 import sys
 
+from blas_kernel import blas_kernel
+
 os.environ.setdefault("MPLBACKEND", "Agg")
+os.environ.update(blas_kernel())
 
 import numpy as np
 import pytest

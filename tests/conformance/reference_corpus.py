@@ -16,8 +16,8 @@ small analyses of every entry of ``systems.SYSTEMS`` and stores them::
     The names of the variables of each table, in the order of the array; the cases with their numbers of rows; and the
     hashes of the models.  If a variable is renamed, edit its name here.  ``null`` skips a variable.
 ``reference_interface.json``
-    Dataset schemas, signatures, command options and printed results.  A rename may change this file: write it again
-    with ``interface`` and read the difference.
+    Signatures, command options, statistics, dataset schemas and printed results, with the commit they are of.  A rename
+    may change this file: write it again with ``interface`` and read the difference.
 """
 
 from __future__ import annotations
@@ -28,18 +28,26 @@ import enum
 import hashlib
 import inspect
 import json
+import os
 import platform
 import re
+import subprocess
 import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from blas_kernel import blas_kernel
+
+os.environ.update(blas_kernel())
 
 import numpy as np
 import xarray as xr
@@ -562,22 +570,41 @@ def printed() -> dict[str, list[str]]:
     return found
 
 
-def interface() -> dict[str, Any]:
-    """Schemas, signatures, commands and printed results."""
+def described_signatures() -> dict[str, str]:
+    """Signatures of public functions and classes."""
     public = {name: getattr(sb, name) for name in sorted(sb.__all__)}
     unsigned = (enum.Enum, BaseException)
-    signatures = {
+    return {
         name: re.sub(r" at 0x[0-9a-f]+", "", str(inspect.signature(each)))
         if inspect.isfunction(each) or (inspect.isclass(each) and not issubclass(each, unsigned))
         else type(each).__name__
         for name, each in public.items()
     }
+
+
+def described_variables() -> dict[str, Any]:
+    """Attributes of every statistic and of the variables of a run, from the tables that datasets are made by."""
+    from snapbeam.simulation.dataset import IMPACT_COLUMNS, SCHEMA
+    from snapbeam.solver.statistics import STATISTICS
+
     return {
-        "datasets": {name: described_dataset(analysed(name)) for name in ANALYSES},
-        "signatures": signatures,
-        "commands": described_commands(),
-        "printed": printed(),
+        "statistics": {name: [row.dtype, row.unit, row.long_name] for name, row in STATISTICS.items()},
+        "runs": {name: list(map(str, row)) for name, row in SCHEMA.items()},
+        "impacts": {name: list(row) for name, *row in IMPACT_COLUMNS},
     }
+
+
+QUICK_PARTS: dict[str, Callable[[], Any]] = {
+    "signatures": described_signatures,
+    "commands": described_commands,
+    "variables": described_variables,
+}
+"""Parts of the interface that are described without a run."""
+PARTS = {
+    "datasets": lambda: {name: described_dataset(analysed(name)) for name in ANALYSES},
+    **QUICK_PARTS,
+    "printed": printed,
+}
 
 
 # ---------------------------------------------------------------- files
@@ -662,16 +689,30 @@ def read(path: Path = DATA) -> Corpus:
     return Corpus(**json.loads(index_path(path).read_text(encoding="utf-8")), tables=tables)
 
 
+def parent_commit() -> str:
+    """The commit that a record is made on, with "and changes" if files differ from it."""
+    git = ["git", "-C", str(Path(__file__).parent)]
+    commit = subprocess.run([*git, "log", "-1", "--format=%h %s"], check=True, capture_output=True, text=True)
+    changed = subprocess.run([*git, "diff", "--quiet", "HEAD"], check=False).returncode
+    return commit.stdout.strip() + (", and changes" if changed else "")
+
+
 def write_interface(path: Path) -> None:
-    text = json.dumps(interface(), indent=1, ensure_ascii=False)
+    found = {"recorded_on": parent_commit()} | {name: describe() for name, describe in PARTS.items()}
+    text = json.dumps(found, indent=1, ensure_ascii=False)
     interface_path(path).write_text(text + "\n", encoding="utf-8")
 
 
-def interface_differences(path: Path = DATA) -> list[str]:
-    """Lines of a unified difference; empty if nothing changed."""
-    stored = interface_path(path).read_text(encoding="utf-8").splitlines()
-    now = json.dumps(interface(), indent=1, ensure_ascii=False).splitlines()
-    return list(difflib.unified_diff(stored, now, "recorded", "now", lineterm="", n=2))
+def interface_differences(parts: Iterable[str] = PARTS, path: Path = DATA) -> list[str]:
+    """Lines of a unified difference of some parts; empty if nothing changed."""
+    stored = json.loads(interface_path(path).read_text(encoding="utf-8"))
+    lines = []
+    for name in parts:
+        texts = [json.dumps(each, indent=1, ensure_ascii=False) for each in (stored.get(name), PARTS[name]())]
+        lines += difflib.unified_diff(
+            *(each.splitlines() for each in texts), f"{name}, {stored['recorded_on']}", "now", "", "", 2, ""
+        )
+    return lines
 
 
 class Compared(NamedTuple):
@@ -757,7 +798,7 @@ def main(command: str, file: str) -> int:
         return 0
     if command == "compare":
         differing = compare(path)
-        changed = interface_differences(path)
+        changed = interface_differences(path=path)
         print("\n".join(changed) if changed else "the interface is the recorded one")
         return int(differing > 0)
     if command == "interface":

@@ -54,9 +54,15 @@ def test_fingerprint() -> None:
     assert rc.solver_fingerprint() == corpus().fingerprint
 
 
+def test_quick_interface() -> None:
+    """Signatures, options and statistics; after an intended change: ``interface``, and read the difference."""
+    changed = rc.interface_differences(rc.QUICK_PARTS)
+    assert not changed, "\n".join(changed)
+
+
 @pytest.mark.slow
 def test_interface() -> None:
-    """Schemas, signatures, options and printed results; after an intended change: ``interface``, and read the diff."""
+    """Dataset schemas and printed results too."""
     if rc.model_hash(rc.small_system()) != corpus().cases["analysis: sweep"]["model"]:
         pytest.skip(
             "printed results contain all digits, and the model's matrices differ from the recorded ones"
