@@ -592,7 +592,11 @@ def basins(
     )
     if found.undecided > 0.0:
         lines.append(f"search for attractors: {found.termination_reason}")
-    lines.append(f"undecided: {100 * dataset.attrs['undecided']:.3g} %")
+    share, low, high = (100 * dataset.attrs[f"sensitive_share{end}"] for end in ("", "_low", "_high"))
+    lines.append(
+        f"undecided: {100 * dataset.attrs['undecided']:.3g} %; label changes at half the step: {share:.2g} % of the plane "
+        f"({low:.2g} to {high:.2g} % at 95 %)"
+    )
     lines += _entropy_lines(basin_entropy(dataset["basin"].values, 5))
     _finish(dataset, output, plot, lines)
 

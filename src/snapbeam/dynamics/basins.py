@@ -11,6 +11,7 @@ from scipy import ndimage, stats
 
 from snapbeam.dynamics.attractors import UNDECIDED, Attractors, Cloud
 from snapbeam.dynamics.flow import Flow, Stroboscope, fixed_parameters, settling_periods
+from snapbeam.dynamics.lifetimes import proportion
 from snapbeam.model.state import State
 from snapbeam.util.diagnostics import Diagnostic, counting, tell, to_json
 from snapbeam.util.validation import InputError, InputTypeError, axis, checked, finite_array, integer, shown
@@ -34,6 +35,11 @@ _AMONG = 8
 """Looks in a row at which a state must lie among the points of a chaotic attractor."""
 _MANY = 0.05
 """Share of undecided states from which on a warning is given."""
+_SAMPLE = 300
+"""States with no other label beside them that are integrated at half the step too."""
+_SENSITIVE = 0.01
+"""Share of labels that change with the step from which on a warning is given."""
+_CONFIDENCE = 0.95
 
 
 @checked
@@ -52,6 +58,11 @@ def basins_of_attraction(
     :class:`~snapbeam.dynamics.attractors.Ball`).  It goes to a chaotic attractor if it is among its points at eight
     consecutive checks and at the end.  All other states are undecided after *periods*, -1.  The tip's mid-position is
     fixed in space.  If more than 5 % of the states are undecided, a warning is given.
+
+    Near a fractal border the error of the integration changes labels.  Every state that has another label beside it, and
+    a random sample of 300 others, is therefore integrated at half the step too.  ``sensitive`` marks the states whose
+    label changes; the attribute ``sensitive_share`` is the share of such states of the plane, with its interval at 95 %
+    (Jeffreys, for the sampled part).  If it exceeds 1 %, a warning is given.
 
     Parameters
     ----------
@@ -73,8 +84,10 @@ def basins_of_attraction(
     Returns
     -------
     xarray.Dataset
-        ``basin`` over the two coordinates, the number of the attractor; ``captured_after``, in periods.  The attribute
-        ``undecided`` is the share of undecided states, ``termination_reason`` the number of periods and its rule.
+        ``basin`` over the two coordinates, the number of the attractor; ``captured_after``, in periods; ``sensitive``, 1
+        for a label that changes at half the step, 0 for one that does not, -1 for one that was not tested, as of a map that
+        has no step.  The attribute ``undecided`` is the share of undecided states, ``termination_reason`` the number of
+        periods and its rule; ``sensitive_share``, ``sensitive_share_low`` and ``sensitive_share_high``.
 
     Raises
     ------
@@ -111,6 +124,10 @@ def basins_of_attraction(
     dataset.attrs["termination_reason"] = (
         f"{total} periods ({rule})" if (label == UNDECIDED).any() else "every state is decided"
     )
+    if isinstance(flow, Stroboscope):
+        tested, interior = _tested(dataset["basin"].values)
+        finer, _ = _labelled(attractors, flow.with_half_step, rows[tested], total, step, None)
+        _add_sensitivity(dataset, tested, interior, finer != label[tested])
     told = _diagnostics(dataset, attractors)
     dataset.attrs["diagnostics"] = to_json(told)
     tell(told)
@@ -118,15 +135,62 @@ def basins_of_attraction(
 
 
 def _diagnostics(dataset: xr.Dataset, attractors: Attractors) -> tuple[Diagnostic, ...]:
-    share, periods = float(dataset.attrs["undecided"]), int(dataset.attrs["periods"])
-    if share <= _MANY:
-        return ()
-    numbers = {"undecided": share, "periods": float(periods)}
-    message = (
-        f"basins: {100 * share:.3g} % of the states are undecided after {periods} periods; increase periods, or search "
-        f"for further attractors with more states (the search had {attractors.labels.size})"
-    )
-    return (Diagnostic("dynamics.basins_undecided", message, numbers),)
+    share, periods, found = float(dataset.attrs["undecided"]), int(dataset.attrs["periods"]), []
+    if share > _MANY:
+        message = (
+            f"basins: {100 * share:.3g} % of the states are undecided after {periods} periods; increase periods, or search "
+            f"for further attractors with more states (the search had {attractors.labels.size})"
+        )
+        numbers = {"undecided": share, "periods": float(periods)}
+        found.append(Diagnostic("dynamics.basins_undecided", message, numbers))
+    names = ("sensitive_share", "sensitive_share_low", "sensitive_share_high")
+    numbers = {name: float(dataset.attrs.get(name, 0.0)) for name in names}
+    share, low, high = numbers.values()
+    if share > _SENSITIVE:
+        assert isinstance(attractors.flow, Stroboscope)
+        finer = attractors.flow.integration.accuracy != "reference"
+        message = (
+            f"basins: the labels of {100 * share:.2g} % of the states ({100 * low:.2g} to {100 * high:.2g} % at 95 %) change "
+            "if the step is halved, so near are they to a border; the variable sensitive marks those that were found; "
+            + (
+                "find the attractors with integration = Integration(accuracy='reference') (--accuracy reference) for a "
+                "smaller error"
+                if finer
+                else "at this accuracy only shares and entropies are reliable, not single labels"
+            )
+        )
+        found.append(Diagnostic("dynamics.basins_sensitive", message, numbers))
+    return tuple(found)
+
+
+def _tested(labels: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
+    """Indices of the states to integrate at half the step, those inside of basins last, and the number of states inside."""
+    size = (3,) * labels.ndim
+    border = (ndimage.maximum_filter(labels, size) != ndimage.minimum_filter(labels, size)).ravel()
+    inside = np.flatnonzero(~border)
+    chosen = np.random.Generator(np.random.Philox(_SAMPLE)).permutation(inside)[:_SAMPLE]
+    return np.concatenate((np.flatnonzero(border), np.sort(chosen))), inside.size
+
+
+def _add_sensitivity(
+    dataset: xr.Dataset, tested: NDArray[np.int64], inside: int, changed: NDArray[np.bool_]
+) -> None:
+    """Add the labels that change at half the step, and their share of the plane with its interval."""
+    basin = dataset["basin"]
+    flags = np.full(basin.size, -1, dtype=np.int8)
+    flags[tested] = changed
+    words = {
+        "units": "1", "long_name": "whether the label changes at half the step", "flag_values": np.array([-1, 0, 1], np.int8),
+        "flag_meanings": "not_tested same_label other_label",
+    }  # fmt: skip
+    dataset["sensitive"] = (basin.dims, flags.reshape(basin.shape), words)
+    border = basin.size - inside
+    sampled, hits = tested.size - border, int(changed[border:].sum())
+    shares = proportion(hits, sampled, _CONFIDENCE) if sampled < inside else (hits / max(inside, 1),) * 3
+    for name, share in zip(("", "_low", "_high"), shares, strict=True):
+        dataset.attrs[f"sensitive_share{name}"] = (
+            int(changed[:border].sum()) + float(share) * inside
+        ) / basin.size
 
 
 def _plane(

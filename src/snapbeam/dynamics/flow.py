@@ -24,7 +24,7 @@ from snapbeam.model.state import State, amplitude_scale, rest_state
 from snapbeam.model.system import System
 from snapbeam.simulation.request import cycle_of
 from snapbeam.simulation.states import states_of
-from snapbeam.solver.assemble import cycles_of, make_ensemble, phases_of, run_columns
+from snapbeam.solver.assemble import cycles_of, make_ensemble, phases_of, plans_of, run_columns
 from snapbeam.solver.registry import resolve
 from snapbeam.solver.statistics import statistics_of
 from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates, perturbed_start
@@ -411,6 +411,12 @@ class Stroboscope:
     def refined(self) -> Stroboscope:
         """The flow at accuracy level "reference"."""
         return Stroboscope(self.system, self.integration.replace(accuracy="reference", step=None), self.phase)
+
+    @property
+    def with_half_step(self) -> Stroboscope:
+        """The flow with steps of half the length."""
+        step = plans_of(self.system, self.integration, run_columns(self.system, {}))[0].step
+        return Stroboscope(self.system, self.integration.replace(step=0.5 * step), self.phase)
 
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:

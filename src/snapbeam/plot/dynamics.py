@@ -807,6 +807,8 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
 def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Draw basins of attraction: a colour an attractor, grey where it is undecided, attractors as rings.
 
+    Dots mark states whose label changes if the step is halved.
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -849,6 +851,14 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         ]
         figure = ax.get_figure(root=True)
         assert figure is not None
+        if (share := float(dataset.attrs.get("sensitive_share", 0.0))) > 0.0:
+            label = f"label changes at half the step: {100 * share:.2g} %"
+            points = np.argwhere(dataset["sensitive"].values == 1)
+            (dots,) = ax.plot(
+                *(dataset[name].values[points[:, i]] for i, name in enumerate(names)), ".", color="0.35", markersize=1.5,
+                label=label,
+            )  # fmt: skip
+            handles.append(dots)
         figure.legend(handles=handles, loc="outside lower center", ncols=3)
         fix_ticks(ax)
     return ax
