@@ -852,10 +852,10 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         figure = ax.get_figure(root=True)
         assert figure is not None
         if (share := float(dataset.attrs.get("sensitive_share", 0.0))) > 0.0:
-            label = f"label changes at half the step: {100 * share:.2g} %"
+            label = f"sensitive: {100 * share:.2g} %"
             points = np.argwhere(dataset["sensitive"].values == 1)
             (dots,) = ax.plot(
-                *(dataset[name].values[points[:, i]] for i, name in enumerate(names)), ".", color="0.35", markersize=1.5,
+                *(dataset[name].values[points[:, i]] for i, name in enumerate(names)), ".", color="0.6", markersize=2.0,
                 label=label,
             )  # fmt: skip
             handles.append(dots)
