@@ -283,10 +283,10 @@ def _questions() -> dict[str, Any]:
     def map_of(system: Any) -> None:
         Stroboscope(system)
 
-    def ends_early(system: Any) -> str | None:
+    def ends_early(system: Any) -> str:
         how = sb.Integration(cycles=1, early_termination=True)
         energy = make_ensemble(system, how).runs["decide_energy"][0]
-        return None if energy > float("-inf") else "never"
+        return "crossings, energy" if energy > float("-inf") else "crossings"
 
     def on_cuda(system: Any) -> None:
         ensemble = make_ensemble(system, sb.Integration(cycles=1))

@@ -10,10 +10,13 @@ from pathlib import Path
 from types import ModuleType
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 import typer.main
 
+import snapbeam as sb
 from snapbeam.cli.app import app
+from snapbeam.model import default_values
 from snapbeam.model.parameter_file import SECTIONS, load_config
 
 ROOT = Path(__file__).parents[2]
@@ -256,6 +259,49 @@ def test_options_in_the_page_of_commands_are_code():
     assert "`--checkpoint`" in words and "mathrm" not in words
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["a base with a sine", "a striker with a mass", "a load with a sine", "an external force"]
+)
+def test_crossings_end_runs_that_energy_does_not(name):
+    """The table says "crossings" of these systems: runs end early, and none has another class than the complete run."""
+    system = REFERENCE["_parts"]()[name].replace(**{"model.modes": 1})
+    section, drive = system.primary_excitation
+    axis = next(
+        each for each in ("velocity_amplitude", "acceleration_amplitude", "amplitude") if hasattr(drive, each)
+    )
+    axes = {f"{section}.{axis}": getattr(drive, axis) * np.linspace(1.0, 12.0, 40)}
+    complete, early = (
+        sb.sweep(system, axes, sb.Integration(cycles=60, early_termination=early)) for early in (False, True)
+    )
+    assert (early["status"] == sb.RunStatus.EARLY_STOP).sum() >= 4
+    np.testing.assert_array_equal(early["response_class"], complete["response_class"])
+
+
+@pytest.mark.slow
+def test_a_proven_well_does_not_prove_the_class():
+    """The page of questions: after more cycles no proven well is another one, while the class may become transient."""
+    system = sb.System(
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=2), default_values.CONTACT,
+        sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1),
+    )  # fmt: skip
+    axes = {
+        "drive.frequency_ratio": np.linspace(0.3, 3.0, 30),
+        "drive.velocity_amplitude": np.linspace(0.1, 0.6, 30),
+    }
+    short, long = (sb.sweep(system, axes, sb.Integration(cycles=cycles)) for cycles in (60, 240))
+    proven = short["final_well_proven"].values
+    assert proven.sum() > 100
+    np.testing.assert_array_equal(short["final_well"].values[proven], long["final_well"].values[proven])
+    np.testing.assert_array_equal(
+        short["zero_crossings"].values[proven], long["zero_crossings"].values[proven]
+    )
+    before, after = (each["response_class"].values[proven] for each in (short, long))
+    changed = before != after
+    assert (before[changed] == sb.ResponseClass.CONTINUOUS).all()
+    assert (after[changed] == sb.ResponseClass.TRANSIENT_2).all()
+
+
 @pytest.mark.slow  # the step sizes of thirty systems
 def test_supported_combinations():
     """Every row has an answer to each question; every refusal has a reason and a remedy."""
@@ -265,7 +311,12 @@ def test_supported_combinations():
         for part in text.split("These systems are refused as a whole:")
     )
     answers = {row[0]: dict(zip(first[0][1:], row[1:], strict=True)) for row in first[2:]}
-    assert {value for row in answers.values() for value in row.values()} >= {"yes", "never", "no (1)"}
+    assert {value for row in answers.values() for value in row.values()} >= {
+        "yes",
+        "crossings",
+        "crossings, energy",
+        "no (1)",
+    }
     assert all(row["`advance`"] == row["lifetimes"] == "yes" for row in answers.values())
     several = answers["several strikers of one frequency, or in such a ratio"]
     assert several["tangents, all exponents"] == several["orbits, sections, attractors, basins"] == "yes"
