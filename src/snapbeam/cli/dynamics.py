@@ -303,7 +303,7 @@ def backbone_curve(
     with progress(None, "backbone curve", "points") as report:
         chosen = {"mode": mode, "amplitude_limit": amplitude_limit, "max_points": max_points}
         named = {name: value for name, value in chosen.items() if value is not None}
-        curve = curve_of(settings.model, well=well, progress=report, **named)  # type: ignore[arg-type]
+        curve = curve_of(settings.free_structure, well=well, progress=report, **named)  # type: ignore[arg-type]
     hertz, stable = curve["frequency"].values, curve["stable"].values
     lines = [
         f"{hertz.size} motions in {duration(time.monotonic() - begun)}, {hertz[0]:.5g} to {hertz[-1]:.5g} Hz; "

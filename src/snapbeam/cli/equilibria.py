@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -86,6 +87,7 @@ def equilibria(
     from rich.table import Table
 
     from snapbeam.model.imperfection_identification import identify_imperfection
+    from snapbeam.model.potential import Potential
     from snapbeam.util.si_prefixes import prefixed, scale_of
     from snapbeam.util.validation import InputError
 
@@ -104,15 +106,23 @@ def equilibria(
             f"{', '.join(asked)}: belongs to the force-displacement curve; add --force-displacement"
         )
     check_pictures(("plot", plot))
-    model = configured(given).model
+    settings = configured(given)
+    potential = settings.potential
+    model = potential.model
     assert model.beam is not None
     if (lower_frequency is None) != (upper_frequency is None):
         raise InputError("lower_frequency, upper_frequency: give both, or neither")
     console = out()
     if lower_frequency is not None and upper_frequency is not None:
+        if not potential.is_of_the_structure_alone:
+            raise InputError(
+                "lower_frequency, upper_frequency with a force: the imperfection is identified from a beam without forces; "
+                "leave the force out"
+            )
         model = identify_imperfection(
             model.beam, lower_frequency, upper_frequency, identify, model.modes, model.imperfection
         )
+        potential = Potential.of(model, None, None)
         assert model.beam is not None
         assert model.imperfection is not None
         unit = {"midspan_amplitude": "m", "point_load": "N", "uniform_load": "N/m"}[identify]
@@ -122,44 +132,52 @@ def equilibria(
         )
     beam = model.beam
     assert beam is not None
-    heights = [float(model.midspan_shape @ each.amplitude) for each in model.equilibria]
+    found = potential.equilibria
+    heights = [potential.center(each) for each in found]
     metres, length_unit = scale_of(heights, "m")
-    joules, energy_unit = scale_of([each.energy for each in model.equilibria], "J")
+    joules, energy_unit = scale_of([each.energy for each in found], "J")
     table = Table(box=None, pad_edge=False)
     for title in ("", f"centre ({length_unit})", f"energy ({energy_unit})", "unstable directions"):
         table.add_column(title, justify="right")
     kinds = {0: "well", 1: "saddle"}
-    for each, height in zip(model.equilibria, heights, strict=True):
+    for each, height in zip(found, heights, strict=True):
         kind = kinds.get(each.unstable_directions, "hilltop")
         values = f"{height / metres:.4f}", f"{each.energy / joules:.4f}"
         table.add_row(kind, *values, str(each.unstable_directions))
     console.print(table)
-    freq = model.well_frequencies[:, :3]
-    if model.is_bistable:
-        barriers = [model.saddle_energy - float(model.potential_energy(well)) for well in model.wells]
-        for name, row, barrier in zip(("lower", "upper"), freq, barriers, strict=True):
-            own = ", ".join(f"{each:.3f}" for each in row)
-            console.print(f"{name} well: {own} Hz; barrier {prefixed(barrier, 'J', 4)}")
-    else:
-        barriers = []
-        console.print(f"monostable: {', '.join(f'{each:.3f}' for each in freq[0])} Hz")
-        if model.imperfection is not None:
-            console.print(model.two_well_limits)
+    freq = [potential.natural_frequencies(well)[:3] for well in potential.wells]
+    barriers = [potential.barrier(i) for i in range(len(freq))] if len(freq) > 1 else []
+    for name, row, barrier in zip_longest(potential.well_names, freq, barriers):
+        own = ", ".join(f"{each:.3f}" for each in row)
+        console.print(
+            f"monostable: {own} Hz"
+            if barrier is None
+            else f"{name}: {own} Hz; barrier {prefixed(barrier, 'J', 4)}"
+        )
+    if len(freq) < 2 and model.imperfection is not None and potential.is_of_the_structure_alone:
+        console.print(model.two_well_limits)
+    for line in potential.force_texts:
+        console.print(line)
     console.print(model.reference_text)
     add_json(
-        bistable=model.is_bistable,
+        bistable=len(freq) > 1,
         buckling_level=beam.buckling_level,
         imperfection={} if model.imperfection is None else {
             name: value for name, value in vars(model.imperfection).items() if isinstance(value, (float, str))
         },
         centers=heights,
-        energies=[each.energy for each in model.equilibria],
-        unstable_directions=[each.unstable_directions for each in model.equilibria],
-        frequencies=freq if model.is_bistable else freq[:1],
+        energies=[each.energy for each in found],
+        unstable_directions=[each.unstable_directions for each in found],
+        frequencies=freq,
         barriers=barriers, reference_well=model.reference_well, reference_frequency=model.reference_frequency,
     )  # fmt: skip
     if with_force:
-        _force_displacement(model, 0.5 if location is None else location, well, output, plot)
+        if potential.local_forces:
+            raise InputError(
+                "--force-displacement with a local force: the curve has a closed form for the beam and constant forces only; "
+                "leave one of them out"
+            )
+        _force_displacement(potential.structure, 0.5 if location is None else location, well, output, plot)
 
 
 def _force_displacement(

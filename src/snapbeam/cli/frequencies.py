@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
+
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import add_json, cli_command, out
 from snapbeam.cli.parameter_options import BEAM, BOUNDARY, IMPERFECTION, MODEL, configured, with_parameters
 
 if TYPE_CHECKING:
-    from snapbeam.model.reduced_model import ReducedModel
+    from snapbeam.model.potential import Potential
 
 __all__ = ["frequencies"]
 
@@ -33,11 +35,12 @@ def frequencies(
     from snapbeam.util.validation import integer
 
     count = integer("count", count, 1, 200)
-    model = configured(given).model
+    potential = configured(given).potential
+    model = potential.model
     beam = model.beam
     assert beam is not None
-    if model.imperfection is not None:
-        _print_wells(model, count)
+    if model.imperfection is not None or not potential.is_of_the_structure_alone:
+        _print_wells(potential, count)
         return
     reduced = model.natural_frequencies
     exact = exact_natural_frequencies(beam, count=count)
@@ -65,21 +68,23 @@ def frequencies(
     console.print(table)
 
 
-def _print_wells(model: ReducedModel, count: int) -> None:
-    """Print the frequencies about each well of an imperfect beam, for which no exact ones are known."""
+def _print_wells(potential: Potential, count: int) -> None:
+    """Print the frequencies about each well of a beam with an imperfection or a force, for which no exact ones are known."""
     from rich.table import Table
 
-    names = ["lower well", "upper well"] if model.is_bistable else ["equilibrium"]
-    freq = model.well_frequencies[: len(names), :count]
-    heights = [float(model.midspan_shape @ well) for well in model.wells[: len(names)]]
+    model, names = potential.model, potential.well_names
+    freq = np.array([potential.natural_frequencies(well)[:count] for well in potential.wells])
+    heights = [potential.center(well) for well in potential.wells]
     add_json(
-        modes=model.modes, bistable=model.is_bistable, wells=names, centers=heights, reduced=freq,
+        modes=model.modes, bistable=len(names) > 1, wells=names, centers=heights, reduced=freq,
         reference_well=model.reference_well, reference_frequency=model.reference_frequency,
     )  # fmt: skip
     console = out()
     console.print(
-        f"imperfect beam, {model.modes} modes, reduced model; exact frequencies are of perfect beams only"
+        f"{model.modes} modes, reduced model; exact frequencies are of perfect beams without forces only"
     )
+    for line in potential.force_texts:
+        console.print(line)
     table = Table(box=None, pad_edge=False)
     for title in (
         "",

@@ -186,7 +186,9 @@ def _add_sensitivity(
     dataset["sensitive"] = (basin.dims, flags.reshape(basin.shape), words)
     border = basin.size - inside
     sampled, hits = tested.size - border, int(changed[border:].sum())
-    shares = proportion(hits, sampled, _CONFIDENCE) if sampled < inside else (hits / max(inside, 1),) * 3
+    shares: tuple[Any, ...] = (hits / max(inside, 1),) * 3
+    if sampled < inside:
+        shares = proportion(hits, sampled, _CONFIDENCE)
     for name, share in zip(("", "_low", "_high"), shares, strict=True):
         dataset.attrs[f"sensitive_share{name}"] = (
             int(changed[:border].sum()) + float(share) * inside

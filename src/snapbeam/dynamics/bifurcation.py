@@ -18,7 +18,6 @@ from snapbeam.dynamics.flow import (
 from snapbeam.dynamics.periodic_orbits import passage_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
-from snapbeam.model.state import rest_state
 from snapbeam.model.system import System
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.validation import InputError, InputTypeError, axis, checked, choice, flag, integer, shown
@@ -207,9 +206,7 @@ class _Diagram:
         """Every value from one start."""
         system = self.flow.system
         location = self.values if self.name == "striker.location" else None
-        state = starts.state(
-            system, number, system.initial_state or rest_state(system.model, system.striker), location
-        )
+        state = starts.state(system, number, system.start, location)
         rows = np.broadcast_to(self.flow.coordinates(state), (self.values.size, self.flow.dimension))
         kept, counts = self._go(rows, np.arange(self.values.size))
         self.sweeps.append(label)

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.model.drive.base import HORIZON
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
-from snapbeam.model.state import State, amplitude_scale, rest_state
+from snapbeam.model.state import State, amplitude_scale
 from snapbeam.model.system import System
 from snapbeam.simulation.request import cycle_of
 from snapbeam.simulation.states import states_of
@@ -111,9 +111,7 @@ class InitialConditions:
 
         *location* is where the tip strikes, x_s/L, or that of each of several runs; the system's by default.
         """
-        found = state if state is not None else system.initial_state
-        if found is None:
-            found = rest_state(system.model, system.striker)
+        found = state if state is not None else system.start
         if self.displacement > 0.0:
             rung = perturbed_start(system, Replicates(1, self.displacement, seed=self.seed), number, found)
             found = leaving(system, found, rung, location)
@@ -183,8 +181,11 @@ def held_in_space(system: System) -> System:
     """
     if system.striker is None:
         return system
-    offset = float(make_ensemble(system, Integration()).runs["offset"][0])
-    held = system.replace(**{"striker.gap": -offset + 0.0})
+    offset, without_gap = (
+        float(make_ensemble(each, Integration()).runs["offset"][0])
+        for each in (system, system.replace(**{"striker.gap": 0.0, "initial_state": None}))
+    )
+    held = system.replace(**{"striker.gap": without_gap - offset})
     start = system.initial_state
     if start is None or np.isnan(start.striker_position).all():
         return held
@@ -501,7 +502,7 @@ class Stroboscope:
     def coordinates(self, state: State | None = None) -> _Array:
         """A state, or a batch of them, in the coordinates of the flow, shape (runs, d); the start by default."""
         if state is None:
-            state = self.system.initial_state or rest_state(self.system.model, self.system.striker)
+            state = self.system.start
         else:
             self._require_phase(state)
         if state.modes != self.modes:

@@ -7,6 +7,7 @@ import numpy as np
 from snapbeam.model.beam import Beam
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.harvester import Harvester, PiezoelectricHarvester
+from snapbeam.model.potential import Potential
 from snapbeam.model.quantity import quantities
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
@@ -29,10 +30,15 @@ _STRONGEST_COUPLING = 1.0
 """Theta^2 (x_2 - x_1) L/(C E I) that no layers reach: e^2/(eps c) of the material, which stiffens the beam too."""
 
 
+_SHIFTED = 0.02
+"""Distance of the saddle of a system from that of its structure, over that between the wells, which is no difference."""
+
+
 def doubts_of(
-    model: ReducedModel, striker: Striker | None, harvester: Harvester | None = None
+    potential: Potential, striker: Striker | None, harvester: Harvester | None = None
 ) -> tuple[Diagnostic, ...]:
-    """Diagnostics about a structure, what strikes it and its harvester."""
+    """Diagnostics about a structure, the forces on it, what strikes it and its harvester."""
+    model = potential.model
     found = [] if model.beam is None else _of_beam(model.beam) + _of_modes(model, model.beam, striker)
     if striker is not None and isinstance(striker.drive, Sine):
         found += _of_sine(striker.drive, model)
@@ -46,7 +52,26 @@ def doubts_of(
                 f"change of wells; {model.two_well_limits}",
             )
         )
+    if model.is_bistable and potential.local_forces:
+        found += _of_wells(potential)
     return tuple(found)
+
+
+def _of_wells(potential: Potential) -> list[Diagnostic]:
+    """Response classes and wells of results are those of the structure without local forces."""
+    model, wells = potential.model, potential.wells
+    height = model.dividing_height
+    words = f"crossings of the centre through {height:.4g} m and response classes are of the structure without local forces"
+    if len(wells) != 2:
+        message = f"the local force leaves {len(wells)} wells, while {words}, which has two"
+        return [Diagnostic("other-wells", message, {"wells": float(len(wells))})]
+    saddle = min(potential.saddles, key=lambda each: each.equilibrium.energy).equilibrium
+    lower, upper = (potential.center(well) for well in wells)
+    own = potential.center(saddle)
+    if abs(own - height) <= _SHIFTED * (upper - lower):
+        return []
+    message = f"the wells of the system, at {lower:.4g} and {upper:.4g} m, are divided at {own:.4g} m, while {words}"
+    return [Diagnostic("other-wells", message, {"saddle": own, "dividing_height": height})]
 
 
 def _of_beam(beam: Beam) -> list[Diagnostic]:

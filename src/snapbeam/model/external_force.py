@@ -31,6 +31,11 @@ class ForceHistory(Drive):
 
     registry: ClassVar[dict[str, type[Drive]]] = FORCES
 
+    @property
+    def constant_part(self) -> float:
+        """Part of the force that does not change in time, N; 0 of a record."""
+        return 0.0
+
     @classmethod
     def can_excite_base(cls) -> bool:
         """A force moves no base."""
@@ -80,6 +85,11 @@ class HarmonicForce(ForceHistory):
     number_names = ("omega", "amplitude", "mean")
     amplitudes = ("amplitude", "mean")
 
+    @property
+    def constant_part(self) -> float:
+        """F_0, N."""
+        return self.mean
+
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """Angular frequency (rad/s), amplitude and mean (N)."""
         omega = columns["frequency_ratio"] * scale.omega
@@ -127,6 +137,11 @@ class ConstantForce(ForceHistory, Timed):
     name = "constant_force"
     number_names = ("omega", "fastest", "force")
     amplitudes = ("force",)
+
+    @property
+    def constant_part(self) -> float:
+        """The force, N."""
+        return self.force
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A period of the first mode."""
@@ -279,7 +294,7 @@ class ExternalForce:
     ... )
     """
 
-    history: Drive
+    history: ForceHistory
     location: float | None = quantity(
         "1", "location of the external force over the length", default=None, optional=True, low=0.0, high=1.0,
         scope=STRUCTURE,

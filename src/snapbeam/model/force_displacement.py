@@ -441,7 +441,8 @@ def force_displacement(
     Parameters
     ----------
     system : System or ReducedModel
-        The striker, the drive and the contact do not matter.
+        The striker, the drive, the contact and forces that change in time do not matter; a constant part of the external
+        force acts.
     location : float, optional
         x_s in (0, 1); that of the striker by default.  A structure given by matrices has its own.
     well : {"lower", "upper"}, optional
@@ -486,7 +487,12 @@ def force_displacement(
 
     if not isinstance(system, (System, ReducedModel)):
         raise InputTypeError(f"system = {shown(system)}: must be a System or a ReducedModel")
-    model = system.model if isinstance(system, System) else system
+    if isinstance(system, System) and system.potential.local_forces:
+        raise InputError(
+            f"local_force = {shown(system.local_force)}: the force-displacement curve has a closed form for the structure and "
+            "constant forces only; leave it out (system.replace(local_force=None)), or use system.potential for its equilibria"
+        )
+    model = system.potential.structure if isinstance(system, System) else system
     if location is None:
         if isinstance(system, System) and system.striker is not None:
             location = system.striker.location

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -39,7 +40,8 @@ class LocalForce:
     - ``damping_force(law, displacement, velocity)``: the part that depends on v;
     - ``damping_coefficient(law, displacement, velocity)``: minus its derivative by v, N s/m or N m s/rad.
 
-    They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone.
+    They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone.  A law that is valid for some displacements only
+    has ``displacement_range(law)``, a pair.
 
     Parameters
     ----------
@@ -53,7 +55,8 @@ class LocalForce:
     Notes
     -----
     In modal coordinates about a well, p' = ... + r F(u, v) with r = V^T shape, u = u_well + r . q and v = r . p.  The wells of
-    the model are those without the force: where F is not 0 in a well, a run that begins there begins out of equilibrium.
+    the model are those without the force, those of the system (:attr:`snapbeam.System.potential`) with it; runs begin in
+    the latter.
 
     Examples
     --------
@@ -120,6 +123,38 @@ class LocalForce:
     def damping_coefficient(law: Any, displacement: float, velocity: float) -> float:
         """Minus the derivative of the damping force by the velocity, N s/m."""
         return 0.0
+
+    @staticmethod
+    def displacement_range(law: Any) -> tuple[float, float]:
+        """Displacements at which the law is valid, such as up to the contact of two electrodes; all by default."""
+        return -math.inf, math.inf
+
+    def force_at(self, displacement: float) -> float:
+        """Conservative force, N."""
+        return float(type(self).force(self.numbers, displacement))
+
+    def energy_at(self, displacement: float) -> float:
+        """Potential energy, J; of a law without *energy*, the integral of its force from 0."""
+        cls = type(self)
+        if cls.energy is LocalForce.energy and cls.force is not LocalForce.force:
+            from scipy.integrate import quad
+
+            return -float(quad(self.force_at, 0.0, displacement, epsabs=0.0, epsrel=1e-10, limit=200)[0])
+        return float(cls.energy(self.numbers, displacement))
+
+    def stiffness_at(self, displacement: float, length: float) -> float:
+        """Minus the derivative of the conservative force, N/m, by differences of order six over a part of *length*."""
+        low, high = self.displacement_range(self.numbers)
+        h = min(1e-3 * length, 0.1 * (displacement - low), 0.1 * (high - displacement))
+        total = 0.0
+        for k, weight in enumerate((45.0, -9.0, 1.0), 1):
+            total += weight * (self.force_at(displacement + k * h) - self.force_at(displacement - k * h))
+        return -total / (60.0 * h)
+
+    @property
+    def is_conservative(self) -> bool:
+        """Whether the law has a conservative part."""
+        return type(self).force is not LocalForce.force
 
     @classmethod
     def numbers_type(cls) -> Any:

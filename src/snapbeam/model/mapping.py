@@ -20,7 +20,7 @@ from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.local_force import LOCAL_FORCES
 from snapbeam.model.quantity import quantities
 from snapbeam.model.reduced_model import ReducedModel
-from snapbeam.model.state import State, started
+from snapbeam.model.state import State
 from snapbeam.model.striker import OF_FIRST_STRIKER, ContactPair, Striker, numbered
 from snapbeam.util.validation import InputError, mapping, shown
 
@@ -321,10 +321,6 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
     start, model = found["initial_state"], found["model"]
     if isinstance(start, State) and "initial_state" not in whole and start.modes != model.modes:
         found["initial_state"] = start.with_modes(model.modes)
-    if "initial_state" in inside:
-        found["initial_state"] = started(
-            found["model"], found["striker"], found["initial_state"], inside["initial_state"]
-        )
     return found
 
 

@@ -35,6 +35,7 @@ from snapbeam.model.parameter_axes import (
     physical_name,
 )
 from snapbeam.model.parameters import Parameter, lookup, parameters, row_of
+from snapbeam.model.potential import Potential
 from snapbeam.model.quantity import quantities
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import numbered
@@ -640,8 +641,10 @@ class Config:
 
     @property
     def is_static(self) -> bool:
-        """Whether only a beam is described, with nothing that moves it."""
-        return not self.extends_paper and not set(self.given) - {"beam", "model", "boundary", "imperfection"}
+        """Whether only a beam is described, with the forces on it, and no damping that a motion needs."""
+        parts = {"beam", "model", "boundary", "imperfection", "external_force", "local_force"}
+        damped = "damping_ratio" in self.section("model") and set(self.given) & set(_AROUND)
+        return not self.extends_paper and not damped and not set(self.given) - parts
 
     def _started(self, system: System) -> System:
         """The system with the start that was given."""
@@ -655,6 +658,26 @@ class Config:
     @property
     def model(self) -> ReducedModel:
         """The reduced model alone, of a beam that need not be buckled."""
+        found: ReducedModel = self._parts()["model"]
+        return found
+
+    @property
+    def potential(self) -> Potential:
+        """Potential energy of the model with the forces that were given, of a beam that need not be buckled."""
+        parts = self._parts("external_force", "local_force")
+        return Potential.of(parts["model"], parts.get("external_force"), parts.get("local_force"))
+
+    @property
+    def free_structure(self) -> ReducedModel:
+        """The model, for questions about its free motion; refused (InputError) if anything else acts on it."""
+        acting = [name for name in (*_AROUND, "contact", "striker", "drive") if self.section(name)]
+        if acting:
+            raise InputError(
+                f"{', '.join(acting)}: free motion of the structure alone is computed; leave out {acting[0]}"
+            )
+        return self.model
+
+    def _parts(self, *forces: str) -> dict[str, Any]:
         self._require("beam")
         own = {
             name: self._with_axes(name) if self._may_be_axis(name) else self.section(name)
@@ -663,8 +686,9 @@ class Config:
         sections = {name: self._defaults()[name] | own[name] for name in own}
         sections["model"].setdefault("damping_ratio", DAMPING_RATIO)  # has no effect without motion
         sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
-        found: ReducedModel = parts_from_mapping(sections)["model"]
-        return found
+        return parts_from_mapping(
+            sections | {name: self._with_axes(name) for name in forces if self.section(name)}
+        )
 
     @cached_property
     def integration(self) -> Integration:
@@ -745,7 +769,7 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "", *, comple
     lines = lines or contradictions(found)
     if not lines and complete:
         try:
-            config.model  # noqa: B018
+            config.potential  # noqa: B018
             if config.model.length_scale is not None and not config.is_static:
                 config.system  # noqa: B018
                 config.axes(keep_units=True)

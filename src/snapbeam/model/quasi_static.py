@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.beam import Beam
 from snapbeam.util.validation import InputError, checked, finite_array
 
-__all__ = ["quasi_static_threshold"]
+__all__ = ["quasi_static_objection", "quasi_static_threshold"]
+
+
+_OTHER = ("local_force", "external_force", "base_excitation", "axial_load", "harvester")
+
+
+def quasi_static_objection(attributes: Mapping[Hashable, Any]) -> str | None:
+    """Reason why Eq. (21) does not describe the system of a dataset, given by its attributes; None if it does."""
+    form = "the closed form of the quasi-static threshold (Eq. 21) is of a clamped beam with equal wells and no forces"
+    for section in _OTHER:
+        if (kind := attributes.get(f"{section}_type")) is not None:
+            return f"{section} of type {kind!r}: {form}"
+    return f"unequal wells: {form}" if "initial_well" in attributes else None
 
 
 @checked

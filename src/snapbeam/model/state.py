@@ -302,16 +302,13 @@ def rest_state(model: ReducedModel, striker: Striker | None = None) -> State:
     return State(amplitude=model.well_amplitude)
 
 
-def started(
-    model: ReducedModel, striker: Striker | None, start: State | None, values: Mapping[str, Any]
-) -> State:
-    """A start with some of its numbers changed.
+def started(model: ReducedModel, state: State, values: Mapping[str, Any]) -> State:
+    """A state with some of its numbers changed.
 
     ``amplitude[i]`` is the amplitude of buckling mode i over that of the well (-1 for i = 1: the lower well),
     ``velocity[i]`` its velocity over the same times omega_1, ``striker_position`` the mid-position of the tip
     in space, m, ``phase`` that of the drive, rad.  Arrays of one length make a batch.
     """
-    state = rest_state(model, striker) if start is None else start
     columns = {name: finite_array(f"initial_state.{name}", value) for name, value in values.items()}
     batch = np.broadcast_shapes(state.batch, *(column.shape for column in columns.values()))
     amplitude = np.array(np.broadcast_to(state.amplitude, (*batch, model.modes)))

@@ -23,8 +23,9 @@ from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.harvester import Harvester
 from snapbeam.model.local_force import LocalForce
 from snapbeam.model.mapping import parts_from_mapping, parts_to_mapping, replaced
+from snapbeam.model.potential import Potential
 from snapbeam.model.reduced_model import ReducedModel
-from snapbeam.model.state import State
+from snapbeam.model.state import State, rest_state, started
 from snapbeam.model.striker import ContactPair, Shaker, Striker, check_others, parted
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.files import atomic_path, check_writable
@@ -249,8 +250,14 @@ class System:
         InputError
             For a name that the system does not have, and for values as the parts refuse them.
         """
+        prefix = "initial_state."
         parts = {item.name: getattr(self, item.name) for item in fields(self)}
-        return System(**replaced(parts, changes))
+        other = {name: value for name, value in changes.items() if not name.startswith(prefix)}
+        found = System(**replaced(parts, other))
+        start = {name.removeprefix(prefix): changes[name] for name in changes if name not in other}
+        if not start:
+            return found
+        return dataclasses.replace(found, initial_state=started(found.model, found.start, start))
 
     def get(self, name: str) -> Any:
         """The value of a parameter by its dotted name.
@@ -316,9 +323,43 @@ class System:
         """That of which one cycle is a cycle of excitation, with its section; None where nothing moves."""
         return self.moving[0] if self.moving else None
 
+    @cached_property
+    def potential(self) -> Potential:
+        """Potential energy of the structure, the local forces and the constant part of the external force, with its wells."""
+        return Potential.of(self.model, self.external_force, self.local_force)
+
+    @cached_property
+    def rest_state(self) -> State:
+        """At rest in the well that the first striker pushes away from, touched by it; without one, in the well of the start.
+
+        With a local force it is the well of the system that a beam comes to, without inertia, from that well of the
+        structure.  An external force begins with the run, its constant part too.
+
+        Raises
+        ------
+        InputError
+            If the local force leaves no well there.
+        """
+        state = rest_state(self.model, self.striker)
+        local = Potential.of(self.model, None, self.local_force)
+        if local.is_of_the_structure_alone:
+            return state
+        well = local.descent(state.amplitude)
+        if well is None:
+            raise InputError(
+                f"local_force = {shown(self.local_force)}: leaves no well where a run begins, such as beyond pull-in; give "
+                "an initial_state, or a weaker force"
+            )
+        return State(amplitude=local.wells[well].amplitude)
+
+    @property
+    def start(self) -> State:
+        """The state that runs begin in: the initial state, or at rest."""
+        return self.rest_state if self.initial_state is None else self.initial_state
+
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Diagnostics: values that look like another unit, and assumptions of the model that do not hold."""
-        return doubts_of(self.model, self.striker, self.harvester)
+        return doubts_of(self.potential, self.striker, self.harvester)
 
     # ------------------------------------------------------------------ identity and files
 

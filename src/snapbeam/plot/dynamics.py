@@ -839,7 +839,7 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         for axis, name in ((ax.xaxis, names[0]), (ax.yaxis, names[1])):
             axis.set_label_text(_coordinate(name))
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
-        handles = [
+        handles: list[Any] = [
             Patch(
                 facecolor=colors[i],
                 edgecolor="black",

@@ -16,7 +16,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis
-from snapbeam.model.quasi_static import quasi_static_threshold
+from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
 from snapbeam.plot.agreement import draw_agreement
 from snapbeam.plot.axes import axis_label, dress, edges_of, in_units, positions, symbol_of
 from snapbeam.plot.style import (
@@ -153,7 +153,7 @@ def plot_response_map(
             handles.append(draw_agreement(ax, dataset, (across, upward), edges))
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
         if quasi_static_line:
-            handles.append(draw_quasi_static_line(ax, across, upward, fixed))
+            handles.append(draw_quasi_static_line(ax, dataset, across, upward, fixed))
         if measurements is not None:
             handles.append(draw_measurements(ax, measurements, across, upward, fixed))
         if legend and own is not None:
@@ -288,8 +288,12 @@ def _percent(count: int, total: int) -> str:
     return "<0.1 %" if 0.0 < share < 0.1 else f"{share:.1f} %"
 
 
-def draw_quasi_static_line(ax: Axes, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
+def draw_quasi_static_line(
+    ax: Axes, dataset: xr.Dataset, across: str, upward: str, fixed: dict[str, float | None]
+) -> Line2D:
     """Draw V_QS1 of one mode (Eq. 21) over two of the paper's coordinates, the third of them fixed."""
+    if (objection := quasi_static_objection(dataset.attrs)) is not None:
+        raise InputError(f"quasi_static_line with {objection}; leave quasi_static_line out")
     x = np.linspace(*ax.get_xlim(), 402)[1:-1]
     if {across, upward} - {"frequency_ratio", "location", "velocity_amplitude"}:
         raise InputError(
@@ -616,7 +620,7 @@ def _over(
     for name in {name for pair in _PAPER for name in pair} - set(along):
         values = np.unique(dataset[name].values) if name in dataset.coords else np.empty(0)
         fixed[name] = float(values[0]) if values.size == 1 else None
-    handles: list[Any] = [draw_quasi_static_line(ax, *along, fixed)] if quasi_static_line else []
+    handles: list[Any] = [draw_quasi_static_line(ax, dataset, *along, fixed)] if quasi_static_line else []
     return handles if measurements is None else [*handles, draw_measurements(ax, measurements, *along, fixed)]
 
 

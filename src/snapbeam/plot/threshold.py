@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from snapbeam.model.quasi_static import quasi_static_threshold
+from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
 from snapbeam.plot.axes import dress, edges_of, positions, symbol_of
 from snapbeam.plot.style import figure_style, fix_ticks, new_figure, set_title
 from snapbeam.util.validation import InputError, checked, instance
@@ -46,7 +46,7 @@ def plot_threshold(
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
     quasi_static : bool
-        Whether to draw the quasi-static threshold V_QS1 of one mode (Eq. 21), dashed.
+        Whether to draw the quasi-static threshold V_QS1 of one mode (Eq. 21), dashed, of a system that it describes.
     legend : bool
         Whether to name the curves.
 
@@ -94,9 +94,8 @@ def plot_threshold(
             ax = new_figure("single", 70.0).add_subplot()
         for curve, (color, dashes) in zip(curves, _STYLES, strict=False):
             _draw_curve(ax, curve, x, (color, dashes), _label(dataset, curve, others, raised))
-        quasi_static = (
-            quasi_static and raised == "velocity_amplitude" and along in ("frequency_ratio", "location")
-        )
+        known = raised == "velocity_amplitude" and along in ("frequency_ratio", "location")
+        quasi_static = quasi_static and known and quasi_static_objection(dataset.attrs) is None
         if quasi_static:
             static = _quasi_static(dataset, along, x)
             (line,) = ax.plot(x, static, color="black", linewidth=0.8, dashes=(4, 2))

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter
 
 from snapbeam.model.parameters import lookup
-from snapbeam.model.quasi_static import quasi_static_threshold
+from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
 from snapbeam.plot.axes import dress, edges_of, is_geometric, positions, symbol_of
 from snapbeam.plot.style import CLASS_COLORS, figure_style, fix_ticks, new_figure, set_title
 from snapbeam.util.status_codes import ResponseClass
@@ -329,6 +329,8 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
 
 
 def _quasi_static(data: xr.Dataset, ax: Axes, along: str, x: np.ndarray) -> None:
+    if (objection := quasi_static_objection(data.attrs)) is not None:
+        raise InputError(f"quasi_static with {objection}; leave quasi_static out")
     if along not in ("location", "frequency_ratio"):
         raise InputError(f"quasi_static over {along}: is known over location and frequency_ratio")
     place = x if along == "location" else float(data["location"])

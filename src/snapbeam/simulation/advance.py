@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.integration import Integration
-from snapbeam.model.state import ModalState, State, rest_state
+from snapbeam.model.state import ModalState, State
 from snapbeam.model.system import System
 from snapbeam.simulation.request import require_motion
 from snapbeam.simulation.states import states_of
@@ -108,11 +108,7 @@ def advance(
     report = counting(progress, "advance", "states")
     if state is None:
         require_motion(system)
-        state = (
-            system.initial_state
-            if system.initial_state is not None
-            else rest_state(system.model, system.striker)
-        )
+        state = system.start
     if state.modes != system.model.modes:
         raise InputError(
             f"state of {state.modes} modes: must have the {system.model.modes} modes of the model"

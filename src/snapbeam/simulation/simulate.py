@@ -15,7 +15,7 @@ from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import quantities
-from snapbeam.model.state import State, rest_state
+from snapbeam.model.state import State
 from snapbeam.model.striker import numbered
 from snapbeam.model.system import System
 from snapbeam.simulation.dataset import impact_table, joined, run_dataset
@@ -83,8 +83,10 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
     if model.imperfection is not None:
         attrs |= _short(model.imperfection)
     if model.transverse_force is not None:
-        start = system.initial_state or rest_state(model, system.striker)
-        attrs |= {"reference_well": model.reference_well, "initial_well": model.side_of(start.amplitude)}
+        attrs |= {
+            "reference_well": model.reference_well,
+            "initial_well": model.side_of(system.start.amplitude),
+        }
     sections = system.to_mapping() if system.has_environment else {}
     for section in ("base_excitation", "axial_load", "external_force", "local_force", "harvester"):
         for name, value in sections.get(section, {}).items():

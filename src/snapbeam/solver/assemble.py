@@ -23,7 +23,7 @@ from snapbeam.model.local_force import LocalForce
 from snapbeam.model.quantity import RUN as RUN_SCOPE
 from snapbeam.model.quantity import quantities
 from snapbeam.model.reduced_model import ReducedModel
-from snapbeam.model.state import State, rest_state
+from snapbeam.model.state import State
 from snapbeam.model.striker import numbered
 from snapbeam.model.system import System
 from snapbeam.solver.ensemble import FAR_AWAY, RUN, CircuitCoupling, Ensemble, FurtherContactTable
@@ -348,7 +348,7 @@ def make_ensemble(
         For parameters that cannot differ between the runs of an ensemble, and for more steps than can be counted.
     """
     columns = run_columns(system, points or {})
-    state = (system.initial_state or rest_state(system.model, system.striker)) if start is None else start
+    state = system.start if start is None else start
     runs = next(iter(columns.values())).size if columns else 1
     if state.batch and runs in (1, state.batch[0]):
         runs = state.batch[0]
@@ -660,8 +660,21 @@ def _offsets(
     begun = begun_at(driven, table["phase"])
     offset = touching - begun
     if "striker.gap" in columns:
-        offset = np.where(np.isnan(columns["striker.gap"]), offset, -columns["striker.gap"])
+        # the gap is that to the beam at rest, which a local force moves out of the well of the structure
+        rest = (
+            0.0
+            if system.potential.is_of_the_structure_alone
+            else _reach_at_rest(system, structure, table, rows)
+        )
+        offset = np.where(np.isnan(columns["striker.gap"]), offset, rest - columns["striker.gap"])
     return np.asarray(np.where(np.isnan(flat.striker_position), offset, position))
+
+
+def _reach_at_rest(system: System, structure: Structure, table: NDArray[Any], rows: _Array) -> _Array:
+    """Displacement of the contact point from the well of the structure at rest."""
+    state = system.rest_state
+    q = structure.to_modal(state.amplitude, state.velocity, 0.0, 0.0, 0.0)[0]
+    return np.asarray(rows[table["contact_row"]] @ q)
 
 
 def _circuit_coupling(system: System, columns: Mapping[str, _Array], runs: int) -> CircuitCoupling | None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from snapbeam.model.state import State, rest_state
+from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.util.validation import InputError, flag, integer, positive
 
@@ -69,9 +69,7 @@ def perturbed_start(system: System, replicates: Replicates, repeat: int, state: 
     q_j' ~ N(0, s).  The factor s gives the mid-span displacement its root mean square, ``perturbation_rms``.
     """
     model = system.model
-    rest = state if state is not None else system.initial_state
-    if rest is None:
-        rest = rest_state(model, system.striker)
+    rest = state if state is not None else system.start
     sign = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
     moving = model.omega > 0.0
     per_unit = np.where(moving, 1.0 / np.where(moving, model.omega, 1.0), 0.0)

@@ -1,0 +1,370 @@
+"""Potential energy of a system: the structure, constant forces and local forces, and the equilibria that follow from it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.model.equilibria import Equilibrium, landscape_of, tangent_stiffness
+from snapbeam.model.external_force import ExternalForce
+from snapbeam.model.local_force import LocalForce
+from snapbeam.model.reduced_model import LinearModes, ReducedModel, linear_modes_about
+from snapbeam.util.validation import InputError, shown
+
+__all__ = ["Potential", "Saddle"]
+
+
+_Array = NDArray[np.float64]
+_STARTS = 512
+"""Starting points of Newton's method, in a first search; a second one has eight times as many."""
+_ITERATIONS = 200
+_HALVINGS = 40
+_RESIDUAL = 1e-11
+"""Of the sum of the magnitudes of the terms of the gradient."""
+_SAME = 1e-6
+"""Distance of two solutions that are one, over the largest amplitude."""
+_NEAR = 1e-3
+"""Distance from a well, over the largest amplitude, at which a descent has come to it."""
+_DESCENT_STEP, _DESCENT_STEPS = 0.02, 2000
+"""Largest step of a descent, over the largest amplitude, and the maximum number of steps."""
+_TOWARDS = 40
+"""Starting points on the way to the end of the range of a law."""
+_REACH = 3.0
+"""Of the region of the starting points, over the largest amplitude of the equilibria without local forces."""
+
+
+class Saddle(NamedTuple):
+    """An equilibrium with one unstable direction, and the wells that the descents from both of its sides end in."""
+
+    equilibrium: Equilibrium
+    wells: tuple[int | None, int | None]
+    """Their numbers, by the height of the centre; None for a descent that leaves the range of a law, such as pull-in."""
+
+
+@dataclass(frozen=True, eq=False)
+class Potential:
+    """Potential energy of a system at rest.
+
+    It is
+
+        U(alpha) = alpha.K0 alpha/2 + gamma (alpha.S alpha)^2/4 - B.alpha - F.alpha + sum_j U_j(r_j.alpha),
+
+    with the constant forces F and the potential energies U_j of the local forces along their rows r_j.  It is 0 for the
+    straight structure, but for what the local forces have there.
+
+    Attributes
+    ----------
+    model : ReducedModel
+    constant : array of shape (N,)
+        F.
+    local_forces : tuple of LocalForce
+    """
+
+    model: ReducedModel
+    constant: _Array
+    local_forces: tuple[LocalForce, ...]
+
+    @classmethod
+    def of(cls, model: ReducedModel, external: ExternalForce | None, local: LocalForce | None) -> Potential:
+        """The potential energy of a structure, the constant part of an external force and a local force."""
+        constant = np.zeros(model.modes)
+        if external is not None and external.history.constant_part != 0.0:
+            constant = external.history.constant_part * external.row(model)
+        return cls(model, constant, () if local is None or not local.is_conservative else (local,))
+
+    @cached_property
+    def structure(self) -> ReducedModel:
+        """The model, with the constant force as a part of its transverse force; the local forces are left out."""
+        model = self.model
+        if not self.constant.any():
+            return model
+        load = self.constant if model.transverse_force is None else self.constant + model.transverse_force
+        well = landscape_of(
+            model.stiffness, model.nonlinear_stiffness, load, model.midspan_shape, model.elongation_matrix
+        ).lower.amplitude
+        return dataclasses.replace(model, transverse_force=load, well_amplitude=well)
+
+    @cached_property
+    def rows(self) -> _Array:
+        """r_j, shape (J, N)."""
+        return np.array([each.row(self.model) for each in self.local_forces]).reshape(-1, self.model.modes)
+
+    @property
+    def is_of_the_structure_alone(self) -> bool:
+        """Whether no force adds to that of the structure."""
+        return not self.local_forces and not self.constant.any()
+
+    def energy(self, alpha: ArrayLike) -> _Array:
+        """U, J, of amplitudes of shape (..., N)."""
+        found = self.model.potential_energy(alpha)
+        if self.is_of_the_structure_alone:
+            return found
+        a = np.asarray(alpha, dtype=np.float64)
+        found = found - a @ self.constant
+        for row, law in zip(self.rows, self.local_forces, strict=True):
+            found = found + np.vectorize(law.energy_at, otypes=[float])(a @ row)
+        return np.asarray(found)
+
+    def gradient(self, alpha: _Array) -> _Array:
+        """dU/dalpha, shape (N,): minus the generalised force."""
+        return self._terms(alpha).sum(axis=0)
+
+    def _terms(self, alpha: _Array) -> _Array:
+        """Terms of the gradient, whose magnitudes are the measure of its rounding."""
+        model = self.model
+        pulled = model.pulled(alpha)
+        bent = model.stiffness * alpha if model.stiffness.ndim == 1 else model.stiffness @ alpha
+        load = self.constant if model.transverse_force is None else self.constant + model.transverse_force
+        forces = [
+            -law.force_at(float(row @ alpha)) * row
+            for row, law in zip(self.rows, self.local_forces, strict=True)
+        ]
+        return np.array([bent, model.nonlinear_stiffness * float(alpha @ pulled) * pulled, -load, *forces])
+
+    def tangent(self, alpha: _Array) -> _Array:
+        """Second derivative of U, shape (N, N)."""
+        model = self.model
+        found = tangent_stiffness(model.stiffness, model.nonlinear_stiffness, alpha, model.elongation_matrix)
+        for row, law in zip(self.rows, self.local_forces, strict=True):
+            found = found + law.stiffness_at(float(row @ alpha), self._length) * np.outer(row, row)
+        return found
+
+    @cached_property
+    def _length(self) -> float:
+        """A displacement over which laws vary, m: the largest of the equilibria, or the length scale."""
+        return max(float(np.abs(self.model.midspan_shape @ self._size)), 1e-30)
+
+    @cached_property
+    def _size(self) -> _Array:
+        """The largest amplitudes of the structure's equilibria, or those that move the centre by its length scale."""
+        found = max((each.amplitude for each in self.model.equilibria), key=lambda each: float(each @ each))
+        if found.any():
+            return found
+        shape = self.model.midspan_shape
+        scale = self.model.length_scale or (1.0 if self.model.beam is None else self.model.beam.thickness)
+        return scale * shape / float(shape @ shape)
+
+    # ------------------------------------------------------------------ equilibria
+
+    @cached_property
+    def equilibria(self) -> tuple[Equilibrium, ...]:
+        """Every equilibrium, by energy.
+
+        Without local forces they are in closed form.  With them Newton's method starts from many points of the space
+        that is spanned by the lowest linear modes and the static responses to the forces.
+
+        Raises
+        ------
+        InputError
+            If the indices of the equilibria do not add up, so that one may be missing.
+        """
+        if not self.local_forces:
+            return self.structure.equilibria
+        found: list[_Array] = []
+        for count in (_STARTS, 8 * _STARTS):
+            for start in self._starts(count):
+                solution = self._newton(start)
+                if solution is not None and not any(self._is_same(solution, each) for each in found):
+                    found.append(solution)
+            listed = [self._equilibrium(each) for each in found]
+            if self._adds_up(listed):
+                return tuple(sorted(listed, key=lambda each: each.energy))
+        raise InputError(
+            f"local_force: {len(found)} equilibria were found, whose numbers of unstable directions "
+            f"{[each.unstable_directions for each in listed]} do not add up; check displacement_range of the law"
+        )
+
+    def _adds_up(self, found: list[Equilibrium]) -> bool:
+        """Check the equilibria by their index: the sum of (-1)^(unstable directions) over all of them is 1 (Morse).
+
+        It is one less for every end of the range of a law at which the force pulls beyond that end.
+        """
+        pulls = 0
+        for law in self.local_forces:
+            for end, sign in zip(law.displacement_range(law.numbers), (-1.0, 1.0), strict=True):
+                if math.isfinite(end):
+                    beside = end - sign * 1e-9 * max(abs(end), self._length)
+                    pulls += sign * law.force_at(beside) > 0.0
+        return sum((-1) ** each.unstable_directions for each in found) == 1 - pulls
+
+    def _is_same(self, one: _Array, other: _Array) -> bool:
+        return bool(np.abs(one - other).max() <= _SAME * np.abs(self._size).max())
+
+    def _equilibrium(self, alpha: _Array) -> Equilibrium:
+        alpha.setflags(write=False)
+        unstable = int((np.linalg.eigvalsh(self._in_modes(self.tangent(alpha))) < 0.0).sum())
+        return Equilibrium(amplitude=alpha, energy=float(self.energy(alpha)), unstable_directions=unstable)
+
+    def _in_modes(self, matrix: _Array) -> _Array:
+        """A symmetric matrix in the linear modes of the structure, whose mass matrix is the identity."""
+        modes = self.model.linear_modes
+        return np.asarray(modes.T @ matrix @ modes)
+
+    def _starts(self, count: int) -> _Array:
+        """Starting points: the structure's equilibria, and a Sobol sequence about and beyond them; (starts, N)."""
+        from scipy.stats import qmc
+
+        model = self.model
+        known = [each.amplitude for each in model.equilibria]
+        stiff = np.abs(model.stiffness) if model.stiffness.ndim == 1 else None
+        directions = [*model.linear_modes.T[: min(3, model.modes)]]
+        for row in (*self.rows, self.constant):
+            if row.any():
+                directions.append(row / np.where(stiff > 0.0, stiff, 1.0) if stiff is not None else row)
+        axes = np.linalg.qr(np.array(directions).T)[0].T
+        points = 2.0 * qmc.Sobol(len(axes), scramble=False).random(count) - 1.0
+        reach = _REACH * float(np.sqrt(self._size @ self._size))
+        return np.array([*known, *self._towards_ends(known), *(reach * (points @ axes))])
+
+    def _towards_ends(self, known: list[_Array]) -> list[_Array]:
+        """Starting points ever nearer to the ends of the ranges of laws, where a force that grows has its equilibria."""
+        found = []
+        for row, law in zip(self.rows, self.local_forces, strict=True):
+            stiffness = self.model.stiffness
+            response = row / np.abs(stiffness) if stiffness.ndim == 1 and stiffness.all() else row
+            ends = [each for each in law.displacement_range(law.numbers) if math.isfinite(each)]
+            for end in ends:
+                for alpha in known:
+                    away = end - float(row @ alpha)
+                    shares = 1.0 - np.geomspace(1.0, 1e-6, _TOWARDS)
+                    found += [alpha + share * away / float(row @ response) * response for share in shares]
+        return found
+
+    def _holds(self, alpha: _Array) -> bool:
+        """Whether the displacement of every local force is within the range of its law."""
+        for row, law in zip(self.rows, self.local_forces, strict=True):
+            low, high = law.displacement_range(law.numbers)
+            if not low < float(row @ alpha) < high:
+                return False
+        return True
+
+    def _newton(self, alpha: _Array) -> _Array | None:
+        """An equilibrium by damped Newton steps; None if they come to none within the ranges of the laws."""
+        if not self._holds(alpha):
+            return None
+        terms = self._terms(alpha)
+        for _ in range(_ITERATIONS):
+            gradient = terms.sum(axis=0)
+            if np.abs(gradient).max() <= _RESIDUAL * np.abs(terms).sum(axis=0).max():
+                return self._polished(alpha)
+            try:
+                step = np.linalg.solve(self.tangent(alpha), gradient)
+            except np.linalg.LinAlgError:
+                return None
+            share, size = 1.0, float(gradient @ gradient)
+            for _ in range(_HALVINGS):
+                tried = alpha - share * step
+                if self._holds(tried):
+                    terms = self._terms(tried)
+                    new = terms.sum(axis=0)
+                    if float(new @ new) < (1.0 - 0.1 * share) * size:
+                        break
+                share *= 0.5
+            else:
+                return None
+            alpha = tried
+        return None
+
+    def _polished(self, alpha: _Array) -> _Array:
+        for _ in range(2):
+            tried = alpha - np.linalg.solve(self.tangent(alpha), self.gradient(alpha))
+            if not self._holds(tried):
+                break
+            if np.abs(self.gradient(tried)).max() >= np.abs(self.gradient(alpha)).max():
+                break
+            alpha = tried
+        return alpha
+
+    # ------------------------------------------------------------------ wells
+
+    @cached_property
+    def wells(self) -> tuple[Equilibrium, ...]:
+        """The stable equilibria, by the height of the centre."""
+        stable = [each for each in self.equilibria if each.is_stable]
+        return tuple(sorted(stable, key=self.center))
+
+    def center(self, equilibrium: Equilibrium) -> float:
+        """Displacement of the centre, m."""
+        return float(self.model.midspan_shape @ equilibrium.amplitude)
+
+    def linear_modes(self, equilibrium: Equilibrium) -> LinearModes:
+        """Linear modes about a well of the system.
+
+        Raises
+        ------
+        InputError
+            If the equilibrium is unstable.
+        """
+        parity = None if self.model.beam is None else self.model.beam.buckling_modes(self.model.modes).parity
+        return linear_modes_about(self.model.mass, self.tangent(equilibrium.amplitude), parity)
+
+    def natural_frequencies(self, equilibrium: Equilibrium) -> _Array:
+        """Natural frequencies about a well, Hz, ascending, shape (N,); without circuits and contacts."""
+        return self.linear_modes(equilibrium).omega / (2.0 * math.pi)
+
+    @property
+    def well_names(self) -> list[str]:
+        """Names of the wells: lower and upper, or by their numbers."""
+        count = len(self.wells)
+        names = {1: ["equilibrium"], 2: ["lower well", "upper well"]}
+        return names.get(count, [f"well {i + 1}" for i in range(count)])
+
+    @property
+    def force_texts(self) -> list[str]:
+        """The forces that act beside those of the structure, a sentence each."""
+        found = [f"with {shown(law)}" for law in self.local_forces]
+        return [*found, "with the constant part of the external force"] if self.constant.any() else found
+
+    @cached_property
+    def saddles(self) -> tuple[Saddle, ...]:
+        """Equilibria with one unstable direction, by energy, with the wells on their two sides."""
+        return tuple(
+            Saddle(each, self._sides(each)) for each in self.equilibria if each.unstable_directions == 1
+        )
+
+    def barrier(self, well: int) -> float:
+        """Energy from a well, by number, to the lowest saddle beside it, J; NaN if there is none."""
+        if not self.local_forces:
+            return self.structure.saddle_energy - self.wells[well].energy if len(self.wells) > 1 else math.nan
+        heights = [each.equilibrium.energy for each in self.saddles if well in each.wells]
+        return min(heights) - self.wells[well].energy if heights else math.nan
+
+    def _sides(self, saddle: Equilibrium) -> tuple[int | None, int | None]:
+        """Wells that the descents from a saddle along its unstable direction, downwards and upwards, end in."""
+        _, axes = np.linalg.eigh(self._in_modes(self.tangent(saddle.amplitude)))
+        away = self.model.linear_modes @ axes[:, 0]
+        away *= 1e-3 * np.abs(self._size).max() / np.abs(away).max()
+        return self.descent(saddle.amplitude - away), self.descent(saddle.amplitude + away)
+
+    def descent(self, alpha: _Array) -> int | None:
+        """Number of the well that a motion without inertia, M alpha' = -dU/dalpha, comes to; None if it leaves a range.
+
+        Implicit Euler steps, q = q - (H + 1/h)^-1 dU/dq with the second derivative H of U, in coordinates q whose mass
+        matrix is the identity; 1/h is raised until a step is short.
+        """
+        modes = self.model.linear_modes
+        size = np.abs(self._size).max()
+        identity = np.eye(len(modes))
+        for _ in range(_DESCENT_STEPS):
+            for number, well in enumerate(self.wells):
+                if np.abs(alpha - well.amplitude).max() <= _NEAR * size:
+                    return number
+            slope, bend = modes.T @ self.gradient(alpha), self._in_modes(self.tangent(alpha))
+            lowest = float(np.linalg.eigvalsh(bend)[0])
+            shift = max(-2.0 * lowest, 1e-6 * float(np.abs(bend).max()))
+            while True:
+                step = modes @ np.linalg.solve(bend + shift * identity, slope)
+                tried = alpha - step
+                if np.abs(step).max() <= _DESCENT_STEP * size:
+                    break
+                shift *= 4.0
+            if not self._holds(tried):
+                return None
+            alpha = tried
+        return None

@@ -1,0 +1,223 @@
+"""The potential energy of a system: closed forms, gradients, and rest states that runs stay in."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, minimize
+
+import snapbeam as sb
+from snapbeam.model import default_values
+from snapbeam.model.local_force import LOCAL_FORCES
+from snapbeam.model.potential import Potential
+
+
+@dataclass(frozen=True, kw_only=True)
+class Magnet(sb.LocalForce):
+    """Attraction by a/(g - u)^2; energy and derivative are left to the package."""
+
+    strength: float = sb.quantity("N m^2", "strength of the magnet", low=0.0)
+    gap: float = sb.quantity("m", "gap of the magnet", low=0.0)
+
+    @staticmethod
+    def force(law, displacement):
+        return law.strength / (law.gap - displacement) ** 2
+
+    @staticmethod
+    def displacement_range(law):
+        return -math.inf, law.gap
+
+
+def model_of(modes: int, **values) -> sb.ReducedModel:
+    return sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, damping_ratio=0.05, **values)
+
+
+def test_a_spring_at_the_centre_of_one_mode():
+    """alpha^2 = -(K0 + k phi^2)/gamma, omega^2 = -2 (K0 + k phi^2)/m, barrier (K0 + k phi^2)^2/(4 gamma)."""
+    model, k = model_of(1), 300.0
+    potential = sb.System(model, local_force=sb.LocalSpring(stiffness=k, location=0.5)).potential
+    stiffness = float(model.stiffness[0] + k * model.midspan_shape[0] ** 2)
+    well = math.sqrt(-stiffness / model.nonlinear_stiffness)
+    lower, upper = potential.wells
+    assert [float(each.amplitude[0]) for each in (lower, upper)] == pytest.approx([-well, well], rel=1e-12)
+    frequency = math.sqrt(-2.0 * stiffness / float(model.mass[0, 0])) / (2.0 * math.pi)
+    assert potential.natural_frequencies(lower) == pytest.approx([frequency], rel=1e-10)
+    assert potential.barrier(0) == pytest.approx(stiffness**2 / (4.0 * model.nonlinear_stiffness), rel=1e-10)
+    assert [each.unstable_directions for each in potential.equilibria] == [0, 0, 1]
+    stiff = sb.System(model, local_force=sb.LocalSpring(stiffness=1e4, location=0.5)).potential
+    assert len(stiff.equilibria) == 1 and stiff.wells[0].amplitude == pytest.approx(0.0, abs=1e-12)
+
+
+def test_pull_in_at_a_third_of_the_gap():
+    """A linear spring under a/(g - u)^2: two equilibria below a = 4 k g^3/27, none above, u = g/3 there."""
+    k, gap = 2.0, 3e-6
+    model = sb.ReducedModel.from_matrices([[1e-9]], [[k]], contact_shape=[1.0], length_scale=gap)
+    critical = 4.0 * k * gap**3 / 27.0
+
+    def potential(share: float) -> Potential:
+        return sb.System(model, local_force=Magnet(strength=share * critical, gap=gap)).potential
+
+    below = potential(1.0 - 1e-6)
+    assert [each.unstable_directions for each in below.equilibria] == [0, 1]
+    places = [float(each.amplitude[0]) / gap for each in below.equilibria]
+    assert places == pytest.approx([1.0 / 3.0, 1.0 / 3.0], abs=1e-3) and places[0] < places[1]
+    exact = brentq(lambda x: x * (1.0 - x) ** 2 - 0.5 * 4.0 / 27.0, 0.0, 1.0 / 3.0, xtol=1e-15)
+    assert float(potential(0.5).wells[0].amplitude[0]) / gap == pytest.approx(exact, rel=1e-10)
+    soft = k - 2.0 * 0.5 * critical / (gap * (1.0 - exact)) ** 3
+    assert potential(0.5).natural_frequencies(potential(0.5).wells[0])[0] == pytest.approx(
+        math.sqrt(soft / 1e-9) / (2.0 * math.pi), rel=1e-9
+    )
+    assert potential(0.5).saddles[0].wells in ((0, None), (None, 0))
+    assert potential(1.0 + 1e-6).equilibria == ()
+    with pytest.raises(sb.InputError, match="leaves no well where a run begins"):
+        print(sb.System(model, local_force=Magnet(strength=1.1 * critical, gap=gap)).start)
+
+
+def test_a_spring_on_eight_modes_against_minimisation():
+    """The shallow silicon arch with a spring of 5 N/m at its centre, by SciPy on an energy written here."""
+    beam = sb.Beam(
+        length=8e-4, thickness=3e-6, width=3e-5, density=2330.0, young_modulus=169e9, axial_load=0.0
+    )
+    model = sb.ReducedModel.from_beam(beam, modes=8, imperfection=sb.Imperfection(midspan_amplitude=6e-6))
+    spring = sb.LocalSpring(stiffness=5.0, cubic_stiffness=2e11, location=0.5)
+    potential = Potential.of(model, None, spring)
+    unit = float(np.abs(model.well_amplitude).max())
+    row = model.midspan_shape
+
+    def energy(x):
+        alpha = unit * x
+        u = float(row @ alpha)
+        tension = 0.25 * model.nonlinear_stiffness * float(alpha @ alpha) ** 2
+        quadratic = 0.5 * float(alpha @ (model.stiffness * alpha)) - float(model.transverse_force @ alpha)
+        return 1e12 * (quadratic + tension + 0.5 * 5.0 * u * u + 0.25 * 2e11 * u**4)
+
+    found = minimize(energy, model.well_amplitude / unit, method="BFGS", options={"gtol": 1e-9})
+    assert float(row @ (unit * found.x)) == pytest.approx(potential.center(potential.wells[0]), rel=1e-6)
+    assert 1e-12 * found.fun == pytest.approx(potential.wells[0].energy, rel=1e-9)
+    assert potential.center(potential.wells[0]) < 0.95 * float(row @ model.well_amplitude)
+
+
+def test_a_constant_force_is_that_of_the_model():
+    """An external force and the same transverse force of the model have the same wells, frequencies and curves."""
+    model, force = model_of(6), -0.05
+    external = sb.ExternalForce(history=sb.ConstantForce(force=force), location=0.37)
+    system = sb.System(model, external_force=external)
+    load = force * model.shape_at(0.37)
+    given = sb.ReducedModel.from_matrices(
+        model.mass, model.stiffness, contact_shape=model.shape_at(0.5), midspan_shape=model.midspan_shape,
+        nonlinear_stiffness=model.nonlinear_stiffness, transverse_force=load, reference_frequency=80.0,
+    )  # fmt: skip
+    potential = system.potential
+    np.testing.assert_allclose(
+        [each.amplitude for each in potential.equilibria], [each.amplitude for each in given.equilibria], rtol=0.0,
+        atol=1e-10 * float(np.abs(model.well_amplitude).max()),
+    )  # fmt: skip
+    np.testing.assert_allclose(
+        potential.natural_frequencies(potential.wells[0]), given.natural_frequencies, rtol=1e-8
+    )
+    curves = sb.force_displacement(system, 0.5), sb.force_displacement(given, 0.5)
+    assert float(curves[0].snap_through_force) == pytest.approx(float(curves[1].snap_through_force), rel=1e-8)
+    barrier = given.saddle_energy - given.landscape.lower.energy
+    assert potential.barrier(0) == pytest.approx(barrier, rel=1e-8)
+
+
+def random_system(rng: np.random.Generator) -> sb.System:
+    modes = int(rng.integers(1, 7))
+    model = model_of(modes, imperfection=rng.choice([None, sb.Imperfection(midspan_amplitude=2e-6)]))
+    at = float(rng.uniform(0.2, 0.8))
+    gap = 3.0 * default_values.BEAM.buckling_level
+    local = rng.choice([
+        sb.LocalSpring(stiffness=float(rng.uniform(1.0, 300.0)), cubic_stiffness=float(rng.uniform(0.0, 1e9)), location=at),
+        sb.LocalSpring(stiffness=float(rng.uniform(1e-4, 1e-2)), location=at, coordinate="rotation"),
+        Magnet(strength=float(rng.uniform(1e-10, 3e-9)), gap=gap, location=at),
+        None,
+    ])  # fmt: skip
+    external = sb.ExternalForce(history=sb.ConstantForce(force=float(rng.normal(0.0, 0.01))), location=at)
+    return sb.System(model, local_force=local, external_force=external if rng.random() < 0.5 else None)
+
+
+def test_gradient_and_tangent_of_random_systems():
+    """Differences of the energy and of the gradient; every equilibrium has no gradient."""
+    rng = np.random.default_rng(2)
+    for _ in range(15):
+        potential = random_system(rng).potential
+        size = float(np.abs(potential.model.well_amplitude).max())
+        alpha = potential.model.well_amplitude + 0.1 * size * rng.standard_normal(potential.model.modes)
+        change = 1e-3 * size * rng.standard_normal(alpha.size)
+        weights = ((1, 45.0 / 60.0), (2, -9.0 / 60.0), (3, 1.0 / 60.0))
+        slope = sum(
+            w * (potential.energy(alpha + k * change) - potential.energy(alpha - k * change))
+            for k, w in weights
+        )
+        assert slope == pytest.approx(float(potential.gradient(alpha) @ change), rel=1e-8)
+        bend = sum(
+            w * (potential.gradient(alpha + k * change) - potential.gradient(alpha - k * change))
+            for k, w in weights
+        )
+        product = potential.tangent(alpha) @ change
+        np.testing.assert_allclose(bend, product, rtol=0.0, atol=1e-7 * np.abs(product).max())
+        for each in potential.equilibria:
+            terms = np.abs(potential._terms(each.amplitude)).sum(axis=0).max()
+            assert np.abs(potential.gradient(each.amplitude)).max() <= 1e-10 * terms
+
+
+@pytest.mark.slow
+def test_runs_stay_at_rest():
+    """A damped run that begins at rest drifts by less than 1e-8 of b in 1,000 cycles, and one beside it comes back."""
+    rng = np.random.default_rng(5)
+    for _ in range(12):
+        system = random_system(rng).replace(external_force=None)
+        if not isinstance(system.local_force, sb.LocalSpring):
+            continue
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            own = float(system.model.midspan_shape @ system.start.amplitude) / system.model.length_scale
+            at_rest = system.replace(initial_state=system.start)
+            run = sb.simulate(at_rest, sb.Integration(cycles=1000), sample_times=[0.0, 1.0])
+            assert np.abs(run.dataset.midspan_displacement.values - own).max() < 1e-8
+            beside = sb.State(amplitude=1.01 * system.start.amplitude)
+            back = sb.simulate(system.replace(initial_state=beside), sb.Integration(cycles=1000))
+            np.testing.assert_allclose(
+                back.final_state.amplitude,
+                system.start.amplitude,
+                rtol=0.0,
+                atol=1e-7 * np.abs(system.start.amplitude).max(),
+            )
+
+
+@pytest.mark.parametrize(
+    "law", [each for each in LOCAL_FORCES.values() if each.__module__.startswith("snapbeam.")]
+)
+def test_laws_of_the_package(law):
+    """Force, energy and stiffness agree with differences for every registered law."""
+    constants = {name: 0.7 for name in law.numbers_type()._fields}
+    one = law(location=0.5, **constants)
+    for u in (-0.3, 0.01, 0.8):
+        slope = (one.energy_at(u + 1e-5) - one.energy_at(u - 1e-5)) / 2e-5
+        assert one.force_at(u) == pytest.approx(-slope, rel=1e-8, abs=1e-12)
+        bend = (one.force_at(u + 1e-5) - one.force_at(u - 1e-5)) / 2e-5
+        assert one.stiffness_at(u, 1.0) == pytest.approx(-bend, rel=1e-8, abs=1e-10)
+
+
+def test_other_questions_refuse_a_local_force():
+    """What does not know the force says so by its name."""
+    system = sb.System(model_of(2), local_force=sb.LocalSpring(stiffness=100.0, location=0.4))
+    with pytest.raises(sb.InputError, match=r"local_force = LocalSpring.*leave it out"):
+        sb.force_displacement(system, 0.5)
+    with pytest.raises(sb.InputError, match="local_force"):
+        sb.dynamics.backbone_curve(system)
+    assert sb.force_displacement(system.replace(local_force=None), 0.5).sizes["point"] > 10
+
+
+def test_classes_of_other_wells_have_a_diagnostic():
+    """A magnet on one side moves the saddle, by which the classes do not count."""
+    gap = 1.5 * default_values.BEAM.buckling_level
+    shifted = sb.System(model_of(1), local_force=Magnet(strength=1e-8, gap=gap, location=0.5))
+    (found,) = [each for each in shifted.diagnostics() if each.code == "other-wells"]
+    assert "response classes are of the structure without local forces" in found.message
+    symmetric = sb.System(model_of(1), local_force=sb.LocalSpring(stiffness=50.0, location=0.5))
+    assert not [each for each in symmetric.diagnostics() if each.code == "other-wells"]
