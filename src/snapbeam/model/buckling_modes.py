@@ -8,9 +8,12 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.equilibria import landscape_of
+from snapbeam.model.matrix_pairs import eigenpairs, fixed_coordinates, is_positive_definite, symmetric
+from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.validation import InputError, finite_array, integer, nonnegative, positive, within
 
 __all__ = [
@@ -323,7 +326,7 @@ def _null(matrix: _Array) -> _Array:
 # Checks of a structure given by its matrices.
 
 
-_SYMMETRY = 1e-10  # largest asymmetry taken for rounding, relative to the largest entry
+_MINUTE = 4000  # coordinates whose dense eigenvalue problem takes about a minute
 _BALANCE = 1e-8  # largest residual force at an equilibrium, relative to its two parts
 
 
@@ -343,6 +346,8 @@ class StructureMatrices:
     transverse_force: ArrayLike | None = None
     base_shape: ArrayLike | None = None
     elongation_matrix: ArrayLike | None = None
+    patch_shape: ArrayLike | None = None
+    modes: int | None = None
 
 
 def damping_ratios(value: ArrayLike, count: int) -> _Array:
@@ -359,51 +364,76 @@ def damping_ratios(value: ArrayLike, count: int) -> _Array:
 
 def checked_structure(given: StructureMatrices) -> dict[str, Any]:
     """The fields of a reduced model for a structure, or an ``InputError`` that says what is wrong."""
-    mass = finite_array("mass", _dense(given.mass))
-    if mass.ndim != 2 or mass.shape[0] != mass.shape[1] or mass.size == 0:
-        raise InputError(f"mass of shape {mass.shape}: must be a square matrix (N, N)")
+    mass, stiffness = _pair(given)
     count = mass.shape[0]
-    mass = _symmetric("mass", mass)
-    try:
-        np.linalg.cholesky(mass)
-    except np.linalg.LinAlgError:
-        lowest = np.linalg.eigvalsh(mass)[0]
-        raise InputError(
-            f"mass: must be positive definite, but its lowest eigenvalue is {lowest:g}; leave out fixed coordinates, and "
-            "condense those without mass"
-        ) from None
-
-    stiffness = finite_array("stiffness", _dense(given.stiffness))
-    if stiffness.ndim == 2:
-        _require_shape("stiffness", stiffness, (count, count), "as large as the mass matrix")
-        stiffness = _symmetric("stiffness", stiffness)
-    else:
-        _require_shape("stiffness", stiffness, (count,), "a diagonal (N,) or a matrix (N, N)")
-
-    contact_shape = _shape("contact_shape", given.contact_shape, count)
-    midspan_shape = contact_shape.copy()
-    if given.midspan_shape is not None:
-        midspan_shape = _shape("midspan_shape", given.midspan_shape, count)
+    rows: dict[str, _Array | None] = {"contact_shape": _shape("contact_shape", given.contact_shape, count)}
+    for name in ("midspan_shape", "base_shape", "patch_shape"):
+        value = getattr(given, name)
+        rows[name] = None if value is None else _shape(name, value, count)
+    for name in ("transverse_force", "well_amplitude"):
+        value = getattr(given, name)
+        if value is not None:
+            value = finite_array(name, value)
+            _require_shape(name, value, (count,), "one number for each coordinate")
+        rows[name] = value
     gamma = nonnegative("nonlinear_stiffness", given.nonlinear_stiffness)
-    reference = given.reference_frequency
-    force = None
-    if given.transverse_force is not None:
-        force = finite_array("transverse_force", given.transverse_force)
-        _require_shape("transverse_force", force, (count,), "one number for each coordinate")
-        if not force.any():
-            force = None
-    if force is not None and given.well_amplitude is not None:
+    elongation: Any = None
+    if given.elongation_matrix is not None:
+        elongation = _matrix("elongation_matrix", given.elongation_matrix)
+        _require_shape("elongation_matrix", elongation, (count, count), "as large as the mass matrix")
+        elongation = symmetric("elongation_matrix", elongation)
+        if gamma == 0.0:
+            raise InputError(
+                "elongation_matrix with nonlinear_stiffness = 0: has no effect; give nonlinear_stiffness"
+            )
+    if rows["transverse_force"] is not None and not rows["transverse_force"].any():
+        rows["transverse_force"] = None
+    if rows["well_amplitude"] is not None and rows["transverse_force"] is not None:
         raise InputError(
             "well_amplitude with transverse_force: leave it out, the equilibria follow from the force"
         )
-    base_shape = None if given.base_shape is None else _shape("base_shape", given.base_shape, count)
-    elongation = None
-    if given.elongation_matrix is not None:
-        elongation = _elongation(given.elongation_matrix, count, gamma)
+
+    damping = finite_array("damping_ratio", given.damping_ratio)
+    fixed = fixed_coordinates(stiffness, mass)
+    if fixed.any():
+        _tell_fixed(fixed, stiffness)
+        free = np.flatnonzero(~fixed)
+        _release(rows, fixed, mass)
+        mass = mass[free][:, free]
+        stiffness = stiffness[free] if stiffness.ndim == 1 else stiffness[free][:, free]
+        elongation = None if elongation is None else elongation[free][:, free]
+        if damping.shape == (count,):
+            damping = damping[: free.size]  # the others are those of the fixed coordinates
+        count = free.size
+    _require_mass(mass)
+    if given.modes is not None:
+        modes = integer("modes", given.modes, 1, min(MAX_MODES, count))
+        if rows["well_amplitude"] is not None and rows["well_amplitude"].any():
+            raise InputError(
+                "well_amplitude with modes: the lowest modes of the unstressed structure do not contain it; leave modes out"
+            )
+        rows["well_amplitude"] = None
+        if stiffness.ndim == 1:
+            stiffness = np.diag(stiffness)
+        stiffness, basis = eigenpairs(stiffness, mass, count=modes)
+        if rows["base_shape"] is not None:
+            rows["base_shape"] = (
+                mass @ rows["base_shape"]
+            )  # back by the inverse of the modal mass, which is 1
+        rows = {name: None if row is None else basis.T @ row for name, row in rows.items()}
+        if gamma > 0.0:
+            elongation = basis.T @ (basis if elongation is None else elongation @ basis)
+        mass, count = np.eye(modes), modes
+    if elongation is not None:
+        elongation = _stretching(_dense(elongation))
+    contact_shape, force = rows["contact_shape"], rows["transverse_force"]
+    assert contact_shape is not None
+    midspan_shape = contact_shape.copy() if rows["midspan_shape"] is None else rows["midspan_shape"]
     if force is None:
-        equilibrium = _equilibrium(given.well_amplitude, stiffness, gamma, midspan_shape, elongation)
+        equilibrium = _equilibrium(rows["well_amplitude"], stiffness, gamma, midspan_shape, elongation)
     else:
         equilibrium = landscape_of(stiffness, gamma, force, midspan_shape, elongation).lower.amplitude
+    reference = given.reference_frequency
     return {
         "mass": mass,
         "stiffness": stiffness,
@@ -411,52 +441,127 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
         "well_amplitude": equilibrium,
         "transverse_force": force,
         "length_scale": positive("length_scale", given.length_scale, "m"),
-        "damping_ratio": damping_ratios(given.damping_ratio, count),
+        "damping_ratio": damping_ratios(damping, count),
         "midspan_shape": midspan_shape,
         "contact_shape": contact_shape,
-        "base_shape": base_shape,
+        "base_shape": rows["base_shape"],
         "elongation_matrix": elongation,
+        "patch_shape": rows["patch_shape"],
         "given_reference_frequency": None
         if reference is None
         else positive("reference_frequency", reference, "Hz"),
     }
 
 
+def _pair(given: StructureMatrices) -> tuple[Any, Any]:
+    """Mass and stiffness, both sparse only if they were given so and only some of their modes are needed."""
+    mass, stiffness = _matrix("mass", given.mass), _matrix("stiffness", given.stiffness)
+    if mass.ndim != 2 or mass.shape[0] != mass.shape[1] or mass.size == 0:
+        raise InputError(f"mass of shape {mass.shape}: must be a square matrix (N, N)")
+    count = mass.shape[0]
+    if stiffness.ndim == 2:
+        _require_shape("stiffness", stiffness, (count, count), "as large as the mass matrix")
+    else:
+        _require_shape("stiffness", stiffness, (count,), "a diagonal (N,) or a matrix (N, N)")
+    sparse = sp.issparse(mass) and sp.issparse(stiffness)
+    if count >= _MINUTE and sparse and given.modes is None:
+        raise InputError(
+            f"mass of shape {mass.shape}: sparse matrices of {_MINUTE} coordinates or more need modes, the number of lowest "
+            f"modes to keep, 1 to {MAX_MODES}"
+        )
+    if count >= _MINUTE and not sparse:
+        seconds = 60.0 * (count / _MINUTE) ** 3
+        tell(
+            [
+                Diagnostic(
+                    "large-matrices",
+                    f"mass of shape {mass.shape}: its natural frequencies take about {seconds / 60.0:.0f} min; give sparse "
+                    "matrices and modes, the number of lowest modes to keep",
+                    {"seconds": seconds},
+                )
+            ]
+        )
+    if not sparse or given.modes is None:
+        mass, stiffness = _dense(mass), _dense(stiffness)
+    return symmetric("mass", mass), stiffness if stiffness.ndim == 1 else symmetric("stiffness", stiffness)
+
+
+def _matrix(name: str, value: Any) -> Any:
+    """A finite array, or a sparse one by rows."""
+    if not sp.issparse(value):
+        return finite_array(name, value)
+    matrix = sp.csr_array(value)
+    return sp.csr_array((finite_array(name, matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
 def _dense(matrix: Any) -> Any:
     """A sparse matrix of SciPy as an array; anything else as it is."""
-    return matrix.toarray() if hasattr(matrix, "toarray") else matrix
+    return matrix.toarray() if sp.issparse(matrix) else matrix
 
 
-def _elongation(value: ArrayLike, count: int, gamma: float) -> _Array:
-    matrix = finite_array("elongation_matrix", _dense(value))
-    _require_shape("elongation_matrix", matrix, (count, count), "as large as the mass matrix")
-    matrix = _symmetric("elongation_matrix", matrix)
+def _require_mass(mass: Any) -> None:
+    if is_positive_definite(mass):
+        return
+    lowest = "" if sp.issparse(mass) else f", but its lowest eigenvalue is {np.linalg.eigvalsh(mass)[0]:g}"
+    raise InputError(
+        f"mass: must be positive definite{lowest}; leave out fixed coordinates, and condense those without mass"
+    )
+
+
+def _tell_fixed(fixed: NDArray[np.bool_], stiffness: Any) -> None:
+    where = np.flatnonzero(fixed)
+    largest = float((stiffness if stiffness.ndim == 1 else stiffness.diagonal())[where].max())
+    listed = ", ".join(str(i) for i in where[:8]) + (", ..." if where.size > 8 else "")
+    tell(
+        [
+            Diagnostic(
+                "fixed-coordinates",
+                f"stiffness: penalties up to {largest:.3g} on its diagonal fix the coordinates {listed}; snapbeam removes "
+                f"them, and the model has {fixed.size - where.size} coordinates",
+                {"removed": where.size, "penalty": largest},
+            )
+        ]
+    )
+
+
+def _release(rows: dict[str, _Array | None], fixed: NDArray[np.bool_], mass: Any) -> None:
+    """Leave the fixed coordinates out of every row; a base that moves them acts on the others through the mass."""
+    base, well, contact = rows["base_shape"], rows["well_amplitude"], rows["contact_shape"]
+    if well is not None and well[fixed].any():
+        raise InputError("well_amplitude: must be 0 in the coordinates that a penalty in the stiffness fixes")
+    if contact is not None and not contact[~fixed].any():
+        raise InputError(
+            "contact_shape: must not be zeros only in the coordinates that no penalty in the stiffness fixes"
+        )
+    for name, row in rows.items():
+        rows[name] = None if row is None else row[~fixed]
+    if base is not None and base[fixed].any():
+        free = np.flatnonzero(~fixed)
+        across = mass[free][:, np.flatnonzero(fixed)] @ base[fixed]
+        own = mass[free][:, free]
+        solved = sp.linalg.spsolve(own.tocsc(), across) if sp.issparse(own) else np.linalg.solve(own, across)
+        rows["base_shape"] = base[free] + solved
+
+
+def _stretching(matrix: _Array) -> _Array:
     eigenvalue = np.linalg.eigvalsh(matrix)
     if eigenvalue[0] < -1e-12 * max(abs(float(eigenvalue[-1])), 1e-300) or not matrix.any():
         raise InputError(
             f"elongation_matrix: its lowest eigenvalue is {eigenvalue[0]:g}; must be at least 0, and the greatest greater "
             "than 0; give the geometric stiffness matrix of a unit tension"
         )
-    if gamma == 0.0:
-        raise InputError(
-            "elongation_matrix with nonlinear_stiffness = 0: has no effect; give nonlinear_stiffness"
-        )
     return matrix
 
 
 def _equilibrium(
-    value: ArrayLike | None,
+    a: _Array | None,
     stiffness: _Array,
     gamma: float,
     midspan_shape: _Array,
     elongation: _Array | None = None,
 ) -> _Array:
-    if value is None:
+    if a is None or not a.any():
         return np.zeros(midspan_shape.size)
-    a = finite_array("well_amplitude", value)
-    _require_shape("well_amplitude", a, midspan_shape.shape, "one number for each coordinate")
-    if not a.any():
-        return a
     given = f"well_amplitude = {a.tolist()}"
     if gamma == 0.0:
         raise InputError(f"{given}: must be zero unless nonlinear_stiffness is greater than 0")
@@ -485,14 +590,3 @@ def _shape(name: str, value: ArrayLike, count: int) -> _Array:
 def _require_shape(name: str, array: _Array, shape: tuple[int, ...], meaning: str) -> None:
     if array.shape != shape:
         raise InputError(f"{name} of shape {array.shape}: must have the shape {shape}, {meaning}")
-
-
-def _symmetric(name: str, matrix: _Array) -> _Array:
-    asymmetry = np.abs(matrix - matrix.T)
-    if asymmetry.max() > _SYMMETRY * np.abs(matrix).max():
-        i, j = (int(n) for n in np.unravel_index(np.argmax(asymmetry), matrix.shape))
-        raise InputError(
-            f"{name}[{i}, {j}] = {matrix[i, j]:g}, {name}[{j}, {i}] = {matrix[j, i]:g}: must be symmetric; check the order "
-            "of the degrees of freedom in the export"
-        )
-    return 0.5 * (matrix + matrix.T)

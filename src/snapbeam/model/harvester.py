@@ -81,7 +81,8 @@ class PiezoelectricHarvester(Harvester):
 
         theta_i = Theta [phi_i'(x_2) - phi_i'(x_1)],     C v' = -v/R - theta . alpha',
 
-    with Theta the bending moment per volt.  Their own mass and stiffness are left out.
+    with Theta the bending moment per volt.  Their own mass and stiffness are left out.  Of a structure given by matrices
+    theta is Theta times its ``patch_shape``, whatever the locations.
 
     Parameters
     ----------
@@ -188,7 +189,14 @@ class PiezoelectricHarvester(Harvester):
 
     def row(self, model: ReducedModel) -> _Array:
         """Theta times the difference of the slopes."""
-        beam = _beam_of(model)
+        if model.beam is None:
+            if model.patch_shape is None:
+                raise InputError(
+                    "harvester: needs the difference of the slopes at the ends of its layers per unit of each coordinate; "
+                    "give patch_shape to ReducedModel.from_matrices"
+                )
+            return np.asarray(self.moment_per_volt * model.patch_shape)
+        beam = model.beam
         modes = modes_between(beam.boundary, beam.length, beam.bending_stiffness, model.modes)
         slopes = [modes.slope(place * beam.length) for place in (self.patch_start, self.patch_end)]
         return np.asarray(self.moment_per_volt * (slopes[1] - slopes[0]))
@@ -279,12 +287,3 @@ class ElectromagneticHarvester(Harvester):
     def volts(self, resistance: _Array) -> _Array:
         """-R i, i the current that z is the negative of."""
         return -resistance
-
-
-def _beam_of(model: ReducedModel) -> Any:
-    if model.beam is None:
-        raise InputError(
-            "harvester: layers are glued to a beam; "
-            "of a structure given by matrices the slopes are not known; use an ElectromagneticHarvester"
-        )
-    return model.beam

@@ -47,7 +47,7 @@ SECTIONS = (
 _MATRICES = (
     "mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "well_amplitude", "length_scale",
 )  # fmt: skip
-_OPTIONAL = ("base_shape", "elongation_matrix")
+_OPTIONAL = ("base_shape", "elongation_matrix", "patch_shape")
 _START = (
     "amplitude",
     "velocity",

@@ -23,6 +23,7 @@ from snapbeam.model.buckling_modes import (
 )
 from snapbeam.model.equilibria import Equilibrium, Landscape, condensed, landscape_of, tangent_stiffness
 from snapbeam.model.imperfection import Imperfection, perfect_equilibria
+from snapbeam.model.matrix_pairs import eigenpairs
 from snapbeam.model.quantity import ParameterField, quantities
 from snapbeam.util.validation import (
     InputError,
@@ -42,7 +43,6 @@ __all__ = [
     "displacement_along",
     "linear_modes_about",
     "linear_modes_of_beam",
-    "linear_modes_of_structure",
     "rank_one_eigenpairs",
 ]
 
@@ -166,47 +166,22 @@ def linear_modes_of_beam(beam: Beam, count: int) -> LinearModes:
     return _read_only(np.sqrt(eigenvalue[order]), vectors[:, order], shapes.parity[order])
 
 
-def linear_modes_of_structure(
+def linear_modes_about(
+    alpha: _Array,
     mass: _Array,
-    stiffness: _Array,
-    nonlinear_stiffness: float,
-    equilibrium: _Array,
-    elongation: _Array | None = None,
+    tangent: _Array,
+    magnitude: _Array,
+    parity: NDArray[np.int_] | None = None,
 ) -> LinearModes:
-    """Linear modes of the tangent K0 + gamma (s S + 2 S a a^T S), s = a . S a, at the equilibrium a.
+    """Linear modes about the equilibrium alpha of a tangent stiffness; each parity by itself where the tangent does not couple the two.
 
-    An eigenvalue that rounding cannot tell from 0 is 0.
-
-    Raises
-    ------
-    InputError
-        If an eigenvalue is negative, so that the equilibrium is unstable.
-    """
-    import scipy.linalg
-
-    a = equilibrium
-    tangent = tangent_stiffness(stiffness, nonlinear_stiffness, a, elongation)
-    eigenvalue, vectors = scipy.linalg.eigh(tangent, mass)
-    rounding = 8.0 * a.size * np.finfo(np.float64).eps * np.abs(eigenvalue).max()
-    if eigenvalue[0] < -rounding:
-        raise InputError(
-            f"well_amplitude = {a.tolist()}: must be stable, but the tangent stiffness has the negative "
-            f"eigenvalue {eigenvalue[0]:g} 1/s^2 there"
-        )
-    eigenvalue[np.abs(eigenvalue) <= rounding] = 0.0
-    return _read_only(np.sqrt(eigenvalue), vectors, np.zeros(a.size, dtype=np.int_))
-
-
-def linear_modes_about(mass: _Array, tangent: _Array, parity: NDArray[np.int_] | None = None) -> LinearModes:
-    """Linear modes of any tangent stiffness; each parity by itself where the tangent does not couple the two.
+    *magnitude* is the sum of the moduli of its terms, from which rounding follows.  Rigid modes have the frequency 0.
 
     Raises
     ------
     InputError
-        If an eigenvalue is negative.
+        If an eigenvalue is negative, or if rounding hides whether one is 0.
     """
-    import scipy.linalg
-
     count = mass.shape[0]
     odd = np.zeros(count, dtype=bool) if parity is None else parity < 0
     apart = parity is not None and not tangent[np.ix_(odd, ~odd)].any()
@@ -215,11 +190,12 @@ def linear_modes_about(mass: _Array, tangent: _Array, parity: NDArray[np.int_] |
     for index in groups:
         if index.size:
             block = np.ix_(index, index)
-            eigenvalue[index], vectors[block] = scipy.linalg.eigh(tangent[block], mass[block])
-    rounding = 8.0 * count * np.finfo(np.float64).eps * np.abs(eigenvalue).max()
-    if eigenvalue.min() < -rounding:
-        raise InputError(f"well_amplitude: must be stable, but has the eigenvalue {eigenvalue.min():g} 1/s^2")
-    eigenvalue[np.abs(eigenvalue) <= rounding] = 0.0
+            eigenvalue[index], vectors[block] = eigenpairs(tangent[block], mass[block], magnitude[block])
+    if eigenvalue.min() < 0.0:
+        raise InputError(
+            f"well_amplitude = {shown(alpha.tolist())}: must be stable, but the tangent stiffness has the negative "
+            f"eigenvalue {eigenvalue.min():g} 1/s^2 there"
+        )
     order = np.argsort(eigenvalue, kind="stable")
     own = parity[order] if parity is not None and apart else np.zeros(count, dtype=np.int_)
     return _read_only(np.sqrt(eigenvalue[order]), vectors[:, order], own)
@@ -566,6 +542,8 @@ class ReducedModel(Wells):
         Displacement of each coordinate per unit of the base's, of a structure given by matrices.
     elongation_matrix : array of shape (N, N) or None
         S of the term gamma (alpha . S alpha) S alpha, of a structure given by matrices; None for the identity.
+    patch_shape : array of shape (N,) or None
+        Difference of the slopes at the ends of piezoelectric layers, of a structure given by matrices.
 
     Examples
     --------
@@ -592,6 +570,7 @@ class ReducedModel(Wells):
     imperfection: Imperfection | None = None
     base_shape: _Array | None = None
     elongation_matrix: _Array | None = None
+    patch_shape: _Array | None = None
 
     def __post_init__(self) -> None:
         for value in vars(self).values():
@@ -705,15 +684,20 @@ class ReducedModel(Wells):
         transverse_force: ArrayLike | None = None,
         base_shape: ArrayLike | None = None,
         elongation_matrix: ArrayLike | None = None,
+        patch_shape: ArrayLike | None = None,
+        modes: int | None = None,
     ) -> ReducedModel:
         """A model of any structure, given by its matrices; a free mass (stiffness 0) is one.
+
+        A coordinate whose stiffness is a penalty (at least 1e14, and 1e12 times every other) is fixed: it is removed from the
+        matrices and from every row, and a :class:`~snapbeam.DiagnosticWarning` names it.
 
         Parameters
         ----------
         mass : array of shape (N, N)
-            Mass matrix, symmetric and positive definite.
+            Mass matrix, symmetric and positive definite; an array or a sparse matrix of SciPy.
         stiffness : array of shape (N,) or (N, N)
-            Linear stiffness of the unstressed structure: a diagonal or a symmetric matrix.
+            Linear stiffness of the unstressed structure: a diagonal or a symmetric matrix, which may be sparse.
         contact_shape : array of shape (N,)
             Displacement under the shaker per unit of each coordinate.
         midspan_shape : array of shape (N,), optional
@@ -738,12 +722,19 @@ class ReducedModel(Wells):
             S of the term gamma (alpha . S alpha) S alpha, symmetric and without negative eigenvalues; the identity by
             default.  For a beam it is the geometric stiffness matrix of a unit tension, with gamma = E A/(2 L); for a
             cubic spring k_3 between coordinates it is h h^T with gamma = k_3, where h . alpha is its elongation.
+        patch_shape : array of shape (N,), optional
+            Difference of the slopes at the two ends of piezoelectric layers, w'(x_2) - w'(x_1), per unit of each
+            coordinate; needed for a :class:`~snapbeam.PiezoelectricHarvester`.
+        modes : int, optional
+            Number of lowest linear modes, 1 to 256, onto which the matrices and rows are projected.  They become the
+            coordinates of the model.  Sparse matrices of more than 4000 coordinates need it; no well_amplitude.
 
         Raises
         ------
         InputError
             For matrices of the wrong shape, not symmetric or not positive definite, values that are not
-            finite or out of range, or an equilibrium that is none or is unstable.
+            finite or out of range, or an equilibrium that is none or is unstable; if rounding hides whether a natural
+            frequency is 0.
         """
         given = checked_structure(
             StructureMatrices(
@@ -759,10 +750,12 @@ class ReducedModel(Wells):
                 transverse_force=transverse_force,
                 base_shape=base_shape,
                 elongation_matrix=elongation_matrix,
+                patch_shape=patch_shape,
+                modes=modes,
             )
         )
         model = cls(**given)
-        model._linear_modes()  # refuses an unstable equilibrium here rather than at its first use
+        _ = model._linear  # refuses an unstable equilibrium here rather than at its first use
         return model
 
     # ------------------------------------------------------------------ shapes
@@ -813,20 +806,21 @@ class ReducedModel(Wells):
     # ------------------------------------------------------------------ linear modes about a well
 
     def _linear_modes(self) -> LinearModes:
-        if self.transverse_force is not None or (self.beam is not None and self.beam.boundary.is_elastic):
-            tangent = tangent_stiffness(
-                self.stiffness, self.nonlinear_stiffness, self.well_amplitude, self.elongation_matrix
-            )
-            parity = None if self.beam is None else self.beam.buckling_modes(self.modes).parity
-            return linear_modes_about(self.mass, tangent, parity)
-        if self.beam is not None:
+        if self.beam is not None and self.transverse_force is None and not self.beam.boundary.is_elastic:
             return linear_modes_of_beam(self.beam, self.modes)
-        return linear_modes_of_structure(
+        parity = None if self.beam is None else self.beam.buckling_modes(self.modes).parity
+        alpha, stretch = self.well_amplitude, self.elongation_matrix
+        return linear_modes_about(
+            alpha,
             self.mass,
-            self.stiffness,
-            self.nonlinear_stiffness,
-            self.well_amplitude,
-            self.elongation_matrix,
+            tangent_stiffness(self.stiffness, self.nonlinear_stiffness, alpha, stretch),
+            tangent_stiffness(
+                np.abs(self.stiffness),
+                self.nonlinear_stiffness,
+                np.abs(alpha),
+                None if stretch is None else np.abs(stretch),
+            ),
+            parity,
         )
 
     @cached_property
