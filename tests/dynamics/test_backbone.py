@@ -8,10 +8,12 @@ from scipy.optimize import least_squares
 from scipy.special import ellipk
 
 import snapbeam as sb
+from snapbeam.dynamics.backbone import _vanishing
 from snapbeam.model import default_values
 from snapbeam.util.validation import InputError
 
 ONE = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
+TWO = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
 THREE = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
 
 
@@ -89,6 +91,37 @@ def test_it_begins_at_the_natural_frequencies(mode: int) -> None:
     curve = sb.dynamics.backbone_curve(THREE, mode=mode, max_points=6)
     assert float(curve.frequency[0]) == pytest.approx(THREE.natural_frequencies[mode - 1], rel=1e-5)
     assert float(curve.participation[0, mode - 1]) > 0.999
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("model", "well", "mode", "end"),
+    [
+        (THREE, "upper", 2, "the turning points meet"),
+        (THREE, "lower", 2, "the turning points meet"),
+        (THREE, "upper", 3, "at another equilibrium"),
+        (TWO, "upper", 2, "at another equilibrium"),
+    ],
+)
+def test_no_motion_comes_twice(model: sb.ReducedModel, well: str, mode: int, end: str) -> None:
+    """The curve ends where the same motions would follow, from their other turning points."""
+    curve = sb.dynamics.backbone_curve(model, well=well, mode=mode)
+    assert curve.attrs["end"].startswith(end) and 20 < curve.sizes["point"] < 60
+    # each motion turns back where no other one of the curve begins
+    begun = curve.initial_amplitude.values
+    mirrored = begun * np.where(np.arange(model.modes) % 2, -1.0, 1.0)
+    if end.startswith("the turning"):
+        steps = np.linalg.norm(np.diff(begun, axis=0), axis=1).max()
+        apart = np.linalg.norm(mirrored[:-2, None] - begun[None], axis=2)[5:, 5:]
+        assert apart.min() > 0.1 * steps
+
+
+def test_a_curve_that_passes_the_equilibrium_ends_there() -> None:
+    """Chords that miss zero, pass it, and pass it where nothing but rounding is left."""
+    assert _vanishing(np.array([0.1, 0.0]), np.array([0.1, -0.1])) is None
+    assert _vanishing(np.array([0.1, 0.001]), np.array([-0.3, -0.002])) == pytest.approx(0.25, abs=1e-2)
+    assert _vanishing(np.array([1e-3, 0.0]), np.array([2e-2, 0.0])) is None
+    assert _vanishing(np.array([1e-12, 0.0]), np.array([-1e-12, 0.0])) is None
 
 
 @pytest.mark.slow

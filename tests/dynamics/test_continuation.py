@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from doubles import henon, logistic
+from scipy.linalg import expm
 from scipy.optimize import brentq
 from test_orbits import EXACT, exact_orbit, oscillator, system_of
 
@@ -131,6 +132,101 @@ def test_orbits_of_twenty_points_are_followed_to_grazing(
     ratio: float, restitution: float, periods: int
 ) -> None:
     follow_to_grazing(ratio, restitution, periods, 0.1)
+
+
+# ----------------------------------------------------------------------------------------------------
+# One impact a period on a wall a gap of 1 away, with damping: two linear conditions and a quadratic equation.
+
+
+def damped(ratio: float, velocity: float) -> sb.System:
+    """Mass and stiffness 1, a damping ratio of 0.05, a coefficient of restitution of 0.8."""
+    model = sb.ReducedModel.from_matrices(
+        [[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0, damping_ratio=0.05
+    )
+    drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity)
+    return sb.System(model, sb.Restitution(0.8), sb.Striker(drive=drive, gap=1.0))
+
+
+def flight(ratio: float) -> tuple[float, float]:
+    """Displacement at impact, and the wall's over its frequency a quarter period earlier, per approach speed."""
+    once = expm(np.array([[0.0, 1.0], [-1.0, -0.1]]) * 2.0 * math.pi / ratio)
+    matrix = [[1.0 - once[0, 0], -once[0, 1]], [-once[1, 0], 1.0 - once[1, 1]]]
+    place, wall = np.linalg.solve(matrix, [0.8 * once[0, 1], 1.0 + 0.8 * once[1, 1]])
+    return place, wall / ratio
+
+
+def fold_of(ratio: float) -> float:
+    place, wall = flight(ratio)
+    return ratio * abs(wall) / math.hypot(place, wall)
+
+
+def damped_orbits(ratio: float, velocity: float, phase: float) -> list[np.ndarray]:
+    """States of both orbits with one impact a period at a phase of the wall, that of the faster impact first."""
+    place, wall = flight(ratio)
+    reach = velocity / ratio
+    found = []
+    for speed in np.sort(np.roots([place**2 + wall**2, 2.0 * place, 1.0 - reach**2]).real)[::-1]:
+        x, rate = place * speed, wall * ratio * speed
+        after = (phase - math.atan2(x + 1.0, rate / ratio)) % (2.0 * math.pi) / ratio
+        carry = expm(np.array([[0.0, 1.0], [-1.0, -0.1]]) * after)
+        found.append(carry @ np.array([x, rate + 0.8 * speed]))
+    return found
+
+
+FOLD = 0.40663746
+
+
+@pytest.mark.parametrize(
+    ("velocity", "which", "direction"),
+    [(0.44, 0, "down"), (0.43, 1, "down"), (0.42495795, 0, "down"), (0.415, 0, "up")],
+)
+def test_an_impact_at_the_phase_of_observation_is_no_bifurcation(
+    velocity: float, which: int, direction: str
+) -> None:
+    """At 0.424958 the faster impact is at the phase at which a run begins; the only fold is at 0.40663746."""
+    assert fold_of(1.4) == pytest.approx(FOLD, abs=1e-8)
+    system = damped(1.4, velocity)
+    orbit = sb.dynamics.periodic_orbit(system, damped_orbits(1.4, velocity, 0.0)[which])
+    if velocity == 0.42495795:
+        values = orbit.multipliers
+        np.testing.assert_allclose([values.real, np.abs(values.imag)], [[0.616] * 2, [0.171] * 2], atol=1e-3)
+    branch = sb.dynamics.continuation(
+        orbit, "velocity_amplitude", (0.38, 0.46), direction=direction, max_step=0.1
+    )
+    assert branch.termination_reason == "limit of the parameter"
+    folds = branch.special_points
+    assert [point.kind for point in folds] == ([] if direction == "up" else ["fold"])
+    for point in folds:
+        assert abs(point.value - fold_of(1.4)) <= 10.0 * point.error < 1e-8
+        assert np.abs(point.orbit.multipliers - 1.0).min() < 1e-6
+    for each, value in zip(branch.orbits, branch.values, strict=True):
+        exact = damped_orbits(1.4, float(value), each.flow.striker_phase)
+        assert min(np.abs(each.coordinates - state).max() for state in exact) < 1e-8
+
+
+@pytest.mark.slow
+def test_the_phase_of_observation_changes_along_a_branch() -> None:
+    """The impact comes within 0.27 rad of the phase given; the dataset keeps that phase, and so does a curve."""
+    orbit = sb.dynamics.periodic_orbit(damped(1.4, 0.415), damped_orbits(1.4, 0.415, 0.9)[0], phase=0.9)
+    branch = sb.dynamics.continuation(
+        orbit, "velocity_amplitude", (0.38, 0.46), direction="down", max_step=0.1
+    )
+    phases = [each.flow.striker_phase for each in branch.orbits]
+    assert phases[0] == 0.9 and len(set(phases)) == 2
+    for state, value in zip(branch.to_dataset()["state"].values, branch.values, strict=True):
+        assert min(np.abs(state - each).max() for each in damped_orbits(1.4, float(value), 0.9)) < 2e-8
+    again = sb.dynamics.periodic_orbit(damped(1.4, 0.415), branch.orbits[0], phase=3.0)
+    np.testing.assert_allclose(again.coordinates, damped_orbits(1.4, 0.415, 3.0)[0], atol=1e-8)
+    curve = sb.dynamics.bifurcation_curve(
+        branch.special_points[0],
+        ("frequency_ratio", "velocity_amplitude"),
+        ((1.2, 1.8), (0.2, 0.6)),
+        step=0.03,
+        max_step=0.1,
+    )
+    assert curve.attrs["termination_reason"] == "limit of a parameter; limit of a parameter"
+    exact = [fold_of(float(ratio)) for ratio in curve["frequency_ratio"]]
+    np.testing.assert_allclose(curve["velocity_amplitude"].values, exact, atol=5e-9)
 
 
 def test_a_branch_of_the_beam() -> None:

@@ -99,7 +99,11 @@ def balls_of(orbit: PeriodicOrbit) -> list[Ball]:
         from snapbeam.dynamics.periodic_orbits import Family, jacobian
 
         for point in points[1:]:
-            came = jacobian(Family(orbit.flow), point, orbit.period)
+            try:
+                came = jacobian(Family(orbit.flow), point, orbit.period)
+            except OrbitNotFoundError:  # an impact is at the phase of observation
+                found.append(Ball(point, np.eye(size), 0.0))
+                continue
             found.append(_ball(orbit, point, came.jacobian, directions))
     return found
 

@@ -39,6 +39,14 @@ _CONVERGED = 1e-10
 """Velocity at the turning point, in the same units."""
 _FIRST, _SHORTEST = 0.02, 1e-5
 """Arc lengths between two points: the first, if it is not above the greatest, and the least."""
+_SAME_STATE = 1e-6
+"""Difference of the two turning points, in units of the well's amplitude, up to which a motion has only one."""
+_NEAR_ZERO = 0.1
+"""Distance of a chord from zero, over its length, up to which the curve passes through zero."""
+_AT_REST, _OTHER_REST = "back at the equilibrium", "at another equilibrium"
+_RETRACED = (
+    "the turning points meet: the curve goes on through the same motions from their other turning points"
+)
 _SAMPLES = 64
 """Instants of half a period from which means are taken."""
 _STABLE = 1e-4
@@ -93,7 +101,8 @@ def backbone_curve(
         ``max_midspan`` (over the length scale), ``stable``, ``unstable_multipliers``; over ``point`` and ``mode``
         ``initial_amplitude`` (of the buckling modes, at rest) and ``participation``, the share of each linear mode in the
         mean kinetic energy; over ``point`` and ``multiplier`` their size and angle.  The attribute ``end`` says why the
-        curve ends.
+        curve ends: among others at an equilibrium or where the two turning points meet, since from there on the same
+        motions would follow again.
 
     Raises
     ------
@@ -393,6 +402,19 @@ def _corrected(
     return None
 
 
+def _vanishing(before: _Array, after: _Array) -> float | None:
+    """Part of the way between two points of a curve at which a vector vanishes; None where its chord misses zero."""
+    chord = after - before
+    square = float(chord @ chord)
+    if (
+        min(np.abs(before).max(), np.abs(after).max()) < _SAME_STATE
+        or not 0.0 < -float(before @ chord) < square
+    ):
+        return None
+    part = -float(before @ chord) / square
+    return part if np.linalg.norm(before + part * chord) < _NEAR_ZERO * np.sqrt(square) else None
+
+
 def _follow(
     structure: _Structure,
     start: tuple[_Array, _Array],
@@ -409,7 +431,8 @@ def _follow(
     found = _corrected(structure, start[0], start[1], start[0])
     if found is None:
         raise RuntimeError("no motion was found where the curve begins; choose another mode")
-    point, along, _, _ = found
+    point, along, turned, _ = found
+    apart = turned - point[:-1]
     points, direction, length = [point], way * along, min(_FIRST, limits[2])
     while len(points) < max_points:
         if report is not None:
@@ -422,6 +445,15 @@ def _follow(
                 return points, "Newton's method no longer converges"
             continue
         point, direction, turned, iterations = found
+        before, apart = apart, turned - point[:-1]
+        part = _vanishing(before, apart)
+        if part is not None:
+            met = ((1.0 - part) * points[-1] + part * point)[:-1]
+            near = _NEAR_ZERO * np.linalg.norm(apart - before)
+            if np.linalg.norm(met) < near:
+                return points, _AT_REST
+            to_rest = np.linalg.lstsq(structure.slope(met), structure.acceleration(met), rcond=None)[0]
+            return points, _OTHER_REST if np.linalg.norm(to_rest) < near else _RETRACED
         points.append(point)
         if iterations <= 3:
             length = min(1.4 * length, limits[2])
@@ -432,7 +464,7 @@ def _follow(
         if point[-1] > limits[1]:
             return points, "lowest_frequency_ratio"
         if structure.well != "both" and np.abs(point[:-1]).max() < 5e-4:
-            return points, "back at the equilibrium"
+            return points, _AT_REST
     return points, "max_points"
 
 

@@ -176,6 +176,48 @@ class _Curve:
             raise OrbitNotFoundError("a run beside the orbit failed")
         return _Point(shot.x, _tangent(table, before), came, table, shot.iterations, shot.residual)
 
+    def at(self, point: _Point) -> Flow:
+        """The flow at the parameters of a point."""
+        flow: Flow = self.plane.flow
+        for name, value in zip(self.plane.names, point.y[-2:] * self.spans, strict=True):
+            flow = flow.neighbour(name, float(value))
+        return flow
+
+    def state(self, point: _Point, flow: Flow) -> _Array:
+        """The state of a point at the phase at which another flow takes states."""
+        if not isinstance(flow, Stroboscope) or flow is self.plane.flow:
+            return point.y[:-2]
+        here = self.at(point)
+        assert isinstance(here, Stroboscope)
+        return here.carried(point.y[:-2], flow.striker_phase)
+
+    def between_contacts(self, point: _Point) -> tuple[_Curve, _Point]:
+        """The point at the phase farthest from contacts, if one is near the phase of the flow; itself otherwise.
+
+        Raises
+        ------
+        OrbitNotFoundError
+        """
+        flow, names = self.plane.flow, self.plane.names
+        if (
+            not isinstance(flow, Stroboscope)
+            or flow.smooth
+            or any(lookup(name).name.endswith(".phase") for name in names)
+        ):
+            return self, point
+        here = self.at(point)
+        assert isinstance(here, Stroboscope)
+        phase = here.phase_between_contacts(point.y[:-2], self.period)
+        if phase is None:
+            return self, point
+        plane = _Plane(Stroboscope(flow.system, flow.integration, phase), names)
+        moved = _Curve(plane, self.kind, self.period, self.spans, self.tolerance)
+        y = np.append(self.state(point, plane.flow), point.y[-2:])
+        moved.border(moved.came(y))
+        table = moved.derivative(y)[2]
+        along = _tangent(table, np.append(np.zeros(y.size - 2), point.tangent[-2:]))
+        return moved, moved.correct(y, along, along, table)
+
     def error(self, point: _Point, relative: float) -> _Array:
         """By how much the parameters may be off for the residual and the error of the map's derivative."""
         size = point.y.size - 2
@@ -183,6 +225,10 @@ class _Curve:
         off = np.append(np.full(size, point.residual), relative * steep + point.residual)
         inverse = np.linalg.pinv(point.table)[size:]
         return np.asarray(np.abs(inverse) @ off * self.spans)
+
+
+_Seen = tuple[_Curve, _Point]
+"""A point, and the curve at whose phase of observation it is seen."""
 
 
 def _pair(came: Return) -> float:
@@ -356,7 +402,7 @@ def bifurcation_curve(
         sides.append(points)
         special += events
         ends.append(end)
-    points = [*reversed(sides[0][1:]), first, *sides[1][1:]]
+    points = [*reversed(sides[0][1:]), *sides[1]]
     return _dataset(curve, names, points, special, ends, flow)
 
 
@@ -368,10 +414,14 @@ def _follow(
     length: float,
     longest: float,
     progress: Callable[[int, int], object] | None,
-) -> tuple[list[_Point], list[tuple[str, _Point]], str]:
-    points, events = [first], list[tuple[str, _Point]]()
+) -> tuple[list[_Seen], list[tuple[str, _Point]], str]:
+    points, events = [(curve, first)], list[tuple[str, _Point]]()
     while len(points) < max_points:
-        last = points[-1]
+        try:
+            points[-1] = curve.between_contacts(points[-1][1])
+        except (OrbitNotFoundError, np.linalg.LinAlgError):
+            pass  # the next point is sought at the phase of this one
+        curve, last = points[-1]
         guess, row, over = last.y + length * last.tangent, last.tangent, False
         shares = [
             (value - last.y[k - 2]) / (length * last.tangent[k - 2])
@@ -399,15 +449,16 @@ def _follow(
                 return points, events, f"no further point: {error}"
             continue
         events += _between(curve, last, point)
-        points.append(point)
+        points.append((curve, point))
         if progress is not None:
             progress(len(points), max_points)
         if over:
             return points, events, "limit of a parameter"
         if (
             len(points) > 8
-            and np.linalg.norm(point.y - first.y) < 0.75 * length
-            and point.tangent @ first.tangent > 0.9
+            and np.linalg.norm(point.y[-2:] - first.y[-2:]) < 0.75 * length
+            and np.linalg.norm(point.y[:-2] - points[0][0].state(first, curve.plane.flow)) < 0.75 * length
+            and point.tangent[-2:] @ first.tangent[-2:] > 0.0
         ):
             return points, events, "closed"
         if point.iterations <= _EASY and turned > 0.95:
@@ -420,13 +471,14 @@ def _follow(
 def _dataset(
     curve: _Curve,
     names: tuple[str, str],
-    points: list[_Point],
+    seen: list[_Seen],
     special: list[tuple[str, _Point]],
     ends: list[str],
     flow: Flow,
 ) -> xr.Dataset:
     from snapbeam.util.datasets import xr
 
+    points = [point for _, point in seen]
     relative = _FINE if isinstance(flow, Stroboscope) else 1e-9
     errors = np.array([curve.error(point, relative) for point in points])
     values = np.array([point.y[-2:] for point in points]) * curve.spans
@@ -436,8 +488,8 @@ def _dataset(
     variables: dict[str, Any] = {
         "state": (
             ("point", "coordinate"),
-            np.array([point.y[:-2] for point in points]),
-            _labels("state of the orbit"),
+            np.array([by.state(point, flow) for by, point in seen]),
+            _labels("state of the orbit at the phase of observation of the special point"),
         ),
         "multiplier_real": (("point", "multiplier"), multipliers.real, _labels("Floquet multiplier")),
         "multiplier_imag": (("point", "multiplier"), multipliers.imag, _labels("its imaginary part")),

@@ -23,6 +23,7 @@ from snapbeam.dynamics.periodic_orbits import (
     PeriodicOrbit,
     Return,
     Spot,
+    orbit_at,
     orbit_tolerance,
 )
 from snapbeam.util.diagnostics import counting, tell, to_json
@@ -138,20 +139,21 @@ class Branch:
         from snapbeam.util.datasets import xr
 
         first = self.orbits[0]
+        seen = [orbit_at(orbit, first.flow) for orbit in self.orbits]
         names = getattr(first.flow, "names", tuple(f"x[{i + 1}]" for i in range(first.coordinates.size)))
         values = np.array([orbit.multipliers for orbit in self.orbits])
         short, unit, words = self.name, "1", self.name
         if isinstance(first.flow, Stroboscope):
             row = lookup(self.name)
             short, unit, words = row.short, row.quantity.unit, row.quantity.long_name
-        states = np.array([orbit.coordinates for orbit in self.orbits])
+        states = np.array([orbit.coordinates for orbit in seen])
         steps = np.linalg.norm(np.diff(states, axis=0), axis=1)
         dataset = xr.Dataset(
             {
                 "state": (
                     ("orbit", "coordinate"),
                     states,
-                    _labels("state of the orbit at the phase it is seen at"),
+                    _labels("state of the orbit at the phase of observation of the first orbit"),
                 ),
                 "multiplier_real": (("orbit", "multiplier"), values.real, _labels("Floquet multiplier")),
                 "multiplier_imag": (("orbit", "multiplier"), values.imag, _labels("its imaginary part")),
@@ -193,9 +195,9 @@ class Branch:
                 ),
                 "special_point_state": (
                     ("special_point", "coordinate"),
-                    np.array([point.orbit.coordinates for point in self.special_points]).reshape(
-                        -1, states.shape[1]
-                    ),
+                    np.array(
+                        [orbit_at(point.orbit, first.flow).coordinates for point in self.special_points]
+                    ).reshape(-1, states.shape[1]),
                     _labels("state of the orbit there"),
                 ),
             },
@@ -213,7 +215,7 @@ class Branch:
             },
         )
         if isinstance(first.flow, Stroboscope):
-            centers = np.array([_centers(orbit) for orbit in self.orbits])
+            centers = np.array([_centers(orbit) for orbit in seen])
             dataset["midspan_displacement"] = (
                 "orbit",
                 centers[:, 0],
@@ -253,6 +255,8 @@ def _labels(words: str) -> dict[str, str]:
 
 _LOCATED = 1e-9
 """Of a multiplier at an event."""
+_CRITICAL = 1e-3
+"""Distance of the critical multiplier at an event from where it is in theory, at most."""
 _HALVINGS = 20
 _TOUCHES = 5e-3
 """Clearance, over the length scale, below which a branch that goes no further ends by grazing."""
@@ -313,7 +317,7 @@ def _between_at(corrector: Corrector, one: Spot, other: Spot, part: float) -> Sp
 
 
 def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -> SpecialPoint | None:
-    """An event between two orbits, by the Illinois form of false position."""
+    """An event between two orbits, by the Illinois form of false position; None where no multiplier is critical."""
     low, high, f_low, f_high = 0.0, 1.0, _test(one, kind), _test(other, kind)
     if not f_low * f_high < 0.0:
         return None
@@ -341,6 +345,9 @@ def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -
             f_high *= 0.5 if side == -1 else 1.0
             side = -1
     orbit = corrector.orbit(best)
+    critical = max(_CRITICAL, 10.0 * _derivative_error(corrector.family.flow, orbit))
+    if not _distance(orbit.multipliers, kind) < critical:
+        return None  # what seems to change its sign jumps, as where an impact passes the phase of observation
     # a derivative that is off moves the place at which a multiplier seems to pass, and so does an orbit off its own
     off += _ACROSS * _unsettled(corrector, best) / float(np.linalg.norm(other.y - one.y))
     off += _derivative_error(corrector.family.flow, orbit) * abs(
@@ -349,6 +356,13 @@ def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -
     found = float(best.y[-1]) * corrector.span
     error = _moved(corrector, (one, best, other), part, off) + corrector.span * _unsettled(corrector, best)
     return SpecialPoint(kind, orbit, found, at, error)
+
+
+def _distance(multipliers: NDArray[np.complex128], kind: str) -> float:
+    """How far the multiplier that is critical at an event is from where it then is."""
+    if kind == "Neimark-Sacker":
+        return float(np.abs(np.abs(multipliers) - 1.0).min())
+    return float(np.abs(multipliers - (-1.0 if kind == "flip" else 1.0)).min())
 
 
 def _derivative_error(flow: Flow, orbit: PeriodicOrbit) -> float:
@@ -400,12 +414,12 @@ def _grazing(corrector: Corrector, one: Spot, other: Spot, at: int) -> SpecialPo
     return SpecialPoint("grazing", corrector.orbit(sides[1]), found, at, error)
 
 
-def grazing_end(corrector: Corrector, spots: list[Spot]) -> SpecialPoint | None:
+def grazing_end(spots: list[tuple[Corrector, Spot]]) -> SpecialPoint | None:
     """The grazing that a branch ends at, if its last orbit passes the tip without room to spare.
 
     The room left, over how fast it went along the branch, is by how much the place is off.
     """
-    last = spots[-1]
+    corrector, last = spots[-1]
     if not isinstance(corrector.family.flow, Stroboscope):
         return None
     orbit = corrector.orbit(last)
@@ -413,9 +427,9 @@ def grazing_end(corrector: Corrector, spots: list[Spot]) -> SpecialPoint | None:
     if not scratch < _TOUCHES:
         return None
     error, found = float("nan"), float(last.y[-1]) * corrector.span
-    for before in reversed(spots[:-1]):
+    for by, before in reversed(spots[:-1]):
         way = abs(float(before.y[-1]) * corrector.span - found)
-        fell = corrector.orbit(before).contact_summary.clearance - scratch
+        fell = by.orbit(before).contact_summary.clearance - scratch
         if fell > max(scratch, _ROUNDING):
             error = 2.0 * scratch * way / fell + corrector.span * _unsettled(corrector, last)
             break
@@ -541,12 +555,16 @@ def _follow(
     max_step: float,
     progress: Callable[[int, int], object] | None,
 ) -> Branch:
-    spots, events = [first], list[SpecialPoint]()
+    spots, events = [(corrector, first)], list[SpecialPoint]()
     end = f"{max_points} orbits, the maximum (max_points)"
     shortest = 1e-7 * max_step
     limit = tuple(value / corrector.span for value in limits)
     while len(spots) < max_points:
-        last = spots[-1]
+        try:
+            spots[-1] = corrector.between_contacts(spots[-1][1])
+        except OrbitNotFoundError:
+            pass  # the next orbit is sought at the phase of this one
+        corrector, last = spots[-1]
         guess = last.y + length * last.tangent
         over = next((value for value in limit if (guess[-1] - value) * (last.y[-1] - value) < 0.0), None)
         row = last.tangent
@@ -567,24 +585,20 @@ def _follow(
             length *= 0.5
             if length < shortest:
                 end = f"no further orbit: {error}"
-                grazing = grazing_end(corrector, spots)
+                grazing = grazing_end(spots)
                 if grazing is not None:
                     events.append(grazing)
                     end = "grazing"
                 break
             continue
         events += between(corrector, last, spot, len(spots) - 1)
-        spots.append(spot)
+        spots.append((corrector, spot))
         if progress is not None:
             progress(len(spots), max_points)
         if over is not None:
             end = "limit of the parameter"
             break
-        if (
-            len(spots) > 8
-            and np.linalg.norm(spot.y - first.y) < 0.75 * length
-            and spot.tangent @ first.tangent > 0.9
-        ):
+        if len(spots) > 8 and _returned(corrector, spot, *spots[0], 0.75 * length):
             end = "closed"
             break
         if spot.iterations <= _EASY and turned > 0.95:
@@ -593,10 +607,21 @@ def _follow(
             length *= 0.6
     if progress is not None and len(spots) < max_points:
         progress(len(spots), len(spots))
-    orbits = [corrector.orbit(spot) for spot in spots]
+    orbits = [by.orbit(spot) for by, spot in spots]
     assert corrector.family.name is not None
-    impacts = [spot.came.impacts for spot in spots]
-    return Branch(corrector.family.name, orbits, events, end, impacts, [spot.tangent for spot in spots])
+    impacts = [spot.came.impacts for _, spot in spots]
+    return Branch(corrector.family.name, orbits, events, end, impacts, [spot.tangent for _, spot in spots])
+
+
+def _returned(corrector: Corrector, spot: Spot, before: Corrector, first: Spot, near: float) -> bool:
+    """Whether an orbit is within a distance of the first one of the branch, and the branch goes on as there."""
+    if not abs(spot.y[-1] - first.y[-1]) < near:
+        return False
+    try:
+        begun = corrector.seen(before, first)
+    except OrbitNotFoundError:
+        return False  # at this phase the first orbit is in contact: it is another one
+    return bool(np.linalg.norm(spot.y - begun.y) < near and spot.tangent @ begun.tangent > 0.9)
 
 
 def switch_branch(

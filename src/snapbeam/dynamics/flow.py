@@ -263,6 +263,8 @@ _Array = NDArray[np.float64]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
 _SAME_PHASE = 1e-6
 """Difference of two phases, rad, that rounding can make."""
+_NEAR_CONTACT = 0.25
+"""Distance of a contact from the instant of observation that is small, over that of the instant farthest from contacts."""
 _BYTES = 2**27
 """Of the states that are held on the way at most."""
 
@@ -535,6 +537,46 @@ class Stroboscope:
         """The argument of the engine's clock at the beginning of a period, rad."""
         own = phases_of(self.system, run_columns(self.system, {}), 1)
         return float(own[0]) if math.isnan(self.given_phase) else self.given_phase
+
+    def carried(self, coordinates: _Array, phase: float) -> _Array:
+        """A state that the map takes, at the next instant at which the primary excitation has *phase*, rad."""
+        from snapbeam.simulation.simulate import simulate
+
+        time = (phase - self.striker_phase) % (2.0 * math.pi) / (2.0 * math.pi) * cycle_of(self.system)
+        if time == 0.0:
+            return coordinates
+        integration = self.integration.replace(cycles=1, early_termination=False)
+        run = simulate(self.starting(self.state(coordinates)), integration, sample_times=[0.0, time])
+        last = run.dataset.isel(time=-1)
+        return np.concatenate([last["modal_amplitude"].values, last["modal_velocity"].values]) / self.scales
+
+    def phase_between_contacts(self, coordinates: _Array, periods: int) -> float | None:
+        """Phase of the primary excitation, rad, at which a periodic motion is farthest from its contacts.
+
+        None where that is not needed: the map is smooth, or no contact is near the phase at which it takes states.
+        """
+        from snapbeam.simulation.simulate import simulate
+
+        if self.smooth or self.system.striker is None:
+            return None
+        cycles, cycle = periods * self.cycles_per_period, cycle_of(self.system)
+        integration = self.integration.replace(cycles=cycles, early_termination=False)
+        end = cycles * cycle
+        run = simulate(self.starting(self.state(coordinates)), integration, sample_times=[0.0, end])
+        onset = run.impacts["onset"].values
+        if run.summary.status != int(RunStatus.OK) or not onset.size:
+            return None
+        order = np.argsort(onset)
+        release = np.maximum.accumulate((onset + run.impacts["duration"].values)[order])
+        free = np.append(onset[order][1:], onset[order][0] + end) - release
+        middle = (release + 0.5 * free) % end
+        # several motions share one clock: their map takes states within the first cycle of the common period
+        free[middle % self.period > cycle] = 0.0
+        best = int(np.argmax(free))
+        distance = min(float(onset.min()), end - float(release[-1]))
+        if distance > _NEAR_CONTACT * 0.5 * free[best]:
+            return None
+        return (self.striker_phase + 2.0 * math.pi * float(middle[best]) / cycle) % (2.0 * math.pi)
 
     @cached_property
     def striker_position(self) -> float:

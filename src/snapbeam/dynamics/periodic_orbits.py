@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -45,6 +45,7 @@ __all__ = [
     "Spot",
     "jacobian",
     "newton",
+    "orbit_at",
     "orbit_tolerance",
     "passage_of",
     "periodic_orbit",
@@ -181,6 +182,11 @@ def _by_differences(family: Family, x: _Array, periods: int, value: float | None
         if impacts is None or (impacts == impacts[0]).all():
             break
         step *= 0.25
+    else:
+        raise OrbitNotFoundError(
+            "states beside the orbit have another number of impacts, so that its derivative is not known: an impact grazes, "
+            "or is at the phase of observation; take another phase"
+        )
     table = advanced.states[1:].reshape(len(_STENCIL), 2, size, size)
     slopes = np.einsum("k,kij->ij", weights, table[:, 0] - table[:, 1]) / step
     return Return(advanced.states[0], slopes.T, _impacts(advanced))
@@ -546,6 +552,17 @@ class PeriodicOrbit:
         return f"<PeriodicOrbit of period {self.period}: {kind}, largest multiplier {size:.6g}>"
 
 
+def orbit_at(orbit: PeriodicOrbit, flow: Flow) -> PeriodicOrbit:
+    """An orbit at the phase at which another flow takes states; its derivative stays that at its own phase."""
+    if not isinstance(flow, Stroboscope) or not isinstance(orbit.flow, Stroboscope):
+        return orbit
+    phase = flow.striker_phase
+    if phase == orbit.flow.striker_phase:
+        return orbit
+    moved = Stroboscope(orbit.flow.system, orbit.flow.integration, phase)
+    return replace(orbit, flow=moved, coordinates=orbit.flow.carried(orbit.coordinates, phase))
+
+
 @checked
 def periodic_orbit(
     system: System | Flow,
@@ -575,7 +592,8 @@ def periodic_orbit(
         ``accuracy="reference"`` by default: a derivative is only as accurate as the steps.  At level
         ``"standard"`` it is off by up to 2 %, which is warned of.
     phase : float, optional
-        Of the drive at which the orbit is seen, rad; where no contact begins, ends or lasts no time.
+        Of the drive at which the orbit is seen, rad.  By default that at which a run begins; under a law that is not
+        smooth, where a contact is near that, the phase farthest from all contacts.  ``orbit.flow.phase`` tells it.
     transient : int
         Periods to advance from the guess first, which brings it to what attracts it.
     tolerance : float
@@ -626,18 +644,40 @@ def periodic_orbit(
     tell(getattr(flow, "diagnostics", ()))
     if not all(isinstance(orbit, PeriodicOrbit) for orbit in deflate):
         raise InputTypeError(f"deflate = {shown(deflate)}: must be orbits, as periodic_orbit gives")
-    known = tuple(point for orbit in deflate for point in orbit.points)
+    most = integer("iterations", iterations, 1, 10_000)
+    orbit = None
     try:
-        return shoot(flow, x, periods, allowed, integer("iterations", iterations, 1, 10_000), deflate=known)
+        orbit = shoot(flow, x, periods, allowed, most, deflate=_points(deflate, flow))
     except OrbitNotFoundError as error:
-        if not getattr(flow, "diagnostics", ()):
-            raise
-        raise OrbitNotFoundError(f"{error}, or use accuracy = 'reference'") from None
+        if phase is not None or _seen_between_contacts(flow, x, periods) is None:
+            if not getattr(flow, "diagnostics", ()):
+                raise
+            raise OrbitNotFoundError(f"{error}, or use accuracy = 'reference'") from None
+    if phase is None:
+        moved = _seen_between_contacts(flow, x if orbit is None else orbit.coordinates, periods)
+        if moved is not None:
+            orbit = shoot(*moved, periods, allowed, most, deflate=_points(deflate, moved[0]))
+    assert orbit is not None
+    return orbit
+
+
+def _points(orbits: Sequence[PeriodicOrbit], flow: Flow) -> tuple[_Array, ...]:
+    return tuple(point for orbit in orbits for point in orbit_at(orbit, flow).points)
+
+
+def _seen_between_contacts(flow: Flow, x: _Array, periods: int) -> tuple[Stroboscope, _Array] | None:
+    """The map and the state at the phase farthest from contacts, if one is near the phase of the flow."""
+    if not isinstance(flow, Stroboscope):
+        return None
+    phase = flow.phase_between_contacts(x, periods)
+    if phase is None:
+        return None
+    return Stroboscope(flow.system, flow.integration, phase), flow.carried(x, phase)
 
 
 def _guess_of(flow: Flow, guess: State | ArrayLike | PeriodicOrbit | None) -> _Array:
     if isinstance(guess, PeriodicOrbit):
-        return np.array(guess.coordinates)
+        return np.array(orbit_at(guess, flow).coordinates)
     if guess is None or isinstance(guess, State):
         if not isinstance(flow, Stroboscope):
             raise InputTypeError(f"guess = {shown(guess)}: must be an array of {flow.dimension} numbers")
@@ -759,6 +799,42 @@ class Corrector:
         except np.linalg.LinAlgError:
             return before
         return found / np.linalg.norm(found)
+
+    def between_contacts(self, spot: Spot) -> tuple[Corrector, Spot]:
+        """The orbit at the phase farthest from contacts, if one is near the phase of the flow; itself otherwise."""
+        flow, name = self.family.flow, self.family.name
+        if (
+            not isinstance(flow, Stroboscope)
+            or flow.smooth
+            or name is None
+            or lookup(name).name.endswith(".phase")
+        ):
+            return self, spot
+        here = self.family.at(float(spot.y[-1]) * self.span)
+        assert isinstance(here, Stroboscope)
+        phase = here.phase_between_contacts(spot.y[:-1], self.period)
+        if phase is None:
+            return self, spot
+        moved = replace(self, family=Family(Stroboscope(flow.system, flow.integration, phase), name))
+        return moved, moved.seen(self, spot)
+
+    def seen(self, other: Corrector, spot: Spot) -> Spot:
+        """An orbit of another corrector at the phase of this one.
+
+        Raises
+        ------
+        OrbitNotFoundError
+        """
+        if other.family.flow is self.family.flow:
+            return spot
+        assert isinstance(self.family.flow, Stroboscope)
+        here = other.family.at(float(spot.y[-1]) * self.span)
+        assert isinstance(here, Stroboscope)
+        guess = np.append(here.carried(spot.y[:-1], self.family.flow.striker_phase), spot.y[-1])
+        row = np.append(np.zeros(guess.size - 1), 1.0)
+        found = self.correct(guess, row, row)
+        along = np.linalg.svd(self.bordered(found.came, found.slope, row)[:-1])[2][-1]
+        return found._replace(tangent=along if along[-1] * spot.tangent[-1] >= 0.0 else -along)
 
     def orbit(self, spot: Spot) -> PeriodicOrbit:
         """As an orbit of the flow at its value."""
