@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
+import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -486,6 +487,9 @@ _COMMENT = ("#", "%", "//", "!")
 _LOOK = 400  # lines in which the table must begin
 _ABOVE = 20
 """Rows at the end whose numbers are compared."""
+_STAMP = re.compile(
+    r"(?<![\d.])(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ]+\d{1,2}:\d{2}(:\d{2})?([.,:]\d{2,})?)?|\d{1,2}:\d{2}(:\d{2})?([.,:]\d{2,})?)"
+)
 _GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?([eE][-+]?\d+)?")
 
 
@@ -605,6 +609,12 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
     if not dialects:
         if len(lines) == 1:
             raise InputError(f"{path}: holds a header and no row")
+        stamp = _STAMP.search(lines[:_LOOK][-1][:_LONGEST_LINE])
+        if stamp:
+            raise InputError(
+                f"{path}: its times are dates or clock times, such as {stamp[0]!r}, which are not read: write them in "
+                "seconds, or leave them out and give sampling_frequency (--sampling-freq)"
+            )
         raise InputError(
             f"{path}: no row of numbers in its first {min(len(lines), _LOOK)} lines; its columns may not be separated "
             "by semicolons, tabs, commas or blanks"
@@ -745,39 +755,55 @@ def read_lvm(path: Path, _told: Told) -> list[Channel]:
     if not lines[0].lower().startswith("labview measurement"):
         raise InputError("does not begin with 'LabVIEW Measurement', so it is no .lvm file")
     file_header, at = _header(lines, 0, None)
-    separator = _SEPARATORS.get(file_header.get("separator", ["Tab"])[0].lower(), "\t")
-    comma = file_header.get("decimal_separator", ["."])[0] == ","
+    separator = _SEPARATORS.get((file_header.get("separator") or ["Tab"])[0].lower(), "\t")
+    decimal = file_header.get("decimal_separator", ["."])
+    comma = decimal != ["."]
+    if comma and separator == ",":
+        raise InputError(
+            "Separator and Decimal_Separator are commas, so that cells and decimals cannot be told apart: save it again "
+            "with the separator Tab"
+        )
+    if decimal not in (["."], [","]):
+        raise InputError(f"Decimal_Separator = {' '.join(decimal)!r}: must be a point or a comma")
     header, at = _header(lines, at, separator)
     if "samples" not in header or "delta_x" not in header:
         raise InputError("has no segment header with Samples and Delta_X")
     if any(_END == line.strip().strip(separator).lower() for line in lines[at:]):
         raise InputError("holds several segments; save one to a file")
     names = [cell.strip() for cell in lines[at].split(separator)]
-    rows = [(k + 1, line.split(separator)) for k, line in enumerate(lines) if k > at and line.strip()]
+    rows = [(k + 1, line.split(separator)) for k, line in enumerate(lines) if k > at and line.strip(" ")]
     count = int(to_number(header.get("channels", ["0"])[0], comma) or 0)
     columns = [k for k, name in enumerate(names) if name and name.lower() not in ("x_value", "comment")]
     if not columns or (count and len(columns) != count):
         raise InputError(f"line {at + 1}: names {len(columns)} channel(s), the header says {count}")
     units = header.get("y_unit_label", [])
-    told: list[Diagnostic] = []
     channels: list[Channel] = []
     for number, k in enumerate(columns):
-        cells = [row[k] if k < len(row) else "" for _, row in rows]
-        if not any(cell.strip() for cell in cells):
+        cells = [row[k].strip() if k < len(row) else "" for _, row in rows]
+        while cells and not cells[-1]:  # of a channel that is shorter than others
+            cells.pop()
+        if not cells:
             continue
-        step = to_number(header["delta_x"][min(number, len(header["delta_x"]) - 1)], comma)
-        start = to_number(header.get("x0", ["0"])[min(number, len(header.get("x0", ["0"])) - 1)], comma)
+        step, start, samples = (
+            to_number(_of(header.get(key) or ["0"], number), comma) for key in ("delta_x", "x0", "samples")
+        )
         if not (math.isfinite(step) and step > 0.0):
-            raise InputError(f"Delta_X = {header['delta_x'][0]!r}: must be a positive number of seconds")
-        samples = int(to_number(header["samples"][min(number, len(header["samples"]) - 1)], comma))
+            raise InputError(
+                f"Delta_X = {_of(header['delta_x'] or [''], number)!r}: must be a positive number of seconds"
+            )
+        if not samples >= 1.0:
+            raise InputError(
+                f"Samples = {_of(header['samples'] or [''], number)!r}: must be a whole number from 1"
+            )
         clock: dict[str, Any] = {"fs": 1.0 / step, "time_offset": start if math.isfinite(start) else 0.0}
-        if len(rows) != samples:
-            kind = KINDS_SIGNAL["cut" if len(rows) < samples else "appended"]
-            promised, present = float(samples), float(len(rows))
+        told: list[Diagnostic] = []
+        if len(cells) != samples:
+            kind = KINDS_SIGNAL["cut" if len(cells) < samples else "appended"]
+            promised, present = samples, float(len(cells))
             told = [kind.found(told=path.name, promised=promised, found=present)]
             tell([kind.found(told=str(path), promised=promised, found=present)])
             if names[0].lower() == "x_value" and rows[0][1][0].strip():
-                clock = {"time": np.array([to_number(row[0], comma) for _, row in rows])}
+                clock = {"time": np.array([to_number(row[0], comma) for _, row in rows[: len(cells)]])}
         data = np.array([to_number(cell, comma) for cell in cells])
         bad = np.flatnonzero(~np.isfinite(data))
         if bad.size:
@@ -792,6 +818,11 @@ def read_lvm(path: Path, _told: Told) -> list[Channel]:
             }
         )
     return numbered(channels)
+
+
+def _of(values: list[str], number: int) -> str:
+    """The value of a channel, or the last where there are fewer."""
+    return values[min(number, len(values) - 1)]
 
 
 def _header(lines: list[str], at: int, separator: str | None) -> tuple[dict[str, list[str]], int]:
@@ -1225,9 +1256,14 @@ def read_tdms(path: Path, _told: Told) -> list[Channel]:
                 continue
             unit = next((str(entry.properties[k]) for k in UNIT_NAMES if entry.properties.get(k)), None)
             channel: Channel = {"data": data, "name": f"{group.name}/{entry.name}", "unit_str": unit}
-            step = entry.properties.get("wf_increment")
-            if step is not None:
-                channel["fs"] = 1.0 / positive(f"{channel['name']}: wf_increment", step, "s")
+            rates = {
+                f"{place}{key}": rate
+                for place, level in (("", entry), (f"{group.name}/", group), ("file/", file))
+                for key, value in level.properties.items()
+                if (rate := _rate_of(key, value)) is not None
+            }
+            if rates:
+                channel["fs"] = _one_rate(rates, channel["name"])
                 channel["time_offset"] = float(entry.properties.get("wf_start_offset", 0.0))
             channels.append(channel)
     return with_time(channels)
@@ -1256,17 +1292,38 @@ _UFF_UNITS = {8: "m", 11: "m/s", 12: "m/s^2", 13: "N"}
 _UFF_TYPES = {unit: code for code, unit in _UFF_UNITS.items()}
 
 
-def read_uff(path: Path, _told: Told) -> list[Channel]:
+_FORTRAN = re.compile(rb"(\.\d*)[Dd]([-+]\d\d)")
+
+
+def read_uff(path: Path, told: Told) -> list[Channel]:
     """Return the channels of a universal file (dataset 58)."""
     import pyuff
 
-    sets = pyuff.UFF(str(path)).read_sets()
+    content = path.read_bytes()
+    if (
+        _FORTRAN.search(content) and b"58b" not in content
+    ):  # exponents as Fortran writes them, which pyuff does not read
+        with tempfile.TemporaryDirectory() as folder:
+            copy = Path(folder) / path.name
+            copy.write_bytes(_FORTRAN.sub(rb"\1E\2", content))
+            return read_uff(copy, told)
+    file = pyuff.UFF(str(path))
+    kinds, bodies = file.get_set_types(), _bodies(content)
     channels: list[Channel] = []
-    for entry in sets if isinstance(sets, list) else [sets]:
-        if entry.get("type") != 58 or entry.get("func_type") not in (0, 1):
+    for number, kind in enumerate(kinds):
+        if kind != 58:
             continue
-        data = np.asarray(entry["data"])
+        entry = file.read_sets(number, header_only=True)
+        if entry.get("func_type") not in (0, 1):
+            continue
         name = _first(entry["id1"], f"channel {len(channels) + 1}")
+        if not entry["binary"]:
+            if len(bodies) != kinds.tolist().count(58):
+                raise InputError("mixes binary and ASCII datasets 58: write each kind to a file of its own")
+            entry |= _numbers_58(name, bodies[kinds[:number].tolist().count(58)], entry)
+        else:
+            entry = file.read_sets(number)
+        data = np.asarray(entry["data"])
         if data.size != entry["num_pts"]:
             raise InputError(
                 f"{name}: the header promises {entry['num_pts']} samples, the file has {data.size}"
@@ -1294,6 +1351,35 @@ def read_uff(path: Path, _told: Told) -> list[Channel]:
     if not channels:
         raise InputError("holds no whole time response in a dataset 58")
     return numbered(channels)
+
+
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+
+
+def _bodies(content: bytes) -> list[list[str]]:
+    """Lines of numbers of each dataset 58 of a file, without the header's eleven."""
+    lines = content.decode("latin-1").splitlines()
+    marks = [k for k, line in enumerate(lines) if line.strip() == "-1"]
+    pairs = zip(marks[::2], marks[1::2], strict=False)
+    return [lines[a + 13 : b] for a, b in pairs if lines[a + 1][:6].strip() == "58"]
+
+
+def _numbers_58(name: str, body: list[str], entry: Mapping[str, Any]) -> dict[str, Any]:
+    """``data`` and ``x`` of an ASCII dataset 58, whatever the width of its numbers, without zeros that fill its last line."""
+    if entry["ord_data_type"] not in (2, 4):
+        raise InputError(f"{name}: complex numbers, or of a type that is not known, are no time series")
+    rows = []
+    for line in body:
+        found = _NUMBER.findall(line)
+        if _NUMBER.sub("", line).strip():
+            raise InputError(f"{name}: {line.strip()[:60]!r} is no line of numbers")
+        rows.append([float(word) for word in found])
+    values = np.array([number for row in rows for number in row])
+    each = 1 if entry["abscissa_spacing"] == 1 else 2
+    count = each * int(entry["num_pts"])
+    if values.size > count and count > values.size - len(rows[-1]) and not values[count:].any():
+        values = values[:count]
+    return {"data": values[each - 1 :: each], "x": values[::each]}
 
 
 def _undo_rounding(step: float) -> float:
