@@ -34,6 +34,40 @@ def test_phantom(tmp_path, high):
     assert recording.max_value == (255 if high == 255 else 65535)
 
 
+# Levels of the library pycine (pycine.linLUT) for light of 12 bits, by packed levels of 10 bits.
+PYCINE = {
+    1: 5, 30: 33, 64: 64, 100: 98, 140: 136, 146: 141, 150: 145, 200: 204, 300: 374, 400: 623, 500: 952, 600: 1368,
+    700: 1872, 800: 2468, 900: 3159, 1000: 3947, 1014: 4064, 1015: 4095, 1023: 4095,
+}  # fmt: skip
+
+
+def test_packed_phantom_levels_are_proportional_to_light(tmp_path):
+    """Packed 10 bits follow a curve of about light^0.52; read as linear, half the light was 73 % of full scale."""
+    levels = np.arange(1024, dtype=np.uint16).reshape(1, 16, 64)
+    write_cine(tmp_path / "a.cine", levels, frame_rate=20_000, exposure=20e-6, bits=10, packing=256)
+    found, recording, codes = read(tmp_path / "a.cine", frame_rate=None)
+    light = (found.ravel() >> 4).astype(int)
+    for level, expected in PYCINE.items():
+        assert abs(light[level] - expected) <= 1, level
+    assert (np.diff(light) >= 0).all() and recording.max_value == 65535 and not codes
+    half = np.searchsorted(light, 2064)
+    assert half / 1023 == pytest.approx(0.72, abs=0.01)
+
+
+@pytest.mark.parametrize(("bits", "packing"), [(12, 256), (14, 256), (12, 1024)])
+def test_other_packings_of_phantom_say_how_to_export(tmp_path, bits, packing):
+    path = write_cine(
+        tmp_path / "a.cine",
+        pictures(1023, (2, 16, 64)),
+        frame_rate=20_000,
+        exposure=20e-6,
+        bits=bits,
+        packing=packing,
+    )
+    with pytest.raises(InputError, match=r"a\.cine.*export it as .*AVI.*TIFF.*--frame-rate"):
+        open_recording(path, pixel_size=1e-5)
+
+
 def test_a_phantom_file_that_cannot_be_read_says_how_to_export_it(tmp_path):
     path = write_cine(tmp_path / "a.cine", pictures(255), frame_rate=20_000, exposure=20e-6)
     for damage in (path.read_bytes()[:3000], path.read_bytes()[:4] + b"\x09" + path.read_bytes()[5:]):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snapbeam.lab.signal_formats import READERS, WRITERS, Channel, Told
+from snapbeam.lab.signal_formats import READERS, WRITERS, Channel, Told, agree
 from snapbeam.lab.signals import check_signal, make_signal, parse_sensitivity, si_unit
 from snapbeam.util.diagnostics import DiagnosticWarning, to_json
 from snapbeam.util.files import atomic_path, check_writable
@@ -93,6 +93,13 @@ def read_channels(
             raise InputError(
                 f"{source}: {channel['name']} is sampled at {told:.9g} Hz but sampling_frequency = {rate:g} "
                 "was given"
+            )
+        if rate is not None and "time" in channel:
+            agree(
+                f"{source}: {channel['name']}",
+                channel["time"],
+                rate,
+                "leave out sampling_frequency (--sampling-freq)",
             )
         if told is None and "time" not in channel:
             if rate is None:
@@ -193,7 +200,8 @@ def _to_signal(entry: Channel, units: str | None, sensitivity: str | None, sourc
     bad = np.flatnonzero(~np.isfinite(data))
     if bad.size:
         raise InputError(
-            f"{name}, sample {bad[0]}: {data[bad[0]]!r} is not a finite number ({bad.size} such)"
+            f"{name}, sample {bad[0]}: {data[bad[0]]:g} is not a finite number ({bad.size} such, fill values "
+            "included): cut the signal there"
         )
     kwargs: dict[str, Any] = {"time": entry["time"]} if "time" in entry else {}
     if not kwargs:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import math
 import re
+import tempfile
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "RATE_NAMES",
     "READERS",
     "TIME_NAMES",
     "UNIT_NAMES",
@@ -34,6 +34,7 @@ __all__ = [
     "Table",
     "TextBlock",
     "Told",
+    "agree",
     "header_rate",
     "header_unit",
     "header_values",
@@ -69,9 +70,21 @@ Channel = dict[str, Any]
 """One channel in the units of the file: ``data``, ``name``, ``unit_str`` (None where the file states
 none), and ``fs`` [Hz] or ``time`` [s] where it has them."""
 
-RATE_NAMES = ("sampling_frequency", "fs", "sample_rate", "samplerate", "wf_samplerate")
 UNIT_NAMES = ("units", "unit", "unit_str", "unit_string", "NI_UnitDescription")
-TIME_NAMES = ("time", "t", "zeit", "temps", "x-axis", "second", "seconds", "x_value")
+TIME_NAMES = (
+    "time", "times", "t", "zeit", "temps", "xaxis", "second", "seconds", "xvalue", "timedomain", "timeaxis",
+    "timevector", "timevec", "timebase", "timearray", "timestamp", "timestamps",
+)  # fmt: skip
+"""Names of time axes, in small letters and digits."""
+_SECONDS = {
+    "minute": 60.0,
+    "minutes": 60.0,
+    "min": 60.0,
+    "hour": 3600.0,
+    "hours": 3600.0,
+    "day": 86400.0,
+    "days": 86400.0,
+}
 
 
 class Told(NamedTuple):
@@ -81,31 +94,79 @@ class Told(NamedTuple):
     columns: str | None = None
 
 
+def _key(name: str) -> str:
+    """Small letters and digits of a name."""
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
 def is_time(name: str) -> bool:
     """Whether a channel's name is that of a time axis."""
-    return name.strip().lower() in TIME_NAMES
+    return _key(name) in TIME_NAMES
+
+
+def _seconds(name: str, unit: str | None) -> float:
+    """Seconds in a unit of a time axis, also as in ``milliseconds since 2024-01-01``."""
+    last = name.rpartition("/")[2]
+    word = (unit or split_unit(last)[1] or "").strip()
+    if not word and _key(last).startswith("timestamp"):
+        raise InputError(f"{name} has no unit: write its unit, such as 's', into the file")
+    word = word.partition(" since ")[0]
+    if word.lower() in _SECONDS:
+        return _SECONDS[word.lower()]
+    factor, base = si_unit(name, word or "s")
+    if base != "s":
+        raise InputError(f"{name} is in {unit!r}, not in seconds")
+    return factor
 
 
 def with_time(channels: list[Channel]) -> list[Channel]:
-    """Take the time axes out of *channels* and give each to the channels of its group and length."""
-    axes: dict[str, Any] = {}
+    """Take the time axes out of *channels* and give each to the channels of its group and length.
+
+    An axis belongs to its group and the groups in it.  A channel may name its own under ``axis``.
+
+    Raises
+    ------
+    InputError
+        If an axis is not in seconds, is of another length than a channel, or contradicts another or the sampling rate.
+    """
+    axes: dict[str, NDArray[np.float64]] = {}
+    signals: list[Channel] = []
+    stated = {channel.get("axis") for channel in channels}
     for channel in channels:
-        folder, _, last = channel["name"].rpartition("/")
-        if is_time(last):
-            factor, base = si_unit(channel["name"], channel["unit_str"] or "s")
-            if base != "s":
-                raise InputError(f"{channel['name']} is in {channel['unit_str']!r}, not in seconds")
-            axes[folder] = np.asarray(channel["data"], dtype=np.float64) * factor
-    signals = [c for c in channels if not is_time(c["name"].rpartition("/")[2])]
+        name = channel["name"]
+        if name in stated or is_time(split_unit(name.rpartition("/")[2])[0]):
+            scale = _seconds(name, channel["unit_str"])
+            axes[name] = np.asarray(channel["data"], dtype=np.float64) * scale
+        else:
+            signals.append(channel)
     for channel in signals:
-        folder = channel["name"].rpartition("/")[0]
-        if "fs" in channel or folder not in axes:
+        name = channel["name"]
+        folder, own = name.rpartition("/")[0], channel.pop("axis", None)
+        found = {own: axes[own]} if own in axes else {}
+        while not found:
+            found = {each: axis for each, axis in axes.items() if each.rpartition("/")[0] == folder}
+            if not folder:
+                break
+            folder = folder.rpartition("/")[0]
+        fitting = {each: axis for each, axis in found.items() if axis.size == np.size(channel["data"])}
+        if not fitting:
+            if found:
+                first, axis = next(iter(found.items()))
+                raise InputError(
+                    f"{name} has {np.size(channel['data'])} samples, its time axis {first} {axis.size}"
+                )
             continue
-        if axes[folder].size != np.size(channel["data"]):
-            raise InputError(
-                f"{channel['name']} has {np.size(channel['data'])} samples, its time axis {axes[folder].size}"
-            )
-        channel["time"] = axes[folder]
+        (first, axis), *others = fitting.items()
+        for other, times in others:
+            if not np.allclose(
+                times - times[0], axis - axis[0], rtol=0.0, atol=1e-3 * abs(axis[-1] - axis[0]) / axis.size
+            ):
+                raise InputError(
+                    f"{name} has the time axes {first} and {other}, which differ: remove the wrong one"
+                )
+        if "fs" in channel:
+            agree(name, axis, channel.pop("fs"), "rename or remove the wrong one")
+        channel["time"] = axis
     return signals
 
 
@@ -135,19 +196,7 @@ def read_numpy(path: Path, _told: Told) -> list[Channel]:
                 f"array of {loaded.dtype} and shape {loaded.shape}: must be one channel of numbers"
             )
         return [{"data": loaded, "name": path.stem, "unit_str": None}]
-    scalars = {name: value.item() for name, value in arrays.items() if value.ndim == 0}
-    stated = next((scalars[name] for name in RATE_NAMES if name in scalars), None)
-    channels: list[Channel] = []
-    for name, data in arrays.items():
-        if data.ndim != 1 or data.dtype.kind not in "iuf":
-            continue
-        units = (scalars.get(f"{name}_{key}", scalars.get(key)) for key in UNIT_NAMES)
-        unit = next((str(value) for value in units if value), None)
-        channel: Channel = {"data": data, "name": name, "unit_str": unit}
-        if stated is not None:
-            channel["fs"] = positive("sampling_frequency", stated, "Hz")
-        channels.append(channel)
-    return with_time(channels)
+    return _channels({name: _Stored(np.squeeze(data), {}) for name, data in arrays.items()}, {})
 
 
 def write_npz(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
@@ -160,46 +209,257 @@ def write_npz(path: Path, signal: xr.DataArray, _full_scale: float | None) -> No
 
 
 # ----------------------------------------------------------------------------------------------------
-# HDF5 files: vectors, and matrices with a channel in each row or column; units and rates in attributes.
+# Arrays with names: vectors, and matrices with a channel in each row or column.  Attributes, and arrays of one number or
+# text, state units and sampling rates; CF attributes state how numbers are packed.
 
 
 _LONGEST_SIDE = 64  # channels in a matrix
+_SCALES = (
+    "scale", "scalefactor", "scaling", "gain", "factor", "slope", "multiplier", "conversion", "conversionfactor", "lsb",
+)  # fmt: skip
+_OFFSETS = ("offset", "addoffset", "intercept", "zerooffset", "bias")
+
+
+class _Stored(NamedTuple):
+    """An array of a file with its own attributes, and the name of the time axis that the file gives it."""
+
+    data: NDArray[Any]
+    attributes: Mapping[str, Any]
+    axis: str | None = None
+
+
+def _unpacked(name: str, data: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[Any]:
+    """The numbers of a packed array by the CF conventions; NaN where it is filled.
+
+    Raises
+    ------
+    InputError
+        If an attribute is no number, or states a scale under a name whose meaning is not known.
+    """
+    from snapbeam.util.datasets import xr
+
+    packing: dict[str, Any] = {}
+    for key in (
+        "scale_factor",
+        "add_offset",
+        "_FillValue",
+        "missing_value",
+        "valid_min",
+        "valid_max",
+        "valid_range",
+    ):
+        if key in attributes:
+            value = np.asarray(attributes[key])
+            filling = key in ("_FillValue", "missing_value")
+            size = 2 if key == "valid_range" else 1
+            finite = value.dtype.kind in "iuf" and (
+                filling or (value.size == size and np.isfinite(value).all())
+            )
+            if not finite or (key == "scale_factor" and value.item() == 0.0):
+                raise InputError(
+                    f"{name}: attribute {key!r} = {_text(attributes[key])}: must be a finite number, a scale not 0"
+                )
+            packing[key] = value if filling and value.size > 1 else value.ravel()[0] if size == 1 else value
+    low, high = packing.pop("valid_range", (None, None))
+    low, high = packing.pop("valid_min", low), packing.pop("valid_max", high)
+    _refuse_scales(name, data, {key: value for key, value in attributes.items() if key not in packing})
+    if "_Unsigned" in attributes:
+        packing["_Unsigned"] = _text(attributes["_Unsigned"])
+    if not packing and low is None and high is None:
+        return data
+    variable = xr.Variable([f"axis{k}" for k in range(data.ndim)], data, packing)
+    values = xr.conventions.decode_cf_variable(name, variable, decode_times=False).values
+    outside = np.zeros(data.shape, dtype=bool)
+    if low is not None:
+        outside |= data < low
+    if high is not None:
+        outside |= data > high
+    return np.where(outside, np.nan, values) if outside.any() else values
+
+
+def _refuse_scales(name: str, data: NDArray[Any], values: Mapping[str, Any]) -> None:
+    """Refuse counts beside a number that may scale them."""
+    for key, value in values.items():
+        neutral = 1.0 if _key(key) in _SCALES else 0.0 if _key(key) in _OFFSETS else None
+        if neutral is None or (data.dtype.kind == "f" and key not in ("scale_factor", "add_offset")):
+            continue
+        number = _quantity(_text(value))[0]
+        if math.isfinite(number) and number != neutral:
+            raise InputError(
+                f"{name}: {key} = {number:g} may scale its numbers: store the scaled numbers without it, or make it the "
+                "attributes scale_factor and add_offset of an array in an HDF5 or NetCDF file"
+            )
+
+
+def _channels(stored: Mapping[str, _Stored], groups: Mapping[str, Mapping[str, Any]]) -> list[Channel]:
+    """Channels of named arrays; *groups* are the attributes of the groups by their names, ``""`` that of the file."""
+    levels: dict[str, dict[str, Any]] = {folder: dict(values) for folder, values in groups.items()}
+    texts: dict[str, str] = {}
+    for name, item in stored.items():
+        if item.data.size == 1 and item.data.dtype.kind in "iufUSO":
+            folder, _, last = name.rpartition("/")
+            value = item.data.reshape(-1)[0]
+            stated = next((_text(item.attributes[key]) for key in UNIT_NAMES if key in item.attributes), "")
+            texts[name] = _text(value)
+            levels.setdefault(folder, {})[last] = f"{_text(value)} {stated}" if stated else value
+    vectors = {
+        name: item
+        for name, item in stored.items()
+        if item.data.dtype.kind in "iuf" and item.data.size > 1 and 0 < item.data.ndim <= 2
+        if item.data.ndim == 1 or min(item.data.shape) <= _LONGEST_SIDE
+    }
+    for name in [name for name in vectors if _rate_of(name.rpartition("/")[2], 1.0) is not None]:
+        folder, _, last = name.rpartition("/")
+        data = vectors.pop(name).data
+        if not (data == data.flat[0]).all():
+            raise InputError(
+                f"{name} has {data.size} numbers that differ: must be one rate; write one file for each rate"
+            )
+        levels.setdefault(folder, {})[last] = data.flat[0]
+    channels: list[Channel] = []
+    for name, item in vectors.items():
+        data = item.data
+        folder, _, last = name.rpartition("/")
+        around: list[tuple[str, Mapping[str, Any]]] = [
+            (name, item.attributes),
+            (folder, levels.get(folder, {})),
+        ]
+        while folder:
+            folder = folder.rpartition("/")[0]
+            around.append((folder, levels.get(folder, {})))
+        time = is_time(split_unit(last)[0])
+        for _, values in () if time else around[1:]:
+            _refuse_scales(name, data, values)
+        unit = next(
+            (_text(item.attributes[key]).strip() for key in UNIT_NAMES if key in item.attributes), None
+        )
+        rates = (
+            {}
+            if time
+            else {
+                f"{place}/{key}".lstrip("/"): rate
+                for place, values in around
+                for key, value in values.items()
+                if (rate := _rate_of(key, value)) is not None
+            }
+        )
+        rows = np.atleast_2d(_unpacked(name, data, item.attributes))
+        rows = rows if rows.shape[0] <= rows.shape[1] else rows.T
+        for k, row in enumerate(rows):
+            own = name if rows.shape[0] == 1 else f"{name} {k + 1}"
+            channel: Channel = {
+                "data": row,
+                "name": own,
+                "unit_str": unit or _unit(texts, name) or None,
+                "axis": item.axis,
+            }
+            if rates:
+                channel["fs"] = _one_rate(rates, own)
+            channels.append(channel)
+    return with_time(channels)
+
+
+def _unit(texts: Mapping[str, str], name: str) -> str | None:
+    """The unit that a text beside an array states, under its name or for all of its group."""
+    folder, _, last = name.rpartition("/")
+    for key in UNIT_NAMES:
+        common = () if is_time(last) else (f"{folder}/{key}" if folder else key,)
+        for candidate in (f"{name}_{key}", *common):
+            if texts.get(candidate, "").strip():
+                return texts[candidate].strip()
+    return None
+
+
+def _text(value: Any) -> str:
+    found = np.asarray(value)
+    item = found.reshape(-1)[0] if found.size == 1 else value
+    return item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item)
+
+
+# ----------------------------------------------------------------------------------------------------
+# HDF5 and NetCDF files.
 
 
 def read_hdf5(path: Path, _told: Told) -> list[Channel]:
-    """Return the channels of an HDF5 file."""
+    """Return the channels of an HDF5 or NetCDF file; packed numbers by the CF conventions."""
     import h5py
 
+    with open(path, "rb") as opened:
+        start = opened.read(4)
+    if start[:3] == b"CDF":
+        return _netcdf3(path, start[3])
     refuse_large(path)
-    channels: list[Channel] = []
+    stored: dict[str, _Stored] = {}
+    groups: dict[str, dict[str, Any]] = {}
     with h5py.File(path, "r") as file:
+        groups[""] = _stating(file.attrs)
 
         def visit(name: str, item: Any) -> None:
-            if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "iuf":
+            if isinstance(item, h5py.Group):
+                groups[name] = _stating(item.attrs)
                 return
-            if item.ndim not in (1, 2) or (
-                item.ndim == 2 and (item.size < 2 or min(item.shape) > _LONGEST_SIDE)
-            ):
+            if not isinstance(item, h5py.Dataset) or item.ndim > 2 or item.dtype.kind not in "iufSO":
                 return
             if item.external or item.is_virtual:
                 raise InputError(
                     f"path = {str(path)!r}: {name!r} has its numbers in another file: copy them into this one"
                 )
-            levels = [item.attrs, item.parent.attrs, file.attrs]
-            stated = next((item.attrs[key] for key in UNIT_NAMES if key in item.attrs), None)
-            rates = [level[key] for level in levels for key in RATE_NAMES if key in level]
-            unit = None if stated is None else _text(stated)
-            rows = np.atleast_2d(item[()])
-            rows = rows if rows.shape[0] <= rows.shape[1] else rows.T
-            for k, data in enumerate(rows):
-                own = name if rows.shape[0] == 1 else f"{name} {k + 1}"
-                channel: Channel = {"data": data, "name": own, "unit_str": unit}
-                if rates:
-                    channel["fs"] = positive(f"{own}: sampling rate", np.asarray(rates[0]).item(), "Hz")
-                channels.append(channel)
+            kept = item.dtype.kind in "iuf" or item.size == 1
+            if not kept or (item.is_scale and not _is_axis(name, item.attrs)):
+                return
+            attributes = dict(item.attrs)
+            if item.dtype.kind in "iuf" and item.fillvalue:
+                attributes.setdefault("_FillValue", item.fillvalue)
+            stored[name] = _Stored(np.squeeze(item[()]), attributes, _axis_of(item))
 
         file.visititems(visit)
-    return with_time(channels)
+    return _channels(stored, groups)
+
+
+def _netcdf3(path: Path, version: int) -> list[Channel]:
+    """Channels of a NetCDF file of version 3, whose layout is not that of HDF5."""
+    from scipy.io import netcdf_file
+
+    if version not in (1, 2):
+        raise InputError(
+            "is a NetCDF file of 64-bit data (CDF-5), which is not read; convert it: nccopy -k nc4 old.nc new.nc"
+        )
+    with netcdf_file(path, "r", mmap=False) as file:
+        stored = {
+            name: _Stored(
+                np.squeeze(np.array(item.data)),
+                dict(item._attributes),
+                item.dimensions[0] if item.dimensions[:1] != (name,) and item.dimensions else None,
+            )
+            for name, item in file.variables.items()
+            if item.data.dtype.kind in "iuf"
+            and (item.dimensions != (name,) or _is_axis(name, item._attributes))
+        }
+        return _channels(stored, {"": _stating(file._attributes)})
+
+
+def _stating(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Attributes of a group without its unit, which need not be that of each array."""
+    return {key: value for key, value in attributes.items() if key not in UNIT_NAMES}
+
+
+def _is_axis(name: str, attributes: Mapping[str, Any]) -> bool:
+    """Whether a dimension scale holds times."""
+    stated = next((_text(attributes[key]) for key in UNIT_NAMES if key in attributes), "")
+    try:
+        return is_time(split_unit(name.rpartition("/")[2])[0]) or (
+            stated != "" and _seconds(name, stated) > 0.0
+        )
+    except InputError:
+        return False
+
+
+def _axis_of(item: Any) -> str | None:
+    """Name of the dimension scale along the samples."""
+    if not item.ndim or item.is_scale:
+        return None
+    scales = item.dims[int(np.argmax(item.shape))]
+    return scales[0].name.lstrip("/") if len(scales) else None
 
 
 def write_hdf5(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
@@ -212,10 +472,6 @@ def write_hdf5(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
         axis.attrs["units"] = "s"
         data = file.create_dataset(str(signal.name), data=values)
         data.attrs["units"] = signal.attrs["units"]
-
-
-def _text(value: Any) -> str:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -231,6 +487,9 @@ _COMMENT = ("#", "%", "//", "!")
 _LOOK = 400  # lines in which the table must begin
 _ABOVE = 20
 """Rows at the end whose numbers are compared."""
+_STAMP = re.compile(
+    r"(?<![\d.])(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ]+\d{1,2}:\d{2}(:\d{2})?([.,:]\d{2,})?)?|\d{1,2}:\d{2}(:\d{2})?([.,:]\d{2,})?)"
+)
 _GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?([eE][-+]?\d+)?")
 
 
@@ -350,6 +609,12 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
     if not dialects:
         if len(lines) == 1:
             raise InputError(f"{path}: holds a header and no row")
+        stamp = _STAMP.search(lines[:_LOOK][-1][:_LONGEST_LINE])
+        if stamp:
+            raise InputError(
+                f"{path}: its times are dates or clock times, such as {stamp[0]!r}, which are not read: write them in "
+                "seconds, or leave them out and give sampling_frequency (--sampling-freq)"
+            )
         raise InputError(
             f"{path}: no row of numbers in its first {min(len(lines), _LOOK)} lines; its columns may not be separated "
             "by semicolons, tabs, commas or blanks"
@@ -490,39 +755,55 @@ def read_lvm(path: Path, _told: Told) -> list[Channel]:
     if not lines[0].lower().startswith("labview measurement"):
         raise InputError("does not begin with 'LabVIEW Measurement', so it is no .lvm file")
     file_header, at = _header(lines, 0, None)
-    separator = _SEPARATORS.get(file_header.get("separator", ["Tab"])[0].lower(), "\t")
-    comma = file_header.get("decimal_separator", ["."])[0] == ","
+    separator = _SEPARATORS.get((file_header.get("separator") or ["Tab"])[0].lower(), "\t")
+    decimal = file_header.get("decimal_separator", ["."])
+    comma = decimal != ["."]
+    if comma and separator == ",":
+        raise InputError(
+            "Separator and Decimal_Separator are commas, so that cells and decimals cannot be told apart: save it again "
+            "with the separator Tab"
+        )
+    if decimal not in (["."], [","]):
+        raise InputError(f"Decimal_Separator = {' '.join(decimal)!r}: must be a point or a comma")
     header, at = _header(lines, at, separator)
     if "samples" not in header or "delta_x" not in header:
         raise InputError("has no segment header with Samples and Delta_X")
     if any(_END == line.strip().strip(separator).lower() for line in lines[at:]):
         raise InputError("holds several segments; save one to a file")
     names = [cell.strip() for cell in lines[at].split(separator)]
-    rows = [(k + 1, line.split(separator)) for k, line in enumerate(lines) if k > at and line.strip()]
+    rows = [(k + 1, line.split(separator)) for k, line in enumerate(lines) if k > at and line.strip(" ")]
     count = int(to_number(header.get("channels", ["0"])[0], comma) or 0)
     columns = [k for k, name in enumerate(names) if name and name.lower() not in ("x_value", "comment")]
     if not columns or (count and len(columns) != count):
         raise InputError(f"line {at + 1}: names {len(columns)} channel(s), the header says {count}")
     units = header.get("y_unit_label", [])
-    told: list[Diagnostic] = []
     channels: list[Channel] = []
     for number, k in enumerate(columns):
-        cells = [row[k] if k < len(row) else "" for _, row in rows]
-        if not any(cell.strip() for cell in cells):
+        cells = [row[k].strip() if k < len(row) else "" for _, row in rows]
+        while cells and not cells[-1]:  # of a channel that is shorter than others
+            cells.pop()
+        if not cells:
             continue
-        step = to_number(header["delta_x"][min(number, len(header["delta_x"]) - 1)], comma)
-        start = to_number(header.get("x0", ["0"])[min(number, len(header.get("x0", ["0"])) - 1)], comma)
+        step, start, samples = (
+            to_number(_of(header.get(key) or ["0"], number), comma) for key in ("delta_x", "x0", "samples")
+        )
         if not (math.isfinite(step) and step > 0.0):
-            raise InputError(f"Delta_X = {header['delta_x'][0]!r}: must be a positive number of seconds")
-        samples = int(to_number(header["samples"][min(number, len(header["samples"]) - 1)], comma))
+            raise InputError(
+                f"Delta_X = {_of(header['delta_x'] or [''], number)!r}: must be a positive number of seconds"
+            )
+        if not samples >= 1.0:
+            raise InputError(
+                f"Samples = {_of(header['samples'] or [''], number)!r}: must be a whole number from 1"
+            )
         clock: dict[str, Any] = {"fs": 1.0 / step, "time_offset": start if math.isfinite(start) else 0.0}
-        if len(rows) != samples:
-            kind = KINDS_SIGNAL["cut" if len(rows) < samples else "appended"]
-            promised, present = float(samples), float(len(rows))
+        told: list[Diagnostic] = []
+        if len(cells) != samples:
+            kind = KINDS_SIGNAL["cut" if len(cells) < samples else "appended"]
+            promised, present = samples, float(len(cells))
             told = [kind.found(told=path.name, promised=promised, found=present)]
             tell([kind.found(told=str(path), promised=promised, found=present)])
             if names[0].lower() == "x_value" and rows[0][1][0].strip():
-                clock = {"time": np.array([to_number(row[0], comma) for _, row in rows])}
+                clock = {"time": np.array([to_number(row[0], comma) for _, row in rows[: len(cells)]])}
         data = np.array([to_number(cell, comma) for cell in cells])
         bad = np.flatnonzero(~np.isfinite(data))
         if bad.size:
@@ -537,6 +818,11 @@ def read_lvm(path: Path, _told: Told) -> list[Channel]:
             }
         )
     return numbered(channels)
+
+
+def _of(values: list[str], number: int) -> str:
+    """The value of a channel, or the last where there are fewer."""
+    return values[min(number, len(values) - 1)]
 
 
 def _header(lines: list[str], at: int, separator: str | None) -> tuple[dict[str, list[str]], int]:
@@ -569,7 +855,12 @@ def read_matlab(path: Path, _told: Told) -> list[Channel]:
         values = _version_73(path)
     else:
         values = _version_5(path)
-    return _channels(values)
+    channels = _channels({name: _Stored(value, {}) for name, value in values.items()}, {})
+    if not channels:
+        raise InputError(
+            "holds no vector or matrix of numbers (objects and cells are not read; save as numbers)"
+        )
+    return channels
 
 
 def _version_5(path: Path) -> dict[str, Any]:
@@ -623,60 +914,17 @@ def _version_73(path: Path) -> dict[str, Any]:
     return values
 
 
-def _channels(values: dict[str, Any]) -> list[Channel]:
-    rates = {name: value for name, value in values.items() if _last(name) in RATE_NAMES and value.size == 1}
-    channels: list[Channel] = []
-    for name, value in values.items():
-        if value.dtype.kind not in "iuf" or value.size < 2:
-            continue
-        if value.ndim == 2 and min(value.shape) <= _LONGEST_SIDE:
-            columns = value if value.shape[0] >= value.shape[1] else value.T
-        elif value.ndim == 1:
-            columns = value[:, None]
-        else:
-            continue
-        folder = name.rpartition("/")[0]
-        unit = _unit(values, name)
-        rate = next((rates[key] for key in rates if key.rpartition("/")[0] in (folder, "")), None)
-        for k in range(columns.shape[1]):
-            own = name if columns.shape[1] == 1 else f"{name} {k + 1}"
-            channel: Channel = {"data": columns[:, k].astype(np.float64), "name": own, "unit_str": unit}
-            if rate is not None:
-                channel["fs"] = positive(f"{own}: sampling rate", float(rate.item()), "Hz")
-            channels.append(channel)
-    if not channels:
-        raise InputError(
-            "holds no vector or matrix of numbers (objects and cells are not read; save as numbers)"
-        )
-    return with_time(channels)
-
-
-def _last(name: str) -> str:
-    return name.rpartition("/")[2].lower()
-
-
-def _unit(values: dict[str, Any], name: str) -> str | None:
-    folder = name.rpartition("/")[0]
-    for key in UNIT_NAMES:
-        common = () if is_time(_last(name)) else (f"{folder}/{key}" if folder else key,)
-        for candidate in (f"{name}_{key}", *common):
-            value = values.get(candidate)
-            if value is not None and value.dtype.kind == "U" and value.ndim == 0:
-                return str(value.item()).strip() or None
-    return None
-
-
 # ----------------------------------------------------------------------------------------------------
 # What the lines above a table say: sampling rate and units, under the names that instruments give them.
 
 
 _RATES = (
-    "samplingfreq", "samplingfrequency", "samplingfreqhz", "samplingfrequencyhz", "samplerate", "samplerate hz",
-    "sampleratehz", "samplingrate", "samplingratehz", "samplefrequency", "fs", "fshz", "abtastrate",
+    "samplingfreq", "samplingfrequency", "samplerate", "samplingrate", "samplefrequency", "samplefreq", "fs", "fsample",
+    "fsampling", "timesamplerate", "wfsamplerate", "abtastrate", "samplespersecond", "daqrate",
 )  # fmt: skip
 _STEPS = (
-    "sampleinterval", "samplingintervall", "samplinginterval", "sampleperiod", "samplingperiod", "timestep",
-    "timeincrement", "timeinterval", "deltat", "deltats", "dt", "dts", "xincrement", "increment", "resolutionx",
+    "sampleinterval", "samplingintervall", "samplinginterval", "sampleperiod", "samplingperiod",  "timestep", "timeincrement", "timeinterval", "deltat", "dt", "tinterval", "tsample",
+    "xincrement", "xincr", "increment", "resolutionx", "wfincrement",
 )  # fmt: skip
 _LONGEST_LINE = 2000
 """Letters of a line of a header that is looked into."""
@@ -718,24 +966,52 @@ def header_rate(values: dict[str, str], where: str) -> float | None:
     InputError
         If it states two that differ.
     """
-    found: dict[str, float] = {}
-    for key, value in values.items():
-        number, unit = _quantity(value)
-        if not (math.isfinite(number) and number > 0.0):
-            continue
-        if key in _RATES and unit.lower() in _PER_SECOND:
-            found[key] = number * _PER_SECOND[unit.lower()]
-        elif key in _STEPS:
-            try:
-                factor, base = si_unit(key, unit or "s")
-            except InputError:
-                continue
-            if base == "s":
-                found[key] = 1.0 / (number * factor)
-    if found and max(found.values()) > 1.001 * min(found.values()):
+    found = {key: rate for key, value in values.items() if (rate := _rate_of(key, value)) is not None}
+    return _one_rate(found, f"{where}: the header") if found else None
+
+
+def _one_rate(found: Mapping[str, float], where: str) -> float:
+    """The one of several stated sampling rates [Hz]."""
+    if max(found.values()) > 1.001 * min(found.values()):
         told = ", ".join(f"{key} {value:.9g} Hz" for key, value in found.items())
-        raise InputError(f"{where}: the header contradicts itself about the sampling rate ({told})")
-    return next(iter(found.values()), None)
+        raise InputError(f"{where} contradicts itself about the sampling rate ({told}): remove the wrong one")
+    return next(iter(found.values()))
+
+
+def _rate_of(name: str, value: Any) -> float | None:
+    """Samples per second [Hz] that a named value states; None if the name states none, or the value is 0 or no number.
+
+    Raises
+    ------
+    InputError
+        If it states a negative or infinite rate.
+    """
+    word, suffix = (name, None) if len(name) > _LONGEST_NAME else split_unit(name)
+    key = _key(name)
+    if key not in _RATES and key not in _STEPS:
+        ending = next(
+            (end for end in ("hz", "s") if key.endswith(end) and key[: -len(end)] in _RATES + _STEPS), ""
+        )
+        key = _key(word) if suffix else key[: -len(ending)] if ending else ""
+    if key not in _RATES and key not in _STEPS:
+        return None
+    number, unit = _quantity(_text(value))
+    unit = unit or suffix or ""
+    step = key in _STEPS
+    if not step and unit.lower() not in _PER_SECOND:
+        return None
+    factor = 1.0 if step else _PER_SECOND[unit.lower()]
+    if step:
+        try:
+            factor, base = si_unit(name, unit or "s")
+        except InputError:
+            return None
+        if base != "s":
+            return None
+    if number == 0.0 or math.isnan(number):
+        return None
+    rate = 1.0 / (number * factor) if step else number * factor
+    return positive(f"{name}: sampling rate", rate, "Hz")
 
 
 def header_unit(values: dict[str, str], *keys: str) -> str | None:
@@ -884,13 +1160,15 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
         )
     common: dict[str, Any] = {}
     if times:
-        unit = columns[times[0]][1] or "s"
-        factor, base = si_unit(f"column {times[0]!r}", unit)
-        if base != "s":
-            raise InputError(f"{path}: column {times[0]!r} is in {unit!r}, not in seconds")
-        common["time"] = table.numbers(times[0]) * factor
+        word, unit = columns[times[0]]
+        common["time"] = table.numbers(times[0]) * _seconds(f"{path}: column {word!r}", unit)
         if rate is not None:
-            _agree(path, common["time"], rate)
+            agree(
+                str(path),
+                common["time"],
+                rate,
+                "correct the header, or name the times otherwise in columns (--columns), such as 'number [1],velocity [m/s]'",
+            )
     elif rate is not None:
         common["fs"] = rate
     upward = header_unit(values, "verticalunits", "yunit", "yunits", "unity")
@@ -903,7 +1181,7 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
 
 def _is_time(word: str, unit: str | None) -> bool:
     """Whether a column is the time: by its name, unless that is one of an axis with another unit."""
-    if not is_time(word) or unit is None or word.lower() not in ("x-axis", "x_value"):
+    if not is_time(word) or unit is None or _key(word) not in ("xaxis", "xvalue"):
         return is_time(word)
     return si_unit(f"column {word!r}", unit)[1] == "s"
 
@@ -915,15 +1193,20 @@ def _in_seconds(name: str, unit: str) -> bool:
         return False
 
 
-def _agree(path: Path, time: NDArray[np.float64], rate: float) -> None:
-    """Refuse a column of times that contradicts the rate in the header."""
+def agree(name: str, time: NDArray[np.float64], rate: float, way_out: str) -> None:
+    """Refuse times that contradict a stated sampling rate [Hz].
+
+    Raises
+    ------
+    InputError
+        With *way_out*, if they do, or are not even.
+    """
     if time.size < 3:
         return
-    _, found = even_sampling(str(path), time)
+    _, found = even_sampling(name, time)
     if abs(found / rate - 1.0) * time.size > 1.0 and abs(found / rate - 1.0) > 1e-3:
         raise InputError(
-            f"{path}: the column of times is sampled at {found:.9g} Hz, the header says {rate:.9g} Hz; give columns "
-            "(--columns) with another name for the wrong one"
+            f"{name}: the times are sampled at {found:.9g} Hz, the header says {rate:.9g} Hz; {way_out}"
         )
 
 
@@ -973,9 +1256,14 @@ def read_tdms(path: Path, _told: Told) -> list[Channel]:
                 continue
             unit = next((str(entry.properties[k]) for k in UNIT_NAMES if entry.properties.get(k)), None)
             channel: Channel = {"data": data, "name": f"{group.name}/{entry.name}", "unit_str": unit}
-            step = entry.properties.get("wf_increment")
-            if step is not None:
-                channel["fs"] = 1.0 / positive(f"{channel['name']}: wf_increment", step, "s")
+            rates = {
+                f"{place}{key}": rate
+                for place, level in (("", entry), (f"{group.name}/", group), ("file/", file))
+                for key, value in level.properties.items()
+                if (rate := _rate_of(key, value)) is not None
+            }
+            if rates:
+                channel["fs"] = _one_rate(rates, channel["name"])
                 channel["time_offset"] = float(entry.properties.get("wf_start_offset", 0.0))
             channels.append(channel)
     return with_time(channels)
@@ -1004,17 +1292,38 @@ _UFF_UNITS = {8: "m", 11: "m/s", 12: "m/s^2", 13: "N"}
 _UFF_TYPES = {unit: code for code, unit in _UFF_UNITS.items()}
 
 
-def read_uff(path: Path, _told: Told) -> list[Channel]:
+_FORTRAN = re.compile(rb"(\.\d*)[Dd]([-+]\d\d)")
+
+
+def read_uff(path: Path, told: Told) -> list[Channel]:
     """Return the channels of a universal file (dataset 58)."""
     import pyuff
 
-    sets = pyuff.UFF(str(path)).read_sets()
+    content = path.read_bytes()
+    if (
+        _FORTRAN.search(content) and b"58b" not in content
+    ):  # exponents as Fortran writes them, which pyuff does not read
+        with tempfile.TemporaryDirectory() as folder:
+            copy = Path(folder) / path.name
+            copy.write_bytes(_FORTRAN.sub(rb"\1E\2", content))
+            return read_uff(copy, told)
+    file = pyuff.UFF(str(path))
+    kinds, bodies = file.get_set_types(), _bodies(content)
     channels: list[Channel] = []
-    for entry in sets if isinstance(sets, list) else [sets]:
-        if entry.get("type") != 58 or entry.get("func_type") not in (0, 1):
+    for number, kind in enumerate(kinds):
+        if kind != 58:
             continue
-        data = np.asarray(entry["data"])
+        entry = file.read_sets(number, header_only=True)
+        if entry.get("func_type") not in (0, 1):
+            continue
         name = _first(entry["id1"], f"channel {len(channels) + 1}")
+        if not entry["binary"]:
+            if len(bodies) != kinds.tolist().count(58):
+                raise InputError("mixes binary and ASCII datasets 58: write each kind to a file of its own")
+            entry |= _numbers_58(name, bodies[kinds[:number].tolist().count(58)], entry)
+        else:
+            entry = file.read_sets(number)
+        data = np.asarray(entry["data"])
         if data.size != entry["num_pts"]:
             raise InputError(
                 f"{name}: the header promises {entry['num_pts']} samples, the file has {data.size}"
@@ -1042,6 +1351,35 @@ def read_uff(path: Path, _told: Told) -> list[Channel]:
     if not channels:
         raise InputError("holds no whole time response in a dataset 58")
     return numbered(channels)
+
+
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+
+
+def _bodies(content: bytes) -> list[list[str]]:
+    """Lines of numbers of each dataset 58 of a file, without the header's eleven."""
+    lines = content.decode("latin-1").splitlines()
+    marks = [k for k, line in enumerate(lines) if line.strip() == "-1"]
+    pairs = zip(marks[::2], marks[1::2], strict=False)
+    return [lines[a + 13 : b] for a, b in pairs if lines[a + 1][:6].strip() == "58"]
+
+
+def _numbers_58(name: str, body: list[str], entry: Mapping[str, Any]) -> dict[str, Any]:
+    """``data`` and ``x`` of an ASCII dataset 58, whatever the width of its numbers, without zeros that fill its last line."""
+    if entry["ord_data_type"] not in (2, 4):
+        raise InputError(f"{name}: complex numbers, or of a type that is not known, are no time series")
+    rows = []
+    for line in body:
+        found = _NUMBER.findall(line)
+        if _NUMBER.sub("", line).strip():
+            raise InputError(f"{name}: {line.strip()[:60]!r} is no line of numbers")
+        rows.append([float(word) for word in found])
+    values = np.array([number for row in rows for number in row])
+    each = 1 if entry["abscissa_spacing"] == 1 else 2
+    count = each * int(entry["num_pts"])
+    if values.size > count and count > values.size - len(rows[-1]) and not values[count:].any():
+        values = values[:count]
+    return {"data": values[each - 1 :: each], "x": values[::each]}
 
 
 def _undo_rounding(step: float) -> float:

@@ -58,7 +58,8 @@ _TO_SI: dict[str, tuple[float, str]] = {
 for _odd in ("cs", "ks", "cV", "cHz", "cPa", "cN"):
     _TO_SI.pop(_odd)
 _WORDS = {
-    "second": "s", "seconds": "s", "millisecond": "ms", "milliseconds": "ms", "volt": "V", "volts": "V",
+    "second": "s", "seconds": "s", "millisecond": "ms", "milliseconds": "ms", "microsecond": "us",
+    "microseconds": "us", "nanosecond": "ns", "nanoseconds": "ns", "volt": "V", "volts": "V",
     "millivolts": "mV", "inch": "in", "inches": "in", "hertz": "Hz", "pascal": "Pa", "newton": "N",
     "meter": "m", "metre": "m",
 }  # fmt: skip

@@ -98,6 +98,9 @@ def read_netcdf(
         raise InputError(f"{name} = {str(path)!r}: no such file")
     read = xr.open_dataset if lazily else xr.load_dataset
     try:
+        with open(path, "rb") as file:
+            if file.read(3) == b"CDF" and group is None:  # version 3, whose layout is not that of HDF5
+                return read(path, engine="scipy")
         refuse_large(path, name)
         return read(path, engine="h5netcdf", group=group)
     except (InputError, MemoryError):
