@@ -140,12 +140,12 @@ def test_rest_without_a_striker_is_in_the_fabricated_well(rise: float, well: str
 def test_amplitudes_are_counted_in_that_of_the_well() -> None:
     scale = amplitude_scale(MODEL)
     assert scale == pytest.approx(abs(MODEL.well_amplitude[0]), rel=1e-14)
-    state = started(MODEL, BELOW, None, {"amplitude[1]": 0.5, "velocity[2]": 0.1, "striker_position": 2e-4})
+    state = started(MODEL, rest_state(MODEL, BELOW), {"amplitude[1]": 0.5, "velocity[2]": 0.1, "striker_position": 2e-4})
     np.testing.assert_allclose(state.amplitude, [0.5 * scale, 0.0, 0.0], rtol=1e-14)
     np.testing.assert_allclose(state.velocity, [0.0, 0.1 * scale * MODEL.omega[0], 0.0], rtol=1e-12)
     assert float(state.striker_position) == 2e-4
     # the centre of the upper well: amplitude[1] = 1 is b up
-    up = started(MODEL, BELOW, None, {"amplitude[1]": 1.0})
+    up = started(MODEL, rest_state(MODEL, BELOW), {"amplitude[1]": 1.0})
     assert float(MODEL.midspan_shape @ up.amplitude) == pytest.approx(
         default_values.BEAM.buckling_level, rel=1e-12
     )
@@ -156,7 +156,7 @@ def test_amplitudes_are_counted_in_that_of_the_well() -> None:
 
 def test_a_start_changes_only_what_is_named() -> None:
     given = sb.State(amplitude=[1e-3, 2e-3, 3e-3], velocity=[0.1, 0.2, 0.3], phase=0.4)
-    state = started(MODEL, BELOW, given, {"velocity[3]": [0.0, 1.0]})
+    state = started(MODEL, given, {"velocity[3]": [0.0, 1.0]})
     assert state.batch == (2,)
     np.testing.assert_array_equal(state.amplitude, [[1e-3, 2e-3, 3e-3]] * 2)
     np.testing.assert_array_equal(state.velocity[:, :2], [[0.1, 0.2]] * 2)
@@ -177,4 +177,4 @@ def test_a_start_changes_only_what_is_named() -> None:
 )
 def test_starts_that_are_none(name: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        started(MODEL, BELOW, None, {name: 1.0})
+        started(MODEL, rest_state(MODEL, BELOW), {name: 1.0})

@@ -445,11 +445,11 @@ def _follow(
                 return points, "Newton's method no longer converges"
             continue
         point, direction, turned, iterations = found
-        before, apart = apart, turned - point[:-1]
-        part = _vanishing(before, apart)
+        last_apart, apart = apart, turned - point[:-1]
+        part = _vanishing(last_apart, apart)
         if part is not None:
             met = ((1.0 - part) * points[-1] + part * point)[:-1]
-            near = _NEAR_ZERO * np.linalg.norm(apart - before)
+            near = _NEAR_ZERO * np.linalg.norm(apart - last_apart)
             if np.linalg.norm(met) < near:
                 return points, _AT_REST
             to_rest = np.linalg.lstsq(structure.slope(met), structure.acceleration(met), rcond=None)[0]

@@ -594,7 +594,7 @@ def _light_of_packed(path: Path, bits: int) -> NDArray[np.uint16]:
     bright = ((np.maximum(signal, 0.0) + _CURVE - 1.0) / _CURVE) ** (1.0 / 0.45)
     light = 64 + 4000 * np.where(signal < 4.5 * _KNEE, signal / 4.5, bright)
     levels = np.where(signal > 1.0, 4095, np.ceil(light)).astype(np.uint16)
-    return (levels << 4) | (levels >> 8)
+    return ((levels << 4) | (levels >> 8)).astype(np.uint16)
 
 
 class VideoSource(FrameSource):

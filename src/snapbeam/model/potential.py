@@ -301,8 +301,13 @@ class Potential:
         InputError
             If the equilibrium is unstable.
         """
-        parity = None if self.model.beam is None else self.model.beam.buckling_modes(self.model.modes).parity
-        return linear_modes_about(self.model.mass, self.tangent(equilibrium.amplitude), parity)
+        model, alpha = self.model, equilibrium.amplitude
+        parity = None if model.beam is None else model.beam.buckling_modes(model.modes).parity
+        magnitude = model.tangent_magnitude(alpha)
+        for row, law in zip(self.rows, self.local_forces, strict=True):
+            stiffness = law.stiffness_at(float(row @ alpha), self._length)
+            magnitude = magnitude + abs(stiffness) * np.abs(np.outer(row, row))
+        return linear_modes_about(alpha, model.mass, self.tangent(alpha), magnitude, parity)
 
     def natural_frequencies(self, equilibrium: Equilibrium) -> _Array:
         """Natural frequencies about a well, Hz, ascending, shape (N,); without circuits and contacts."""

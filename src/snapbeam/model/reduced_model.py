@@ -814,14 +814,14 @@ class ReducedModel(Wells):
             alpha,
             self.mass,
             tangent_stiffness(self.stiffness, self.nonlinear_stiffness, alpha, stretch),
-            tangent_stiffness(
-                np.abs(self.stiffness),
-                self.nonlinear_stiffness,
-                np.abs(alpha),
-                None if stretch is None else np.abs(stretch),
-            ),
+            self.tangent_magnitude(alpha),
             parity,
         )
+
+    def tangent_magnitude(self, alpha: _Array) -> _Array:
+        """Sum of the magnitudes of the terms of the tangent stiffness, shape (N, N): the measure of its rounding."""
+        stretch = None if self.elongation_matrix is None else np.abs(self.elongation_matrix)
+        return tangent_stiffness(np.abs(self.stiffness), self.nonlinear_stiffness, np.abs(alpha), stretch)
 
     @cached_property
     def _linear(self) -> LinearModes:
