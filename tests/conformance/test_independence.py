@@ -65,7 +65,7 @@ def test_runs_of_different_contact_are_what_they_are_alone(integrate_ensemble, m
     for i, value in enumerate(stiffness):
         alone = make_ensemble(sb.System(model_of(2), sb.HertzContact(float(value)), shaker), integration)
         assert alone.runs["tick"][0] == whole.runs["tick"][i]
-        assert alone.runs["finest"][0] == whole.runs["finest"][i]
+        assert alone.runs["max_halvings"][0] == whole.runs["max_halvings"][i]
         found = integrate_ensemble.engine.run_ensemble(alone, None, None)
         for name in accumulators_of_runs.dtype.names:
             np.testing.assert_array_equal(found[name][0], accumulators_of_runs[name][i], err_msg=name)

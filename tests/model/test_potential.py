@@ -74,7 +74,7 @@ def test_pull_in_at_a_third_of_the_gap():
     assert potential(0.5).saddles[0].wells in ((0, None), (None, 0))
     assert potential(1.0 + 1e-6).equilibria == ()
     with pytest.raises(sb.InputError, match="leaves no well where a run begins"):
-        print(sb.System(model, local_force=Magnet(strength=1.1 * critical, gap=gap)).start)
+        print(sb.System(model, local_force=Magnet(strength=1.1 * critical, gap=gap)).start_state)
 
 
 def test_a_spring_on_eight_modes_against_minimisation():
@@ -175,17 +175,17 @@ def test_runs_stay_at_rest():
             continue
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            own = float(system.model.midspan_shape @ system.start.amplitude) / system.model.length_scale
-            at_rest = system.replace(initial_state=system.start)
+            own = float(system.model.midspan_shape @ system.start_state.amplitude) / system.model.length_scale
+            at_rest = system.replace(initial_state=system.start_state)
             run = sb.simulate(at_rest, sb.Integration(cycles=1000), sample_times=[0.0, 1.0])
             assert np.abs(run.dataset.midspan_displacement.values - own).max() < 1e-8
-            beside = sb.State(amplitude=1.01 * system.start.amplitude)
+            beside = sb.State(amplitude=1.01 * system.start_state.amplitude)
             back = sb.simulate(system.replace(initial_state=beside), sb.Integration(cycles=1000))
             np.testing.assert_allclose(
                 back.final_state.amplitude,
-                system.start.amplitude,
+                system.start_state.amplitude,
                 rtol=0.0,
-                atol=1e-7 * np.abs(system.start.amplitude).max(),
+                atol=1e-7 * np.abs(system.start_state.amplitude).max(),
             )
 
 

@@ -140,7 +140,9 @@ def test_rest_without_a_striker_is_in_the_fabricated_well(rise: float, well: str
 def test_amplitudes_are_counted_in_that_of_the_well() -> None:
     scale = amplitude_scale(MODEL)
     assert scale == pytest.approx(abs(MODEL.well_amplitude[0]), rel=1e-14)
-    state = started(MODEL, rest_state(MODEL, BELOW), {"amplitude[1]": 0.5, "velocity[2]": 0.1, "striker_position": 2e-4})
+    state = started(
+        MODEL, rest_state(MODEL, BELOW), {"amplitude[1]": 0.5, "velocity[2]": 0.1, "striker_position": 2e-4}
+    )
     np.testing.assert_allclose(state.amplitude, [0.5 * scale, 0.0, 0.0], rtol=1e-14)
     np.testing.assert_allclose(state.velocity, [0.0, 0.1 * scale * MODEL.omega[0], 0.0], rtol=1e-12)
     assert float(state.striker_position) == 2e-4

@@ -206,7 +206,7 @@ class _Diagram:
         """Every value from one start."""
         system = self.flow.system
         location = self.values if self.name == "striker.location" else None
-        state = starts.state(system, number, system.start, location)
+        state = starts.state(system, number, system.start_state, location)
         rows = np.broadcast_to(self.flow.coordinates(state), (self.values.size, self.flow.dimension))
         kept, counts = self._go(rows, np.arange(self.values.size))
         self.sweeps.append(label)

@@ -111,7 +111,7 @@ class InitialConditions:
 
         *location* is where the tip strikes, x_s/L, or that of each of several runs; the system's by default.
         """
-        found = state if state is not None else system.start
+        found = state if state is not None else system.start_state
         if self.displacement > 0.0:
             rung = perturbed_start(system, Replicates(1, self.displacement, seed=self.seed), number, found)
             found = leaving(system, found, rung, location)
@@ -504,7 +504,7 @@ class Stroboscope:
     def coordinates(self, state: State | None = None) -> _Array:
         """A state, or a batch of them, in the coordinates of the flow, shape (runs, d); the start by default."""
         if state is None:
-            state = self.system.start
+            state = self.system.start_state
         else:
             self._require_phase(state)
         if state.modes != self.modes:

@@ -257,7 +257,7 @@ class System:
         start = {name.removeprefix(prefix): changes[name] for name in changes if name not in other}
         if not start:
             return found
-        return dataclasses.replace(found, initial_state=started(found.model, found.start, start))
+        return dataclasses.replace(found, initial_state=started(found.model, found.start_state, start))
 
     def get(self, name: str) -> Any:
         """The value of a parameter by its dotted name.
@@ -353,7 +353,7 @@ class System:
         return State(amplitude=local.wells[well].amplitude)
 
     @property
-    def start(self) -> State:
+    def start_state(self) -> State:
         """The state that runs begin in: the initial state, or at rest."""
         return self.rest_state if self.initial_state is None else self.initial_state
 

@@ -108,7 +108,7 @@ def advance(
     report = counting(progress, "advance", "states")
     if state is None:
         require_motion(system)
-        state = system.start
+        state = system.start_state
     if state.modes != system.model.modes:
         raise InputError(
             f"state of {state.modes} modes: must have the {system.model.modes} modes of the model"

@@ -85,7 +85,7 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
     if model.transverse_force is not None:
         attrs |= {
             "reference_well": model.reference_well,
-            "initial_well": model.side_of(system.start.amplitude),
+            "initial_well": model.side_of(system.start_state.amplitude),
         }
     sections = system.to_mapping() if system.has_environment else {}
     for section in ("base_excitation", "axial_load", "external_force", "local_force", "harvester"):

@@ -348,7 +348,7 @@ def make_ensemble(
         For parameters that cannot differ between the runs of an ensemble, and for more steps than can be counted.
     """
     columns = run_columns(system, points or {})
-    state = system.start if start is None else start
+    state = system.start_state if start is None else start
     runs = next(iter(columns.values())).size if columns else 1
     if state.batch and runs in (1, state.batch[0]):
         runs = state.batch[0]

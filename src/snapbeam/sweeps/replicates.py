@@ -69,7 +69,7 @@ def perturbed_start(system: System, replicates: Replicates, repeat: int, state: 
     q_j' ~ N(0, s).  The factor s gives the mid-span displacement its root mean square, ``perturbation_rms``.
     """
     model = system.model
-    rest = state if state is not None else system.start
+    rest = state if state is not None else system.start_state
     sign = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
     moving = model.omega > 0.0
     per_unit = np.where(moving, 1.0 / np.where(moving, model.omega, 1.0), 0.0)

@@ -265,7 +265,7 @@ class SweepSetup:
         own = {
             name.removeprefix(prefix): values for name, values in points.items() if name.startswith(prefix)
         }
-        return started(system.model, system.start, own) if own else None
+        return started(system.model, system.start_state, own) if own else None
 
     @cached_property
     def plan(self) -> Plan:
