@@ -128,3 +128,65 @@ def test_a_statistic_from_the_command_line(tmp_path, monkeypatch, synthetic_map)
     assert (tmp_path / "power.png").stat().st_size > 5_000
     refused = CliRunner().invoke(app, [*command, "nosuch"], catch_exceptions=False)
     assert refused.exit_code == 2 and "nosuch" in refused.output
+
+
+# ---------------------------------------------------------------------- structures given by matrices
+
+
+def test_bistable_piezoelectric_oscillator_of_the_literature() -> None:
+    """x'' + .02 x' - .5 x + .5 x^3 - chi v = .115 cos .8 t, v' + lambda v + kappa x' = 0; chi = .05, kappa = .5, lambda = .05.
+
+    With theta = chi the capacitance is chi/kappa and the resistance 1/(lambda C).  The mean of lambda v^2 over the last
+    quarter is .017855962 on the orbit between the wells; SciPy (DOP853, rtol = 1e-11) gives .0178559580 after 400 periods
+    from any of the states below.
+    """
+    model = sb.ReducedModel.from_matrices(
+        [[1.0]], [-0.5], contact_shape=[1.0], patch_shape=[1.0], nonlinear_stiffness=0.5, well_amplitude=[-1.0],
+        damping_ratio=0.01,
+    )  # fmt: skip
+    layers = sb.PiezoelectricHarvester(moment_per_volt=0.05, capacitance=0.1, resistance=200.0)
+    force = sb.HarmonicForce(frequency_ratio=0.8, amplitude=0.115, phase=0.5 * np.pi)
+    for start in (sb.State(amplitude=[-1.0]), sb.State(amplitude=[1.0], velocity=[1.3])):
+        system = sb.System(
+            model, external_force=sb.ExternalForce(history=force), harvester=layers, initial_state=start
+        )
+        power = sb.simulate(system, sb.Integration(cycles=400)).summary.harvested_power_last_quarter
+        assert power / 0.1 == pytest.approx(0.017855962, rel=3e-6)
+
+
+def test_layers_on_the_matrices_of_a_beam(shaken: sb.System) -> None:
+    """The coupling row of the beam's own layers, given with the beam's matrices, gives the beam's run."""
+    beam, layers = shaken.model, shaken.harvester
+    assert isinstance(layers, sb.PiezoelectricHarvester)
+    given = sb.ReducedModel.from_matrices(
+        beam.mass, beam.stiffness, contact_shape=beam.midspan_shape, nonlinear_stiffness=beam.nonlinear_stiffness,
+        well_amplitude=beam.well_amplitude, length_scale=beam.length_scale, damping_ratio=0.02,
+        patch_shape=layers.row(beam) / layers.moment_per_volt,
+    )  # fmt: skip
+    force = sb.HarmonicForce(frequency_ratio=0.9, amplitude=0.02)
+    powers = [
+        sb.simulate(
+            sb.System(model, external_force=sb.ExternalForce(history=force, **more), harvester=layers),
+            sb.Integration(cycles=20),
+        ).summary.harvested_power
+        for model, more in ((beam, {"location": 0.5}), (given, {}))
+    ]
+    assert powers[0] > 0.0
+    assert powers[1] == pytest.approx(powers[0], rel=1e-6)
+    assert given.patch_shape is not None
+    again = sb.System(given, external_force=sb.ExternalForce(history=force), harvester=layers)
+    changed = again.replace(**{"model.damping_ratio": 0.03})
+    assert changed.model.patch_shape.tolist() == given.patch_shape.tolist()
+
+
+def test_layers_need_their_row() -> None:
+    model = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0])
+    layers = sb.PiezoelectricHarvester(moment_per_volt=0.05, capacitance=0.1, resistance=200.0)
+    with pytest.raises(sb.InputError, match="give patch_shape to ReducedModel.from_matrices"):
+        sb.System(
+            model,
+            harvester=layers,
+            external_force=sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=1.0, amplitude=0.1)),
+        )
+    with pytest.raises(sb.InputError, match=r"patch_shape of shape \(2,\)"):
+        sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], patch_shape=[1.0, 2.0])

@@ -61,7 +61,7 @@ def symmetric(name: str, matrix: Any) -> Any:
         advice = (
             "check the order of the degrees of freedom in the export"
             if upper and lower
-            else f"only the {'upper' if upper else 'lower'} triangle is given; give A + A.T - diag(A) of this A"
+            else f"only the {'upper' if upper else 'lower'} triangle is given; give A + A.T - np.diag(A.diagonal()) of this A"
         )
         raise InputError(
             f"{name}[{i}, {j}] = {float(matrix[i, j])!r}, {name}[{j}, {i}] = {float(matrix[j, i])!r}: must be symmetric; "
