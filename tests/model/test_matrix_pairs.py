@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 import snapbeam as sb
+from snapbeam.model import buckling_modes
 from snapbeam.model.matrix_pairs import eigenpairs
 from snapbeam.util import diagnostics
 from snapbeam.util.validation import InputError
@@ -267,3 +268,134 @@ def test_random_pairs_against_scipy(numbers: range) -> None:
         np.testing.assert_allclose(
             found[rigid:], expected[rigid:], rtol=1e-9, atol=1e-13 * expected[-1], err_msg=str(number)
         )
+
+
+# ---------------------------------------------------------------------- sparse matrices and size
+
+
+def laplacian(n: int, free: bool = False) -> sp.csr_array:
+    diagonal = np.full(n, 2.0)
+    if free:
+        diagonal[[0, -1]] = 1.0
+    return sp.csr_array(sp.diags_array([diagonal, -np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1, -1]))
+
+
+@pytest.mark.filterwarnings("ignore::snapbeam.DiagnosticWarning")
+def test_sparse_strip_of_20_000_coordinates() -> None:
+    """In less than a second; rounding of the entries is reported."""
+    mass, stiffness = strip(10_001)
+    model = model_of(mass, stiffness, modes=6)
+    assert model.modes == 6
+    assert model.natural_frequencies[0] == pytest.approx(FIRST, rel=1e-3)
+    mass, stiffness = strip(2_000, clamped=False)
+    found = model_of(mass, stiffness, modes=4).natural_frequencies
+    assert found[:2].tolist() == [0.0, 0.0]
+    assert found[2] == pytest.approx(FIRST, rel=1e-5)
+
+
+def test_sparse_grid_finds_every_double_frequency() -> None:
+    n, one = 60, sp.eye_array(60)
+    side = laplacian(n)
+    stiffness = sp.csr_array(sp.kron(side, one) + sp.kron(one, side))
+    own = 2.0 - 2.0 * np.cos(math.pi * np.arange(1, n + 1) / (n + 1))
+    expected = np.sort((own[:, None] + own).ravel())
+    for modes in (1, 2, 12):
+        found = model_of(sp.csr_array(sp.eye_array(n * n)), stiffness, modes=modes).omega ** 2
+        np.testing.assert_allclose(found, expected[:modes], rtol=1e-11)
+
+
+def test_sparse_parts_and_unstable_motions() -> None:
+    """Parts that nothing connects, each with its scale; negative eigenvalues are not missed."""
+    alone = sp.diags_array([0.0, 1e-9, 5.0])
+    stiffness = sp.csr_array(sp.block_diag([laplacian(3000, True), laplacian(1000), alone]))
+    found = eigenpairs(stiffness, sp.csr_array(sp.eye_array(4003)), count=3).value
+    assert found[:2].tolist() == [0.0, 0.0]
+    assert found[2] == pytest.approx(1e-9, rel=1e-14)
+    pulled = laplacian(2000).tolil()
+    pulled[0, 0], pulled[1000, 1000] = -1.0, -3.0
+    found = eigenpairs(sp.csr_array(pulled), sp.csr_array(sp.eye_array(2000)), count=10).value
+    expected = scipy.linalg.eigvalsh_tridiagonal(
+        pulled.diagonal(), -np.ones(1999), select="i", select_range=(0, 9)
+    )
+    np.testing.assert_allclose(found, expected, atol=1e-14)
+    with pytest.raises(InputError, match="must be stable"):
+        model_of(sp.csr_array(sp.eye_array(2000)), sp.csr_array(pulled), modes=4)
+
+
+def test_modes_are_those_of_the_whole_model() -> None:
+    """Projection onto all modes changes the coordinates only; dense, sparse and fewer modes agree."""
+    mass, stiffness = (each.toarray() for each in strip(10))
+    rows = {name: np.linspace(0.1, 1.0, len(mass)) for name in ("midspan_shape", "base_shape", "patch_shape")}
+    force = 1e-3 * np.ones(len(mass))
+    more = {"nonlinear_stiffness": 1e3, "transverse_force": force, "damping_ratio": 0.01, **rows}
+    whole = model_of(mass, stiffness, **more)
+    turned = model_of(mass, stiffness, elongation_matrix=np.eye(len(mass)), modes=len(mass), **more)
+    np.testing.assert_allclose(turned.natural_frequencies, whole.natural_frequencies, rtol=1e-9)
+    for name in rows:
+        one, two = (
+            each.linear_modes.T
+            @ (each.mass if name == "base_shape" else np.eye(each.modes))
+            @ getattr(each, name)
+            for each in (turned, whole)
+        )
+        np.testing.assert_allclose(np.abs(one), np.abs(two), rtol=1e-6, atol=1e-9)
+    assert turned.potential_energy(turned.well_amplitude) == pytest.approx(whole.well_energy, rel=1e-9)
+    few = model_of(sp.csr_array(mass), sp.csr_array(stiffness), modes=3)
+    np.testing.assert_allclose(few.omega, model_of(mass, stiffness).omega[:3], rtol=1e-9)
+
+
+@pytest.mark.parametrize("modes", [0, 257, 2.5])
+def test_refused_numbers_of_modes(modes: Any) -> None:
+    mass, stiffness = strip(300)
+    with pytest.raises(InputError, match="modes = "):
+        model_of(mass, stiffness, modes=modes)
+
+
+def test_a_well_with_modes_is_refused() -> None:
+    with pytest.raises(InputError, match="well_amplitude with modes"):
+        model_of(np.eye(2), [-1.0, 1.0], nonlinear_stiffness=1.0, well_amplitude=[-1.0, 0.0], modes=1)
+
+
+def test_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A dense pair that takes a minute is announced, a sparse one needs its number of modes."""
+    mass, stiffness = sp.csr_array(sp.eye_array(4000)), laplacian(4000)
+    with pytest.raises(InputError, match="sparse matrices of 4000 coordinates or more need modes"):
+        model_of(mass, stiffness)
+    monkeypatch.setattr(buckling_modes, "_MINUTE", 40)
+    with pytest.warns(sb.DiagnosticWarning, match=r"mass of shape \(40, 40\): .* take about 1 min"):
+        model_of(np.eye(40), laplacian(40).toarray())
+
+
+# ---------------------------------------------------------------------- symmetry
+
+
+@pytest.mark.parametrize("kind", [np.asarray, sp.csr_array])
+def test_asymmetry(kind: Any) -> None:
+    def given(difference: float) -> sb.ReducedModel:
+        return model_of(np.eye(2), kind(np.array([[2.0, 1.0], [1.0 + difference, 2.0]])))
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert given(1e-14).omega == pytest.approx([1.0, math.sqrt(3.0)])
+    with pytest.warns(sb.DiagnosticWarning, match="stiffness: is symmetric to single precision only"):
+        assert given(1e-7).stiffness[0, 1] == pytest.approx(1.0 + 0.5e-7, abs=1e-15)
+    message = r"stiffness\[0, 1\] = 1.0, stiffness\[1, 0\] = 1.000001: must be symmetric; check the order"
+    with pytest.raises(InputError, match=message):
+        given(1e-6)
+
+
+@pytest.mark.parametrize("kind", [np.asarray, sp.csr_array])
+def test_one_triangle(kind: Any) -> None:
+    mass, stiffness = coupled(4)
+    with pytest.raises(InputError, match=r"mass.*only the upper triangle is given; give A"):
+        model_of(kind(np.triu(mass)), stiffness)
+    with pytest.raises(InputError, match=r"stiffness.*only the lower triangle is given; give A"):
+        model_of(mass, kind(np.tril(stiffness)))
+
+
+def test_penalty_hides_no_asymmetry() -> None:
+    """The scale of an entry is that of its rows, not the largest entry."""
+    stiffness = np.diag([4.0, 4.0, 1e20])
+    stiffness[0, 1] = 1.0
+    with pytest.raises(InputError, match=r"stiffness\[0, 1\] = 1.0"):
+        model_of(np.eye(3), stiffness)

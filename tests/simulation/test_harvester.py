@@ -182,7 +182,7 @@ def test_layers_on_the_matrices_of_a_beam(shaken: sb.System) -> None:
 def test_layers_need_their_row() -> None:
     model = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0])
     layers = sb.PiezoelectricHarvester(moment_per_volt=0.05, capacitance=0.1, resistance=200.0)
-    with pytest.raises(sb.InputError, match="give patch_shape to ReducedModel.from_matrices"):
+    with pytest.raises(sb.InputError, match=r"give patch_shape to ReducedModel\.from_matrices"):
         sb.System(
             model,
             harvester=layers,

@@ -248,14 +248,24 @@ def _lowest(stiffness: Any, mass: Any, count: int) -> tuple[_Array, _Array]:
     root = 1.0 / np.sqrt(mass.diagonal())
     scale = sp.diags_array(root)
     k, m = sp.csc_array(scale @ stiffness @ scale), sp.csc_array(scale @ mass @ scale)
+    start = np.random.default_rng(0).normal(size=k.shape[0])
+
+    def nearest(at: float, factors: Any, number: int) -> _Array:
+        inverse = LinearOperator(k.shape, matvec=factors.solve, dtype=np.float64)
+        found: _Array = eigsh(k, k=number, M=m, sigma=at, OPinv=inverse, v0=start, which="LA")[1]
+        return found
+
     below = -_EPS * float(np.abs(k.diagonal()).max())
     factors = _factors(k, m, below)
-    while _negative(factors) != 0:
-        below *= 10.0
-        factors = _factors(k, m, below)
-    start = np.random.default_rng(0).normal(size=k.shape[0])
-    inverse = LinearOperator(k.shape, matvec=factors.solve, dtype=np.float64)
-    _, columns = eigsh(k, k=count, M=m, sigma=below, OPinv=inverse, v0=start, which="LM")
+    unstable = min(_negative(factors), count)
+    columns = np.zeros((k.shape[0], 0))
+    if unstable < count:
+        columns = nearest(below, factors, count - unstable)  # the lowest above
+    if unstable > 0:
+        while _negative(factors) != 0:
+            below *= 10.0
+            factors = _factors(k, m, below)
+        columns = np.hstack((nearest(below, factors, unstable), columns))
     value, columns = _projected(k, m, columns)
     gap = np.diff(value[max(count - _MORE, 1) - 1 :])
     last = max(count - _MORE, 1) - 1 + int(np.argmax(gap))
