@@ -74,7 +74,9 @@ def independent(system, force, start, times):
         return np.concatenate((velocity, inverse @ (load + total * shape)))
 
     y0 = np.concatenate((start.amplitude, start.velocity))
-    found = solve_ivp(rate, (0.0, times[-1]), y0, "DOP853", times, rtol=1e-12, atol=1e-15)
+    # of a system at rest SciPy would try a first step so long that the cubic force overflows
+    first = 1e-6 * float(times[-1])
+    found = solve_ivp(rate, (0.0, times[-1]), y0, "DOP853", times, rtol=1e-12, atol=1e-15, first_step=first)
     return found.y.T[:, : model.modes]
 
 
