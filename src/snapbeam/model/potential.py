@@ -154,15 +154,17 @@ class Potential:
 
     @cached_property
     def equilibria(self) -> tuple[Equilibrium, ...]:
-        """Every equilibrium, by energy.
+        """Equilibria, by energy.
 
-        Without local forces they are in closed form.  With them Newton's method starts from many points of the space
-        that is spanned by the lowest linear modes and the static responses to the forces.
+        Without local forces they are in closed form, and all of them.  With local forces Newton's method starts from
+        more than 500 points of the space that is spanned by the lowest linear modes and the static responses to the
+        forces.  The sum of the indices shows a single missing equilibrium, but not a well and a saddle that are both
+        missing.
 
         Raises
         ------
         InputError
-            If the indices of the equilibria do not add up, so that one may be missing.
+            If the indices of the equilibria do not add up.
         """
         if not self.local_forces:
             return self.structure.equilibria
