@@ -40,6 +40,31 @@ def exact_orbit(ratio: float, restitution: float, periods: int) -> tuple[float, 
     return speed, np.array([w * cosine + up * sine, -w * sine + up * cosine])
 
 
+@pytest.mark.parametrize("with_striker", [True, False])
+def test_a_constant_force_repeats_after_any_time(with_striker: bool) -> None:
+    """The orbit under a constant load closes, and runs from it return to it; a load alone leaves the equilibrium."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 1, damping_ratio=0.02)
+    load = sb.ExternalForce(history=sb.ConstantForce(force=1e-3), location=0.5)
+    striker = (
+        (default_values.CONTACT, sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03))
+        if with_striker
+        else ()
+    )
+    orbit = sb.dynamics.periodic_orbit(sb.System(model, *striker, external_force=load), transient=100)
+    assert orbit.residual < 1e-10
+    period = orbit.flow.period
+    run = sb.simulate(
+        orbit.system,
+        sb.Integration(accuracy="reference", cycles=6),
+        sample_times=period * np.arange(1, 6) * (1.0 - 1e-13),
+    )
+    assert np.ptp(run.dataset.midspan_displacement.values) < 1e-9
+    if not with_striker:
+        potential = orbit.system.potential
+        center = run.dataset.midspan_displacement.values[-1] * model.length_scale
+        assert center == pytest.approx(potential.center(potential.wells[0]), rel=1e-9)
+
+
 EXACT = [
     *((ratio, r, 1) for ratio in (1.3, 1.4, 1.6, 1.8, 1.9) for r in (0.3, 0.9)),
     *((2.0 * ratio, r, 2) for ratio in (1.7, 1.75, 1.8, 1.85, 1.9) for r in (0.3, 0.9)),

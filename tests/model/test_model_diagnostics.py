@@ -41,6 +41,45 @@ def test_the_papers_own_system_is_beyond_doubt() -> None:
 
 
 @pytest.mark.parametrize(
+    ("record", "drifts"),
+    [
+        ("sine", False),
+        ("sine with an offset", True),
+        ("noise with an offset", True),
+        ("noise", False),
+        ("half-sine shock", False),
+        ("constant", True),
+    ],
+)
+def test_an_offset_of_a_recorded_acceleration_is_told(record: str, drifts: bool) -> None:
+    times = np.arange(20_001) / 1e4
+    noise = np.random.default_rng(1).normal(size=times.size)
+    noise -= np.polynomial.Polynomial.fit(times, noise, 1)(times)
+    pulse = np.where(times < 0.005, 50.0 * np.sin(np.pi * times / 0.005), 0.0)
+    sine = 0.3 * np.sin(2.0 * np.pi * 80.3 * times)
+    acceleration = {
+        "sine": sine,
+        "sine with an offset": sine + 0.01,
+        "noise with an offset": 0.01 * noise - 0.01,
+        "noise": 1e-3 * noise,
+        "half-sine shock": pulse,
+        "constant": np.full(times.size, 0.01),
+    }[record]
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 1)
+    motion = sb.RecordedAcceleration.from_g(acceleration, 1e4)
+    shaken = sb.System(model, base_excitation=sb.BaseExcitation(motion=motion))
+    found = [each for each in shaken.diagnostics() if each.code == "drifting-record"]
+    assert len(found) == drifts
+    if drifts:
+        offset = np.median(motion.record)
+        assert found[0].numbers["drift"] == pytest.approx(abs(offset) * 2.0**2 / 8.0, rel=0.2)
+        # the way out that the message gives
+        mended = dataclasses.replace(motion, record=motion.record - offset)
+        mended = sb.System(model, base_excitation=sb.BaseExcitation(motion=mended))
+        assert "drifting-record" not in codes(mended)
+
+
+@pytest.mark.parametrize(
     ("changes", "code", "words"),
     [
         ({"density": 7.8}, "implausible-size", r"beam\.density = 7\.8 kg/m\^3.*is it given in g/cm\^3\?"),

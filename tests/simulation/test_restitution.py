@@ -66,6 +66,35 @@ def test_a_plastic_impact_sticks_until_the_force_would_pull(one_mode):
     assert abs(run.dataset.penetration_normalised.values[held]).max() < 1e-12
 
 
+def test_a_plastic_landing_is_one_impact(one_mode):
+    """Landing and sustained contact are one impact, whose impulse is that of the landing and that of the force after it."""
+    shaker = sb.Shaker(frequency_ratio=0.1, velocity_amplitude=0.05)
+    run = sb.simulate(sb.System(one_mode, sb.Restitution(0.0), shaker), sb.Integration(cycles=4))
+    impacts, force = run.impacts, run.dataset.contact_force
+    apart = impacts.onset.values[1:] - (impacts.onset + impacts.duration).values[:-1]
+    assert apart.size >= 3
+    assert apart.min() > 1e-6  # s
+    for impact in impacts.to_dataframe().itertuples():
+        during = (force.time >= impact.onset) & (force.time <= impact.onset + impact.duration)
+        pushed = np.trapezoid(force.values[during], force.time.values[during])
+        assert impact.impulse > pushed * (1.0 - 1e-3)  # the landing adds to it
+        assert impact.peak_force >= force.values[during].max() * (1.0 - 1e-6)
+    assert run.summary.impulse == pytest.approx(impacts.impulse.sum(), rel=1e-12)
+
+
+def test_a_plastic_landing_that_nothing_presses_is_one_impact():
+    mass, speed = 0.01, 0.1
+    model = sb.ReducedModel.from_matrices(
+        [[mass]], [0.0], contact_shape=[1.0], length_scale=1e-3, reference_frequency=100.0
+    )
+    wall = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0)
+    start = sb.State(amplitude=[0.02 * speed], velocity=[-speed])
+    run = sb.simulate(
+        sb.System(model, sb.Restitution(0.0), wall, initial_state=start), sb.Integration(cycles=20)
+    )
+    assert run.impacts.impulse.values == pytest.approx([mass * speed], rel=1e-12)
+
+
 def test_mirror_image_is_exact(one_mode):
     runs = [
         sb.simulate(

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from snapbeam.model.beam import Beam
+from snapbeam.model.drive.base import Drive
+from snapbeam.model.drive.recorded_acceleration import RecordedAcceleration
+from snapbeam.model.drive.shock import GRAVITY
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.harvester import Harvester, PiezoelectricHarvester
 from snapbeam.model.potential import Potential
@@ -22,6 +27,8 @@ _STOCKY = 0.1
 """Thickness over length up to which shear and rotary inertia may be left out."""
 _CENTRAL = 0.05
 """Distance of a striker from the centre, over the length, below which it hardly excites antisymmetric modes."""
+_LONGEST_DRIFT = 1.0
+"""Displacement by an offset of a recorded acceleration, over the length scale, up to which it is plausible."""
 _LARGEST_RATIO = 20.0
 _LARGEST_AMPLITUDE = 20.0
 
@@ -35,15 +42,21 @@ _SHIFTED = 0.02
 
 
 def doubts_of(
-    potential: Potential, striker: Striker | None, harvester: Harvester | None = None
+    potential: Potential,
+    striker: Striker | None,
+    harvester: Harvester | None = None,
+    moving: Sequence[tuple[str, Drive]] = (),
 ) -> tuple[Diagnostic, ...]:
-    """Diagnostics about a structure, the forces on it, what strikes it and its harvester."""
+    """Diagnostics about a structure, the forces on it, what strikes it, its harvester and prescribed motions, by section."""
     model = potential.model
     found = [] if model.beam is None else _of_beam(model.beam) + _of_modes(model, model.beam, striker)
     if striker is not None and isinstance(striker.drive, Sine):
         found += _of_sine(striker.drive, model)
     if isinstance(harvester, PiezoelectricHarvester) and model.beam is not None:
         found += _of_layers(harvester, model.beam)
+    for section, drive in moving:
+        if isinstance(drive, RecordedAcceleration):
+            found += _of_record(section, drive, model)
     if model.imperfection is not None and not model.is_bistable:
         found.append(
             Diagnostic(
@@ -72,6 +85,23 @@ def _of_wells(potential: Potential) -> list[Diagnostic]:
         return []
     message = f"the wells of the system, at {lower:.4g} and {upper:.4g} m, are divided at {own:.4g} m, while {words}"
     return [Diagnostic("other-wells", message, {"saddle": own, "dividing_height": height})]
+
+
+def _of_record(section: str, drive: RecordedAcceleration, model: ReducedModel) -> list[Diagnostic]:
+    drift = drive.drift
+    if model.length_scale is None or drift <= _LONGEST_DRIFT * model.length_scale:
+        return []
+    offset = float(np.median(drive.record))
+    return [
+        Diagnostic(
+            "drifting-record",
+            f"{section}.record: its acceleration has an offset of {offset:.3g} m/s^2 ({offset / GRAVITY:.2g} g), by which "
+            f"its displacement drifts by {drift:.3g} m ({drift / model.length_scale:.3g} times the length scale) within "
+            f"{drive.duration:.4g} s; subtract the offset, record - numpy.median(record), or filter the record by a "
+            "high-pass below the lowest frequency that matters",
+            {"drift": drift, "drift_over_length_scale": drift / model.length_scale, "offset": offset},
+        )
+    ]
 
 
 def _of_beam(beam: Beam) -> list[Diagnostic]:

@@ -147,6 +147,10 @@ class ConstantForce(ForceHistory, Timed):
         """A period of the first mode."""
         return np.full(columns["force"].size, 2.0 * math.pi / scale.omega)
 
+    def frequencies(self, columns: Mapping[str, _Array], scale: Scale) -> list[_Array]:
+        """None: it repeats after any time."""
+        return []
+
     def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """The force, which never changes."""
         return {"fastest": np.zeros(columns["force"].size), "force": columns["force"]}

@@ -359,7 +359,7 @@ class System:
 
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Diagnostics: values that look like another unit, and assumptions of the model that do not hold."""
-        return doubts_of(self.potential, self.striker, self.harvester)
+        return doubts_of(self.potential, self.striker, self.harvester, self.moving)
 
     # ------------------------------------------------------------------ identity and files
 

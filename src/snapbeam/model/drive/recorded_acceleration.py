@@ -128,6 +128,18 @@ class RecordedAcceleration(Timed):
             (self.record, spline(times, 1), velocity(times) - mean, moved(times) - mean * times)
         )
 
+    @property
+    def drift(self) -> float:
+        """Range of the parabola through the displacement that an offset of the acceleration leaves, m; 0 without one.
+
+        An offset a leaves a T^2/8 over a record of T.  A shock, whose mean is no offset, has a median of zero.
+        """
+        moved = self._rows[:, 3]
+        times = np.linspace(-1.0, 1.0, moved.size)
+        drift = float(np.ptp(np.polynomial.Polynomial.fit(times, moved, 2)(times)))
+        of_offset = abs(float(np.median(self.record))) * self.duration**2 / 8.0
+        return drift if drift > 0.5 * float(np.ptp(moved)) and of_offset > 0.5 * drift else 0.0
+
     def samples(self) -> _Array:
         """Acceleration, its rate, velocity and displacement, sample after sample."""
         return self._rows.ravel()

@@ -205,6 +205,14 @@ def apply_impact_law(memory, blocks, workspace, run, tip, p, kinematics, when, p
     lost = 0.5 * (1.0 - e * e) * kinematics.dv * kinematics.dv / (c * c)
     accumulators.dissipated += lost
     accumulators.lost += lost
+    spare, size = run.spare, layout.size
+    away = e * kinematics.dv
+    force, _, _ = hold(memory, blocks, layout, tip, phase, spare, spare + size, spare + 2 * size)
+    pressed = force * c * c
+    if e == 0.0 and pressed > 0.0:
+        # without a rebound, landing and sustained contact are one impact: closed, and counted, at its release
+        accumulators.impulse, accumulators.deepest = impulse, force
+        return True
     accumulators.total_impulse += impulse
     if outputs is not None:
         at = accumulators.impacts - outputs.marks[1]
@@ -214,14 +222,10 @@ def apply_impact_law(memory, blocks, workspace, run, tip, p, kinematics, when, p
             outputs.impacts[at, 2] = math.nan
             outputs.impacts[at, 3] = impulse
     accumulators.impacts += 1
-    spare, size = run.spare, layout.size
-    away = e * kinematics.dv
-    force, _, _ = hold(memory, blocks, layout, tip, phase, spare, spare + size, spare + 2 * size)
-    pressed = force * c * c
     if not pressed > 0.0:
         return False
     height = 0.5 * away * away / pressed
-    if height <= run.lowest * 1e-4 or e == 0.0:
+    if height <= run.lowest * 1e-4:
         return True
     if height > run.lowest or e >= 1.0:
         return False
@@ -236,15 +240,15 @@ def apply_impact_law(memory, blocks, workspace, run, tip, p, kinematics, when, p
 
 @inlined
 def _stuck(memory, workspace, run, kinematics, p, accumulators):
-    """What is left of the relative velocity after the last hit of a chatter is lost; begins the record of accumulators of a contact."""
+    """Begin the record of a sustained contact: the relative velocity that the last hit left is lost."""
     c = memory[workspace.layout.contact]
     away = run.tip.law.coefficient * kinematics.dv
-    accumulators.impulse = -away / (c * c)
-    accumulators.work += accumulators.impulse * (kinematics.wv + kinematics.dv)
+    impulse = -away / (c * c)
+    accumulators.impulse += impulse
+    accumulators.work += impulse * (kinematics.wv + kinematics.dv)
     lost = 0.5 * away * away / (c * c)
     accumulators.dissipated += lost
     accumulators.lost += lost
-    accumulators.deepest = 0.0
     accumulators.touching = 1
 
 
