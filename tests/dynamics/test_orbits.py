@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 from doubles import henon, logistic
+from scipy.integrate import solve_ivp
 
 import snapbeam as sb
 from snapbeam.model import default_values
@@ -38,6 +40,83 @@ def exact_orbit(ratio: float, restitution: float, periods: int) -> tuple[float, 
     after = ((math.pi - math.atan2(w, wall / ratio)) % (2.0 * math.pi)) / ratio
     cosine, sine = math.cos(after), math.sin(after)
     return speed, np.array([w * cosine + up * sine, -w * sine + up * cosine])
+
+
+KELVIN_VOIGT = sb.KelvinVoigt(1e6, 5.0)
+
+
+def test_the_map_of_a_force_that_begins_with_a_jump_is_smooth() -> None:
+    """The onset falls between two ticks: without its part of a tick the period map has steps of 2e-9."""
+    system = dataclasses.replace(system_of(1, 1.6, 0.03), contact=KELVIN_VOIGT)
+    state = sb.advance(system, periods=60)
+    length = abs(float(system.model.well_amplitude[0]))
+    offset = np.linspace(-1.0, 1.0, 101)
+    near = sb.State(
+        amplitude=state.amplitude + 1e-7 * length * offset[:, None],
+        velocity=np.repeat(state.velocity[None], 101, axis=0),
+    )
+    image = sb.advance(system, near, periods=1).amplitude[:, 0] / length
+    residual = image - np.polynomial.Polynomial.fit(offset, image, 2)(offset)
+    assert np.sqrt(np.mean(residual**2)) < 1e-10
+
+
+@pytest.mark.parametrize("transient", range(60, 165, 7))
+def test_orbits_of_a_force_that_begins_with_a_jump(transient: int) -> None:
+    """At the default tolerance, from 15 states."""
+    system = dataclasses.replace(system_of(1, 1.6, 0.03), contact=KELVIN_VOIGT)
+    assert sb.dynamics.periodic_orbit(system, transient=transient).residual < 1e-9
+
+
+def contact_of_a_ball(
+    law: sb.KelvinVoigt, stroke: float, phase: float, state: np.ndarray
+) -> tuple[float, np.ndarray]:
+    """Time in contact with a force, and the state a period later, of a unit mass under unit weight on stroke sin t."""
+    k, c = law.linear_stiffness, law.linear_damping
+
+    def gap(t, y):
+        return y[0] - stroke * math.sin(t)
+
+    def force(t, y):
+        return -k * gap(t, y) + c * (stroke * math.cos(t) - y[1])
+
+    def until(rates, event, direction, t, y):
+        event.terminal, event.direction = True, direction
+        found = solve_ivp(
+            rates, (t, end), y, method="DOP853", rtol=1e-13, atol=1e-13, events=event, max_step=0.1
+        )
+        return found.t[-1], found.y[:, -1], found.t_events[0].size > 0
+
+    def falling(t, y):
+        return [y[1], -1.0]
+
+    t, y, end, pressed = phase, np.asarray(state), phase + 2.0 * math.pi, 0.0
+    while True:
+        onset, y, met = until(falling, lambda t, y: gap(t, y), -1, t, y)
+        if not met:
+            return pressed, y
+        t, y, _ = until(lambda t, y: [y[1], -1.0 + force(t, y)], lambda t, y: force(t, y), -1, onset, y)
+        pressed += t - onset
+        t, y, _ = until(falling, lambda t, y: gap(t, y), 1, t, y)  # the spring has yet to recover
+        t, y = t + 1e-9, y + 1e-9 * np.array(falling(t, y))
+
+
+@pytest.mark.parametrize(("restitution", "stroke"), [(0.5, 1.2), (0.3, 1.8)])
+def test_determinant_of_a_bouncing_ball(restitution: float, stroke: float) -> None:
+    """Phase volume shrinks by exp(-c/m times the time with a force) in a period; k = 1e7."""
+    ball = sb.ReducedModel.from_matrices(
+        [[1.0]], [0.0], contact_shape=[1.0], reference_frequency=0.5 / math.pi
+    )
+    law = sb.KelvinVoigt.from_restitution(1e7, restitution, 1.0)
+    phase = math.acos(math.pi * (1.0 - restitution) / ((1.0 + restitution) * stroke))
+    table = sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=stroke, phase=phase)
+    above = sb.State(amplitude=[stroke * math.sin(phase)], velocity=[math.pi], striker_position=0.0)
+    weight = sb.ExternalForce(history=sb.ConstantForce(force=-1.0))
+    system = sb.System(ball, law, sb.Striker(drive=table), above, external_force=weight)
+    orbit = sb.dynamics.periodic_orbit(system, transient=30)
+    pressed, later = contact_of_a_ball(law, stroke, orbit.flow.phase, orbit.coordinates)
+    np.testing.assert_allclose(later, orbit.coordinates, rtol=0.0, atol=1e-9)
+    determinant = math.exp(orbit.log_determinant)
+    assert determinant == pytest.approx(math.exp(-law.linear_damping * pressed), rel=1e-5)
 
 
 @pytest.mark.parametrize("with_striker", [True, False])

@@ -47,6 +47,7 @@ __all__ = [
 # Nodes and weights of Gauss's rule of four points on [0, 1].
 _NODES = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
 _WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
+_SMALLEST = 2.2250738585072014e-308
 _SMALL = 0.05
 
 
@@ -274,14 +275,21 @@ def _kick_force(law, penetration, rate, mobility, push, weight):
 
 
 def mark_of(law: Any, penetration: float, rate: float) -> float:
-    """What a record of accumulators keeps the maximum of in a contact: the penetration, or the force of a law that loses energy."""
-    return max(penetration, 0.0) if not type(law).owner.rate_dependent else felt_force(law, penetration, rate)
+    """The penetration of a contact, of which a record of accumulators keeps the maximum, or the force of a law that loses energy.
+
+    At the onset, where the penetration is zero, that force is its limit from the side of the contact.
+    """
+    if not type(law).owner.rate_dependent:
+        return max(penetration, 0.0)
+    return felt_force(law, _SMALLEST if penetration == 0.0 else penetration, rate)
 
 
 @overloaded(mark_of)
 def _mark_of(law, penetration, rate):
     if law.instance_class.owner.rate_dependent:
-        return lambda law, penetration, rate: felt_force(law, penetration, rate)
+        return lambda law, penetration, rate: felt_force(
+            law, _SMALLEST if penetration == 0.0 else penetration, rate
+        )
     return lambda law, penetration, rate: max(penetration, 0.0)
 
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from numba.extending import overload
 
 from snapbeam.solver.compilation import INLINE_HERE, compiled, inlined
-from snapbeam.solver.contact_force import felt_force, jumps, zero_force_crossing
+from snapbeam.solver.contact_force import felt_force, jumps, scalar_function, zero_force_crossing
 from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.mode_lanes import (
     flow_coefficients,
@@ -59,7 +59,7 @@ from snapbeam.solver.interpolation import (
 )
 from snapbeam.solver.physics import sincos, tension_energy
 from snapbeam.solver.registered_statistics import observe as observe_extras
-from snapbeam.solver.simd import WIDTH, lanes_sum, load
+from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, store
 from snapbeam.solver.step_control import (
     TRUST,
     ContactKinematics,
@@ -253,6 +253,57 @@ def sample_inside_step(memory, layout, tip, flow, subintervals, subinterval, ste
         inner_samples[i, 2] = c
         inner_samples[i, 3] = c_rate + remaining * ((1.0 - done) * center0 + done * center1)
         sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine
+
+
+# ----------------------------------------------------------------------------------------------------
+# The part of a tick between the onset of a force that begins with a jump and the tick at which its contact begins.
+
+
+def kick_at_onset(
+    memory: Any, layout: Any, law: Any, p: Any, kinematics: Any, accumulators: Any, outputs: Any
+) -> Any:
+    """The kinematics of a contact that begins at a tick, once the velocities *p* have the impulse since its onset.
+
+    The gap closed d/v before the tick (after it where d < 0), and the force that begins there with c v has the impulse
+    c v d/v = c d by the tick; what is left out is of second order in that time.  A law without a jump changes nothing.
+    """
+    raise TypeError("kick_at_onset runs in compiled code only")
+
+
+@overload(kick_at_onset, jit_options=INLINE_HERE)
+def _kick_at_onset(memory, layout, law, p, kinematics, accumulators, outputs):
+    owner = law.instance_class.owner
+    if not (owner.rate_dependent and not owner.properties.smooth):
+        return lambda memory, layout, law, p, kinematics, accumulators, outputs: kinematics
+    damping_coefficient = scalar_function(owner, "damping_coefficient")
+
+    def implementation(memory, layout, law, p, kinematics, accumulators, outputs):
+        size, contact = layout.size, layout.contact
+        damping, rate = damping_coefficient(law, 0.0), kinematics.dv
+        impulse, gained = damping * kinematics.d, dot(memory, size, contact, contact)
+        for row in range(0, size, WIDTH):
+            store(memory, p + row, fma(impulse, load(memory, contact + row), load(memory, p + row)))
+        gained *= impulse
+        work, lost = impulse * (kinematics.wv + rate), impulse * (rate - 0.5 * gained)
+        accumulators.impulse += impulse
+        accumulators.work += work
+        accumulators.gross_work += abs(work)
+        accumulators.lost += lost
+        if outputs is not None:
+            accumulators.dissipated += lost
+        # the force at the onset is the maximum of an impact that the damper stops
+        accumulators.deepest = max(accumulators.deepest, damping * rate)
+        centre = impulse * dot(memory, size, layout.center, contact)
+        return ContactKinematics(
+            kinematics.w,
+            kinematics.wv + gained,
+            kinematics.d,
+            rate - gained,
+            kinematics.c,
+            kinematics.cv + centre,
+        )
+
+    return implementation
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -460,6 +511,7 @@ def accept_step(
     if contact_event.event_ticks < 1:
         if contact_event.event:
             accumulators.touching, accumulators.onset = 1, t
+            kinematics = kick_at_onset(memory, layout, tip.law, step.p, kinematics, accumulators, outputs)
         update_further_contacts(memory, layout.others, 0, t, 0.0, tick, accumulators, outputs)
         status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
         control = StepControl(
@@ -565,6 +617,7 @@ def accept_step(
             )
         else:
             accumulators.touching, accumulators.onset = 1, t
+            kinematics1 = kick_at_onset(memory, layout, tip.law, step.p1, kinematics1, accumulators, outputs)
     update_further_contacts(
         memory, layout.others, contact_event.event_ticks, t, step.length, tick, accumulators, outputs
     )
