@@ -380,6 +380,29 @@ def _text(value: Any) -> str:
 # HDF5 and NetCDF files.
 
 
+def _refuse_length(path: Path, ends: tuple[int, ...]) -> None:
+    """Refuse a file that is longer than its own header says: what lies behind the surplus bytes would be read shifted."""
+    size = path.stat().st_size
+    if size not in ends:
+        raise InputError(
+            f"has {size} bytes, and its header says {ends[0]}: damaged, such as by a transfer in text mode; copy it again"
+        )
+
+
+def _refuse_length_of_hdf5(path: Path) -> None:
+    """The same by the end of file that the superblock states, from the start of the file or of the HDF5 data in it."""
+    with open(path, "rb") as opened:
+        start, at = opened.read(1 << 16), 0
+    while start[at : at + 8] != b"\x89HDF\r\n\x1a\n":
+        at = 2 * at or 512
+        if at >= len(start):
+            return
+    version, size = start[at + 8], start[at + (9 if start[at + 8] > 1 else 13)]
+    first = at + {0: 24, 1: 28}.get(version, 12)
+    end = int.from_bytes(start[first + 2 * size : first + 3 * size], "little")
+    _refuse_length(path, (end, at + end))
+
+
 def read_hdf5(path: Path, _told: Told) -> list[Channel]:
     """Return the channels of an HDF5 or NetCDF file; packed numbers by the CF conventions."""
     import h5py
@@ -389,6 +412,7 @@ def read_hdf5(path: Path, _told: Told) -> list[Channel]:
     if start[:3] == b"CDF":
         return _netcdf3(path, start[3])
     refuse_large(path)
+    _refuse_length_of_hdf5(path)
     stored: dict[str, _Stored] = {}
     groups: dict[str, dict[str, Any]] = {}
     with h5py.File(path, "r") as file:
@@ -892,6 +916,7 @@ def _version_73(path: Path) -> dict[str, Any]:
     import h5py
 
     refuse_large(path)
+    _refuse_length_of_hdf5(path)
     values: dict[str, Any] = {}
     with h5py.File(path, "r") as file:
 
@@ -1245,6 +1270,11 @@ def read_tdms(path: Path, _told: Told) -> list[Channel]:
     """Return the channels of a TDMS file."""
     from nptdms import TdmsFile
 
+    with open(path, "rb") as opened:  # 28 bytes lead into each segment, and say how many follow
+        end, size = 0, path.stat().st_size
+        while end < size and opened.seek(end) == end and opened.read(4) == b"TDSm":
+            end += 28 + int.from_bytes(opened.read(16)[8:], "little")
+    _refuse_length(path, (end, size) if end > size else (end,))  # nptdms says which segment is cut short
     file = TdmsFile.read(path)
     if file.file_status.incomplete_final_segment:
         raise InputError("the file is cut short: its last segment is incomplete")
