@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
+from test_potential import Magnet
 
 import snapbeam as sb
 from snapbeam.model import default_values
@@ -134,7 +136,7 @@ def test_no_branch_is_missed(rise: float, location: float) -> None:
             for pair in equilibria_of(model.stiffness, model.nonlinear_stiffness, load)
             if abs(row @ pair[0]) < 3e-4
         ]
-        crossed = near[(force[near] - given) * (force[near + 1] - given) < 0.0]
+        crossed = near[(force[near] >= given) != (force[near + 1] >= given)]
         assert len(crossed) == len(exact), share
         for each, unstable in exact:
             distance = np.abs(alpha - each).max(axis=1)
@@ -187,6 +189,68 @@ def test_finite_elements_with_springs() -> None:
     for name in ("snap_through_force", "snap_back_force", "snap_through_displacement"):
         assert float(curve[name]) == pytest.approx(float(modal[name]), rel=3e-3)
     assert curve.attrs["snap_through_kind"] == modal.attrs["snap_through_kind"] == "limit"
+
+
+@pytest.mark.parametrize("modes", [1, 3, 8])
+@pytest.mark.parametrize("law", ["spring", "magnet", "electrode"])
+def test_local_forces_where_the_force_acts_add_to_it(modes: int, law: str) -> None:
+    """F(w) of the system is that of the beam less the local force at w, at the same amplitudes."""
+    level, location = default_values.BEAM.buckling_level, 0.47
+    force = {
+        "spring": sb.LocalSpring(stiffness=40.0, cubic_stiffness=1e8, location=location),
+        "magnet": Magnet(strength=2e-9, gap=2.0 * level, location=location),
+        "electrode": Magnet(strength=2e-9, gap=0.5 * level, location=location),
+    }[law]
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
+    curve = sb.force_displacement(sb.System(model, local_force=force), location, well="lower")
+    alpha, row = curve.amplitude.values, model.shape_at(location)
+    w = curve.displacement.values
+    assert w.max() < force.displacement_range(force.numbers)[1]
+    bare = curve.force.values + np.array([force.force_at(each) for each in w])
+    tension = model.nonlinear_stiffness * np.sum(alpha**2, axis=1)[:, None] * alpha
+    residual = model.stiffness * alpha + tension - bare[:, None] * row
+    assert np.abs(residual).max() < 1e-9 * np.abs(tension).max()
+    # the two limits, by the derivative of the curve of one mode
+    if modes == 1:
+        numbers = np.polynomial.Polynomial([0.0, model.stiffness[0], 0.0, model.nonlinear_stiffness])
+        stiffness = [force.stiffness_at(each, level) for each in w]
+        slope = numbers.deriv()(alpha[:, 0]) / row[0] ** 2 + stiffness
+        assert ((slope < 0.0) == (curve.unstable_directions.values > 0))[2:-2].mean() > 0.99
+    forces = [force.force_at(float(each)) for each in curve.critical_displacement]
+    beam = sb.force_displacement(model, location, well="lower")
+    if modes == 1 and law == "spring":
+        # gamma' = gamma + k_3 phi^4, K' = K + k phi^2: F = 2/(3 sqrt 3) |K'|^1.5/(phi sqrt gamma')
+        k = model.stiffness[0] + force.stiffness * row[0] ** 2
+        gamma = model.nonlinear_stiffness + force.cubic_stiffness * row[0] ** 4
+        exact = 2.0 / (3.0 * np.sqrt(3.0)) * abs(k) ** 1.5 / (row[0] * np.sqrt(gamma))
+        assert float(curve.snap_through_force) == pytest.approx(exact, rel=1e-9)
+        assert float(curve.snap_through_force) < float(beam.snap_through_force)
+    assert np.isfinite(forces).all()
+
+
+def test_local_forces_anywhere() -> None:
+    """A spring and its force elsewhere: every point against a minimum or a root that SciPy finds from nearby."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=6)
+    system = sb.System(model, local_force=sb.LocalSpring(stiffness=60.0, location=0.3))
+    curve = sb.force_displacement(system, 0.5)
+    row = model.shape_at(0.5)
+    for i in np.linspace(0, curve.sizes["point"] - 1, 23).astype(int):
+        alpha, force = curve.amplitude.values[i], float(curve.force[i])
+        assert np.abs(system.potential.gradient(alpha) - force * row).max() < 1e-12
+        if curve.unstable_directions.values[i] == 0:
+            found = minimize(
+                lambda a, f=force: float(system.potential.energy(a) - f * a @ row), alpha * 1.001
+            )
+            np.testing.assert_allclose(found.x, alpha, rtol=0.0, atol=1e-4 * np.abs(alpha).max())
+    # snap-through is where a slowly growing force makes a simulated beam leave its well
+    assert float(curve.snap_through_force) != pytest.approx(
+        float(sb.force_displacement(model, 0.5).snap_through_force), rel=1e-2
+    )
+    # force-free points are the equilibria, and the barrier is that of the potential
+    assert float(curve.energy_barrier) == pytest.approx(system.potential.barrier(0), rel=1e-12)
+    for each in system.potential.equilibria:
+        away = np.abs(curve.amplitude.values - each.amplitude).max(axis=1)
+        assert away.min() < 1e-2 * np.abs(each.amplitude).max()
 
 
 def test_wells_and_refusals() -> None:

@@ -21,7 +21,7 @@ from snapbeam.cli.console import (
 from snapbeam.cli.parameter_options import BEAM, BOUNDARY, IMPERFECTION, MODEL, configured, with_parameters
 
 if TYPE_CHECKING:
-    from snapbeam.model.reduced_model import ReducedModel
+    from snapbeam.model.potential import Potential
 
 __all__ = ["equilibria"]
 
@@ -172,22 +172,17 @@ def equilibria(
         barriers=barriers, reference_well=model.reference_well, reference_frequency=model.reference_frequency,
     )  # fmt: skip
     if with_force:
-        if potential.local_forces:
-            raise InputError(
-                "--force-displacement with a local force: the curve has a closed form for the beam and constant forces only; "
-                "leave one of them out"
-            )
-        _force_displacement(potential.structure, 0.5 if location is None else location, well, output, plot)
+        _force_displacement(potential, 0.5 if location is None else location, well, output, plot)
 
 
 def _force_displacement(
-    model: ReducedModel, location: float, well: str | None, output: Path | None, plot: Path | None
+    potential: Potential, location: float, well: str | None, output: Path | None, plot: Path | None
 ) -> None:
     """Print snap-through and snap-back, and write the curve and its figure."""
     from snapbeam.model.force_displacement import force_displacement
     from snapbeam.util.si_prefixes import prefixed
 
-    curve = force_displacement(model, location, well=well)
+    curve = force_displacement(potential, location, well=well)
     console = out()
     console.print(
         f"force at {location:g} of the length, from the {curve.attrs['well']} well ({curve.attrs['well_chosen_as']}); "

@@ -176,10 +176,10 @@ def _bracketed(
     """The root between a pole, or 0, and a place at the distance *reach* where the function is negative."""
     shift = sign * _distance(lambda t: -value(origin, sign * t), reach, pole=origin >= 0)
     for _ in range(_POLISHINGS):
-        change = value(origin, shift) / slope(origin, shift)
-        if not abs(change) < _SMALL * abs(shift):
+        steep = slope(origin, shift)
+        if not abs(value(origin, shift)) < _SMALL * abs(shift * steep):
             break
-        shift -= change
+        shift -= value(origin, shift) / steep
     return origin, shift, sign < 0.0
 
 
@@ -196,12 +196,14 @@ def _distance(function: Callable[[float], float], reach: float, pole: bool) -> f
         return (
             0.0 if function(0.0) >= 0.0 else float(brentq(function, 0.0, reach, xtol=1e-300, rtol=_ROUNDING))
         )
-    low = math.log(reach)
+    low = high = math.log(reach)
+    if not function(math.exp(high)) > 0.0:  # a fold, where the function touches 0: a matter of rounding
+        return reach
     while function(math.exp(low)) > 0.0:
         low -= 4.0
         if low < _LEAST:
             return math.exp(_LEAST)
-    return math.exp(brentq(lambda u: function(math.exp(u)), low, math.log(reach), xtol=1e-15, rtol=_ROUNDING))
+    return math.exp(brentq(lambda u: function(math.exp(u)), low, high, xtol=1e-15, rtol=_ROUNDING))
 
 
 _ROUNDING = 4.0 * float(np.finfo(np.float64).eps)

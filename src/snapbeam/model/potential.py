@@ -138,10 +138,10 @@ class Potential:
     @cached_property
     def _length(self) -> float:
         """A displacement over which laws vary, m: the largest of the equilibria, or the length scale."""
-        return max(float(np.abs(self.model.midspan_shape @ self._size)), 1e-30)
+        return max(float(np.abs(self.model.midspan_shape @ self.size)), 1e-30)
 
     @cached_property
-    def _size(self) -> _Array:
+    def size(self) -> _Array:
         """The largest amplitudes of the structure's equilibria, or those that move the centre by its length scale."""
         found = max((each.amplitude for each in self.model.equilibria), key=lambda each: float(each @ each))
         if found.any():
@@ -196,14 +196,14 @@ class Potential:
         return sum((-1) ** each.unstable_directions for each in found) == 1 - pulls
 
     def _is_same(self, one: _Array, other: _Array) -> bool:
-        return bool(np.abs(one - other).max() <= _SAME * np.abs(self._size).max())
+        return bool(np.abs(one - other).max() <= _SAME * np.abs(self.size).max())
 
     def _equilibrium(self, alpha: _Array) -> Equilibrium:
         alpha.setflags(write=False)
-        unstable = int((np.linalg.eigvalsh(self._in_modes(self.tangent(alpha))) < 0.0).sum())
+        unstable = int((np.linalg.eigvalsh(self.in_modes(self.tangent(alpha))) < 0.0).sum())
         return Equilibrium(amplitude=alpha, energy=float(self.energy(alpha)), unstable_directions=unstable)
 
-    def _in_modes(self, matrix: _Array) -> _Array:
+    def in_modes(self, matrix: _Array) -> _Array:
         """A symmetric matrix in the linear modes of the structure, whose mass matrix is the identity."""
         modes = self.model.linear_modes
         return np.asarray(modes.T @ matrix @ modes)
@@ -221,7 +221,7 @@ class Potential:
                 directions.append(row / np.where(stiff > 0.0, stiff, 1.0) if stiff is not None else row)
         axes = np.linalg.qr(np.array(directions).T)[0].T
         points = 2.0 * qmc.Sobol(len(axes), scramble=False).random(count) - 1.0
-        reach = _REACH * float(np.sqrt(self._size @ self._size))
+        reach = _REACH * float(np.sqrt(self.size @ self.size))
         return np.array([*known, *self._towards_ends(known), *(reach * (points @ axes))])
 
     def _towards_ends(self, known: list[_Array]) -> list[_Array]:
@@ -238,7 +238,7 @@ class Potential:
                     found += [alpha + share * away / float(row @ response) * response for share in shares]
         return found
 
-    def _holds(self, alpha: _Array) -> bool:
+    def holds(self, alpha: _Array) -> bool:
         """Whether the displacement of every local force is within the range of its law."""
         for row, law in zip(self.rows, self.local_forces, strict=True):
             low, high = law.displacement_range(law.numbers)
@@ -248,7 +248,7 @@ class Potential:
 
     def _newton(self, alpha: _Array) -> _Array | None:
         """An equilibrium by damped Newton steps; None if they come to none within the ranges of the laws."""
-        if not self._holds(alpha):
+        if not self.holds(alpha):
             return None
         terms = self._terms(alpha)
         for _ in range(_ITERATIONS):
@@ -262,7 +262,7 @@ class Potential:
             share, size = 1.0, float(gradient @ gradient)
             for _ in range(_HALVINGS):
                 tried = alpha - share * step
-                if self._holds(tried):
+                if self.holds(tried):
                     terms = self._terms(tried)
                     new = terms.sum(axis=0)
                     if float(new @ new) < (1.0 - 0.1 * share) * size:
@@ -276,7 +276,7 @@ class Potential:
     def _polished(self, alpha: _Array) -> _Array:
         for _ in range(2):
             tried = alpha - np.linalg.solve(self.tangent(alpha), self.gradient(alpha))
-            if not self._holds(tried):
+            if not self.holds(tried):
                 break
             if np.abs(self.gradient(tried)).max() >= np.abs(self.gradient(alpha)).max():
                 break
@@ -344,9 +344,9 @@ class Potential:
 
     def _sides(self, saddle: Equilibrium) -> tuple[int | None, int | None]:
         """Wells that the descents from a saddle along its unstable direction, downwards and upwards, end in."""
-        _, axes = np.linalg.eigh(self._in_modes(self.tangent(saddle.amplitude)))
+        _, axes = np.linalg.eigh(self.in_modes(self.tangent(saddle.amplitude)))
         away = self.model.linear_modes @ axes[:, 0]
-        away *= 1e-3 * np.abs(self._size).max() / np.abs(away).max()
+        away *= 1e-3 * np.abs(self.size).max() / np.abs(away).max()
         return self.descent(saddle.amplitude - away), self.descent(saddle.amplitude + away)
 
     def descent(self, alpha: _Array) -> int | None:
@@ -356,13 +356,13 @@ class Potential:
         matrix is the identity; 1/h is raised until a step is short.
         """
         modes = self.model.linear_modes
-        size = np.abs(self._size).max()
+        size = np.abs(self.size).max()
         identity = np.eye(len(modes))
         for _ in range(_DESCENT_STEPS):
             for number, well in enumerate(self.wells):
                 if np.abs(alpha - well.amplitude).max() <= _NEAR * size:
                     return number
-            slope, bend = modes.T @ self.gradient(alpha), self._in_modes(self.tangent(alpha))
+            slope, bend = modes.T @ self.gradient(alpha), self.in_modes(self.tangent(alpha))
             lowest = float(np.linalg.eigvalsh(bend)[0])
             shift = max(-2.0 * lowest, 1e-6 * float(np.abs(bend).max()))
             while True:
@@ -371,7 +371,7 @@ class Potential:
                 if np.abs(step).max() <= _DESCENT_STEP * size:
                     break
                 shift *= 4.0
-            if not self._holds(tried):
+            if not self.holds(tried):
                 return None
             alpha = tried
         return None

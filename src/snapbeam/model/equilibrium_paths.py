@@ -1,0 +1,321 @@
+"""Equilibrium paths of any potential under a point force, by continuation in arc length.
+
+The equilibria of a system under the force F on the row c solve dU/dalpha = F c.  Every path through an equilibrium
+without the force is followed to both sides by steps along its tangent and Newton's method on the plane across it
+(Keller 1977), and so is every path that branches off.  Where a law of a local force has no closed form, nothing else is
+possible; a closed path that has no equilibrium without the force, and meets no other path, is not found then.  Of a
+structure without local forces, whose equilibria are known in closed form, it is, by its equilibria under many forces.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.potential import Potential
+from snapbeam.util.validation import InputError
+
+__all__ = ["EquilibriumPath", "Singular", "equilibrium_paths"]
+
+
+_Array = NDArray[np.float64]
+
+_STEP = 1.0 / 80.0
+"""Longest step; displacement and amplitudes over those of the wells, the force over that which moves a well as far."""
+_SHORTEST = 1e-7
+_STEPS = 20_000
+"""Of a path, at most."""
+_TURN = 0.15
+"""Angle between the tangents of two points, rad."""
+_LARGEST = 100.0
+"""Force up to which a path is followed where a local force may grow without bound, in its unit."""
+_NEWTON = 12
+_LEAST_NORM = 40
+"""Steps of least norm, whose convergence is linear at a singular point."""
+_CONVERGED = 1e-12
+_UNCOUPLED = 1e-6
+"""Share of the row of the force in the direction that loses its stiffness, up to which a path branches off there."""
+_ASIDE = 4e-3
+"""First step on a path that branches off."""
+_FORCES = 40
+"""Forces, between the largest ones of singular points, under which closed paths are looked for."""
+_SAME = 1e-3
+"""Distance from a path, up to which a point lies on it."""
+
+
+class Singular(NamedTuple):
+    """A point where the tangent stiffness is singular: "limit", where the force turns round, or "bifurcation"."""
+
+    place: int
+    """Number of the point of the path."""
+    kind: str
+
+
+@dataclass
+class EquilibriumPath:
+    """A path: its points in order, force (N) and amplitudes, and the number of unstable directions under the force."""
+
+    force: _Array
+    amplitude: _Array
+    unstable: NDArray[np.int_]
+    singular: tuple[Singular, ...]
+    secondary: bool
+    """Whether it branches off from another one."""
+    closed: bool
+
+
+class _Point(NamedTuple):
+    """A point in scaled coordinates y, amplitudes and force, with the unit tangent and the eigenvalues of the stiffness."""
+
+    y: _Array
+    tangent: _Array
+    eigenvalues: _Array
+
+    @property
+    def unstable(self) -> int:
+        return int((self.eigenvalues < 0.0).sum())
+
+
+@dataclass
+class _Tracer:
+    """Continuation of the equilibria of a potential under a force on a row, between two displacements of its point."""
+
+    potential: Potential
+    row: _Array
+    low: float
+    high: float
+    paths: list[EquilibriumPath] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.length = float(np.abs(self.potential.size).max())
+        reach = self.length * float(np.abs(self.row).max())
+        stiffness = self.potential.tangent(self.potential.equilibria[0].amplitude)
+        self.unit = reach / max(abs(float(self.row @ np.linalg.solve(stiffness, self.row))), 1e-300)
+        self.balance = 1.0 / np.maximum(np.abs(stiffness).max(axis=1) * self.length, 1e-300)
+
+    def amplitude(self, y: _Array) -> _Array:
+        return self.length * y[:-1]
+
+    def _jacobian(self, y: _Array) -> _Array:
+        """Derivatives of the scaled residual, shape (N, N + 1)."""
+        stiffness = self.length * self.potential.tangent(self.amplitude(y))
+        return np.column_stack((stiffness, -self.unit * self.row)) * self.balance[:, None]
+
+    def point(self, y: _Array, along: _Array) -> _Point:
+        """The point with the tangent on the side of *along*."""
+        tangent = np.linalg.svd(self._jacobian(y))[2][-1]
+        stiffness = self.potential.in_modes(self.potential.tangent(self.amplitude(y)))
+        tangent = math.copysign(1.0, float(tangent @ along)) * tangent
+        return _Point(y, np.asarray(tangent), np.asarray(np.linalg.eigvalsh(stiffness)))
+
+    def correct(self, guess: _Array, normal: _Array | None) -> _Array | None:
+        """The point of the path on the plane across *normal* through *guess*; None if there is none near.
+
+        Without *normal*, by steps of least norm: at a singular point no plane is across all paths.
+        """
+        y = guess
+        for _ in range(_NEWTON if normal is not None else _LEAST_NORM):
+            if not self.potential.holds(self.amplitude(y)):
+                return None
+            residual = self.potential.gradient(self.amplitude(y)) - self.unit * y[-1] * self.row
+            residual = residual * self.balance
+            try:
+                if normal is None:
+                    step = np.linalg.lstsq(self._jacobian(y), residual, rcond=1e-9)[0]
+                else:
+                    system = np.vstack((self._jacobian(y), normal))
+                    step = np.linalg.solve(system, np.append(residual, normal @ (y - guess)))
+            except np.linalg.LinAlgError:
+                return None
+            y = y - step
+            if np.abs(step).max() <= _CONVERGED * max(1.0, float(np.abs(y).max())):
+                return y if self.potential.holds(self.amplitude(y)) else None
+        return y if normal is None else None
+
+    def between(self, a: _Point, b: _Point, value: Callable[[_Point], float]) -> _Point:
+        """The point between two points at which a *value* changes its sign."""
+        from scipy.optimize import brentq
+
+        away = b.y - a.y
+        found = {0.0: a, 1.0: b}
+
+        def at(share: float) -> float:
+            if share not in found:
+                y = self.correct(a.y + share * away, None)
+                found[share] = self.point(a.y + share * away if y is None else y, away)
+            return value(found[share])
+
+        share = float(brentq(at, 0.0, 1.0, xtol=1e-13, rtol=1e-13))
+        at(share)
+        return found[share]
+
+    def singular_between(self, a: _Point, b: _Point) -> tuple[_Point, str] | None:
+        """The singular point between two neighbours, and its kind; None without one.
+
+        Where the path keeps its unstable directions and the force turns round, it is one that branches off there.
+        """
+        if abs(a.unstable - b.unstable) > 1:
+            raise InputError(
+                f"location: {abs(a.unstable - b.unstable)} directions lose their stiffness at the same force, "
+                f"{self.unit * a.y[-1]:.6g} N, whose branches cannot be told apart; change the structure a little"
+            )
+        if a.unstable == b.unstable:
+            if a.tangent[-1] * b.tangent[-1] >= 0.0:
+                return None
+            return self.between(a, b, lambda point: float(point.tangent[-1])), "origin"
+        lost = min(a.unstable, b.unstable)
+        found = self.between(a, b, lambda point: float(point.eigenvalues[lost]))
+        direction = self.null_direction(found)
+        part = abs(float(self.row @ direction)) / float(np.linalg.norm(self.row) * np.linalg.norm(direction))
+        return found, "limit" if part > _UNCOUPLED else "bifurcation"
+
+    def null_direction(self, point: _Point) -> _Array:
+        """Amplitudes of the direction without stiffness."""
+        stiffness = self.potential.in_modes(self.potential.tangent(self.amplitude(point.y)))
+        values, axes = np.linalg.eigh(stiffness)
+        return np.asarray(self.potential.model.linear_modes @ axes[:, int(np.abs(values).argmin())])
+
+    def is_known(self, y: _Array) -> bool:
+        """Whether a point lies on a path that was followed."""
+        for path in self.paths:
+            points = np.column_stack((path.amplitude / self.length, path.force / self.unit))
+            begin, away = points[:-1], np.diff(points, axis=0)
+            along = np.clip(((y - begin) * away).sum(1) / np.maximum((away * away).sum(1), 1e-300), 0.0, 1.0)
+            if np.sqrt((((begin + along[:, None] * away) - y) ** 2).sum(1).min()) < _SAME:
+                return True
+        return False
+
+    def follow(self, start: _Point) -> tuple[list[_Point], dict[int, str], bool]:
+        """Points after *start* in the direction of its tangent, the kinds of the singular ones, and whether it closed.
+
+        A path ends where it meets another one.
+        """
+        points, singular, step = [start], dict[int, str](), _STEP / 4.0
+        for _ in range(_STEPS):
+            here = points[-1]
+            y = self.correct(here.y + step * here.tangent, here.tangent)
+            new = None if y is None else self.point(y, here.tangent)
+            if new is not None:
+                turned = math.acos(min(1.0, float(new.tangent @ here.tangent)))
+                jumped = np.linalg.norm(new.y - here.y) > 2.0 * step
+                crossed = abs(new.unstable - here.unstable) > 1 and step > 1e3 * _SHORTEST
+                if turned > _TURN or jumped or crossed:
+                    new = None
+            if new is None:
+                step *= 0.5
+                if step < _SHORTEST:
+                    return points, singular, False
+                continue
+            between = self.singular_between(here, new)
+            if between is not None:
+                points.append(between[0])
+                if between[1] != "limit" and self.is_known(between[0].y):
+                    return points, singular, False
+                singular[len(points) - 1] = between[1]
+                if between[1] == "origin":
+                    return points, singular, False
+            closes = (
+                np.linalg.norm(new.y - start.y) < 0.75 * step and float(new.tangent @ start.tangent) > 0.9
+            )
+            if len(points) > 8 and closes:
+                return [*points, start], singular, True
+            points.append(new)
+            displacement = float(self.row @ self.amplitude(new.y))
+            outward = float(self.row @ (new.y - here.y)[:-1])
+            beyond = (displacement > self.high and outward > 0.0) or (displacement < self.low and outward < 0.0)
+            if beyond or (self.potential.local_forces and abs(new.y[-1]) > _LARGEST):
+                return points, singular, False
+            step = min(_STEP * max(1.0, abs(float(new.y[-1]))), 1.5 * step)
+        return points, singular, False
+
+    def add(self, start: _Point, secondary: bool) -> None:
+        """Follow the path through a point to both sides, and then those that branch off from it.
+
+        A path that turns out to branch off itself is left, for the one that it branches off from.
+        """
+        forth, special, closed = self.follow(start)
+        back: list[_Point] = []
+        turned: dict[int, str] = {}
+        if not closed:
+            back, turned, _ = self.follow(start._replace(tangent=-start.tangent))
+        points = [*back[:0:-1], *forth]
+        shift = max(len(back) - 1, 0)
+        kinds = {shift - at: kind for at, kind in turned.items()}
+        kinds |= {shift + at: kind for at, kind in special.items()}
+        for at, kind in kinds.items():
+            if kind == "origin":
+                self._add_beside(points[at], np.linalg.svd(self._jacobian(points[at].y))[2][-2:], False)
+                return
+        unstable = np.array([point.unstable for point in points])
+        for at in kinds:
+            unstable[at] = unstable[[at - 1, (at + 1) % len(points)]].min()
+        if not closed:
+            unstable[[0, -1]] = unstable[[1, -2]]  # a singular point, where the path meets another one
+        self.paths.append(
+            EquilibriumPath(
+                force=self.unit * np.array([point.y[-1] for point in points]),
+                amplitude=np.array([self.amplitude(point.y) for point in points]),
+                unstable=unstable,
+                singular=tuple(Singular(at, kinds[at]) for at in sorted(kinds)),
+                secondary=secondary,
+                closed=closed,
+            )
+        )
+        forks = [points[at] for at, kind in kinds.items() if kind == "bifurcation"]
+        modes = self.potential.model.linear_modes
+        forks.sort(key=lambda fork: int(np.abs(np.linalg.solve(modes, self.null_direction(fork))).argmax()))
+        for fork in forks:
+            direction = np.append(self.null_direction(fork), 0.0)
+            self._add_beside(fork, direction[None] / np.linalg.norm(direction), True)
+
+    def _add_beside(self, fork: _Point, space: _Array, secondary: bool) -> None:
+        """Follow the paths through a bifurcation in the direction of a line, or of the part of a plane across its tangent."""
+        away = space[0]
+        if len(space) > 1:
+            part = space @ fork.tangent
+            away = part[1] * space[0] - part[0] * space[1]
+            away /= np.linalg.norm(away)
+        for sign in (1.0, -1.0):
+            y = self.correct(fork.y + sign * _ASIDE * away, away)
+            if y is not None and not self.is_known(y):
+                self.add(self.point(y, sign * away), secondary)
+
+    def run(self) -> list[EquilibriumPath]:
+        """All paths: through equilibria without the force, those that branch off, and closed ones under some force."""
+        along = np.append(self.row, 0.0)
+        forces = [0.0]
+        for _ in range(1 if self.potential.local_forces else 2):
+            for force, alpha in self._seeds(forces):
+                y = np.append(alpha / self.length, force / self.unit)
+                if self.low < float(self.row @ alpha) < self.high and not self.is_known(y):
+                    self.add(self.point(y, along), False)
+            limits = [abs(float(path.force[at])) for path in self.paths for at, _ in path.singular]
+            forces = (np.linspace(-1.0, 1.0, _FORCES) * max(limits, default=0.0)).tolist()
+        return self.paths
+
+    def _seeds(self, forces: Iterable[float]) -> Iterator[tuple[float, _Array]]:
+        """Equilibria under given forces on the row."""
+        for force in forces:
+            loaded = dataclasses.replace(self.potential, constant=self.potential.constant + force * self.row)
+            for each in loaded.equilibria:
+                yield float(force), each.amplitude
+
+
+def equilibrium_paths(
+    potential: Potential, row: _Array, between: tuple[float, float]
+) -> list[EquilibriumPath]:
+    """Paths of the equilibria of a potential under a force on *row*, a little beyond two displacements of its point."""
+    return _Tracer(potential, row, *between).run()
+
+
+def stable_parts(path: EquilibriumPath) -> list[tuple[int, int]]:
+    """First and last points of the stable parts of a path, singular points at their ends included."""
+    ends = [0, *(each.place for each in path.singular), len(path.force) - 1]
+    return [(a, b) for a, b in pairwise(ends) if b > a + 1 and not path.unstable[(a + b) // 2]]
