@@ -18,7 +18,7 @@ from snapbeam.model.potential import Potential
 
 @dataclass(frozen=True, kw_only=True)
 class Magnet(sb.LocalForce):
-    """Attraction by a/(g - u)^2; energy and derivative are left to the package."""
+    """Attraction by a/(g - u)^2; the derivative is left to the package."""
 
     strength: float = sb.quantity("N m^2", "strength of the magnet", low=0.0)
     gap: float = sb.quantity("m", "gap of the magnet", low=0.0)
@@ -28,8 +28,15 @@ class Magnet(sb.LocalForce):
         return law.strength / (law.gap - displacement) ** 2
 
     @staticmethod
+    def energy(law, displacement):
+        return -law.strength / (law.gap - displacement)
+
+    @staticmethod
     def displacement_range(law):
         return -math.inf, law.gap
+
+
+LEVEL = default_values.BEAM.buckling_level
 
 
 def model_of(modes: int, **values) -> sb.ReducedModel:
@@ -210,11 +217,44 @@ def test_other_questions_refuse_a_local_force():
         sb.dynamics.backbone_curve(system)
 
 
-def test_classes_of_other_wells_have_a_diagnostic():
-    """A magnet on one side moves the saddle, by which the classes do not count."""
-    gap = 1.5 * default_values.BEAM.buckling_level
-    shifted = sb.System(model_of(1), local_force=Magnet(strength=1e-8, gap=gap, location=0.5))
-    (found,) = [each for each in shifted.diagnostics() if each.code == "other-wells"]
-    assert "response classes are of the structure without local forces" in found.message
-    symmetric = sb.System(model_of(1), local_force=sb.LocalSpring(stiffness=50.0, location=0.5))
-    assert not [each for each in symmetric.diagnostics() if each.code == "other-wells"]
+def test_a_law_with_a_force_has_an_energy():
+    """The energy balance of a run would be wrong without it."""
+    with pytest.raises(sb.InputError, match=r"Bare\.energy: must be given for a law with a force"):
+        type("Bare", (sb.LocalForce,), {"force": staticmethod(lambda law, displacement: -displacement)})
+
+
+def test_a_force_that_leaves_one_well_has_a_diagnostic():
+    one = sb.System(model_of(1), local_force=sb.LocalSpring(stiffness=5000.0, location=0.5))
+    (found,) = [each for each in one.diagnostics() if each.code == "other-wells"]
+    assert "leaves 1 wells, while response classes" in found.message
+    shifted = sb.System(model_of(1), local_force=Magnet(strength=8e-9, gap=LEVEL * 2.5, location=0.5))
+    assert not [each for each in shifted.diagnostics() if each.code == "other-wells"]
+
+
+@pytest.mark.parametrize("modes", [1, 4])
+@pytest.mark.parametrize("rise", [0.0, 2e-6])
+@pytest.mark.parametrize("side", ["below", "above"])
+def test_classes_count_crossings_of_the_saddle_of_the_system(modes, rise, side, monkeypatch):
+    """Released at rest on either side of the saddle that a magnet shifts: the well, and no crossing."""
+    monkeypatch.setattr(Magnet, "name", "magnet")
+    monkeypatch.setitem(LOCAL_FORCES, "magnet", Magnet)
+    shape = sb.Imperfection(midspan_amplitude=rise) if rise else None
+    model = model_of(modes, imperfection=shape)
+    magnet = Magnet(strength=8e-9, gap=LEVEL * 2.5, location=0.5)
+    tip = sb.Striker(drive=sb.FixedStop(), gap=5.0 * LEVEL, side=side)
+    system = sb.System(model, default_values.CONTACT, tip, local_force=magnet)
+    potential = system.potential
+    (saddle,) = [each.equilibrium for each in potential.saddles if set(each.wells) == {0, 1}]
+    assert potential.dividing_height == pytest.approx(potential.center(saddle), rel=1e-12)
+    assert abs(potential.dividing_height - model.dividing_height) > 0.02 * LEVEL
+    for step, well in ((-0.02, "lower"), (0.02, "upper")):
+        start = saddle.amplitude + step * LEVEL * model.midspan_shape / float(
+            model.midspan_shape @ model.midspan_shape
+        )
+        assert potential.descent(start) == ("lower", "upper").index(well)
+        run = sb.simulate(system.replace(initial_state=sb.State(amplitude=start)), sb.Integration(cycles=400))
+        assert run.summary.zero_crossings == 0
+        assert run.summary.final_well == {"lower": -1, "upper": 1}[well]
+        assert run.final_state.amplitude == pytest.approx(
+            potential.wells[("lower", "upper").index(well)].amplitude, abs=1e-6
+        )

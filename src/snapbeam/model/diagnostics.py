@@ -37,10 +37,6 @@ _STRONGEST_COUPLING = 1.0
 """Theta^2 (x_2 - x_1) L/(C E I) that no layers reach: e^2/(eps c) of the material, which stiffens the beam too."""
 
 
-_SHIFTED = 0.02
-"""Distance of the saddle of a system from that of its structure, over that between the wells, which is no difference."""
-
-
 def doubts_of(
     potential: Potential,
     striker: Striker | None,
@@ -71,20 +67,15 @@ def doubts_of(
 
 
 def _of_wells(potential: Potential) -> list[Diagnostic]:
-    """Response classes and wells of results are those of the structure without local forces."""
-    model, wells = potential.model, potential.wells
-    height = model.dividing_height
-    words = f"crossings of the centre through {height:.4g} m and response classes are of the structure without local forces"
-    if len(wells) != 2:
-        message = f"the local force leaves {len(wells)} wells, while {words}, which has two"
-        return [Diagnostic("other-wells", message, {"wells": float(len(wells))})]
-    saddle = min(potential.saddles, key=lambda each: each.equilibrium.energy).equilibrium
-    lower, upper = (potential.center(well) for well in wells)
-    own = potential.center(saddle)
-    if abs(own - height) <= _SHIFTED * (upper - lower):
+    """Response classes count crossings of the height that divides two wells."""
+    count = len(potential.wells)
+    if count == 2:
         return []
-    message = f"the wells of the system, at {lower:.4g} and {upper:.4g} m, are divided at {own:.4g} m, while {words}"
-    return [Diagnostic("other-wells", message, {"saddle": own, "dividing_height": height})]
+    message = (
+        f"the local force leaves {count} wells, while response classes count crossings of the centre through "
+        f"{potential.dividing_height:.4g} m, which divides the two wells of the structure without it"
+    )
+    return [Diagnostic("other-wells", message, {"wells": float(count)})]
 
 
 def _of_record(section: str, drive: RecordedAcceleration, model: ReducedModel) -> list[Diagnostic]:

@@ -229,7 +229,9 @@ class _Tracer:
             points.append(new)
             displacement = float(self.row @ self.amplitude(new.y))
             outward = float(self.row @ (new.y - here.y)[:-1])
-            beyond = (displacement > self.high and outward > 0.0) or (displacement < self.low and outward < 0.0)
+            beyond = (displacement > self.high and outward > 0.0) or (
+                displacement < self.low and outward < 0.0
+            )
             if beyond or (self.potential.local_forces and abs(new.y[-1]) > _LARGEST):
                 return points, singular, False
             step = min(_STEP * max(1.0, abs(float(new.y[-1]))), 1.5 * step)

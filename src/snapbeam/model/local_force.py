@@ -94,6 +94,11 @@ class LocalForce:
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
+        if cls.force is not LocalForce.force and cls.energy is LocalForce.energy:
+            raise InputError(
+                f"{cls.__name__}.energy: must be given for a law with a force, which is minus its derivative; define "
+                "energy(law, displacement)"
+            )
         if cls.name:
             LOCAL_FORCES[cls.name] = cls
 
@@ -134,13 +139,8 @@ class LocalForce:
         return float(type(self).force(self.numbers, displacement))
 
     def energy_at(self, displacement: float) -> float:
-        """Potential energy, J; of a law without *energy*, the integral of its force from 0."""
-        cls = type(self)
-        if cls.energy is LocalForce.energy and cls.force is not LocalForce.force:
-            from scipy.integrate import quad
-
-            return -float(quad(self.force_at, 0.0, displacement, epsabs=0.0, epsrel=1e-10, limit=200)[0])
-        return float(cls.energy(self.numbers, displacement))
+        """Potential energy, J."""
+        return float(type(self).energy(self.numbers, displacement))
 
     def stiffness_at(self, displacement: float, length: float) -> float:
         """Minus the derivative of the conservative force, N/m, by differences of order six over a part of *length*."""

@@ -335,6 +335,19 @@ class Potential:
             Saddle(each, self._sides(each)) for each in self.equilibria if each.unstable_directions == 1
         )
 
+    @cached_property
+    def dividing_height(self) -> float:
+        """Displacement of the centre that divides two wells, m: that of the lowest saddle between them.
+
+        It is that of the structure if the system has another number of wells.
+        """
+        own = self.structure.dividing_height
+        between = [each for each in self.saddles if set(each.wells) == {0, 1}]
+        if not self.local_forces or len(self.wells) != 2 or not between:
+            return own
+        found = self.center(min(between, key=lambda each: each.equilibrium.energy).equilibrium)
+        return own if abs(found - own) <= _SAME * self._length else found
+
     def barrier(self, well: int) -> float:
         """Energy from a well, by number, to the lowest saddle beside it, J; NaN if there is none."""
         if not self.local_forces:

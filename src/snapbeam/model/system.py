@@ -329,6 +329,13 @@ class System:
         return Potential.of(self.model, self.external_force, self.local_force)
 
     @cached_property
+    def unloaded_potential(self) -> Potential:
+        """The potential energy before a run, when no external force acts yet: its wells are those that a run begins in."""
+        if not self.potential.constant.any():
+            return self.potential
+        return Potential.of(self.model, None, self.local_force)
+
+    @cached_property
     def rest_state(self) -> State:
         """At rest in the well that the first striker pushes away from, touched by it; without one, in the well of the start.
 
@@ -340,8 +347,7 @@ class System:
         InputError
             If the local force leaves no well there.
         """
-        state = rest_state(self.model, self.striker)
-        local = Potential.of(self.model, None, self.local_force)
+        state, local = rest_state(self.model, self.striker), self.unloaded_potential
         if local.is_of_the_structure_alone:
             return state
         well = local.descent(state.amplitude)
@@ -359,7 +365,7 @@ class System:
 
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Diagnostics: values that look like another unit, and assumptions of the model that do not hold."""
-        return doubts_of(self.potential, self.striker, self.harvester, self.moving)
+        return doubts_of(self.unloaded_potential, self.striker, self.harvester, self.moving)
 
     # ------------------------------------------------------------------ identity and files
 

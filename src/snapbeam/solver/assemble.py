@@ -356,7 +356,7 @@ def make_ensemble(
     side = _side(system, state, goes_on=periods is not None)
     structure = structure_of(
         system.model, side, system.striker, system.base_excitation, system.harvester, system.external_force,
-        system.local_force,
+        system.local_force, system.unloaded_potential.dividing_height,
     )  # fmt: skip
     plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
     if step_factor != 1.0:

@@ -215,11 +215,13 @@ def structure_of(
     harvester: Harvester | None = None,
     force: ExternalForce | None = None,
     local_force: LocalForce | None = None,
+    dividing_height: float | None = None,
 ) -> Structure:
     """The structure of a reduced model, about the well that a striker from *side* pushes away from.
 
     A striker that is a body of mass m_s on a spring k_s is one more linear mode, q_s = sqrt(m_s) times its displacement
-    beyond the motion that its drive gives it: no tension, contact row -1/sqrt(m_s).
+    beyond the motion that its drive gives it: no tension, contact row -1/sqrt(m_s).  The *dividing_height*, in space, is
+    that of the model by default; where a local force moves it, the wells count as unequal.
     """
     sign = 1.0 if side == "below" else -1.0
     model = model if sign > 0.0 else model.mirrored
@@ -238,7 +240,7 @@ def structure_of(
         sign=sign,
         equilibrium=equilibrium,
         model=model,
-        unequal_wells=_uneven(model, sign),
+        unequal_wells=_uneven(model, sign, dividing_height),
         base_load=_base_load(model, base, force),
         local_force=None if local_force is None else _local_force(model, equilibrium, local_force),
     )
@@ -261,18 +263,26 @@ def _local_force(model: ReducedModel, equilibrium: _Array, local_force: LocalFor
     return LocalForceRow(model.linear_modes.T @ shape, float(shape @ equilibrium), local_force.numbers)
 
 
-def _uneven(model: ReducedModel, sign: float) -> UnequalWells | None:
+def _uneven(model: ReducedModel, sign: float, dividing_height: float | None) -> UnequalWells | None:
     """What unequal wells add, of a model that is positive as the striker pushes."""
-    if model.landscape is None or model.transverse_force is None or not model.is_bistable:
+    if not model.is_bistable:
         return None
-    lower, upper = model.landscape.lower, model.landscape.upper
-    away = upper.amplitude + lower.amplitude
+    level = model.dividing_height if dividing_height is None else sign * dividing_height
+    load, landscape = model.transverse_force, model.landscape
+    if load is None or landscape is None:
+        if level == model.dividing_height:
+            return None
+        load = lower = away = np.zeros(model.modes)
+        depth = 0.0
+    else:
+        lower, away = landscape.lower.amplitude, landscape.upper.amplitude + landscape.lower.amplitude
+        depth = landscape.upper.energy - landscape.lower.energy
     return UnequalWells(
-        force=sign * 2.0 * (model.linear_modes.T @ model.transverse_force),
-        lift=2.0 * float(model.transverse_force @ lower.amplitude),
+        force=sign * 2.0 * (model.linear_modes.T @ load),
+        lift=2.0 * float(load @ lower),
         second=sign * (model.linear_modes.T @ (model.mass @ away)),
-        depth=upper.energy - lower.energy,
-        level=model.dividing_height,
+        depth=depth,
+        level=level,
     )
 
 
