@@ -42,8 +42,10 @@ from .model.harvester import ElectromagneticHarvester as ElectromagneticHarveste
 from .model.harvester import PiezoelectricHarvester as PiezoelectricHarvester
 from .model.imperfection import Imperfection as Imperfection
 from .model.integration import Integration as Integration
+from .model.local_force import ElectrostaticForce as ElectrostaticForce
 from .model.local_force import LocalForce as LocalForce
 from .model.local_force import LocalSpring as LocalSpring
+from .model.local_force import MagneticForce as MagneticForce
 from .model.local_force import QuadraticDamping as QuadraticDamping
 from .model.quantity import quantity as quantity
 from .model.reduced_model import ReducedModel as ReducedModel

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from test_potential import Magnet
 
 import snapbeam as sb
 from snapbeam.model import default_values
@@ -198,8 +197,8 @@ def test_local_forces_where_the_force_acts_add_to_it(modes: int, law: str) -> No
     level, location = default_values.BEAM.buckling_level, 0.47
     force = {
         "spring": sb.LocalSpring(stiffness=40.0, cubic_stiffness=1e8, location=location),
-        "magnet": Magnet(strength=2e-9, gap=2.0 * level, location=location),
-        "electrode": Magnet(strength=2e-9, gap=0.5 * level, location=location),
+        "magnet": sb.MagneticForce(strength=2e-9, gap=2.0 * level, location=location),
+        "electrode": sb.MagneticForce(strength=2e-9, gap=0.5 * level, location=location),
     }[law]
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     curve = sb.force_displacement(sb.System(model, local_force=force), location, well="lower")

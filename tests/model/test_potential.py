@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -14,27 +13,6 @@ import snapbeam as sb
 from snapbeam.model import default_values
 from snapbeam.model.local_force import LOCAL_FORCES
 from snapbeam.model.potential import Potential
-
-
-@dataclass(frozen=True, kw_only=True)
-class Magnet(sb.LocalForce):
-    """Attraction by a/(g - u)^2; the derivative is left to the package."""
-
-    strength: float = sb.quantity("N m^2", "strength of the magnet", low=0.0)
-    gap: float = sb.quantity("m", "gap of the magnet", low=0.0)
-
-    @staticmethod
-    def force(law, displacement):
-        return law.strength / (law.gap - displacement) ** 2
-
-    @staticmethod
-    def energy(law, displacement):
-        return -law.strength / (law.gap - displacement)
-
-    @staticmethod
-    def displacement_range(law):
-        return -math.inf, law.gap
-
 
 LEVEL = default_values.BEAM.buckling_level
 
@@ -66,7 +44,7 @@ def test_pull_in_at_a_third_of_the_gap():
     critical = 4.0 * k * gap**3 / 27.0
 
     def potential(share: float) -> Potential:
-        return sb.System(model, local_force=Magnet(strength=share * critical, gap=gap)).potential
+        return sb.System(model, local_force=sb.MagneticForce(strength=share * critical, gap=gap)).potential
 
     below = potential(1.0 - 1e-6)
     assert [each.unstable_directions for each in below.equilibria] == [0, 1]
@@ -81,7 +59,41 @@ def test_pull_in_at_a_third_of_the_gap():
     assert potential(0.5).saddles[0].wells in ((0, None), (None, 0))
     assert potential(1.0 + 1e-6).equilibria == ()
     with pytest.raises(sb.InputError, match="leaves no well where a run begins"):
-        print(sb.System(model, local_force=Magnet(strength=1.1 * critical, gap=gap)).start_state)
+        print(sb.System(model, local_force=sb.MagneticForce(strength=1.1 * critical, gap=gap)).start_state)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_pull_in_voltage_of_an_electrode(side):
+    """V^2 = 8 k g^3/(27 eps_0 A), on either side; a run beyond it ends, and one below it comes to rest."""
+    mass, k, gap, area = 1e-9, 2.0, 3e-6, 4e-8
+    model = sb.ReducedModel.from_matrices(
+        [[mass]], [[k]], contact_shape=[1.0], length_scale=gap, damping_ratio=0.2
+    )
+    critical = math.sqrt(8.0 * k * gap**3 / (27.0 * 8.8541878188e-12 * area))
+
+    def system(share: float) -> sb.System:
+        electrode = sb.ElectrostaticForce(voltage=share * critical, area=area, gap=side * gap)
+        straight = sb.State(amplitude=[0.0], velocity=[0.0])
+        return sb.System(model, local_force=electrode, initial_state=straight)
+
+    below = system(1.0 - 1e-6).potential
+    assert [each.unstable_directions for each in below.equilibria] == [0, 1]
+    for each in below.equilibria:
+        assert float(each.amplitude[0]) / (side * gap) == pytest.approx(1.0 / 3.0, abs=1e-3)
+    assert system(1.0 + 1e-6).potential.equilibria == ()
+    rest = sb.simulate(system(0.8), sb.Integration(cycles=100)).final_state
+    well = system(0.8).potential.wells[0].amplitude
+    assert rest.amplitude == pytest.approx(well, rel=1e-8)
+    pulled = sb.simulate(system(1.2), sb.Integration(cycles=100))
+    assert pulled.summary.status is sb.RunStatus.DIVERGED
+    assert "as at pull-in" in pulled.dataset.attrs["status"]
+
+
+def test_electrodes_and_magnets_stand_on_one_side():
+    for kind, name in ((sb.MagneticForce, "strength"), (sb.ElectrostaticForce, "voltage")):
+        more = {"area": 1e-9} if kind is sb.ElectrostaticForce else {}
+        with pytest.raises(sb.InputError, match=r"local_force\.gap = 0: must differ from 0"):
+            kind(**{name: 1.0}, gap=0.0, location=0.5, **more)
 
 
 def test_a_spring_on_eight_modes_against_minimisation():
@@ -140,7 +152,7 @@ def random_system(rng: np.random.Generator) -> sb.System:
     local = rng.choice([
         sb.LocalSpring(stiffness=float(rng.uniform(1.0, 300.0)), cubic_stiffness=float(rng.uniform(0.0, 1e9)), location=at),
         sb.LocalSpring(stiffness=float(rng.uniform(1e-4, 1e-2)), location=at, coordinate="rotation"),
-        Magnet(strength=float(rng.uniform(1e-10, 3e-9)), gap=gap, location=at),
+        sb.MagneticForce(strength=float(rng.uniform(1e-10, 3e-9)), gap=gap, location=at),
         None,
     ])  # fmt: skip
     external = sb.ExternalForce(history=sb.ConstantForce(force=float(rng.normal(0.0, 0.01))), location=at)
@@ -201,13 +213,13 @@ def test_runs_stay_at_rest():
 )
 def test_laws_of_the_package(law):
     """Force, energy and stiffness agree with differences for every registered law."""
-    constants = {name: 0.7 for name in law.numbers_type()._fields}
+    constants = {name: 1.3 for name in law.numbers_type()._fields}
     one = law(location=0.5, **constants)
     for u in (-0.3, 0.01, 0.8):
         slope = (one.energy_at(u + 1e-5) - one.energy_at(u - 1e-5)) / 2e-5
-        assert one.force_at(u) == pytest.approx(-slope, rel=1e-8, abs=1e-12)
+        assert one.force_at(u) == pytest.approx(-slope, rel=1e-7, abs=1e-12)
         bend = (one.force_at(u + 1e-5) - one.force_at(u - 1e-5)) / 2e-5
-        assert one.stiffness_at(u, 1.0) == pytest.approx(-bend, rel=1e-8, abs=1e-10)
+        assert one.stiffness_at(u, 1.0) == pytest.approx(-bend, rel=1e-7, abs=1e-10)
 
 
 def test_other_questions_refuse_a_local_force():
@@ -227,20 +239,20 @@ def test_a_force_that_leaves_one_well_has_a_diagnostic():
     one = sb.System(model_of(1), local_force=sb.LocalSpring(stiffness=5000.0, location=0.5))
     (found,) = [each for each in one.diagnostics() if each.code == "other-wells"]
     assert "leaves 1 wells, while response classes" in found.message
-    shifted = sb.System(model_of(1), local_force=Magnet(strength=8e-9, gap=LEVEL * 2.5, location=0.5))
+    shifted = sb.System(
+        model_of(1), local_force=sb.MagneticForce(strength=8e-9, gap=LEVEL * 2.5, location=0.5)
+    )
     assert not [each for each in shifted.diagnostics() if each.code == "other-wells"]
 
 
 @pytest.mark.parametrize("modes", [1, 4])
 @pytest.mark.parametrize("rise", [0.0, 2e-6])
 @pytest.mark.parametrize("side", ["below", "above"])
-def test_classes_count_crossings_of_the_saddle_of_the_system(modes, rise, side, monkeypatch):
+def test_classes_count_crossings_of_the_saddle_of_the_system(modes, rise, side):
     """Released at rest on either side of the saddle that a magnet shifts: the well, and no crossing."""
-    monkeypatch.setattr(Magnet, "name", "magnet")
-    monkeypatch.setitem(LOCAL_FORCES, "magnet", Magnet)
     shape = sb.Imperfection(midspan_amplitude=rise) if rise else None
     model = model_of(modes, imperfection=shape)
-    magnet = Magnet(strength=8e-9, gap=LEVEL * 2.5, location=0.5)
+    magnet = sb.MagneticForce(strength=8e-9, gap=LEVEL * 2.5, location=0.5)
     tip = sb.Striker(drive=sb.FixedStop(), gap=5.0 * LEVEL, side=side)
     system = sb.System(model, default_values.CONTACT, tip, local_force=magnet)
     potential = system.potential

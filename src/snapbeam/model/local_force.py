@@ -14,7 +14,14 @@ from snapbeam.model.quantity import STRUCTURE, check_fields, numbers_type, quant
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.validation import InputError, finite_array
 
-__all__ = ["LOCAL_FORCES", "LocalForce", "LocalSpring", "QuadraticDamping"]
+__all__ = [
+    "LOCAL_FORCES",
+    "ElectrostaticForce",
+    "LocalForce",
+    "LocalSpring",
+    "MagneticForce",
+    "QuadraticDamping",
+]
 
 
 _Array = NDArray[np.float64]
@@ -22,6 +29,10 @@ _Array = NDArray[np.float64]
 LOCAL_FORCES: dict[str, type[LocalForce]] = {}
 """Every law of a local force, by the name it has in parameter files."""
 _PLACES = ("location", "coordinate", "shape")
+_PERMITTIVITY = 8.8541878188e-12
+"""Of vacuum, F/m (CODATA 2022)."""
+_NEAREST = 0.1
+"""Share of the way to the end of the range of a law, from which on the steps of a run do not follow its stiffness."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +52,7 @@ class LocalForce:
     - ``damping_coefficient(law, displacement, velocity)``: minus its derivative by v, N s/m or N m s/rad.
 
     They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone.  A law that is valid for some displacements only
-    has ``displacement_range(law)``, a pair.
+    has ``displacement_range(law)``, a pair; a run that leaves it ends with the status DIVERGED.
 
     Parameters
     ----------
@@ -151,6 +162,11 @@ class LocalForce:
             total += weight * (self.force_at(displacement + k * h) - self.force_at(displacement - k * h))
         return -total / (60.0 * h)
 
+    @classmethod
+    def is_limited(cls) -> bool:
+        """Whether the law is valid for some displacements only."""
+        return cls.displacement_range is not LocalForce.displacement_range
+
     @property
     def is_conservative(self) -> bool:
         """Whether the law has a conservative part."""
@@ -201,7 +217,9 @@ class LocalForce:
 
     def greatest_stiffness(self, largest: float) -> float:
         """Greatest slope of the conservative force over displacements up to *largest*, by differences; N/m."""
-        numbers, at = self.numbers, np.linspace(-largest, largest, 401)
+        numbers, (low, high) = self.numbers, self.displacement_range(self.numbers)
+        inside = (1.0 - _NEAREST) * low, (1.0 - _NEAREST) * high
+        at = np.linspace(max(-largest, inside[0]), min(largest, inside[1]), 401)
         forces = np.array([type(self).force(numbers, float(u)) for u in at])
         return float(np.abs(np.diff(forces) / np.diff(at)).max())
 
@@ -247,6 +265,104 @@ class LocalSpring(LocalForce):
         """k u^2/2 + k_3 u^4/4."""
         square = displacement * displacement
         return square * (0.5 * law.stiffness + 0.25 * law.cubic_stiffness * square)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElectrostaticForce(LocalForce):
+    """Attraction between a part of the beam and a fixed electrode, F = eps_0 A V^2/(2 (g - u)^2), as of parallel plates.
+
+    On a spring of stiffness k it pulls in at V^2 = 8 k g^3/(27 eps_0 A), at u = g/3.
+
+    Parameters
+    ----------
+    voltage : float
+        V.
+    area : float
+        A, m^2, of the electrode.
+    gap : float
+        g, m: where the electrode is, from the straight beam; negative below it.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> electrode = sb.ElectrostaticForce(voltage=20.0, area=3e-9, gap=-8e-6, location=0.5)
+    """
+
+    voltage: float = quantity("V", "voltage of the electrode", symbol="V")
+    area: float = quantity("m^2", "area of the electrode", low=0.0, symbol="A")
+    gap: float = quantity("m", "location of the electrode, from the straight beam", symbol="g")
+    name = "electrostatic_force"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_gap(self.gap)
+
+    @staticmethod
+    def force(law: Any, displacement: float) -> float:
+        """eps_0 A V^2/(2 (g - u)^2), towards the electrode."""
+        away = law.gap - displacement
+        return math.copysign(
+            0.5 * _PERMITTIVITY * law.area * law.voltage * law.voltage / (away * away), law.gap
+        )
+
+    @staticmethod
+    def energy(law: Any, displacement: float) -> float:
+        """Of the electrode and its source, -eps_0 A V^2/(2 |g - u|)."""
+        return -0.5 * _PERMITTIVITY * law.area * law.voltage * law.voltage / abs(law.gap - displacement)
+
+    @staticmethod
+    def displacement_range(law: Any) -> tuple[float, float]:
+        """Up to the electrode."""
+        return (-math.inf, law.gap) if law.gap > 0.0 else (law.gap, math.inf)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MagneticForce(LocalForce):
+    """Attraction or repulsion by a magnet, F = a/(g - u)^2 towards it, as of two poles in line.
+
+    Parameters
+    ----------
+    strength : float
+        a, N m^2; negative for repulsion.
+    gap : float
+        g, m: where the magnet is, from the straight beam; negative below it.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> magnet = sb.MagneticForce(strength=8e-9, gap=8e-4, location=0.5)
+    """
+
+    strength: float = quantity("N m^2", "strength of the magnet", symbol="a")
+    gap: float = quantity("m", "location of the magnet, from the straight beam", symbol="g")
+    name = "magnetic_force"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_gap(self.gap)
+
+    @staticmethod
+    def force(law: Any, displacement: float) -> float:
+        """a/(g - u)^2, towards the magnet."""
+        away = law.gap - displacement
+        return math.copysign(1.0, law.gap) * law.strength / (away * away)
+
+    @staticmethod
+    def energy(law: Any, displacement: float) -> float:
+        """-a/|g - u|."""
+        return -law.strength / abs(law.gap - displacement)
+
+    @staticmethod
+    def displacement_range(law: Any) -> tuple[float, float]:
+        """Up to the magnet."""
+        return (-math.inf, law.gap) if law.gap > 0.0 else (law.gap, math.inf)
+
+
+def _require_gap(gap: float) -> None:
+    if gap == 0.0:
+        raise InputError(
+            "local_force.gap = 0: must differ from 0; give the distance from the straight beam, with its sign"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -224,7 +224,8 @@ def run_attributes(run: Prepared, summary: RunSummary, accumulators_of_runs: Any
     attrs = attributes_of("run of a struck bistable beam", run.system, run.integration, run.plan, more)
     attrs["gross_work"] = float(accumulators_of_runs["gross_work"][0])
     attrs["energy_error"] = _energy_error(accumulators_of_runs)
-    tell(_energy_diagnostics(attrs["energy_error"]))
+    if summary.status is not RunStatus.DIVERGED:
+        tell(_energy_diagnostics(attrs["energy_error"]))
     if run.accuracy is not None:
         attrs |= run.accuracy.attributes()
     return attrs

@@ -11,6 +11,7 @@ the impulse, integral of D, which acts along r.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,7 +60,29 @@ def _of_law_and_velocity(name: str) -> Any:
     return stub
 
 
-_force, _energy = _of_law("force"), _of_law("energy")
+def _force(law: Any, u: float) -> float:
+    """The conservative force; NaN outside of the range of the law, which ends the run."""
+    raise TypeError("laws of local forces run in compiled code only")
+
+
+@overload(_force, jit_options=INLINE)
+def _force_in_range(law, u):
+    owner = law.instance_class.owner
+    own = scalar_function(owner, "force")
+    if not owner.is_limited():
+        return lambda law, u: own(law, u)
+    ends = scalar_function(owner, "displacement_range")
+
+    def limited(law, u):
+        low, high = ends(law)
+        if low < u < high:
+            return own(law, u)
+        return math.nan
+
+    return limited
+
+
+_energy = _of_law("energy")
 _damping_force, _damping_coefficient = (
     _of_law_and_velocity("damping_force"),
     _of_law_and_velocity("damping_coefficient"),
