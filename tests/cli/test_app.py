@@ -85,9 +85,9 @@ def test_refusals_come_before_computing(cli, tmp_path, args, message):
 
 
 def test_text_where_a_number_belongs(cli):
-    result = cli("map", "--length", "16 cm")
+    result = cli("map", "--length", "16 kg")
     assert result.exit_code == 2
-    assert "'16 cm' is not a number" in " ".join(result.stderr.split())
+    assert "'16 kg' is not a number" in " ".join(result.stderr.split())
     near = cli("map", "--lenght", "0.16")
     assert near.exit_code == 2 and "--length" in near.stderr
 

@@ -46,7 +46,10 @@ REFUSALS = [
     ({"model": {"qqq": 1}}, "[model] qqq: unknown key; must be one of modes, damping_ratio"),
     ({"baem": {}}, "[baem]: unknown section; did you mean 'beam'?"),
     ({"beam": 3}, "beam = 3: must be a section [beam]"),
-    ({"beam": {"thickness": "0.4 mm"}}, "[beam] thickness = '0.4 mm': must be a number in m"),
+    (
+        {"beam": {"thickness": "0.4 ms"}},
+        "[beam] thickness = '0.4 ms': the unit 'ms' does not fit; must be in m",
+    ),
     ({"beam": {"length": True}}, "[beam] length = True: must be a number in m"),
     ({"beam": {"length": float("nan")}}, "[beam] length = nan: must be a finite number in m"),
     ({"beam": {"density": float("inf")}}, "[beam] density = inf: must be a finite number in kg/m^3"),
@@ -125,7 +128,10 @@ REFUSALS = [
         {"drive": {"frequency_hz": -100.0}},
         "[drive] frequency_hz = -100 Hz: is frequency_ratio = -1.2217, which must be a finite number greater than 0",
     ),
-    ({"drive": {"frequency_hz": "100 Hz"}}, "[drive] frequency_hz = '100 Hz': must be a number in Hz"),
+    (
+        {"drive": {"frequency_hz": "100 rad/s"}},
+        "[drive] frequency_hz = '100 rad/s': the unit 'rad/s' does not fit; must be in Hz",
+    ),
     (
         {"drive": {"velocity_m_s": -1.0}},
         "[drive] velocity_m_s = -1 m/s: is velocity_amplitude = -5.80416, which must",
@@ -139,7 +145,7 @@ REFUSALS = [
         "[striker] location_m = 0.2 m: is location = 1.24224, which must be a number in (0, 1)",
     ),
     ({"striker": {"location_m": 0.05, "location": 0.3}}, "[striker] give location or location_m, not both"),
-    ({"striker": {"gap": "1 mm"}}, "[striker] gap = '1 mm': must be a number in m"),
+    ({"striker": {"gap": "1 mm^2"}}, "[striker] gap = '1 mm^2': the unit 'mm^2' does not fit; must be in m"),
     (
         {"shaker": {"frequency_ratio": 1.0}, "drive": {"frequency_ratio": 2.0}},
         "[shaker]: unknown section",

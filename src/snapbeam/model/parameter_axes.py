@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.model.drive.shock import GRAVITY
 from snapbeam.model.parameters import Parameter, lookup
 from snapbeam.model.system import System
+from snapbeam.util.units import number_in_unit
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -62,7 +62,7 @@ def parse_axis(
         The parameter to name in a refusal.
     value : float, str or sequence of float
         ``0.18``, ``"0.18"``, ``"1/2.1"``, ``"0.1,0.2,0.5"``, or ``"0.1:4:64"`` for 64 points from 0.1 to 4,
-        both included.  Numbers of text may have a unit: ``"1.9um:2.1um:5"``, ``"1kohm,1Mohm"``.
+        both included.  Numbers of text may have a unit that pint knows: ``"1.9um:2.1um:5"``, ``"1kohm,1Mohm"``.
     whole : bool
         Whether the numbers are to be whole, as a refusal then says.
     unit : str
@@ -110,38 +110,13 @@ def _parse_text(name: str, text: str, forms: str, unit: str) -> Axis:
     return numbers[0] if len(numbers) == 1 else axis(name, numbers, -math.inf, math.inf)
 
 
-_WITH_UNIT = re.compile(r"(.*?[\d.])\s*([A-Za-zµμΩ][A-Za-zµμΩ/]*)")
-_PREFIXES = {"p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
-_WITH_PREFIX = ("m", "m/s", "m/s^2", "s", "Hz", "N", "Pa", "ohm", "F", "H")
-
-
-def _scaled(unit: str) -> tuple[str, float]:
-    """A unit without its prefix, and what the prefix multiplies by."""
-    plain = unit.replace("Ω", "ohm").replace("Ohm", "ohm")
-    if plain in _WITH_PREFIX or plain[:1] not in _PREFIXES or plain[1:] not in _WITH_PREFIX:
-        return plain, 1.0
-    return plain[1:], _PREFIXES[plain[0]]
-
-
-def _factor(name: str, text: str, given: str, unit: str) -> float:
-    """What a number in the unit *given* is multiplied by to be in *unit*."""
-    (mine, factor), (own, scale) = _scaled(given), _scaled(unit)
-    if mine != own:
-        must = "a number without a unit" if unit == "1" else f"in {unit}"
-        raise InputError(f"{name} = {text!r}: the unit {given!r} does not fit; must be {must}")
-    return factor / scale
-
-
 def _number(name: str, text: str, part: str, forms: str, unit: str) -> float:
-    found = _WITH_UNIT.fullmatch(part.strip())
-    if found is not None:
-        number = _number(name, text, found[1], forms, unit)
-        return number * _factor(name, text, found[2], unit)
-    numerator, slash, denominator = part.partition("/")
     try:
-        value = float(numerator) / float(denominator) if slash else float(part)
-    except (ValueError, ZeroDivisionError):
-        raise InputError(f"{name} = {shown(text)}: must be {forms}") from None
+        value = number_in_unit(part, unit)
+    except InputError as error:
+        raise InputError(f"{name} = {text!r}: {error}") from None
+    if value is None:
+        raise InputError(f"{name} = {shown(text)}: must be {forms}")
     return _finite(name, text, value)
 
 

@@ -42,6 +42,7 @@ from snapbeam.model.striker import numbered
 from snapbeam.model.system import System
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.input_files import read_toml
+from snapbeam.util.units import number_in_unit
 from snapbeam.util.validation import InputError, file_path, finite, instance, mapping, shown
 
 __all__ = [
@@ -231,6 +232,9 @@ def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any
 def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
     item = row.quantity
     unit = "" if item.unit == "1" else f" in {item.unit}"
+    message, value = _from_text(name, value, item.unit) if item.kind is float else ("", value)
+    if message:
+        return message, None
     if item.kind is float and not (name == "damping_ratio" and isinstance(value, (list, np.ndarray))):
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return f"{name} = {shown(value)}: must be a number{unit}", None
@@ -251,6 +255,17 @@ def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
         return "", item.check(name, value)
     except InputError as error:
         return str(error), None
+
+
+def _from_text(name: str, value: Any, unit: str) -> tuple[str, Any]:
+    """A number that is given as text with a unit, in *unit*; anything else as it is."""
+    if not isinstance(value, str):
+        return "", value
+    try:
+        number = number_in_unit(value, unit)
+    except InputError as error:
+        return f"{name} = {shown(value)}: {error}", None
+    return "", value if number is None else number
 
 
 def _implausible(row: Parameter, name: str, value: float) -> str:
@@ -290,6 +305,9 @@ def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
     if full in PHYSICAL or name == "radius" or name in WANTED:
         unit = PHYSICAL[full].unit if full in PHYSICAL else "m"
         unit = WANTED[name][0] if name in WANTED else unit
+        message, value = _from_text(name, value, unit)
+        if message:
+            return message, None
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
             return f"{name} = {shown(value)}: must be a number in {unit}", None
         window = MATERIALS[name][2] if name in MATERIALS else None
