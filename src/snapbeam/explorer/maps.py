@@ -9,7 +9,7 @@ import pprint
 import shlex
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,8 +28,8 @@ from snapbeam import (
     System,
     sweep,
 )
-from snapbeam.explorer.jobs import WINDOW_POINTS, Jobs, Token
-from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis
+from snapbeam.explorer.jobs import WINDOW_POINTS, Jobs, Token, check_run
+from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, to_physical
 from snapbeam.model.parameter_file import config_from_mapping, config_text
 from snapbeam.plot.axes import edges_of, is_geometric, positions
 from snapbeam.sweeps.points import ratios_of
@@ -55,6 +55,7 @@ __all__ = [
     "chances",
     "compared",
     "compute",
+    "difference",
     "integration_of",
     "known_cells",
     "layers_of",
@@ -62,14 +63,19 @@ __all__ = [
     "opened",
     "parameter_dims",
     "parameter_name",
+    "parameter_of",
+    "patched",
     "picture",
     "plain",
     "plain_symbol",
     "planned",
     "python_lines",
     "run_command",
+    "sections_of",
+    "system_from",
     "system_of",
     "system_toml",
+    "values_of",
     "visible_strides",
 ]
 
@@ -1487,11 +1493,60 @@ def _integration_section(integration: Integration) -> dict[str, Any]:
 
 def system_toml(system: System, integration: Integration, comment: str = "") -> str:
     """A parameter file of a system, which ``--config`` reads back equal."""
-    sections = plain(system.to_mapping())
-    settings = _integration_section(integration)
-    return config_text(
-        config_from_mapping(sections | ({"integration": settings} if settings else {})), comment
-    )
+    return config_text(config_from_mapping(sections_of(system, integration)), comment)
+
+
+def sections_of(system: System, integration: Integration) -> dict[str, dict[str, Any]]:
+    """A system and how it is integrated, as a parameter file holds them."""
+    found = plain(system.to_mapping()) | {"integration": _integration_section(integration)}
+    return {section: values for section, values in found.items() if values}
+
+
+def system_from(sections: Mapping[str, Any], name: str = "sections") -> tuple[System, Integration]:
+    """The system and the integration of a parameter file; refused (InputError) if a page may not ask for them."""
+    own = dict(sections)
+    start = own.pop("initial_state", None)  # in the units of a system, not in those of a parameter file
+    config = config_from_mapping(own, name)
+    system, integration = config.system, config.integration
+    if start is not None:
+        system = System.from_mapping(system.to_mapping() | {"initial_state": start})
+    check_run(system, integration)
+    return system, integration
+
+
+def difference(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of *after* that differ, by dotted name; None for a parameter, or a section, that only *before* has."""
+    found: dict[str, Any] = {section: None for section in before if section not in after}
+    for section, values in after.items():
+        old = before.get(section, {})
+        names = [name for name in dict.fromkeys([*old, *values]) if old.get(name) != values.get(name)]
+        found |= {f"{section}.{name}": values.get(name) for name in names}
+    return found
+
+
+def patched(sections: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Sections with a :func:`difference`: ``patched(before, difference(before, after)) == after``."""
+    found = {section: dict(values) for section, values in sections.items()}
+    for name, value in changes.items():
+        section, dot, key = name.partition(".")
+        if not dot:
+            found.pop(section, None)
+        elif value is None:
+            found.get(section, {}).pop(key, None)
+        else:
+            found.setdefault(section, {})[key] = value
+    return {section: values for section, values in found.items() if values}
+
+
+def values_of(names: Iterable[str], system: System, integration: Integration) -> dict[str, Any]:
+    """The values of some parameters, also in physical units, by dotted name; without those that a system has not."""
+    held = dict(system.parameters) | {"integration.cycles": integration.cycles_or_default}
+    found = {}
+    for name in names:
+        value = held.get(PHYSICAL[name].parameter if name in PHYSICAL else name)
+        if value is not None:
+            found[name] = float(to_physical(system, name, value)) if name in PHYSICAL else value
+    return found
 
 
 def _value(value: Any) -> str:
