@@ -171,3 +171,54 @@ def test_fields_show_the_system_at_the_point(tab, served, small_map, system):
         "the point moved",
     )
     assert page.text("old-words") == "" and "set=" not in page.page.url, "the map is not old"
+
+
+@pytest.fixture(scope="module")
+def sliced(serve, system, tmp_path_factory):
+    """A server of a map over modes too, and the map."""
+    where = tmp_path_factory.mktemp("sliced")
+    axes = {
+        "modes": [1, 2, 3], "frequency_ratio": np.linspace(0.5, 2.0, 8), "velocity_amplitude": np.linspace(0.05, 0.4, 6),
+    }  # fmt: skip
+    found = sb.sweep(system, axes, sb.Integration(cycles=10))
+    found.to_netcdf(where / "sliced.nc", engine="h5netcdf")
+    return serve("sliced.nc", where=where), found
+
+
+_SLIDE = """(at) => { for (const model of Bokeh.documents[0]._all_models.values()) {
+  if (model.type === 'Slider' && model.end === 2) { model.value = at; return true; } } return false; }"""
+_AXES = "x=frequency_ratio&y=velocity_amplitude&show=zero_crossings"
+
+
+def _cells(page):
+    return page.js("() => Array.from(Bokeh.documents[0].get_model_by_name('map-base').data.image[0])")
+
+
+def test_a_slice_is_in_the_address_and_stays_at_a_reload(tab, sliced):
+    server, found = sliced
+    page = tab(f"{server.url}?{_AXES}")
+    first = _cells(page)
+    x, y = float(found["frequency_ratio"][4]), float(found["velocity_amplitude"][3])
+    page.click(x, y)
+    page.wait(lambda: "modes 1" in page.head() and "bitwise identical" in page.notes(), "the run of one mode")
+    assert page.js(_SLIDE, 1)
+    page.wait(
+        lambda: "modes 2" in page.head() and "bitwise identical" in page.notes(),
+        "the point follows the slider",
+    )
+    page.wait(
+        lambda: "cut=model.modes:2" in page.page.url and "model.modes:2" in page.page.url.split("at=")[1],
+        "address",
+    )
+    seen, address = _cells(page), page.page.url
+    assert seen != first
+    page.page.go_back()
+    page.wait(lambda: "modes 1" in page.head() and _cells(page) == first, "the slice before")
+    page.page.go_forward()
+    page.wait(lambda: "modes 2" in page.head() and _cells(page) == seen, "the slice again")
+    page.open(address)
+    page.wait(lambda: "modes 2" in page.head() and "bitwise identical" in page.notes(), "the same run")
+    assert _cells(page) == seen and page.page.url == address
+    page.page.keyboard.press("ArrowRight")
+    words = f"frequency ratio {float(found['frequency_ratio'][5]):.6g}, velocity amplitude {y:.6g}, modes 2"
+    page.wait(lambda: words in page.head() and "bitwise identical" in page.notes(), words)

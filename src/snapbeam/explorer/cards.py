@@ -413,9 +413,9 @@ class MapCard:
 
     def _cut_changed(self) -> None:
         self.plane = replace(self.plane, fixed=self.plane.fixed | self._fixed())
+        self.cut_moved(self.cut())
         self.redraw()
         self.control.view_moved()
-        self.cut_moved(self.cut())
 
     def _fixed(self) -> dict[str, int]:
         return {
