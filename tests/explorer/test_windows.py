@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+import shlex
+
 import numpy as np
 import pytest
+import xarray as xr
 
 import snapbeam as sb
+from snapbeam.cli import app
 
 pytest.importorskip("panel")
 
 from snapbeam.explorer.jobs import Cancelled, Jobs, Token
-from snapbeam.explorer.maps import DatasetSource, Plane, compute, known_cells, planned, visible_strides
+from snapbeam.explorer.maps import (
+    DatasetSource,
+    Plane,
+    Point,
+    SystemSource,
+    compute,
+    known_cells,
+    map_command,
+    planned,
+    system_toml,
+    visible_strides,
+)
 
 NAMES = ("drive.frequency_ratio", "drive.velocity_amplitude")
 
@@ -193,3 +208,27 @@ def test_what_each_of_two_strikers_does_is_shown_and_kept(one_mode, jobs) -> Non
     assert order[0] == "response_class"
     at = order.index("peak_force")
     assert order[at : at + 3] == ["peak_force", "peak_force_striker_1", "peak_force_striker_2"]
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_the_command_of_a_window_on_a_slice_computes_the_window(
+    system, jobs, tmp_path, monkeypatch, log
+) -> None:
+    """The parameter file has 6 modes, the slice 1."""
+    axes = {"modes": [1, 2], NAMES[0]: np.linspace(0.9, 1.4, 3), NAMES[1]: np.linspace(0.1, 0.4, 3)}
+    source = SystemSource(system, axes, sb.Integration(cycles=8), "sliced")
+    plane = Plane.of(source, "frequency_ratio", "velocity_amplitude", {"modes": 0})
+    cut = plane.fixed_values()
+    at_cut, how = Point(cut).system(system, sb.Integration(cycles=8))
+    window = planned(at_cut, how, NAMES, (0.9, 1.4, 0.1, 0.4), (log, False), (27, 27), 1)
+    compute(window, jobs, Token(), lambda _: None)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "system.toml").write_text(system_toml(system, how), encoding="utf-8")
+    with pytest.raises(SystemExit) as ended:
+        app(shlex.split(map_command(window, cut))[1:])
+    assert ended.value.code in (0, None)
+    found = xr.load_dataset("window.nc", engine="h5netcdf")
+    for name in ("response_class", "zero_crossings", "peak_force"):
+        np.testing.assert_array_equal(
+            found[name].transpose("velocity_amplitude", "frequency_ratio"), window.values[name]
+        )

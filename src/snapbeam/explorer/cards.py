@@ -1075,16 +1075,13 @@ class TakeCard:
             parts.append(Markup('<h2>The same in Python</h2><pre class="python">{}</pre>').format(text))
         window = self._window()
         if window is not None:
-            axes = {
-                name: (float(values[0]), float(values[-1]), int(values.size))
-                for name, values in zip(window.names, (window.x, window.y), strict=True)
-            }
-            if not any(window.log):
-                parts.append(
-                    Markup(
-                        '<h2>The command that makes the finest window</h2><pre class="map-command">{}</pre>'
-                    ).format(map_command(axes, {}))
-                )
+            command = map_command(window, page.card.plane.fixed_values())
+            parts.append(
+                Markup(
+                    "<h2>The command that makes the finest window (with the system saved as system.toml beside it)</h2>"
+                    '<pre class="map-command">{}</pre>'
+                ).format(command)
+            )
         self.text.object = Markup("").join(parts) or _NOTE.format("Click on a point of the map first.")
 
     def _window(self) -> Any:

@@ -1315,7 +1315,9 @@ def _middle(at: int, stride: int) -> int:
 
 def _spread(low: float, high: float, cells: int, log: bool) -> _Array:
     share = (np.arange(cells) + 0.5) / cells
-    return np.exp(np.log(low) + share * np.log(high / low)) if log else low + share * (high - low)
+    if log:
+        return np.exp(np.log(low) + share * np.log(high / low))
+    return np.linspace(low + share[0] * (high - low), low + share[-1] * (high - low), cells)
 
 
 def planned(
@@ -1565,13 +1567,16 @@ def run_command(values: Mapping[str, Any], file: str, on_map: bool) -> str:
     return shlex.join(["snapbeam", "simulate", *source, "-o", "run.nc", "--plot", "run.png"])
 
 
-def map_command(axes: Mapping[str, tuple[float, float, int]], fixed: Mapping[str, Any]) -> str:
-    """The command that computes a window on even axes, of a parameter file kept beside it."""
+def map_command(window: Window, fixed: Mapping[str, Any]) -> str:
+    """The command that computes a window, on the cut at *fixed*, of a parameter file kept beside it."""
     parts = ["snapbeam", "map", "--config", _CONFIG]
     for name, value in fixed.items():
         parts += ["--set", f"{name}={_value(value)}"]
-    for name, (first, last, count) in axes.items():
-        parts += ["--sweep", f"{name}={first!r}:{last!r}:{count}"]
+    for name, values in zip(window.names, (window.x, window.y), strict=True):
+        first, last, count = float(values[0]), float(values[-1]), values.size
+        even = np.array_equal(np.linspace(first, last, count), values)
+        text = f"{first!r}:{last!r}:{count}" if even else ",".join(map(repr, values.tolist()))
+        parts += ["--sweep", f"{name}={text}"]
     return shlex.join([*parts, "-o", "window.nc", "--plot", "window.png"])
 
 
