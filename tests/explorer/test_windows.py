@@ -20,6 +20,7 @@ from snapbeam.explorer.maps import (
     Point,
     SystemSource,
     compute,
+    drawn_shares,
     known_cells,
     map_command,
     planned,
@@ -232,3 +233,31 @@ def test_the_command_of_a_window_on_a_slice_computes_the_window(
         np.testing.assert_array_equal(
             found[name].transpose("velocity_amplitude", "frequency_ratio"), window.values[name]
         )
+
+
+def test_shares_are_those_of_the_area_that_is_drawn(one_mode, plane, jobs) -> None:
+    """Of a part of one cell of the map the map's cells give 0 and 100 %, whatever windows are drawn over it."""
+    whole = (*plane.x.span, *plane.y.span)
+    kinds = plane.values("response_class")
+    alone = drawn_shares(plane, kinds, [], whole, (560, 340))
+    assert alone == pytest.approx({int(kind): float(np.mean(kinds == kind)) for kind in np.unique(kinds)})
+    window = compute(_window(one_mode, (81, 81)), jobs, Token(), lambda _: None)
+    drawn = list(zip([window], visible_strides([window], plane), strict=True))
+    rng = np.random.default_rng(4)
+    differs = 0
+    for _ in range(8):
+        (left, right), (low, high) = np.sort(rng.uniform(0.95, 1.35, 2)), np.sort(rng.uniform(0.12, 0.38, 2))
+        view = (left, right, low, high)
+        found = drawn_shares(plane, kinds, drawn, view, (4000, 4000))
+        x, y = rng.uniform(left, right, 8_000), rng.uniform(low, high, 8_000)
+        at = [window.cell(a, b) for a, b in zip(x, y, strict=True)]
+        seen = np.array([window.values["response_class"][each] for each in at])
+        for kind in np.unique(seen):
+            assert found[int(kind)] == pytest.approx(float(np.mean(seen == kind)), abs=0.02)
+        assert sum(found.values()) == pytest.approx(1.0)
+        coarse = drawn_shares(plane, kinds, [], view, (4000, 4000))
+        differs += any(abs(coarse.get(kind, 0.0) - share) > 0.1 for kind, share in found.items())
+        rough = drawn_shares(plane, kinds, drawn, view, (30, 30))  # fewer pixels than cells
+        assert all(rough.get(kind, 0.0) == pytest.approx(share, abs=0.1) for kind, share in found.items())
+    assert differs > 0
+    assert drawn_shares(plane, None, [], whole, (560, 340)) == {}, "of another system nothing is drawn yet"

@@ -32,6 +32,7 @@ from snapbeam.explorer.maps import (
     Scatter,
     Window,
     compute,
+    drawn_shares,
     integration_mapping,
     known_cells,
     map_command,
@@ -522,11 +523,12 @@ class MapCard:
         if "threshold" in layers and self.source.is_list:
             words.append("the threshold is that of the columns of a grid; these are points")
         wanted = "threshold" in layers and values is not None and not self.source.is_list
-        kinds = self.plane.values("response_class") if wanted else None
+        if wanted and self.changed:
+            words.append("the threshold is that of the map, which is of the system before")
+        kinds = self.plane.values("response_class") if wanted and not self.changed else None
         self.view.show_threshold(kinds)
         self._draw_dots("dots" in layers, words)
         self._draw_marks()
-        self._legend()
         if any(words):
             self._words = [each for each in words if each]
         self.tell()
@@ -542,6 +544,7 @@ class MapCard:
                 low=self.view.limits[0], high=max(self.view.limits[1], self.view.limits[0] + 1e-300)
             )
         self._drawn = self.view.show_windows(shown, self.show.value, self.shown_plane)
+        self._legend()
 
     @property
     def shown_plane(self) -> Plane | None:
@@ -577,39 +580,36 @@ class MapCard:
         self.view.show_marks([(*place, text) for place, text in places if place is not None])
 
     def _legend(self) -> None:
-        """Name the classes, with the share of the cells in view that each has."""
-        kinds = self._kinds_in_view() if self.show.value == "response_class" else None
+        """Name the classes, with the share of the area in view that each has as it is drawn."""
+        if self.show.value != "response_class":
+            self.key.object = ""
+            return
+        shares = self._shares()
         items = []
         for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
-            share = (
-                ""
-                if kinds is None or not kinds.size
-                else f" {100.0 * float(np.mean(kinds == int(kind))):.1f} %"
-            )
-            if kind is ResponseClass.UNKNOWN and (kinds is None or not (kinds == int(kind)).any()):
+            if kind is ResponseClass.UNKNOWN and int(kind) not in shares:
                 continue
+            share = f" {100.0 * shares.get(int(kind), 0.0):.1f} %" if shares else ""
             swatch = Markup('<span class="swatch" style="background:{}"></span>{}{}')
             items.append(swatch.format(CLASS_COLORS[kind], kind.label, share))
-        if kinds is not None and kinds.size:
+        if shares:
             part = "the map" if self.view.is_whole else "the view"
             items.append(Markup('<span class="faint">shares of {}</span>').format(part))
-        shown = Markup('<div class="key">{}</div>').format(Markup(" &nbsp; ").join(items))
-        self.key.object = shown if self.show.value == "response_class" else ""
+        self.key.object = Markup('<div class="key">{}</div>').format(Markup(" &nbsp; ").join(items))
 
-    def _kinds_in_view(self) -> NDArray[Any] | None:
-        """Classes of the cells of the map in view, or of all points of a list."""
+    def _shares(self) -> dict[int, float]:
+        """Shares of the classes that are drawn in view: of the area, or of the points of a list; empty if there are none."""
         try:
-            kinds = self.plane.values("response_class")
+            kinds = None if self.changed else self.plane.values("response_class")
         except InputError:
-            return None
-        if kinds is None or self.source.is_list:
-            return kinds
+            kinds = None
         left, right, low, high = self.view.view
-        columns, rows = (
-            (axis.edges[1:] > first) & (axis.edges[:-1] < last)
-            for axis, first, last in ((self.plane.x, left, right), (self.plane.y, low, high))
-        )
-        return kinds[np.ix_(rows, columns)]
+        if self.source.is_list:
+            x, y = self.plane.x.at, self.plane.y.at
+            inside = (x >= left) & (x <= right) & (y >= low) & (y <= high)
+            found, counts = np.unique(np.zeros(0) if kinds is None else kinds[inside], return_counts=True)
+            return dict(zip(found.tolist(), (counts / max(counts.sum(), 1)).tolist(), strict=True))
+        return drawn_shares(self.plane, kinds, self._drawn, (left, right, low, high), self.view.pixels)
 
     def say(self, words: str) -> None:
         """Add a line to what is wrong."""

@@ -56,6 +56,7 @@ __all__ = [
     "compared",
     "compute",
     "difference",
+    "drawn_shares",
     "integration_of",
     "known_cells",
     "layers_of",
@@ -1307,6 +1308,51 @@ def visible_strides(windows: list[Window], plane: Plane | None) -> list[NDArray[
         stride[~_finer((sides, sides), known_cells(window, plane, drawn))] = 0
         drawn.append((window, stride))
     return [stride for _, stride in drawn]
+
+
+def drawn_shares(
+    plane: Plane,
+    kinds: NDArray[Any] | None,
+    drawn: list[tuple[Window, NDArray[np.int8]]],
+    view: tuple[float, float, float, float],
+    pixels: tuple[int, int],
+) -> dict[int, float]:
+    """Share that each class has of the area of a view with a map (*kinds*, of shape (y, x), or None) and windows over it."""
+    none = np.iinfo(np.int16).min
+    where: list[NDArray[np.int64]] = []
+    cells: list[list[NDArray[np.int64]]] = []
+    areas: list[_Array] = []
+    for side, axis in enumerate((plane.x, plane.y)):
+        first, last = _scaled(view[2 * side : 2 * side + 2], axis.log)
+        own = _scaled(axis.edges, axis.log)
+        spans = [_scaled(window.bounds[2 * side : 2 * side + 2], axis.log) for window, _ in drawn]
+        sizes = [(window.x, window.y)[side].size for window, _ in drawn]
+        parts = [np.linspace(a, b, size + 1) for (a, b), size in zip(spans, sizes, strict=True)]
+        edges = np.unique(np.clip(np.concatenate([own, *parts, [first, last]]), first, last))
+        if edges.size > 2 * pixels[side]:  # more of them than the screen shows
+            edges = np.linspace(first, last, pixels[side] + 1)
+        middles = 0.5 * (edges[1:] + edges[:-1])
+        areas.append(np.diff(edges))
+        where.append(np.searchsorted(own, middles, side="right").astype(np.int64) - 1)
+        cells.append([
+            np.floor((middles - a) / (b - a) * size).astype(np.int64)
+            for (a, b), size in zip(spans, sizes, strict=True)
+        ])  # fmt: skip
+    shown = np.full((where[1].size, where[0].size), none, dtype=np.int16)
+    pictures: list[tuple[NDArray[Any], NDArray[Any], NDArray[np.int64], NDArray[np.int64]]] = []
+    if kinds is not None:
+        pictures.append((kinds, np.ones_like(kinds), where[0], where[1]))
+    for at, (window, stride) in enumerate(drawn):
+        pictures.append((window.values["response_class"], stride, cells[0][at], cells[1][at]))
+    for values, stride, columns, rows in pictures:
+        height, width = stride.shape
+        across = np.flatnonzero((columns >= 0) & (columns < width))
+        upward = np.flatnonzero((rows >= 0) & (rows < height))
+        part, there = np.ix_(upward, across), np.ix_(rows[upward], columns[across])
+        shown[part] = np.where(stride[there] > 0, values[there], shown[part])
+    area = np.outer(areas[1], areas[0])
+    whole = float(area[shown != none].sum())
+    return {int(kind): float(area[shown == kind].sum()) / whole for kind in np.unique(shown) if kind != none}
 
 
 def _middle(at: int, stride: int) -> int:
