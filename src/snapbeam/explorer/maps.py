@@ -333,11 +333,24 @@ class DatasetSource(Source):
     """A map in memory."""
 
     def __init__(self, dataset: xr.Dataset, name: str = "map") -> None:
-        if not parameter_dims(dataset) or not layers_of(dataset):
-            known = ", ".join(map(str, dataset.data_vars)) or "none"
-            raise InputError(f"{name}: is no map; it has no variable over swept parameters among {known}")
+        if not layers_of(dataset) or len(_axes_of(dataset)) < 2:
+            raise InputError(f"{name}: {_other_kind(dataset)}")
         self.skeleton = dataset
         self.name = name
+
+
+def _other_kind(dataset: xr.Dataset) -> str:
+    """Say of a dataset that is not a map which kind of result it is."""
+    from snapbeam.plot.dataset import figures_of
+
+    try:
+        kind, _ = figures_of(dataset)
+    except (InputError, ValueError, KeyError, IndexError, TypeError):
+        known = ", ".join(map(str, dataset.data_vars)) or "none"
+        return f"must be a map; it has no variable over swept parameters among {known}"
+    if kind == "map":
+        return "must be a map over parameters; neither its axes nor its coordinates name two of them"
+    return f"must be a map, and is a {kind}; draw it with snapbeam plot, or ds.snapbeam.plot()"
 
 
 class SystemSource(Source):

@@ -19,7 +19,16 @@ import snapbeam as sb
 from snapbeam import InputError, Integration, Run, RunStatus, System
 from snapbeam.explorer.address import Address, number
 from snapbeam.explorer.cards import MapCard, SystemCard, TakeCard
-from snapbeam.explorer.jobs import RUN_SECONDS, Downloads, Token, Waiting, check_run, samples_of, too_large
+from snapbeam.explorer.jobs import (
+    ADDRESS,
+    RUN_SECONDS,
+    Downloads,
+    Token,
+    Waiting,
+    check_run,
+    samples_of,
+    too_large,
+)
 from snapbeam.explorer.maps import Point, compared, difference, patched, sections_of, system_from, values_of
 from snapbeam.explorer.maps import chances as chances_of
 from snapbeam.explorer.run_view import RunView
@@ -557,7 +566,9 @@ class Page:
     def write_address(self) -> None:
         """Write what is shown into the address: a step in the history of the browser."""
         search = "" if self._quiet else self._search()
-        if search and search != self._written:
+        if len(search) > ADDRESS:
+            self.card.tell("the system is too long for an address: save it as TOML to open it again")
+        elif search and search != self._written:
             self.bar.data = {
                 "search": [search],
                 "step": [self.bar.data["step"][0] + 1 if self._written else 0],
