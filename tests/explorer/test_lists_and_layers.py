@@ -138,5 +138,5 @@ def test_shares_of_replicas_are_told(one_mode):
 
 def test_what_is_no_map_is_refused(one_mode):
     run = sb.simulate(one_mode, SHORT)
-    with pytest.raises(sb.InputError, match="is no map"):
+    with pytest.raises(sb.InputError, match="must be a map, and is a run"):
         opened(run.dataset)

@@ -2,15 +2,31 @@
 
 from __future__ import annotations
 
+import shlex
+
 import numpy as np
 import pytest
+import xarray as xr
 
 import snapbeam as sb
+from snapbeam.cli import app
 
 pytest.importorskip("panel")
 
 from snapbeam.explorer.jobs import Cancelled, Jobs, Token
-from snapbeam.explorer.maps import DatasetSource, Plane, compute, known_cells, planned, visible_strides
+from snapbeam.explorer.maps import (
+    DatasetSource,
+    Plane,
+    Point,
+    SystemSource,
+    compute,
+    drawn_shares,
+    known_cells,
+    map_command,
+    planned,
+    system_toml,
+    visible_strides,
+)
 
 NAMES = ("drive.frequency_ratio", "drive.velocity_amplitude")
 
@@ -193,3 +209,55 @@ def test_what_each_of_two_strikers_does_is_shown_and_kept(one_mode, jobs) -> Non
     assert order[0] == "response_class"
     at = order.index("peak_force")
     assert order[at : at + 3] == ["peak_force", "peak_force_striker_1", "peak_force_striker_2"]
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_the_command_of_a_window_on_a_slice_computes_the_window(
+    system, jobs, tmp_path, monkeypatch, log
+) -> None:
+    """The parameter file has 6 modes, the slice 1."""
+    axes = {"modes": [1, 2], NAMES[0]: np.linspace(0.9, 1.4, 3), NAMES[1]: np.linspace(0.1, 0.4, 3)}
+    source = SystemSource(system, axes, sb.Integration(cycles=8), "sliced")
+    plane = Plane.of(source, "frequency_ratio", "velocity_amplitude", {"modes": 0})
+    cut = plane.fixed_values()
+    at_cut, how = Point(cut).system(system, sb.Integration(cycles=8))
+    window = planned(at_cut, how, NAMES, (0.9, 1.4, 0.1, 0.4), (log, False), (27, 27), 1)
+    compute(window, jobs, Token(), lambda _: None)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "system.toml").write_text(system_toml(system, how), encoding="utf-8")
+    with pytest.raises(SystemExit) as ended:
+        app(shlex.split(map_command(window, cut))[1:])
+    assert ended.value.code in (0, None)
+    found = xr.load_dataset("window.nc", engine="h5netcdf")
+    for name in ("response_class", "zero_crossings", "peak_force"):
+        np.testing.assert_array_equal(
+            found[name].transpose("velocity_amplitude", "frequency_ratio"), window.values[name]
+        )
+
+
+def test_shares_are_those_of_the_area_that_is_drawn(one_mode, plane, jobs) -> None:
+    """Of a part of one cell of the map the map's cells give 0 and 100 %, whatever windows are drawn over it."""
+    whole = (*plane.x.span, *plane.y.span)
+    kinds = plane.values("response_class")
+    alone = drawn_shares(plane, kinds, [], whole, (560, 340))
+    assert alone == pytest.approx({int(kind): float(np.mean(kinds == kind)) for kind in np.unique(kinds)})
+    window = compute(_window(one_mode, (81, 81)), jobs, Token(), lambda _: None)
+    drawn = list(zip([window], visible_strides([window], plane), strict=True))
+    rng = np.random.default_rng(4)
+    differs = 0
+    for _ in range(8):
+        (left, right), (low, high) = np.sort(rng.uniform(0.95, 1.35, 2)), np.sort(rng.uniform(0.12, 0.38, 2))
+        view = (left, right, low, high)
+        found = drawn_shares(plane, kinds, drawn, view, (4000, 4000))
+        x, y = rng.uniform(left, right, 8_000), rng.uniform(low, high, 8_000)
+        at = [window.cell(a, b) for a, b in zip(x, y, strict=True)]
+        seen = np.array([window.values["response_class"][each] for each in at])
+        for kind in np.unique(seen):
+            assert found[int(kind)] == pytest.approx(float(np.mean(seen == kind)), abs=0.02)
+        assert sum(found.values()) == pytest.approx(1.0)
+        coarse = drawn_shares(plane, kinds, [], view, (4000, 4000))
+        differs += any(abs(coarse.get(kind, 0.0) - share) > 0.1 for kind, share in found.items())
+        rough = drawn_shares(plane, kinds, drawn, view, (30, 30))  # fewer pixels than cells
+        assert all(rough.get(kind, 0.0) == pytest.approx(share, abs=0.1) for kind, share in found.items())
+    assert differs > 0
+    assert drawn_shares(plane, None, [], whole, (560, 340)) == {}, "of another system nothing is drawn yet"

@@ -5,7 +5,9 @@ Whatever comes from there is checked like any input, and counts for nothing wher
 
 from __future__ import annotations
 
+import json
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -18,8 +20,9 @@ from snapbeam.model.parameter_axes import parameter_of_axis
 __all__ = ["Address", "number"]
 
 
-_KEYS = ("x", "y", "show", "at", "b", "view", "set", "theme", "type", "tab", "card")
+_KEYS = ("x", "y", "show", "cut", "at", "b", "view", "set", "theme", "type", "tab", "card")
 _MOST = 64
+_NAME = r"[a-z]\w*(\.\w+)?"
 
 
 @dataclass(frozen=True)
@@ -30,12 +33,14 @@ class Address:
     ----------
     x, y, show : str
         The two axes and the variable; empty for the default.
+    cut : dict
+        The point of each axis that is not shown, by dotted name.
     at, b : dict
         The point whose run is shown, and that of the second run, by dotted name.
     view : tuple of 4 floats, optional
         What is seen of the map.
     changes : dict
-        Parameters that differ from the map's system, by dotted name.
+        Parameters that differ from the map's system, by dotted name; None for a parameter, or a section, that it has not.
     theme, type : str
         "dark" or "default"; "large" for a lecture.
     tab, card : str
@@ -47,6 +52,7 @@ class Address:
     x: str = ""
     y: str = ""
     show: str = ""
+    cut: Mapping[str, Any] = field(default_factory=dict)
     at: Mapping[str, Any] = field(default_factory=dict)
     b: Mapping[str, Any] = field(default_factory=dict)
     view: tuple[float, ...] | None = None
@@ -77,9 +83,10 @@ class Address:
     def write(self) -> str:
         """The part of the address after the question mark."""
         parts = {"x": self.x, "y": self.y, "show": self.show, "tab": self.tab, "card": self.card}
+        parts["cut"] = _pairs_text(self.cut)
         parts["at"] = _pairs_text(self.at)
         parts["b"] = _pairs_text(self.b)
-        parts["set"] = _pairs_text(self.changes)
+        parts["set"] = ",".join(f"{name}:{_written(value)}" for name, value in self.changes.items())
         if self.view is not None:
             parts["view"] = ",".join(repr(float(value)) for value in self.view)
         if self.theme != "default":
@@ -107,7 +114,37 @@ def _with(found: Address, name: str, text: str) -> Address:
         if len(view) != 4 or not (view[0] < view[1] and view[2] < view[3]):
             raise InputError("must be left,right,low,high")
         return replace(found, view=view)
-    return replace(found, **{"changes" if name == "set" else name: _pairs(text)})  # type: ignore[arg-type]
+    if name == "set":
+        return replace(found, changes=_changes(text))
+    return replace(found, **{name: _pairs(text)})  # type: ignore[arg-type]
+
+
+def _written(value: Any) -> str:
+    """A value of a parameter file in an address: empty for None, a word as it is, anything else as JSON without commas."""
+    if value is None:
+        return ""
+    if isinstance(value, str) and value.isidentifier() and _value(value) == value:
+        return value
+    if isinstance(value, str):
+        return json.dumps(value).replace(",", r"\u002c").replace(";", r"\u003b")
+    return json.dumps(value, separators=(";", ":"))
+
+
+def _value(text: str) -> Any:
+    try:
+        return json.loads(text.replace(";", ",")) if text else None
+    except (ValueError, RecursionError):
+        return text
+
+
+def _changes(text: str) -> dict[str, Any]:
+    """What differs from the map's system; whether it makes a system is seen when it is made."""
+    parts = [part.partition(":") for part in text.split(",")]
+    changes = {name: _value(value) for name, _, value in parts}
+    for name, colon, value in parts:
+        if not colon or not re.fullmatch(_NAME, name) or ("." not in name and value):
+            raise InputError("must be section.name:value,section.name:value")
+    return changes
 
 
 def _pairs(text: str) -> dict[str, Any]:

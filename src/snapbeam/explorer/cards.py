@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,12 +17,8 @@ from numpy.typing import NDArray
 from snapbeam import InputError, Integration, ResponseClass, System, write_netcdf
 from snapbeam.explorer.address import Address, number
 from snapbeam.explorer.jobs import (
-    CYCLES,
-    MODES,
     UPLOAD,
     WINDOW_SECONDS,
-    Downloads,
-    Jobs,
     Token,
     Waiting,
     drawing,
@@ -36,13 +32,17 @@ from snapbeam.explorer.maps import (
     Scatter,
     Window,
     compute,
+    drawn_shares,
     integration_mapping,
     known_cells,
     map_command,
-    plain,
+    parameter_of,
+    patched,
     planned,
     python_lines,
     run_command,
+    sections_of,
+    system_from,
     system_toml,
 )
 from snapbeam.explorer.shared import Shared
@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from snapbeam import Run
     from snapbeam.explorer.page import Page
 
-__all__ = ["MapCard", "SystemCard", "TakeCard", "WindowControl", "changed_parameters", "window_dataset"]
+__all__ = ["MapCard", "SystemCard", "TakeCard", "WindowControl", "window_dataset"]
 
 
 _HEADING = Markup("<h2>{}</h2>")
@@ -281,6 +281,7 @@ class MapCard:
         self.marks: list[tuple[dict[str, Any], str]] = []
         self.asked: Callable[[Point], None] = lambda _: None
         self.moved: Callable[[], None] = lambda: None
+        self.cut_moved: Callable[[dict[str, Any]], None] = lambda _: None
         self.own: set[Any] = set()
         """Keys of the windows that this page has asked for: those of other tabs are not laid over its map."""
         self._drawn: list[tuple[Window, NDArray[np.int8]]] = []
@@ -344,7 +345,7 @@ class MapCard:
         self.more.on_click(lambda _: self.post(self.control.more))
         self.again.on_click(lambda _: self.post(lambda: self.control.compute_view(force=True)))
         for slider in self.sliders.values():
-            slider.param.watch(lambda _: self.post(self._cut_changed), "value")
+            slider.param.watch(lambda _: None if self._restoring else self.post(self._cut_changed), "value")
         self.auto.visible = self.again.visible = not source.is_list
         self.slider_box = pn.FlexBox(margin=0)
         self.typed = pn.FlexBox(margin=0)
@@ -360,15 +361,26 @@ class MapCard:
             labels = {repr(value): at for at, value in enumerate(points.tolist())}
         words, unit = self.source.label(name)
         title = f"{words} ({unit})" if unit != "1" else words
-        wanted = address.at.get(str(self.source.skeleton[name].attrs.get("parameter", name)))
-        value = (
-            int(np.argmin(np.abs(points - wanted)))
-            if isinstance(wanted, float) and points.dtype.kind == "f"
-            else 0
-        )
+        value = self._place(name, address) or 0
         # this one of Panel's widgets shows its name and its labels as HTML
         options = {str(escape(label)): at for label, at in labels.items()}
         return pn.widgets.DiscreteSlider(name=str(escape(title)), options=options, value=value, width=240)
+
+    def _place(self, name: str, address: Address) -> int | None:
+        """Which point of an axis that is not shown an address describes; None if it does not, or is of another map."""
+        full, points = parameter_of(self.source.skeleton, name), self.source.coordinate(name)
+        wanted = address.cut.get(full, address.at.get(full))
+        if wanted is None or points.dtype.kind not in "iuf":
+            found = np.flatnonzero(points == wanted)
+            return int(found[0]) if found.size else None
+        return int(np.argmin(np.abs(points - wanted)))
+
+    def cut(self) -> dict[str, Any]:
+        """The values of the axes that have a slider and are not shown, by dotted name."""
+        skeleton, held = self.source.skeleton, self._fixed()
+        return {
+            parameter_of(skeleton, name): self.source.coordinate(name)[at].item() for name, at in held.items()
+        }
 
     def restore(self, address: Address) -> None:
         """Show the axes, the variable, the cut and the part of the map of an address of this page."""
@@ -377,13 +389,13 @@ class MapCard:
             if name in widget.options.values():
                 widget.value = name
         for name, slider in self.sliders.items():
-            wanted = address.at.get(str(self.source.skeleton[name].attrs.get("parameter", name)))
-            if isinstance(wanted, float):
-                slider.value = int(np.argmin(np.abs(self.source.coordinate(name) - wanted)))
+            place = self._place(name, address)
+            slider.value = slider.value if place is None else place
         self._restoring = False
         if (self.x.value, self.y.value) != (self.plane.x.name, self.plane.y.name):
             self.rebuild(address.view)
             return
+        self.plane = replace(self.plane, fixed=self.plane.fixed | self._fixed())
         if address.view is None:
             self.view.view = (*self.plane.x.span, *self.plane.y.span)
         elif len(address.view) == 4:
@@ -401,7 +413,8 @@ class MapCard:
         self.post(lambda: self.rebuild(None))
 
     def _cut_changed(self) -> None:
-        self.plane = replace(self.plane, fixed=self._fixed())
+        self.plane = replace(self.plane, fixed=self.plane.fixed | self._fixed())
+        self.cut_moved(self.cut())
         self.redraw()
         self.control.view_moved()
 
@@ -510,11 +523,12 @@ class MapCard:
         if "threshold" in layers and self.source.is_list:
             words.append("the threshold is that of the columns of a grid; these are points")
         wanted = "threshold" in layers and values is not None and not self.source.is_list
-        kinds = self.plane.values("response_class") if wanted else None
+        if wanted and self.changed:
+            words.append("the threshold is that of the map, which is of the system before")
+        kinds = self.plane.values("response_class") if wanted and not self.changed else None
         self.view.show_threshold(kinds)
         self._draw_dots("dots" in layers, words)
         self._draw_marks()
-        self._legend()
         if any(words):
             self._words = [each for each in words if each]
         self.tell()
@@ -530,6 +544,7 @@ class MapCard:
                 low=self.view.limits[0], high=max(self.view.limits[1], self.view.limits[0] + 1e-300)
             )
         self._drawn = self.view.show_windows(shown, self.show.value, self.shown_plane)
+        self._legend()
 
     @property
     def shown_plane(self) -> Plane | None:
@@ -565,39 +580,36 @@ class MapCard:
         self.view.show_marks([(*place, text) for place, text in places if place is not None])
 
     def _legend(self) -> None:
-        """Name the classes, with the share of the cells in view that each has."""
-        kinds = self._kinds_in_view() if self.show.value == "response_class" else None
+        """Name the classes, with the share of the area in view that each has as it is drawn."""
+        if self.show.value != "response_class":
+            self.key.object = ""
+            return
+        shares = self._shares()
         items = []
         for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
-            share = (
-                ""
-                if kinds is None or not kinds.size
-                else f" {100.0 * float(np.mean(kinds == int(kind))):.1f} %"
-            )
-            if kind is ResponseClass.UNKNOWN and (kinds is None or not (kinds == int(kind)).any()):
+            if kind is ResponseClass.UNKNOWN and int(kind) not in shares:
                 continue
+            share = f" {100.0 * shares.get(int(kind), 0.0):.1f} %" if shares else ""
             swatch = Markup('<span class="swatch" style="background:{}"></span>{}{}')
             items.append(swatch.format(CLASS_COLORS[kind], kind.label, share))
-        if kinds is not None and kinds.size:
+        if shares:
             part = "the map" if self.view.is_whole else "the view"
             items.append(Markup('<span class="faint">shares of {}</span>').format(part))
-        shown = Markup('<div class="key">{}</div>').format(Markup(" &nbsp; ").join(items))
-        self.key.object = shown if self.show.value == "response_class" else ""
+        self.key.object = Markup('<div class="key">{}</div>').format(Markup(" &nbsp; ").join(items))
 
-    def _kinds_in_view(self) -> NDArray[Any] | None:
-        """Classes of the cells of the map in view, or of all points of a list."""
+    def _shares(self) -> dict[int, float]:
+        """Shares of the classes that are drawn in view: of the area, or of the points of a list; empty if there are none."""
         try:
-            kinds = self.plane.values("response_class")
+            kinds = None if self.changed else self.plane.values("response_class")
         except InputError:
-            return None
-        if kinds is None or self.source.is_list:
-            return kinds
+            kinds = None
         left, right, low, high = self.view.view
-        columns, rows = (
-            (axis.edges[1:] > first) & (axis.edges[:-1] < last)
-            for axis, first, last in ((self.plane.x, left, right), (self.plane.y, low, high))
-        )
-        return kinds[np.ix_(rows, columns)]
+        if self.source.is_list:
+            x, y = self.plane.x.at, self.plane.y.at
+            inside = (x >= left) & (x <= right) & (y >= low) & (y <= high)
+            found, counts = np.unique(np.zeros(0) if kinds is None else kinds[inside], return_counts=True)
+            return dict(zip(found.tolist(), (counts / max(counts.sum(), 1)).tolist(), strict=True))
+        return drawn_shares(self.plane, kinds, self._drawn, (left, right, low, high), self.view.pixels)
 
     def say(self, words: str) -> None:
         """Add a line to what is wrong."""
@@ -741,53 +753,37 @@ _PRESETS: dict[str, dict[str, dict[str, Any]]] = {
 
 
 class SystemCard:
-    """Fields of a system.
+    """Fields of the system at the point that is shown.
 
     Parameters
     ----------
-    system, integration : System, Integration
-        What the fields hold at first.
-    post : callable
-        ``post(work)``: do something on the page's own thread.
-    downloads : Downloads
-    look : Look
-    jobs : Jobs
-        Threads that read files, so that the page answers meanwhile.
+    page : Page
+        Whose system it is.
     """
 
-    def __init__(
-        self,
-        system: System,
-        integration: Integration,
-        post: Callable[[Callable[[], None]], None],
-        downloads: Downloads,
-        look: Look,
-        jobs: Jobs,
-    ) -> None:
-        self.look, self.jobs = look, jobs
-        self.first = (system, integration)
-        self.system, self.integration = system, integration
-        self.post, self.downloads = post, downloads
-        self.used: Callable[[System, Integration], None] = lambda *_: None
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        self.system: System
         self.fields: dict[str, Any] = {}
+        self._filled: dict[str, Any] = {}
         self.words = Html("", sizing_mode="stretch_width", css_classes=["system-words"])
         self.facts = Html("", sizing_mode="stretch_width", css_classes=["system-facts"])
         self.box = pn.Column(sizing_mode="stretch_width", margin=0)
         apply = pn.widgets.Button(name="Use this system", button_type="primary", width=130)
-        apply.on_click(lambda _: post(self.apply))
+        apply.on_click(lambda _: page.post(self.apply))
         back = pn.widgets.Button(name="Back to the map's", width=130)
-        back.on_click(lambda _: post(lambda: self.take(*self.first)))
+        back.on_click(lambda _: page.post(self._back))
         save = pn.widgets.Button(name="Save as TOML", width=110)
-        save.on_click(lambda _: post(self._save))
+        save.on_click(lambda _: page.post(self._save))
         self.preset = pn.widgets.Select(name="Preset", options=["", *_PRESETS], width=210)
-        self.preset.param.watch(lambda event: post(lambda: self._chosen(event.new)), "value")
+        self.preset.param.watch(lambda event: page.post(lambda: self._chosen(event.new)), "value")
         laws = {_LAWS.get(kind, kind.replace("_", " ")): kind for kind in _kinds("contact")}
         self.law = pn.widgets.Select(name="Contact law", options=laws, width=160)
-        self.law.param.watch(lambda _: post(self._law_changed), "value")
+        self.law.param.watch(lambda _: page.post(self._law_changed), "value")
         self.file = pn.widgets.FileInput(accept=".toml", multiple=False, width=220)
-        self.file.param.watch(lambda event: post(lambda: self._given(event.new)), "value")
+        self.file.param.watch(lambda event: page.post(lambda: self._given(event.new)), "value")
         self._buttons = pn.FlexBox(apply, back, save, margin=0)
-        self._fill()
+        self.fill()
 
     @property
     def layout(self) -> Any:
@@ -801,89 +797,92 @@ class SystemCard:
     # ------------------------------------------------------------------ fields
 
     def _rows(self) -> list[Parameter]:
-        held = self.system.parameters
-        drive = str(held.get("drive.type", "sine"))
-        rows = []
-        for row in parameters().values():
-            kinds = {"contact": self.law.value, "drive": drive}
-            of_kind = not row.kinds or kinds.get(row.section) in row.kinds
-            plain_kind = row.quantity.kind in (float, int, str, bool)
-            if (
-                of_kind
-                and plain_kind
-                and (row.section != "integration" or row.name in _INTEGRATION)
-                and row.section in _SECTIONS
-            ):
-                rows.append(row)
-        return rows
+        drive = str(self.system.parameters.get("drive.type", "sine"))
+        kinds = {"contact": self.law.value, "drive": drive}
+        return [
+            row
+            for row in parameters().values()
+            if (not row.kinds or kinds.get(row.section) in row.kinds)
+            and row.quantity.kind in (float, int, str, bool)
+            and (row.section != "integration" or row.name in _INTEGRATION)
+            and row.section in _SECTIONS
+        ]
 
-    def _fill(self) -> None:
-        """Make the fields of the system that is held."""
-        law = str(self.system.parameters.get("contact.type", "hertz"))
-        if self.law.value != law and law in self.law.options.values():
-            self.law.value = law
-        self._make_fields()
+    def fill(self, keep: bool = False) -> None:
+        """Let the fields show the system at the point that is shown; *keep* what was typed and is not used yet."""
+        typed = self._edited() if keep else {}
+        self.system, self.integration = self.page.shown_system()
+        self._law = str(self.system.parameters.get("contact.type", self.law.value))
+        if not keep:
+            self.words.object = ""
+            if self._law in self.law.options.values():
+                self.law.value = self._law
+        self._make_fields(typed)
         self._show_facts()
 
-    def _make_fields(self) -> None:
+    def _edited(self) -> dict[str, Any]:
+        return {name: each.value for name, each in self.fields.items() if each.value != self._filled[name]}
+
+    def _make_fields(self, typed: Mapping[str, Any]) -> None:
         held = dict(self.system.parameters)
         held |= {
             f"integration.{name}": value for name, value in integration_mapping(self.integration).items()
         }
-        if self.integration.cycles is None:
-            held["integration.cycles"] = self.integration.cycles_or_default
-        self.fields = {}
-        parts: list[Any] = []
-        for section, title in _SECTIONS.items():
-            own = [row for row in self._rows() if row.section == section]
-            fields = [self._field(row, held.get(row.name)) for row in own]
-            if section == "contact":
-                fields = [self.law, *fields]
-            if fields:
-                parts += [Html(_HEADING.format(title), margin=0), pn.FlexBox(*fields, margin=0)]
-        for part in parts:
-            styled(part, self.look)
-        self.box.objects = parts
+        held["integration.cycles"] = self.integration.cycles_or_default
+        rows = self._rows()
+        if [row.name for row in rows] != list(self.fields):
+            self.fields = {row.name: self._field(row) for row in rows}
+            parts: list[Any] = []
+            for section, title in _SECTIONS.items():
+                fields = [self.fields[row.name] for row in rows if row.section == section]
+                if section == "contact":
+                    fields = [self.law, *fields]
+                if fields:
+                    parts += [Html(_HEADING.format(title), margin=0), pn.FlexBox(*fields, margin=0)]
+            for part in parts:
+                styled(part, self.page.look)
+            self.box.objects = parts
+        for row in rows:
+            value = held.get(row.name)
+            is_choice = row.quantity.choices or row.quantity.kind is bool
+            self._filled[row.name] = value if is_choice else _text(value)
+            self.fields[row.name].value = typed.get(row.name, self._filled[row.name])
 
-    def _field(self, row: Parameter, value: Any) -> Any:
+    def _field(self, row: Parameter) -> Any:
         unit = "" if row.quantity.unit == "1" else f" ({row.quantity.unit})"
         name = f"{row.name.partition('.')[2].replace('_', ' ')}{unit}"
         words = f"{row.quantity.long_name}; allowed: {row.limits or 'any'}"
         common: dict[str, Any] = {"name": name, "width": 160, "description": words}
         if row.quantity.choices:
-            field = pn.widgets.Select(options=list(row.quantity.choices), value=value, **common)
-        elif row.quantity.kind is bool:
-            field = pn.widgets.Select(options={"no": False, "yes": True}, value=bool(value), **common)
-        else:
-            field = pn.widgets.TextInput(value=_text(value), placeholder=row.limits, **common)
-        self.fields[row.name] = field
-        return field
+            return pn.widgets.Select(options=list(row.quantity.choices), **common)
+        if row.quantity.kind is bool:
+            return pn.widgets.Select(options={"no": False, "yes": True}, **common)
+        return pn.widgets.TextInput(placeholder=row.limits, **common)
 
-    def sections(self) -> dict[str, dict[str, Any]]:
-        """What stands in the fields.
+    def _typed(self, name: str) -> Any:
+        """The value in a field; None if it is empty.  Refused (InputError) if it is no number, or out of range."""
+        row, value = parameters()[name], self.fields[name].value
+        if isinstance(value, str) and not row.quantity.choices:
+            if not value.strip():
+                return None
+            value = number(name, value)
+            if row.quantity.kind is int and value == int(value):
+                value = int(value)
+        return row.quantity.check(name, value)
+
+    def changed_fields(self) -> dict[str, Any]:
+        """Parameters whose fields were changed, by dotted name; of another contact law all, None for those of the old one.
 
         Raises
         ------
         InputError
             For what is no number, and for values out of range.
         """
-        found: dict[str, dict[str, Any]] = {}
-        for name, field in self.fields.items():
-            row = parameters()[name]
-            section, _, key = name.partition(".")
-            value: Any = field.value
-            if isinstance(value, str) and not row.quantity.choices:
-                if not value.strip():
-                    continue
-                value = number(name, value)
-                if row.quantity.kind is int and value == int(value):
-                    value = int(value)
-            found.setdefault(section, {})[key] = row.quantity.check(name, value)
-        found.setdefault("contact", {})["type"] = self.law.value
-        if found.get("model", {}).get("modes", 1) > MODES:
-            raise InputError(f"model.modes: a page may ask for at most {MODES}")
-        if found.get("integration", {}).get("cycles", 1) > CYCLES:
-            raise InputError(f"integration.cycles: a page may ask for at most {CYCLES}")
+        found = {name: self._typed(name) for name in self._edited()}
+        if self.law.value != self._law:
+            found |= {name: None for name in self.system.parameters if name.startswith("contact.")}
+            found |= {name: self._typed(name) for name in self.fields if name.startswith("contact.")}
+            found["contact.type"] = self.law.value
         return found
 
     # ------------------------------------------------------------------ doing
@@ -891,40 +890,34 @@ class SystemCard:
     def apply(self) -> None:
         """Use what stands in the fields from now on; refused with words, and nothing changes."""
         try:
-            sections = self.sections()
-            settings = {
-                name: value for name, value in sections.pop("integration", {}).items() if value is not None
-            }
-            kept = self.system.to_mapping()
-            sections.setdefault("drive", {})["type"] = kept.get("drive", {}).get("type", "sine")
-            if (
-                sections["drive"]["type"] != "sine"
-                or "initial_state" in kept
-                or "mass" in kept.get("model", {})
-            ):
-                raise InputError(
-                    "a system with a recorded drive, an initial state or matrices can only be changed from Python"
-                )
-            system = System.from_mapping(sections)
-            self.take(system, Integration(**settings))
+            changed = self.changed_fields()
+            card = self.page.card
+            assert card.system is not None
+            held = sections_of(card.system, card.integration)
+            self.page.use(*system_from(patched(held, changed)), changed)
         except InputError as error:
             self.refuse(str(error))
 
-    def take(self, system: System, integration: Integration) -> None:
-        """Use a system from now on."""
-        self.system, self.integration = system, integration
-        self.words.object = ""
-        self._fill()
-        self.used(system, integration)
+    def _back(self) -> None:
+        shared = self.page.shared
+        assert shared.system is not None
+        self.page.use(shared.system, shared.integration, ())
 
     def _law_changed(self) -> None:
-        if str(self.system.parameters.get("contact.type")) != self.law.value:
-            self._make_fields()
+        if self._law != self.law.value:
+            self._make_fields(self._edited())
 
     def _chosen(self, name: str) -> None:
         if name:
-            config = config_from_mapping(_PRESETS[name] | {"extends": "paper"})
-            self.take(config.system, config.integration)
+            self._open(config_from_mapping(_PRESETS[name] | {"extends": "paper"}))
+
+    def _open(self, config: Config) -> None:
+        given = {f"{section}.{name}" for section, values in config.given.items() for name in values}
+        given |= {PHYSICAL[name].parameter for name in given & PHYSICAL.keys()}
+        try:
+            self.page.use(config.system, config.integration, given)
+        except InputError as error:
+            self.refuse(str(error))
 
     def _given(self, content: bytes | None) -> None:
         if not content:
@@ -934,11 +927,9 @@ class SystemCard:
             return
 
         def done(config: Config | None, error: str) -> None:
-            self.post(
-                lambda: self.refuse(error) if config is None else self.take(config.system, config.integration)
-            )
+            self.page.post(lambda: self.refuse(error) if config is None else self._open(config))
 
-        self.jobs.run(lambda _: _uploaded_config(content), done, Token())
+        self.page.shared.jobs.run(lambda _: _uploaded_config(content), done, Token())
 
     def refuse(self, words: str) -> None:
         """Say what cannot be done."""
@@ -950,7 +941,7 @@ class SystemCard:
         except InputError as error:
             self.refuse(str(error))
             return
-        self.downloads.give("system.toml", text.encode())
+        self.page.downloads.give("system.toml", text.encode())
 
     def _show_facts(self) -> None:
         model = self.system.model
@@ -977,25 +968,6 @@ class SystemCard:
 
 def _kinds(section: str) -> list[str]:
     return sorted({kind for row in parameters().values() if row.section == section for kind in row.kinds})
-
-
-def changed_parameters(
-    before: tuple[System, Integration], after: tuple[System, Integration]
-) -> dict[str, Any]:
-    """What differs between two systems and how they are integrated: new values by dotted name."""
-    found: dict[str, Any] = {}
-    old, new = plain(before[0].to_mapping()), plain(after[0].to_mapping())
-    for section, values in new.items():
-        for name, value in values.items():
-            before_it: Any = old.get(section, {}).get(name)
-            if not np.array_equal(before_it, value):
-                found[f"{section}.{name}"] = value
-    one, other = (integration_mapping(each[1]) for each in (before, after))
-    for name, value in other.items():
-        cycles = name == "cycles" and before[1].cycles_or_default == after[1].cycles_or_default
-        if one[name] != value and name not in ("engine",) and not cycles:
-            found[f"integration.{name}"] = value
-    return found
 
 
 def _text(value: Any) -> str:
@@ -1103,16 +1075,13 @@ class TakeCard:
             parts.append(Markup('<h2>The same in Python</h2><pre class="python">{}</pre>').format(text))
         window = self._window()
         if window is not None:
-            axes = {
-                name: (float(values[0]), float(values[-1]), int(values.size))
-                for name, values in zip(window.names, (window.x, window.y), strict=True)
-            }
-            if not any(window.log):
-                parts.append(
-                    Markup(
-                        '<h2>The command that makes the finest window</h2><pre class="map-command">{}</pre>'
-                    ).format(map_command(axes, {}))
-                )
+            command = map_command(window, page.card.plane.fixed_values())
+            parts.append(
+                Markup(
+                    "<h2>The command that makes the finest window (with the system saved as system.toml beside it)</h2>"
+                    '<pre class="map-command">{}</pre>'
+                ).format(command)
+            )
         self.text.object = Markup("").join(parts) or _NOTE.format("Click on a point of the map first.")
 
     def _window(self) -> Any:

@@ -9,7 +9,7 @@ import pprint
 import shlex
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,8 +28,8 @@ from snapbeam import (
     System,
     sweep,
 )
-from snapbeam.explorer.jobs import WINDOW_POINTS, Jobs, Token
-from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis
+from snapbeam.explorer.jobs import WINDOW_POINTS, Jobs, Token, check_run
+from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, to_physical
 from snapbeam.model.parameter_file import config_from_mapping, config_text
 from snapbeam.plot.axes import edges_of, is_geometric, positions
 from snapbeam.sweeps.points import ratios_of
@@ -55,6 +55,8 @@ __all__ = [
     "chances",
     "compared",
     "compute",
+    "difference",
+    "drawn_shares",
     "integration_of",
     "known_cells",
     "layers_of",
@@ -62,14 +64,19 @@ __all__ = [
     "opened",
     "parameter_dims",
     "parameter_name",
+    "parameter_of",
+    "patched",
     "picture",
     "plain",
     "plain_symbol",
     "planned",
     "python_lines",
     "run_command",
+    "sections_of",
+    "system_from",
     "system_of",
     "system_toml",
+    "values_of",
     "visible_strides",
 ]
 
@@ -326,11 +333,24 @@ class DatasetSource(Source):
     """A map in memory."""
 
     def __init__(self, dataset: xr.Dataset, name: str = "map") -> None:
-        if not parameter_dims(dataset) or not layers_of(dataset):
-            known = ", ".join(map(str, dataset.data_vars)) or "none"
-            raise InputError(f"{name}: is no map; it has no variable over swept parameters among {known}")
+        if not layers_of(dataset) or len(_axes_of(dataset)) < 2:
+            raise InputError(f"{name}: {_other_kind(dataset)}")
         self.skeleton = dataset
         self.name = name
+
+
+def _other_kind(dataset: xr.Dataset) -> str:
+    """Say of a dataset that is not a map which kind of result it is."""
+    from snapbeam.plot.dataset import figures_of
+
+    try:
+        kind, _ = figures_of(dataset)
+    except (InputError, ValueError, KeyError, IndexError, TypeError):
+        known = ", ".join(map(str, dataset.data_vars)) or "none"
+        return f"must be a map; it has no variable over swept parameters among {known}"
+    if kind == "map":
+        return "must be a map over parameters; neither its axes nor its coordinates name two of them"
+    return f"must be a map, and is a {kind}; draw it with snapbeam plot, or ds.snapbeam.plot()"
 
 
 class SystemSource(Source):
@@ -1303,13 +1323,60 @@ def visible_strides(windows: list[Window], plane: Plane | None) -> list[NDArray[
     return [stride for _, stride in drawn]
 
 
+def drawn_shares(
+    plane: Plane,
+    kinds: NDArray[Any] | None,
+    drawn: list[tuple[Window, NDArray[np.int8]]],
+    view: tuple[float, float, float, float],
+    pixels: tuple[int, int],
+) -> dict[int, float]:
+    """Share that each class has of the area of a view with a map (*kinds*, of shape (y, x), or None) and windows over it."""
+    none = np.iinfo(np.int16).min
+    where: list[NDArray[np.int64]] = []
+    cells: list[list[NDArray[np.int64]]] = []
+    areas: list[_Array] = []
+    for side, axis in enumerate((plane.x, plane.y)):
+        first, last = _scaled(view[2 * side : 2 * side + 2], axis.log)
+        own = _scaled(axis.edges, axis.log)
+        spans = [_scaled(window.bounds[2 * side : 2 * side + 2], axis.log) for window, _ in drawn]
+        sizes = [(window.x, window.y)[side].size for window, _ in drawn]
+        parts = [np.linspace(a, b, size + 1) for (a, b), size in zip(spans, sizes, strict=True)]
+        edges = np.unique(np.clip(np.concatenate([own, *parts, [first, last]]), first, last))
+        if edges.size > 2 * pixels[side]:  # more of them than the screen shows
+            edges = np.linspace(first, last, pixels[side] + 1)
+        middles = 0.5 * (edges[1:] + edges[:-1])
+        areas.append(np.diff(edges))
+        where.append(np.searchsorted(own, middles, side="right").astype(np.int64) - 1)
+        cells.append([
+            np.floor((middles - a) / (b - a) * size).astype(np.int64)
+            for (a, b), size in zip(spans, sizes, strict=True)
+        ])  # fmt: skip
+    shown = np.full((where[1].size, where[0].size), none, dtype=np.int16)
+    pictures: list[tuple[NDArray[Any], NDArray[Any], NDArray[np.int64], NDArray[np.int64]]] = []
+    if kinds is not None:
+        pictures.append((kinds, np.ones_like(kinds), where[0], where[1]))
+    for at, (window, stride) in enumerate(drawn):
+        pictures.append((window.values["response_class"], stride, cells[0][at], cells[1][at]))
+    for values, stride, columns, rows in pictures:
+        height, width = stride.shape
+        across = np.flatnonzero((columns >= 0) & (columns < width))
+        upward = np.flatnonzero((rows >= 0) & (rows < height))
+        part, there = np.ix_(upward, across), np.ix_(rows[upward], columns[across])
+        shown[part] = np.where(stride[there] > 0, values[there], shown[part])
+    area = np.outer(areas[1], areas[0])
+    whole = float(area[shown != none].sum())
+    return {int(kind): float(area[shown == kind].sum()) / whole for kind in np.unique(shown) if kind != none}
+
+
 def _middle(at: int, stride: int) -> int:
     return at // stride * stride + stride // 2
 
 
 def _spread(low: float, high: float, cells: int, log: bool) -> _Array:
     share = (np.arange(cells) + 0.5) / cells
-    return np.exp(np.log(low) + share * np.log(high / low)) if log else low + share * (high - low)
+    if log:
+        return np.exp(np.log(low) + share * np.log(high / low))
+    return np.linspace(low + share[0] * (high - low), low + share[-1] * (high - low), cells)
 
 
 def planned(
@@ -1487,11 +1554,60 @@ def _integration_section(integration: Integration) -> dict[str, Any]:
 
 def system_toml(system: System, integration: Integration, comment: str = "") -> str:
     """A parameter file of a system, which ``--config`` reads back equal."""
-    sections = plain(system.to_mapping())
-    settings = _integration_section(integration)
-    return config_text(
-        config_from_mapping(sections | ({"integration": settings} if settings else {})), comment
-    )
+    return config_text(config_from_mapping(sections_of(system, integration)), comment)
+
+
+def sections_of(system: System, integration: Integration) -> dict[str, dict[str, Any]]:
+    """A system and how it is integrated, as a parameter file holds them."""
+    found = plain(system.to_mapping()) | {"integration": _integration_section(integration)}
+    return {section: values for section, values in found.items() if values}
+
+
+def system_from(sections: Mapping[str, Any], name: str = "sections") -> tuple[System, Integration]:
+    """The system and the integration of a parameter file; refused (InputError) if a page may not ask for them."""
+    own = dict(sections)
+    start = own.pop("initial_state", None)  # in the units of a system, not in those of a parameter file
+    config = config_from_mapping(own, name)
+    system, integration = config.system, config.integration
+    if start is not None:
+        system = System.from_mapping(system.to_mapping() | {"initial_state": start})
+    check_run(system, integration)
+    return system, integration
+
+
+def difference(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of *after* that differ, by dotted name; None for a parameter, or a section, that only *before* has."""
+    found: dict[str, Any] = {section: None for section in before if section not in after}
+    for section, values in after.items():
+        old = before.get(section, {})
+        names = [name for name in dict.fromkeys([*old, *values]) if old.get(name) != values.get(name)]
+        found |= {f"{section}.{name}": values.get(name) for name in names}
+    return found
+
+
+def patched(sections: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Sections with a :func:`difference`: ``patched(before, difference(before, after)) == after``."""
+    found = {section: dict(values) for section, values in sections.items()}
+    for name, value in changes.items():
+        section, dot, key = name.partition(".")
+        if not dot:
+            found.pop(section, None)
+        elif value is None:
+            found.get(section, {}).pop(key, None)
+        else:
+            found.setdefault(section, {})[key] = value
+    return {section: values for section, values in found.items() if values}
+
+
+def values_of(names: Iterable[str], system: System, integration: Integration) -> dict[str, Any]:
+    """The values of some parameters, also in physical units, by dotted name; without those that a system has not."""
+    held = dict(system.parameters) | {"integration.cycles": integration.cycles_or_default}
+    found = {}
+    for name in names:
+        value = held.get(PHYSICAL[name].parameter if name in PHYSICAL else name)
+        if value is not None:
+            found[name] = float(to_physical(system, name, value)) if name in PHYSICAL else value
+    return found
 
 
 def _value(value: Any) -> str:
@@ -1510,13 +1626,16 @@ def run_command(values: Mapping[str, Any], file: str, on_map: bool) -> str:
     return shlex.join(["snapbeam", "simulate", *source, "-o", "run.nc", "--plot", "run.png"])
 
 
-def map_command(axes: Mapping[str, tuple[float, float, int]], fixed: Mapping[str, Any]) -> str:
-    """The command that computes a window on even axes, of a parameter file kept beside it."""
+def map_command(window: Window, fixed: Mapping[str, Any]) -> str:
+    """The command that computes a window, on the cut at *fixed*, of a parameter file kept beside it."""
     parts = ["snapbeam", "map", "--config", _CONFIG]
     for name, value in fixed.items():
         parts += ["--set", f"{name}={_value(value)}"]
-    for name, (first, last, count) in axes.items():
-        parts += ["--sweep", f"{name}={first!r}:{last!r}:{count}"]
+    for name, values in zip(window.names, (window.x, window.y), strict=True):
+        first, last, count = float(values[0]), float(values[-1]), values.size
+        even = np.array_equal(np.linspace(first, last, count), values)
+        text = f"{first!r}:{last!r}:{count}" if even else ",".join(map(repr, values.tolist()))
+        parts += ["--sweep", f"{name}={text}"]
     return shlex.join([*parts, "-o", "window.nc", "--plot", "window.png"])
 
 

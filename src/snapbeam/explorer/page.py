@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 from urllib.parse import parse_qs
@@ -18,13 +18,23 @@ from numpy.typing import NDArray
 import snapbeam as sb
 from snapbeam import InputError, Integration, Run, RunStatus, System
 from snapbeam.explorer.address import Address, number
-from snapbeam.explorer.cards import MapCard, SystemCard, TakeCard, changed_parameters
-from snapbeam.explorer.jobs import RUN_SECONDS, Downloads, Token, Waiting, check_run, samples_of, too_large
-from snapbeam.explorer.maps import Point, compared
+from snapbeam.explorer.cards import MapCard, SystemCard, TakeCard
+from snapbeam.explorer.jobs import (
+    ADDRESS,
+    RUN_SECONDS,
+    Downloads,
+    Token,
+    Waiting,
+    check_run,
+    samples_of,
+    too_large,
+)
+from snapbeam.explorer.maps import Point, compared, difference, patched, sections_of, system_from, values_of
 from snapbeam.explorer.maps import chances as chances_of
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.style import Html, Look, framed, look_of, styled
+from snapbeam.model.parameter_axes import PHYSICAL
 
 __all__ = ["Answer", "Page", "answer"]
 
@@ -126,6 +136,7 @@ class Page:
         self.card = MapCard(self.look, shared, self.address, self.post, self.later)
         self.card.asked = self.ask
         self.card.moved = self.write_address
+        self.card.cut_moved = self._cut_moved
         self.waiting = Waiting(shared.compiling, self.later)
         self.runs = [RunView(self.look, "A", self.post, self.later)]
         self.runs[0].turned = self.write_address
@@ -163,7 +174,8 @@ class Page:
         self._system: SystemCard | None = None
         self.layout = framed(self)
         self._version = shared.source.version
-        self._begin()
+        if self.address.changes:
+            self._take_changes(self.address.changes)
         pn.state.onload(self._stands)
 
     def _stands(self) -> None:
@@ -187,17 +199,17 @@ class Page:
     def system_card(self) -> SystemCard:
         """The card of the system, made when it is first needed."""
         if self._system is None:
-            assert self.shared.system is not None
-            self._system = SystemCard(
-                self.shared.system,
-                self.shared.integration,
-                self.post,
-                self.downloads,
-                self.look,
-                self.shared.jobs,
-            )
-            self._system.used = self._use
+            self._system = SystemCard(self)
         return self._system
+
+    def shown_system(self) -> tuple[System, Integration]:
+        """The system and the integration at the point that is shown; without a point, on the cut."""
+        assert self.card.system is not None
+        point = self.points[self.which] or Point(self.card.plane.fixed_values())
+        try:
+            return point.system(self.card.system, self.card.integration)
+        except InputError:  # a point that the system cannot have
+            return self.card.system, self.card.integration
 
     def take_card(self) -> TakeCard:
         """The card of what can be taken away, made when it is first needed."""
@@ -262,37 +274,23 @@ class Page:
             styled(part, self.look)
         self.card.typed.objects = [*parts, self.go]
 
-    def _begin(self) -> None:
-        """Take the system that the address names."""
-        if self.address.changes:
-            self._take_changes(self.address.changes)
-
     def _take_changes(self, changes: Mapping[str, Any]) -> None:
-        """Compute with the map's system with some parameters changed."""
-        if self.shared.system is None:
-            return
+        """Compute with the map's system with the changes of an address."""
         try:
-            settings = {
-                key.partition(".")[2]: item for key, item in changes.items() if key.startswith("integration.")
-            }
-            own = {key: item for key, item in changes.items() if not key.startswith("integration.")}
-            system, how = self.shared.system.replace(**own), self.shared.integration.replace(**settings)
-            check_run(system, how)
-            self.system_card().take(system, how)
+            self._adopt(changes)
         except InputError as error:
             self.card.say(f"address, set: {error}")
 
-    def _show_runs(self, address: Address) -> None:
-        """Show the points, the view of the run and the card of an address."""
+    def _show_runs(self, address: Address, again: bool = False) -> None:
+        """Show the points, the view of the run and the card of an address; compute them *again* of another system."""
         names = set(self.card.plane.parameters)
         self.compare.value = bool(address.b)
         self._compared()
         for which, at in ((0, address.at), (1, address.b)):
             values = {name: at[name] for name in at if name in names} if names <= at.keys() else {}
             point = self.points[which]
-            if values and (point is None or point.values != values):
-                self.target.value = "AB"[which]
-                self.ask(Point(values))
+            if values and (again or point is None or point.values != values):
+                self.ask(Point(values), which)
             elif not values and point is not None:
                 self._forget(which)
         self.target.value = "B" if address.b else "A"
@@ -311,10 +309,11 @@ class Page:
         })  # fmt: skip
         self._quiet = True
         with self._together():
-            if dict(address.changes) != self.changes:
+            again = dict(address.changes) != self.changes
+            if again:
                 self._take_changes(address.changes)
             self.card.restore(address)
-            self._show_runs(address)
+            self._show_runs(address, again)
         self._quiet, self._written = False, self._search()
 
     def _forget(self, which: int) -> None:
@@ -354,9 +353,9 @@ class Page:
         """Which of the two runs is asked for."""
         return 1 if self.compare.value and self.target.value == "B" else 0
 
-    def ask(self, point: Point) -> None:
+    def ask(self, point: Point, which: int | None = None) -> None:
         """Compute the run of a point; what was asked for before is not wanted any more."""
-        which = self.which
+        which = self.which if which is None else which
         view, words = self.runs[which], point.words()
         if self.card.system is None:
             self._fill_fields(point)
@@ -386,6 +385,12 @@ class Page:
             self.card.select(point)
             self._mark()
             self.write_address()
+
+    def _cut_moved(self, cut: dict[str, Any]) -> None:
+        """Let the point that the fields hold follow the sliders."""
+        point = self.points[self.which]
+        if point is not None and point.values | cut != point.values:
+            self.ask(Point(point.values | cut))
 
     def _first(self, which: int, point: Point, token: Token, run: Run) -> None:
         """Show a first look, asked on a thread of the server, and wait until it is on its way to the browser."""
@@ -429,22 +434,48 @@ class Page:
 
         self.shared.jobs.run(lambda t: conditioned(run, t), done, token)
 
-    def _use(self, system: System, integration: Integration) -> None:
-        """Compute with another system from now on, and say what is old."""
+    def use(self, system: System, integration: Integration, given: Collection[str]) -> None:
+        """Compute with another system from now on; the point moves to those of the *given* parameters that the map sweeps.
+
+        Raises
+        ------
+        InputError
+            If a page may not ask for it.
+        """
         assert self.shared.system is not None
-        self.changes = changed_parameters(
-            (self.shared.system, self.shared.integration), (system, integration)
-        )
-        self.card.use(system, integration, bool(self.changes))
-        names = ", ".join(f"{name} = {_brief(value)}" for name, value in list(self.changes.items())[:6])
-        old = f"The map is old: it is of the system before. Changed: {names}" if self.changes else ""
-        if not self.shared.source.skeleton.data_vars:
-            old = f"Changed: {names}" if self.changes else ""
-        self.old.object = Markup('<p class="old" role="status">{}</p>').format(old) if old else ""
-        for view, point in zip(self.runs, self.points, strict=False):
-            if view.run is not None and point is not None:
-                view.say("old", "old: of the system before; run it again to see the changed one", bad=True)
+        swept = {
+            name: PHYSICAL[name].parameter if name in PHYSICAL else name
+            for name in self.card.plane.parameters
+        }
+        before = sections_of(self.shared.system, self.shared.integration)
+        found = difference(before, sections_of(system, integration))
+        self._adopt({name: value for name, value in found.items() if name not in swept.values()})
+        held, own = self.points[self.which], values_of(swept, system, integration)
+        moved = {name: value for name, value in own.items() if swept[name] in given}
+        if moved:
+            self.points[self.which] = Point({**own, **(held.values if held else {}), **moved})
+        for which in sorted({0, 1}, key=lambda each: each == self.which):
+            point = self.points[which]
+            if point is not None:
+                self.ask(Point(point.values), which)
         self.write_address()
+
+    def _adopt(self, changes: Mapping[str, Any]) -> None:
+        """Take the map's system with some parameters changed, and say whether the map is old."""
+        if self.shared.system is None:
+            return
+        system, integration = self.shared.system, self.shared.integration
+        if changes:
+            system, integration = system_from(patched(sections_of(system, integration), changes))
+        self.changes = dict(changes)
+        self.card.use(system, integration, bool(changes))
+        names = ", ".join(f"{name} = {_brief(value)}" for name, value in list(changes.items())[:6])
+        old = f"The map is old: it is of the system before. Changed: {names}" if changes else ""
+        if not self.shared.source.skeleton.data_vars:
+            old = f"Changed: {names}" if changes else ""
+        self.old.object = Markup('<p class="old" role="status">{}</p>').format(old) if old else ""
+        if self._system is not None:
+            self._system.fill()
 
     def _mark(self) -> None:
         names = ("A", "B") if self.compare.value else ("",)
@@ -485,6 +516,8 @@ class Page:
             if name in self.fields:
                 self.fields[name].value = repr(value) if isinstance(value, float) else str(value)
                 self.errors[name].object = ""
+        if self._system is not None:
+            self._system.fill(keep=True)
 
     def _ask_typed(self) -> None:
         from snapbeam.model.parameter_axes import parameter_of_axis
@@ -533,7 +566,9 @@ class Page:
     def write_address(self) -> None:
         """Write what is shown into the address: a step in the history of the browser."""
         search = "" if self._quiet else self._search()
-        if search and search != self._written:
+        if len(search) > ADDRESS:
+            self.card.tell("the system is too long for an address: save it as TOML to open it again")
+        elif search and search != self._written:
             self.bar.data = {
                 "search": [search],
                 "step": [self.bar.data["step"][0] + 1 if self._written else 0],
@@ -547,10 +582,10 @@ class Page:
         view = None if card.view.is_whole else card.view.view
         tab, shown = self.runs[0].tabs.active, 0 if self.cards is None else self.cards.active
         return Address(
-            card.x.value, card.y.value, card.show.value, at, b if self.compare.value else {}, view, self.changes,
+            card.x.value, card.y.value, card.show.value, card.cut(), at, b if self.compare.value else {}, view, self.changes,
             self.address.theme, self.address.type, self.runs[0].parts[tab].title if tab else "", self.card_names[shown] if shown else "",
         ).write()  # fmt: skip
 
 
 def _brief(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    return "none" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
