@@ -74,12 +74,14 @@ def test_a_plastic_landing_is_one_impact(one_mode):
     apart = impacts.onset.values[1:] - (impacts.onset + impacts.duration).values[:-1]
     assert apart.size >= 3
     assert apart.min() > 1e-6  # s
-    for impact in impacts.to_dataframe().itertuples():
-        during = (force.time >= impact.onset) & (force.time <= impact.onset + impact.duration)
-        pushed = np.trapezoid(force.values[during], force.time.values[during])
-        assert impact.impulse > pushed * (1.0 - 1e-3)  # the landing adds to it
-        assert impact.peak_force >= force.values[during].max() * (1.0 - 1e-6)
-    assert run.summary.impulse == pytest.approx(impacts.impulse.sum(), rel=1e-12)
+    time = force.time.values
+    columns = (impacts[name].values for name in ("onset", "duration", "peak_force", "impulse"))
+    for onset, duration, peak, impulse in zip(*columns, strict=True):
+        during = (time >= onset) & (time <= onset + duration)
+        pushed = np.trapezoid(force.values[during], time[during])
+        assert impulse > pushed * (1.0 - 1e-3)  # the landing adds to it
+        assert peak >= force.values[during].max() * (1.0 - 1e-6)
+    assert run.summary.impulse == pytest.approx(float(impacts.impulse.sum()), rel=1e-12)
 
 
 def test_a_plastic_landing_that_nothing_presses_is_one_impact():

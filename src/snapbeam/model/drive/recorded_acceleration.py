@@ -132,12 +132,14 @@ class RecordedAcceleration(Timed):
     def drift(self) -> float:
         """Range of the parabola through the displacement that an offset of the acceleration leaves, m; 0 without one.
 
-        An offset a leaves a T^2/8 over a record of T.  A shock, whose mean is no offset, has a median of zero.
+        An offset a leaves a T^2/8 over a record of T, and is in the median of every quarter of it.  A shock, whose mean is
+        no offset, has medians of zero, and those of noise differ in sign.
         """
         moved = self._rows[:, 3]
         times = np.linspace(-1.0, 1.0, moved.size)
         drift = float(np.ptp(np.polynomial.Polynomial.fit(times, moved, 2)(times)))
-        of_offset = abs(float(np.median(self.record))) * self.duration**2 / 8.0
+        medians = [float(np.median(part)) for part in np.array_split(self.record, 4)]
+        of_offset = max(min(medians), -max(medians), 0.0) * self.duration**2 / 8.0
         return drift if drift > 0.5 * float(np.ptp(moved)) and of_offset > 0.5 * drift else 0.0
 
     def samples(self) -> _Array:
