@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from snapbeam._version import __version__
 from snapbeam.util.files import VERSION, NoRoomError, atomic_path, check_writable
+from snapbeam.util.input_files import refuse_inflated
 from snapbeam.util.validation import InputError, file_path, instance, mapping
 
 if TYPE_CHECKING:
@@ -36,16 +37,11 @@ __all__ = [
 ]
 
 
-_MEMORY = 4 * 2**30
 _MOST_TEXTS = 100_000
-_COMPRESSED = 20
-"""Bytes in memory for each byte on the disk, beyond which a large file is refused."""
 
 
 def refuse_large(path: str | os.PathLike[str], name: str = "path") -> None:
     """Refuse an HDF5 file whose contents fill the memory although the file is small.
-
-    Fill values and compression can turn a file of some kilobytes into any size.
 
     Parameters
     ----------
@@ -56,7 +52,7 @@ def refuse_large(path: str | os.PathLike[str], name: str = "path") -> None:
     Raises
     ------
     InputError
-        If the numbers need more than 4 GiB and more than twenty times the file, or there are more than 100,000 texts.
+        For content that :func:`~snapbeam.util.input_files.refuse_inflated` refuses, and for more than 100,000 texts.
     """
     import h5py
 
@@ -71,13 +67,7 @@ def refuse_large(path: str | os.PathLike[str], name: str = "path") -> None:
 
     with h5py.File(path, "r") as file:
         file.visititems(add)
-    found = os.stat(path)
-    stored = min(found.st_size, getattr(found, "st_blocks", found.st_size) * 512)
-    if size > max(_MEMORY, _COMPRESSED * stored):
-        raise InputError(
-            f"{name} = {str(path)!r}: would take {size / 2**30:.3g} GiB of memory, from {stored / 1e6:.3g} MB on the "
-            f"disk: must be at most {_MEMORY / 2**30:.0f} GiB, or {_COMPRESSED} times the file"
-        )
+    refuse_inflated(name, path, size)
     if texts > _MOST_TEXTS:
         raise InputError(f"{name} = {str(path)!r}: has {texts} texts: must be at most {_MOST_TEXTS}")
 
