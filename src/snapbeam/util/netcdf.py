@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from snapbeam._version import __version__
-from snapbeam.util.files import VERSION, NoRoomError, atomic_path, check_writable
+from snapbeam.util.files import REQUEST, VERSION, NoRoomError, atomic_path, check_writable, request_hash
 from snapbeam.util.input_files import refuse_inflated
 from snapbeam.util.validation import InputError, file_path, instance, mapping
 
@@ -195,6 +195,8 @@ def netcdf_file(path: str | os.PathLike[str]) -> Iterator[h5netcdf.File]:
             yield file
             if VERSION not in file.attrs:
                 file.attrs[VERSION] = __version__
+            if (request := request_hash()) is not None:
+                file.attrs[REQUEST] = request
 
 
 @contextmanager
