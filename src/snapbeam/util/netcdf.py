@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from snapbeam._version import __version__
 from snapbeam.util.files import REQUEST, VERSION, NoRoomError, atomic_path, check_writable, request_hash
 from snapbeam.util.input_files import refuse_inflated
+from snapbeam.util.interrupts import held_back, raise_held
 from snapbeam.util.validation import InputError, file_path, instance, mapping
 
 if TYPE_CHECKING:
@@ -178,6 +179,7 @@ def write_netcdf(
     settings = mapping("encoding", {} if encoding is None else encoding)
     with netcdf_file(target) as file:
         for name, dataset in groups.items():
+            raise_held()
             group = None if name is None else file.create_group(name)
             store = H5NetCDFStore(file if group is None else group)
             dataset.dump_to_store(
@@ -187,10 +189,13 @@ def write_netcdf(
 
 @contextmanager
 def netcdf_file(path: str | os.PathLike[str]) -> Iterator[h5netcdf.File]:
-    """Give a NetCDF file to write to, which is put at *path* if all went well; errors as of :func:`write_netcdf`."""
+    """Give a NetCDF file to write to, which is put at *path* if all went well; errors as of :func:`write_netcdf`.
+
+    Signals are held back in the block, apart from calls of :func:`~snapbeam.util.interrupts.raise_held`.
+    """
     import h5netcdf
 
-    with atomic_path(path) as temporary, hdf5_stream(temporary, Path(path)) as stream:
+    with held_back(), atomic_path(path) as temporary, hdf5_stream(temporary, Path(path)) as stream:
         with h5netcdf.File(stream, "w", invalid_netcdf=False) as file:
             yield file
             if VERSION not in file.attrs:
@@ -205,7 +210,8 @@ def hdf5_stream(path: Path, target: Path | None = None) -> Iterator[io.RawIOBase
 
     *target* is the name to tell in errors, those of :func:`write_netcdf`.
     """
-    with _Stream(path) as stream:
+    with held_back() as incomplete, _Stream(path) as stream:
+        incomplete.add(path)
         yield stream
         stream.settle()
     if stream.trouble is not None:
