@@ -33,3 +33,15 @@ def test_two_well_limits_of_a_model_without_an_imperfection():
     straight = sb.ReducedModel.from_beam(default_values.BEAM.replace(axial_load=0.0), modes=1)
     with pytest.raises(sb.InputError, match="this model has no imperfection"):
         _ = straight.two_well_limits
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("ratio", [1e308, 1e300, 1e-320])
+def test_frequencies_whose_periods_are_not_numbers(ratio):
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
+    shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=0.1)
+    system = sb.System(model, default_values.CONTACT, shaker)
+    with pytest.raises(sb.InputError, match=r"drive: a period of .* s: must be at least 1e-300 s and finite"):
+        sb.simulate(system, sb.Integration(cycles=1))
+    with pytest.raises(sb.InputError, match=r"a period of|must be a number"):
+        sb.sweep(system, {"drive.frequency_ratio": [ratio / 2.0, ratio]}, sb.Integration(cycles=1))
