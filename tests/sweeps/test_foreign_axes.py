@@ -35,7 +35,7 @@ def test_two_well_limits_of_a_model_without_an_imperfection():
         _ = straight.two_well_limits
 
 
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("ratio", [1e308, 1e300, 1e-320])
 def test_frequencies_whose_periods_are_not_numbers(ratio):
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
