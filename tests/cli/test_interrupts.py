@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -79,6 +80,39 @@ def test_while_points_are_computed(tmp_path, number):
     process.send_signal(number)
     _, messages = process.communicate(timeout=600)
     assert process.returncode == 128 + number
+    assert messages.splitlines()[-1] == SENTENCE and "Traceback" not in messages
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("delay", [0.0, 0.1, 0.5, 2.0])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "run",
+    [
+        ("--stream", "--modes", "8", "--cycles", "100000"),
+        ("--stream", "--modes", "32", "--cycles", "4000000"),
+        ("--modes", "1", "--cycles", "15000"),
+    ],
+    ids=["streamed", "800 million instants", "saved"],
+)
+def test_while_a_file_is_written(tmp_path, run, number, delay):
+    """HDF5 calls back into Python, where an exception is lost or ends the process; also in one long call of NumPy."""
+    command = [sys.executable, "-m", "snapbeam", "simulate", *run, "-o", "st.nc"]
+    out = subprocess.DEVNULL
+    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=out, text=True)
+    while not os.listdir(tmp_path):
+        assert process.poll() is None
+        time.sleep(0.005)
+    time.sleep(delay)
+    if process.poll() is None:
+        process.send_signal(number)
+    began = time.monotonic()
+    _, messages = process.communicate(timeout=600)
+    if os.listdir(tmp_path) == ["st.nc"]:  # it was written before the signal was heard
+        assert delay > 0.0
+        return
+    assert process.returncode == 128 + number and time.monotonic() - began < 1.0
     assert messages.splitlines()[-1] == SENTENCE and "Traceback" not in messages
     assert os.listdir(tmp_path) == []
 

@@ -238,7 +238,7 @@ def test_hdf5_files_that_fill_the_memory(tmp_path, at_most, tried, make):
 
 def test_the_limit_follows_the_size_of_the_file(tmp_path, monkeypatch):
     """Stored numbers are read however many they are."""
-    monkeypatch.setattr("snapbeam.util.netcdf._MEMORY", 1000)
+    monkeypatch.setattr("snapbeam.util.input_files.LARGEST_CONTENT", 1000)
     system = sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=1), default_values.CONTACT,
         sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3),

@@ -5,10 +5,12 @@ from __future__ import annotations
 import importlib.util
 import os
 import random
+import subprocess
+import sys
 
 import pytest
 
-from snapbeam.solver.compilation import private_folder
+from snapbeam.solver.compilation import is_private, private_folder
 
 RUN = """
 import snapbeam as sb
@@ -149,6 +151,89 @@ def test_a_private_folder_that_is_somebody_elses_is_not_used(tmp_path, monkeypat
     os.symlink(tmp_path, folder)
     with pytest.raises(PermissionError):
         private_folder()
+
+
+PLANTED = """
+import os, sys
+from snapbeam.solver.compilation import _CheckedFiles
+
+class Planted:
+    def __reduce__(self):
+        return os.mkdir, (sys.argv[1],)
+
+for folder, _, names in os.walk(os.environ["NUMBA_CACHE_DIR"]):
+    for name in names:
+        path = os.path.join(folder, name)
+        file = _CheckedFiles(folder, "x", None)
+        file._write(path, file._dump(Planted()))
+        assert file._read(path)
+"""
+"""Files with a right check sum that make a folder when they are loaded."""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no access bits")
+@pytest.mark.parametrize("fault", ["foreign", "writable", "writable above", "group"])
+def test_code_that_others_planted_is_not_executed(tmp_path, tried, fault):
+    """In a folder that NUMBA_CACHE_DIR names, whoever named it."""
+    place, temporary, proof = tmp_path / "cache", tmp_path / "temporary", tmp_path / "executed"
+    place.mkdir()
+    temporary.mkdir()
+    given = {"NUMBA_CACHE_DIR": str(place), "TMPDIR": str(temporary)}
+    code = tmp_path / "code"
+    code.mkdir()
+    (code / "small.py").write_text(SMALL, encoding="utf-8")
+    run = "import sys; sys.path.insert(0, sys.argv[1]); import small"
+    command = [sys.executable, "-c", run, str(code)]
+    environment = os.environ | given
+
+    def started():
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        return done.stdout.split()[-1], done.stderr
+
+    assert started() == ("compiled", "") and started() == ("loaded", "")
+    subprocess.run([sys.executable, "-c", PLANTED, str(proof)], env=environment, check=True)
+    (kept,) = place.iterdir()
+    if fault == "writable above":
+        place.chmod(0o777)
+    elif fault == "writable":
+        kept.chmod(0o777)
+    elif os.getuid() != 0:
+        pytest.skip("only the administrator gives files to others")
+    elif fault == "foreign":
+        os.chown(kept, 12345, 12345)
+    else:
+        os.chown(kept, 0, 12345)
+        kept.chmod(0o775)
+    result, said = started()
+    assert result == "compiled" and f"others can write to {kept}" in said and not proof.exists()
+    assert started()[0] == "loaded" and not proof.exists()
+    assert len(list(temporary.iterdir())) == 1
+    tried("planted files of compiled code")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no access bits")
+def test_folders_of_this_user(tmp_path):
+    own = tmp_path / "a" / "b"
+    own.mkdir(parents=True)
+    assert is_private(own)
+    own.chmod(0o775)
+    assert is_private(own)  # of this user's own group
+    own.chmod(0o777)
+    assert not is_private(own)
+    own.chmod(0o1777)
+    assert not is_private(own)
+    own.chmod(0o755)
+    own.parent.chmod(0o777)
+    assert not is_private(own)
+    own.parent.chmod(0o1777)
+    assert is_private(own)
+    if os.getuid() == 0:
+        os.chown(own, 12345, 0)
+        assert not is_private(own)
+        source = tmp_path / "source.py"
+        source.touch()
+        os.chown(source, 12345, 0)
+        assert is_private(own, source)
 
 
 @pytest.mark.slow

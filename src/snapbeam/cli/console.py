@@ -11,7 +11,7 @@ import math
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -97,7 +97,7 @@ _QUIET = Annotated[
 _FORCE = Annotated[
     bool,
     typer.Option(
-        "--force", help="Overwrite files that snapbeam did not write, and input files.", rich_help_panel="Output"
+        "--force", help="Overwrite files that snapbeam did not write, input files, and results of other parameters.", rich_help_panel="Output"
     ),
 ]  # fmt: skip
 
@@ -196,8 +196,13 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
 
     @functools.wraps(command)
     def guarded(*args: _P.args, **kwargs: _P.kwargs) -> _R:
-        named = _named(kwargs.values())
-        kept = nullcontext() if kwargs.pop("force", False) else foreign_files_kept(named)
+        context: Any = kwargs.pop("context")
+        kept = foreign_files_kept(
+            _named(kwargs.values()),
+            defaults=_defaults(kwargs, context),
+            request={name: value for name, value in kwargs.items() if name not in _NO_PARAMETERS},
+            force=bool(kwargs.pop("force", False)),
+        )
         kwargs.pop("help_all", None)
         quiet, path = bool(kwargs.pop("quiet", False)), kwargs.pop("json", None)
         asked = _OutputOptions(quiet, path if isinstance(path, Path) else None)
@@ -232,11 +237,28 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
         for name, kind in (("quiet", _QUIET), ("force", _FORCE), ("help_all", _HELP_ALL))
     ]
+    more.append(inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context))
     more.append(inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_JSON))
     mine = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values()]
     guarded.__signature__ = inspect.Signature(mine + more)  # type: ignore[attr-defined]
     guarded.__annotations__ = {}
     return guarded
+
+
+_NO_PARAMETERS = frozenset(
+    "output plot variable measurements quasi_static_line statistic picture frame report video video_every figure json "
+    "quiet force help_all threads yes estimate_cost checkpoint check_checkpoint cluster points_per_task log".split()
+)
+"""Arguments of commands that do not change the numbers of a result."""
+
+
+def _defaults(arguments: Mapping[str, Any], context: typer.Context) -> list[Path]:
+    """The paths among the arguments of a command that were not given."""
+    return [
+        each
+        for name, each in arguments.items()
+        if isinstance(each, Path) and getattr(context.get_parameter_source(name), "name", "") == "DEFAULT"
+    ]
 
 
 def _named(values: Iterable[Any]) -> list[Path]:

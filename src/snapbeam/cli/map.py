@@ -65,10 +65,12 @@ def compute_map(
     """
     from snapbeam.cli.console import check_pictures, draw, read_overlay
     from snapbeam.cli.summary import map_facts, map_summary
-    from snapbeam.util.files import check_writable
+    from snapbeam.util.files import check_writable, set_request
 
     settings = opt.resumed(given, keeping, configured(given, _axes_of))
     axes = _axes_of(settings, given)
+    stored = opt.kept_config(settings, keeping)
+    set_request([settings.system.hash, settings.integration, axes, stored["options"]])
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
     if plot is not None:
@@ -92,7 +94,7 @@ def compute_map(
     counts = SweepReport()
     with opt.report(total, keeping["log"], keeping["checkpoint"]) as say:
         kept = CheckpointOptions(
-            keeping["checkpoint"], keeping["check_checkpoint"], keeping["points_per_task"], opt.kept_config(settings, keeping),
+            keeping["checkpoint"], keeping["check_checkpoint"], keeping["points_per_task"], stored,
             say.note, counts,
         )  # fmt: skip
         dataset = compute_sweep(

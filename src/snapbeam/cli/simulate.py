@@ -167,9 +167,8 @@ def _even(system: Any, integration: Any, samples: int | None) -> Any:
     """Instants of so many samples a cycle, evenly spaced to the end; None if no number was given."""
     if samples is None:
         return None
-    import numpy as np
-
     from snapbeam.simulation.request import cycle_of
+    from snapbeam.simulation.simulate import even_instants
     from snapbeam.util.validation import integer
 
     integer("samples", samples, 1, 100_000)
@@ -177,7 +176,7 @@ def _even(system: Any, integration: Any, samples: int | None) -> Any:
     cycles = integration.cycles_or_default
     if integration.cycles is None and hasattr(drive, "frequency"):
         cycles = int(round(drive.duration * drive.frequency, 9))
-    return np.linspace(0.0, cycles * cycle_of(system), cycles * samples + 1)
+    return even_instants(cycles * cycle_of(system), cycles * samples + 1)
 
 
 class _share_done:

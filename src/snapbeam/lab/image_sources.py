@@ -7,8 +7,10 @@ between calls but an open decoder.
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 from snapbeam.lab.diagnostics import KINDS_RECORDING, LOSSY_ERROR
 from snapbeam.lab.photron import CameraHeader, check_pixels, read_header, read_mraw
 from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.input_files import refuse_inflated
 from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError
 
@@ -131,6 +134,11 @@ def float_range(pictures: list[NDArray[Any]], path: Path) -> float:
     return next(full for full in (1.0, 255.0, 1023.0, 4095.0, 16383.0, 65535.0) if top <= full)
 
 
+def _refuse_picture(path: Path, shape: Iterable[int]) -> None:
+    """Refuse a picture that fills the memory although its file is small; see ``refuse_inflated``."""
+    refuse_inflated("path", path, 8 * math.prod(map(int, shape)))
+
+
 class TiffSource(FrameSource):
     """A TIFF file of many pages.  ImageJ's frame interval and calibrated pixel size are used if present."""
 
@@ -150,6 +158,7 @@ class TiffSource(FrameSource):
                     f"{path}: holds {kind}; a recording has pages of grey levels or red, green and blue, unsigned "
                     "integers of 8 or 16 bits or floating point numbers"
                 )
+            _refuse_picture(path, first.shape)
             self.shape = (int(first.shape[0]), int(first.shape[1]))
             self._dtype = first.dtype
             self._colors = first.ndim == 3
@@ -193,7 +202,11 @@ class TiffSource(FrameSource):
 
     def _page(self, index: int) -> NDArray[Any]:
         try:
-            image = self._file.pages[index].asarray()
+            page = self._file.pages[index]
+            _refuse_picture(self.path, page.shape)
+            image = page.asarray()
+        except InputError:
+            raise
         except Exception as error:  # a damaged page makes tifffile raise many kinds
             raise InputError(f"{self.path}: page {index} cannot be read ({error})") from None
         if image.shape[:2] != self.shape or (image.ndim == 3) != self._colors:
@@ -252,6 +265,7 @@ class ArraySource(FrameSource):
                 f"{path}: an array of shape {shape} and type {dtype}: must be (frames, height, width), or with 3 "
                 "colours last, of unsigned integers of 8 or 16 bits or floating point numbers"
             )
+        _refuse_picture(path, shape[1:])
         self.shape = (int(shape[1]), int(shape[2]))
         self.numbers = np.arange(shape[0])
         self._colors = len(shape) == 4
@@ -434,6 +448,7 @@ def load_image(file: Path, *, grey: bool = True) -> NDArray[Any]:
         raw = np.fromfile(file, dtype=np.uint8)
     except OSError as error:
         raise InputError(f"{file}: cannot be read ({error.strerror})") from None
+    _refuse_picture(file, _stated_shape(file))
     image = cv2.imdecode(raw, cv2.IMREAD_UNCHANGED) if raw.size else None
     if image is None:
         raise InputError(f"{file}: cannot be read as an image")
@@ -442,6 +457,22 @@ def load_image(file: Path, *, grey: bool = True) -> NDArray[Any]:
     if image.ndim == 3:
         image = image[..., 2::-1]
     return grey_of(image) if grey and image.ndim == 3 else image
+
+
+def _stated_shape(file: Path) -> tuple[int, ...]:
+    """Width and height of a picture as its header states them; empty if Pillow does not know the kind."""
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(file) as image:
+                return image.size
+    except (Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
+        pixels = re.search(r"\d+", str(error))
+        return (int(pixels[0]),) if pixels else ()
+    except Exception:  # OpenCV decides whether it can be read
+        return ()
 
 
 def images_of_header(header: CameraHeader) -> FrameSource:
@@ -643,6 +674,7 @@ class VideoSource(FrameSource):
             raise InputError(f"{path}: cannot be read as a video ({error}){way_out}") from None
         if count == 0 or 0 in self.shape:
             raise InputError(f"{path}: the video holds no frame")
+        _refuse_picture(path, self.shape)
         if name not in ("gray", "gray8") and re.search(r"rgb|bgr|bayer|gbr|pal8", name):
             self.diagnostics += (KINDS_RECORDING["colour"].found(channels=3),)
         deep = re.search(r"(9|10|12|14|16|48)(le|be)", name)

@@ -7,10 +7,12 @@ import math
 import re
 import tempfile
 import warnings
+import zipfile
+import zlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 from snapbeam.lab.diagnostics import KINDS_SIGNAL
 from snapbeam.lab.signals import check_signal, even_sampling, si_unit
 from snapbeam.util.diagnostics import Diagnostic, tell
-from snapbeam.util.input_files import decoded
+from snapbeam.util.input_files import decoded, refuse_inflated
 from snapbeam.util.netcdf import hdf5_stream, refuse_large
 from snapbeam.util.validation import InputError, positive
 
@@ -187,6 +189,7 @@ def numbered(channels: list[Channel]) -> list[Channel]:
 
 def read_numpy(path: Path, _told: Told) -> list[Channel]:
     """Return the channels of a NumPy file, ``.npy`` or ``.npz``."""
+    refuse_inflated("path", path, _stated_size(path))
     with open(path, "rb") as file:  # opened here, since NumPy leaves damaged files open
         loaded = np.load(file, allow_pickle=False)
         arrays = None if isinstance(loaded, np.ndarray) else {name: loaded[name] for name in loaded.files}
@@ -197,6 +200,26 @@ def read_numpy(path: Path, _told: Told) -> list[Channel]:
             )
         return [{"data": loaded, "name": path.stem, "unit_str": None}]
     return _channels({name: _Stored(np.squeeze(data), {}) for name, data in arrays.items()}, {})
+
+
+def _stated_size(path: Path) -> int:
+    """Bytes of the arrays of a NumPy file as its headers state them, at least 8 for a number."""
+    if not zipfile.is_zipfile(path):
+        with open(path, "rb") as file:
+            return _stated_array(file)
+    size = 0
+    with zipfile.ZipFile(path) as archive:
+        for member in archive.infolist():
+            with archive.open(member) as file:
+                size += max(member.file_size, _stated_array(file))
+    return size
+
+
+def _stated_array(file: Any) -> int:
+    version = np.lib.format.read_magic(file)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(file)
+    return math.prod(shape) * max(dtype.itemsize, 8)
 
 
 def write_npz(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
@@ -674,9 +697,10 @@ def _kept(
     cells: list[str], dialect: _Dialect, line: int, path: Path, names: tuple[str, ...] | None
 ) -> list[str]:
     """The cells of a row that belong to the table's columns."""
-    whole = len(cells) > max(dialect.used)
+    last = max(dialect.used)
+    whole = len(cells) > last
     extra = dialect.separator is None and len(cells) != len(dialect.used)
-    stray = [cell for i, cell in enumerate(cells) if cell and i > max(dialect.used)]
+    stray = any(cells[last + 1 :])
     if not whole or extra or stray:
         count = len([cell for cell in cells if cell]) if stray or extra else len(cells)
         told = "the header names" if names else "the first has"
@@ -890,6 +914,7 @@ def read_matlab(path: Path, _told: Told) -> list[Channel]:
 def _version_5(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
 
+    refuse_inflated("path", path, _stated_matlab_size(path))
     loaded = loadmat(path, squeeze_me=True, struct_as_record=True, chars_as_strings=True)
     values: dict[str, Any] = {}
 
@@ -910,6 +935,32 @@ def _version_5(path: Path) -> dict[str, Any]:
         if not name.startswith("__"):
             take(name, item, 0)
     return values
+
+
+def _stated_matlab_size(path: Path) -> int:
+    """Bytes of the variables of a MATLAB file of version 4 or 5 as its headers state them, 8 for a number.
+
+    The numbers of structures and cells are not counted in any header: each may take one byte in the file.
+    """
+    from scipy.io import whosmat
+
+    arrays = {"double", "single", "logical", "char", "sparse"} | {
+        f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)
+    }
+    variables = whosmat(path)
+    size = sum(8 * math.prod(map(int, shape)) for _, shape, kind in variables if kind in arrays)
+    if all(kind in arrays - {"sparse"} for *_, kind in variables):
+        return size
+    with open(path, "rb") as file:
+        order: Literal["little", "big"] = "little" if file.read(128)[126:] == b"IM" else "big"
+        while len(tag := file.read(8)) == 8:
+            kind, length = (int.from_bytes(tag[at : at + 4], order) for at in (0, 4))
+            start = file.tell()
+            if kind == 15:  # a compressed element, whose own tag states its length
+                inner = zlib.decompressobj().decompress(file.read(min(length, 64)), 8)
+                size += 8 * int.from_bytes(inner[4:8], order)
+            file.seek(start + length)
+    return size
 
 
 def _version_73(path: Path) -> dict[str, Any]:

@@ -350,7 +350,7 @@ class GaussianPicture:
 CELLS_PER_PIXEL = 4  # cells to a pixel, each way
 
 
-@numba.njit(cache=True)
+@numba.njit
 def _add(cover: NDArray, column: int, row: float, weight: float) -> None:  # pragma: no cover
     """Add to the change of coverage by cell: everything below *row* (cells, 0 at the upper border)."""
     if row <= 0.0:
@@ -365,7 +365,7 @@ def _add(cover: NDArray, column: int, row: float, weight: float) -> None:  # pra
         cover[k + 1, column] += weight * (1.0 - share)
 
 
-@numba.njit(cache=True)
+@numba.njit
 def _cover(
     light: NDArray,
     shaker: NDArray,
@@ -395,6 +395,9 @@ def _cover(
                 if levels[2] != 0.0:
                     _add(shaker, x, max(tip[n] + sizes[1], near), part * levels[2])
                     _add(shaker, x, max(tip[n] + sizes[2], near), -part * levels[2])
+
+
+keep_code(_cover, numba.__version__)
 
 
 def disk_kernel(radius: float) -> NDArray[np.float32]:

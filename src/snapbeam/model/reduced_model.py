@@ -374,9 +374,18 @@ class Wells:
 
     @cached_property
     def two_well_limits(self) -> str:
-        """In words, the nearest imperfection and the least axial load with two wells, of a beam with one; computed."""
-        assert self.beam is not None
-        assert self.imperfection is not None
+        """In words, the nearest imperfection and the least axial load with two wells, of a beam with one; computed.
+
+        Raises
+        ------
+        InputError
+            If the model has two wells already, or no imperfection that takes one away.
+        """
+        if self.beam is None or self.imperfection is None or self.is_bistable:
+            why = "has two wells" if self.is_bistable else "has no imperfection"
+            raise InputError(
+                f"two_well_limits: must be of a beam with one well by its imperfection; this model {why}"
+            )
         beam, given = self.beam, self.imperfection
 
         def scaled(factor: float) -> bool:

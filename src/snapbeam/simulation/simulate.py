@@ -32,6 +32,7 @@ from snapbeam.solver.statistics import Recorded, statistics_of
 from snapbeam.solver.step_size import Plan
 from snapbeam.solver.terms import WORKS
 from snapbeam.util.diagnostics import Diagnostic, counting, sharing, tell
+from snapbeam.util.interrupts import raise_held
 from snapbeam.util.provenance import array_hash, made_by
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, finite_array, shown
@@ -44,6 +45,7 @@ __all__ = [
     "check_memory",
     "describe_system",
     "end_state",
+    "even_instants",
     "prepared",
     "reached_by",
     "run_attributes",
@@ -164,6 +166,8 @@ _Array = NDArray[np.float64]
 
 _SAMPLES_PER_CYCLE = 200
 """Regular samples per cycle of the excitation or of the first mode, whichever is shorter."""
+_BLOCK = 2**22
+"""Instants in a block."""
 MEMORY_LIMIT = 4 * 2**30
 """Maximum memory of the samples of a run, bytes."""
 _ENERGY_ERROR = 1e-3
@@ -192,7 +196,18 @@ class Prepared(NamedTuple):
     @property
     def instants(self) -> _Array:
         """Sample times, s."""
-        return np.linspace(0.0, self.end, self.samples) if self.times is None else self.times
+        return even_instants(self.end, self.samples) if self.times is None else self.times
+
+
+def even_instants(end: float, count: int) -> _Array:
+    """Return ``numpy.linspace(0, end, count)``, by blocks: signals are heard between them."""
+    instants, step = np.empty(count), end / max(count - 1, 1)
+    for first in range(0, count, _BLOCK):
+        raise_held()
+        instants[first : first + _BLOCK] = np.arange(first, min(first + _BLOCK, count)) * step
+    if count > 1:
+        instants[-1] = end
+    return instants
 
 
 def prepared(system: System, integration: Integration, sample_times: ArrayLike | None) -> Prepared:

@@ -19,6 +19,7 @@ from snapbeam.solver.registry import resolve
 from snapbeam.solver.statistics import Recorded, statistics_of
 from snapbeam.util.diagnostics import sharing
 from snapbeam.util.files import check_writable
+from snapbeam.util.interrupts import raise_held
 from snapbeam.util.netcdf import netcdf_file
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputTypeError, instance, shown
@@ -93,9 +94,15 @@ def simulate_to_file(
     target, report = check_writable(path, "path", (".nc",)), sharing(progress, "run")
     run = prepared(system, integration, sample_times)
     _, engine = resolve("cpu")
+
+    def reported(share: float) -> None:
+        raise_held()
+        if report is not None:
+            report(share)
+
     with netcdf_file(target) as file:
         writer = _Writer(file, run)
-        for piece in engine.record(run.ensemble, run.instants, run.times is None, report):
+        for piece in engine.record(run.ensemble, run.instants, run.times is None, reported):
             writer.take(piece)
         summary = writer.finish()
     if report is not None:
@@ -119,6 +126,7 @@ class _Writer:
         ready = max(0, together.times.size - _KEPT_BACK)
         self.waiting = _part(together, slice(ready, None))
         for begin in range(0, ready, _CHUNK):
+            raise_held()
             self.append(_part(together, slice(begin, min(ready, begin + _CHUNK))))
 
     def finish(self) -> RunSummary:

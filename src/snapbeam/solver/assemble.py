@@ -136,6 +136,10 @@ class Driven(NamedTuple):
     samples: _Array
 
 
+_SHORTEST_PERIOD = 1e-300
+"""Period of an excitation, s, below which its reciprocal and its products are not numbers."""
+
+
 def cycles_of(system: System, columns: Mapping[str, _Array]) -> _Array:
     """Seconds of one cycle of excitation of each run, or of the first mode where nothing moves, shape (runs,)."""
     runs = next(iter(columns.values())).size if columns else 1
@@ -143,7 +147,15 @@ def cycles_of(system: System, columns: Mapping[str, _Array]) -> _Array:
     if leads is None:
         return 2.0 * math.pi / (np.ones(runs) * system.scale.omega)
     section, drive = leads
-    return drive.cycle(_own_driven(columns, section, runs), system.scale)
+    with np.errstate(all="ignore"):
+        periods = drive.cycle(_own_driven(columns, section, runs), system.scale)
+    bad = np.flatnonzero(~((periods >= _SHORTEST_PERIOD) & np.isfinite(periods)))
+    if bad.size:
+        raise InputError(
+            f"{section}: a period of {float(periods[bad[0]]):g} s: must be at least {_SHORTEST_PERIOD:g} s and finite; "
+            "change the frequency"
+        )
+    return periods
 
 
 def phases_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:

@@ -156,8 +156,8 @@ def pipeline() -> dict[str, Any]:
 #
 # Machine code that is loaded is run, so a file of it that was damaged could do anything.  Every file here begins with
 # the check sum of what follows; one that does not agree counts for nothing, and the code is compiled and written again.
-# Where nothing can be written, the code goes into a private folder of the temporary ones, or is not kept at all; that
-# is said once.
+# The check sum does not tell who wrote a file: code is kept only in folders that nobody else can write.  Where there is
+# none, it goes into a private folder of the temporary ones, or is not kept at all; that is said once.
 
 
 _CHECK = hashlib.sha256
@@ -216,9 +216,6 @@ class _PrivateFolder(_CacheLocator):
             locator.ensure_cache_path()
         except OSError:
             return None
-        _say(
-            f"compiled code is kept in {locator.get_cache_path()}: neither the package nor HOME can be written"
-        )
         return locator
 
 
@@ -233,16 +230,47 @@ def private_folder() -> str:
     owner = os.getuid() if hasattr(os, "getuid") else 0
     folder = Path(tempfile.gettempdir()) / f"snapbeam-{owner}"
     folder.mkdir(mode=0o700, exist_ok=True)
-    found = folder.lstat()
-    if not stat.S_ISDIR(found.st_mode) or (
-        os.name != "nt" and (found.st_uid != owner or found.st_mode & 0o022)
-    ):
+    if folder.is_symlink() or not folder.is_dir() or not is_private(folder):
         raise PermissionError(f"{folder} is not this user's alone")
     return str(folder)
 
 
+def is_private(folder: str | os.PathLike[str], source: str | os.PathLike[str] | None = None) -> bool:
+    """Return whether nobody but this user, the administrator and the owner of *source* can write to a folder.
+
+    Members of this user's own group count as the user.  Nobody else may replace the folder either: a folder above it
+    that others can write must be sticky, as the temporary one is.
+    """
+    if os.name == "nt":
+        return True
+    owners = {os.getuid(), 0} | (
+        {os.stat(source).st_uid} if source is not None and os.path.exists(source) else set()
+    )
+    folder = Path(folder).resolve()
+    for at, each in enumerate((folder, *folder.parents)):
+        found = each.stat()
+        group = stat.S_IWGRP if found.st_gid not in (os.getgid(), 0) else 0
+        others = found.st_mode & (stat.S_IWOTH | group) and (at == 0 or not found.st_mode & stat.S_ISVTX)
+        if others or (at < 2 and found.st_uid not in owners):
+            return False
+    return True
+
+
 class _Implementation(CompileResultCacheImpl):
+    _locator: Any
     _locator_classes = [*CompileResultCacheImpl._locator_classes, _PrivateFolder]  # noqa: RUF012
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        place, source = self._locator.get_cache_path(), inspect.getfile(function)
+        why = "neither the package nor HOME can be written"
+        if not isinstance(self._locator, _PrivateFolder) and not is_private(place, source):
+            why = f"others can write to {place}"
+            self._locator = _PrivateFolder.from_function(function, source)
+            if self._locator is None:
+                raise PermissionError(why)
+        if isinstance(self._locator, _PrivateFolder):
+            _say(f"compiled code is kept in {self._locator.get_cache_path()}: {why}")
 
 
 class _KeptCode(FunctionCache):

@@ -11,6 +11,7 @@ import numpy as np
 from snapbeam.simulation.save import code_flags
 from snapbeam.sweeps.points import PointList, Points
 from snapbeam.sweeps.tasks import CLASSES, PointWork, ResultRows
+from snapbeam.util.interrupts import raise_held
 from snapbeam.util.netcdf import netcdf_file
 from snapbeam.util.status_codes import ResponseClass
 
@@ -92,6 +93,7 @@ def to_netcdf(work: PointWork, points: Points, rows: ResultRows, attrs: dict[str
             if scalars:
                 written[name].attrs["coordinates"] = scalars
         for place, start, stop in _blocks(points):
+            raise_held()
             table = rows.read(start, stop)
             for name, variable in written.items():
                 values = work.values(name, table)

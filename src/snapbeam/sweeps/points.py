@@ -280,17 +280,27 @@ def _swept(name: str) -> Parameter:
     return row
 
 
+def _array(name: str, values: Any) -> NDArray[Any]:
+    """Return the values of an axis as an array, of whatever object."""
+    try:
+        return np.asarray(values)
+    except Exception as error:  # an object decides by itself how it becomes an array
+        raise InputTypeError(
+            f"{name} = {shown(values)}: must be an array of numbers or words, not {type(values).__name__}"
+        ) from error
+
+
 def _axis(row: Parameter, name: str, values: Any) -> NDArray[Any]:
     """Return the checked values of one axis: increasing numbers, or different words."""
     item = row.quantity
     if item.kind in (str, bool):
-        words = [item.check(name, value) for value in np.atleast_1d(np.asarray(values)).tolist()]
+        words = [item.check(name, value) for value in np.atleast_1d(_array(name, values)).tolist()]
         if len(set(words)) < len(words):
             raise InputError(f"{name} = {words}: must differ from each other")
         return np.array(words)
     if isinstance(values, str):
         values = np.atleast_1d(parse_axis(name, values, whole=item.kind is int, unit=item.unit))
-    if not isinstance(values, (list, tuple, range)) and np.ndim(values) == 0:
+    if not isinstance(values, (list, tuple, range)) and np.ndim(_array(name, values)) == 0:
         raise InputError(f"{name} = {shown(values)}: must be an array; put a single value into the system")
     closed = item.closed if item.kind is float else "both"
     array = axis(name, values, item.low, item.high, closed=closed)

@@ -19,6 +19,7 @@ from snapbeam.util.validation import InputError, file_path
 
 __all__ = [
     "MADE_BY",
+    "REQUEST",
     "VERSION",
     "NoRoomError",
     "atomic_path",
@@ -27,6 +28,8 @@ __all__ = [
     "is_ours",
     "lives",
     "refuse_foreign",
+    "request_hash",
+    "set_request",
 ]
 
 
@@ -45,11 +48,20 @@ _MARK = b"made by snapbeam "
 _LOOKED_AT = 1 << 16  # bytes, at each end
 
 
-@dataclass(frozen=True)
+REQUEST = "request_hash"
+"""Name of the attribute of NetCDF files that a command wrote: the hash of its parameters."""
+_HASHED = 64 * 2**20
+"""Bytes of an input file up to which its content is part of the request; of larger ones size and time are."""
+
+
+@dataclass
 class _Guard:
-    """The files that a command names, and those of them that it may write to."""
+    """The files that a command names, those that it may write to, and what it was asked for."""
 
     named: tuple[Path, ...]
+    defaults: tuple[Path, ...]
+    request: str
+    force: bool
     allowed: set[Path] = field(default_factory=set)
 
 
@@ -57,33 +69,83 @@ _GUARD: ContextVar[_Guard | None] = ContextVar("guard", default=None)
 
 
 @contextmanager
-def foreign_files_kept(named: Sequence[Path] = ()) -> Iterator[None]:
+def foreign_files_kept(
+    named: Sequence[Path] = (),
+    *,
+    defaults: Sequence[Path] = (),
+    request: object = None,
+    force: bool = False,
+) -> Iterator[None]:
     """In the block, refuse to replace files that snapbeam did not write, and those that are read too.
 
     Parameters
     ----------
     named : sequence of path
         Every file that a command names: one that stands there twice is read as well as written.
+    defaults : sequence of path
+        Files and folders that a command writes to since no other was named: results of another request stay.
+    request : object
+        Parameters of the command; its NetCDF files get their hash.
+    force : bool
+        Whether any file may be replaced.
     """
-    token = _GUARD.set(_Guard(tuple(path.resolve() for path in named)))
+    guard = _Guard(
+        tuple(path.resolve() for path in named),
+        tuple(path.resolve() for path in defaults),
+        _hash(request),
+        force,
+    )
+    token = _GUARD.set(guard)
     try:
         yield
     finally:
         _GUARD.reset(token)
 
 
+def set_request(request: object) -> None:
+    """Replace the request of the running command by parameters that it has completed, as from a checkpoint."""
+    if (guard := _GUARD.get()) is not None:
+        guard.request = _hash(request)
+
+
+def request_hash() -> str | None:
+    """Return the hash of the request of the running command; None if no command runs."""
+    guard = _GUARD.get()
+    return None if guard is None else guard.request
+
+
+def _hash(request: object) -> str:
+    text = json.dumps(request, sort_keys=True, default=_described)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _described(value: object) -> object:
+    """Plain values for an argument of a command: of a path, what is there."""
+    if not isinstance(value, Path):
+        return value.tolist() if hasattr(value, "tolist") else repr(value)
+    if value.is_dir():
+        return sorted((each.name, each.stat().st_size, each.stat().st_mtime_ns) for each in value.iterdir())
+    if not value.is_file():
+        return str(value)
+    found = value.stat()
+    if found.st_size > _HASHED:
+        return value.name, found.st_size, found.st_mtime_ns
+    return hashlib.sha256(value.read_bytes()).hexdigest()
+
+
 def refuse_foreign(target: Path, name: str, begin: str = "") -> None:
-    """Refuse a file to be written if a guard is up and it would replace what is not snapbeam's.
+    """Refuse a file to be written if a guard is up and it would replace what is not snapbeam's, or another result.
 
     What was allowed once stays so: a file that appears while a result is computed does not cost the result.
 
     Raises
     ------
     InputError
-        If *target* exists and snapbeam did not write it, or it is named twice.
+        If *target* exists and snapbeam did not write it, it is named twice, or it is a default output and has other
+        parameters.
     """
     guard = _GUARD.get()
-    if guard is None or (there := target.resolve()) in guard.allowed:
+    if guard is None or guard.force or (there := target.resolve()) in guard.allowed:
         return
     if guard.named.count(there) > 1:
         raise InputError(
@@ -95,6 +157,14 @@ def refuse_foreign(target: Path, name: str, begin: str = "") -> None:
             f"{name} = {str(target)!r}: exists and does not say that snapbeam made it; give another name, or --force "
             "to replace it"
         )
+    by_default = there in guard.defaults or there.parent in guard.defaults
+    if by_default and target.suffix == ".nc" and target.exists():
+        found = _attribute(target, REQUEST) if target.stat().st_size else guard.request
+        if found != guard.request:
+            raise InputError(
+                f"{name} = {str(target)!r}: exists, and its parameters are not those of this command; name another output "
+                "with -o, or give --force to replace it"
+            )
     guard.allowed.add(there)
 
 
@@ -114,7 +184,7 @@ def is_ours(path: str | os.PathLike[str], begin: str = "") -> bool:
         return True
     with suppress(OSError, ValueError):
         if path.suffix.lower() == ".nc":
-            return _attribute(path)
+            return _attribute(path, VERSION) is not None
         if path.suffix.lower() == ".json":
             found = json.loads(path.read_text(encoding="utf-8"))
             return isinstance(found, dict) and VERSION in found
@@ -128,12 +198,12 @@ def is_ours(path: str | os.PathLike[str], begin: str = "") -> bool:
     return False
 
 
-def _attribute(path: Path) -> bool:
-    """Whether the root of a NetCDF file has the attribute; False of what is no such file."""
+def _attribute(path: Path, name: str) -> object:
+    """An attribute of the root of a NetCDF file; None if it has none."""
     import h5py
 
     with h5py.File(path, "r") as file:
-        return VERSION in file.attrs
+        return file.attrs.get(name)
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Files that a user gives: regular files below a size limit, and TOML whose keys are not too deep."""
+"""Files that a user gives: regular files below a size limit, contents that fit the memory, and TOML of limited depth."""
 
 from __future__ import annotations
 
@@ -11,11 +11,23 @@ from typing import Any
 
 from snapbeam.util.validation import InputError, file_path
 
-__all__ = ["LARGEST_INPUT", "decoded", "input_bytes", "input_text", "parsed_toml", "read_toml"]
+__all__ = [
+    "LARGEST_INPUT",
+    "decoded",
+    "input_bytes",
+    "input_text",
+    "parsed_toml",
+    "read_toml",
+    "refuse_inflated",
+]
 
 
 LARGEST_INPUT = 64 * 2**20
 """Largest file of parameters or of a table, bytes."""
+LARGEST_CONTENT = 512 * 2**20
+"""Largest content of a compressed file of numbers, bytes, at 8 bytes a number."""
+COMPRESSION = 20
+"""Bytes of content for each byte on the disk, up to which a larger content is read too."""
 _KEY_PARTS = 8
 """Most parts of a dotted key.  The parser's time grows with the square of their number."""
 
@@ -49,6 +61,35 @@ def input_bytes(name: str, path: str | os.PathLike[str], largest: int = LARGEST_
     if len(data) > largest:
         raise InputError(f"{name} = {str(path)!r}: must be at most {largest / 2**20:g} MiB")
     return data
+
+
+def refuse_inflated(name: str, path: str | os.PathLike[str], size: int) -> None:
+    """Refuse a small file with a large content, before memory is allocated for it.
+
+    Compression, fill values and false headers can turn a file of some kilobytes into any size.  Every reader calls this
+    with the size that the header of the file states.
+
+    Parameters
+    ----------
+    name : str
+        The parameter to name in a refusal.
+    path : path
+        The file.
+    size : int
+        Size of the content in memory, bytes, at 8 bytes for a number.
+
+    Raises
+    ------
+    InputError
+        If the content needs more than 512 MiB and more than twenty times the file.
+    """
+    found = os.stat(path)
+    stored = min(found.st_size, getattr(found, "st_blocks", found.st_size) * 512)
+    if size > max(LARGEST_CONTENT, COMPRESSION * stored):
+        raise InputError(
+            f"{name} = {str(path)!r}: would take {size / 2**30:.3g} GiB of memory, from {stored / 1e6:.3g} MB on the "
+            f"disk: must be at most {LARGEST_CONTENT / 2**20:.0f} MiB, or {COMPRESSION} times the file"
+        )
 
 
 def input_text(name: str, path: str | os.PathLike[str]) -> str:

@@ -1,6 +1,7 @@
 """Ctrl-C, termination and a closed terminal: the program ends with a sentence and a status.
 
-Only the program installs the handler; the library leaves the signals of a process as they are.
+Only the program installs the handler; the library leaves the signals of a process as they are.  Calls of HDF5 hold them
+back: an exception inside its callbacks is lost, or ends the process with a segmentation fault.
 """
 
 from __future__ import annotations
@@ -9,18 +10,29 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
 
-__all__ = ["WORDS", "during_command", "end", "install"]
+__all__ = ["WORDS", "during_command", "end", "held_back", "install", "raise_held"]
 
 
 WORDS = "interrupted; no file was left half written"
 _SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 _GRACE = 0.5
-"""Seconds that the main thread has to react, before it is asked whether it is compiling."""
+"""Seconds that the main thread has to react, before the program ends if it compiles or holds signals back."""
+
+
+@dataclass
+class _Held:
+    """Signals that wait for the end of a block, and the incomplete files to remove if the program cannot wait."""
+
+    handlers: dict[int, Callable[[int, FrameType | None], object]] = field(default_factory=dict)
+    waiting: list[int] = field(default_factory=list)
+    incomplete: set[Path] = field(default_factory=set)
 
 
 class _State:
@@ -29,6 +41,7 @@ class _State:
     in_command = False
     """Whether a command runs, which closes its files and reports what is finished when it is interrupted."""
     heard = threading.Event()
+    held: _Held | None = None
 
 
 def install() -> None:
@@ -52,6 +65,43 @@ def during_command() -> Iterator[None]:
         _State.in_command = False
 
 
+@contextmanager
+def held_back() -> Iterator[set[Path]]:
+    """Hold signals with a handler back in the block; :func:`raise_held` and the end of the block handle them.
+
+    Gives the set of incomplete files, which are removed if the program ends in the block.
+    """
+    if _State.held is not None or threading.current_thread() is not threading.main_thread():
+        yield set() if _State.held is None else _State.held.incomplete
+        return
+    held = _State.held = _Held()
+    try:
+        for number in _SIGNALS:
+            handler = signal.getsignal(number)
+            if callable(handler):
+                held.handlers[number] = handler
+                signal.signal(number, lambda number, _: held.waiting.append(number))
+        yield held.incomplete
+    finally:
+        _State.held = None
+        for number, handler in held.handlers.items():
+            signal.signal(number, handler)
+        _handle(held)
+
+
+def raise_held() -> None:
+    """Handle a signal that is held back: a place of the block where an exception may be raised."""
+    if _State.held is not None and threading.current_thread() is threading.main_thread():
+        _handle(_State.held)
+
+
+def _handle(held: _Held) -> None:
+    if held.waiting:
+        number = held.waiting[0]
+        held.waiting.clear()
+        held.handlers[number](number, None)
+
+
 def end(code: Any) -> None:
     """End an interrupted program with the status of the signal; threads that still compile are not awaited."""
     if _State.number and code:
@@ -71,10 +121,12 @@ def _stop(number: int, frame: FrameType | None) -> None:
 
 
 def _watch(reader: int) -> None:
-    """End a program whose main thread compiles: it reacts to a signal only after seconds."""
+    """End a program whose main thread compiles or writes a large file: it reacts to a signal only after seconds."""
     while data := os.read(reader, 1):
         while data[0] in _SIGNALS and not _State.heard.wait(_GRACE):
-            if _compiles(sys._current_frames().get(threading.main_thread().ident or 0)):
+            if _State.held is not None or _compiles(
+                sys._current_frames().get(threading.main_thread().ident or 0)
+            ):
                 _leave(data[0])
 
 
@@ -87,6 +139,9 @@ def _compiles(frame: FrameType | None) -> bool:
 
 
 def _leave(number: int) -> NoReturn:
+    for path in [] if _State.held is None else list(_State.held.incomplete):
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
     with suppress(OSError):  # a closed terminal
         os.write(2, f"{WORDS}\n".encode())
     os._exit(128 + number)

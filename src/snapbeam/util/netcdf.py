@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from snapbeam._version import __version__
-from snapbeam.util.files import VERSION, NoRoomError, atomic_path, check_writable
+from snapbeam.util.files import REQUEST, VERSION, NoRoomError, atomic_path, check_writable, request_hash
+from snapbeam.util.input_files import refuse_inflated
+from snapbeam.util.interrupts import held_back, raise_held
 from snapbeam.util.validation import InputError, file_path, instance, mapping
 
 if TYPE_CHECKING:
@@ -36,16 +38,11 @@ __all__ = [
 ]
 
 
-_MEMORY = 4 * 2**30
 _MOST_TEXTS = 100_000
-_COMPRESSED = 20
-"""Bytes in memory for each byte on the disk, beyond which a large file is refused."""
 
 
 def refuse_large(path: str | os.PathLike[str], name: str = "path") -> None:
     """Refuse an HDF5 file whose contents fill the memory although the file is small.
-
-    Fill values and compression can turn a file of some kilobytes into any size.
 
     Parameters
     ----------
@@ -56,7 +53,7 @@ def refuse_large(path: str | os.PathLike[str], name: str = "path") -> None:
     Raises
     ------
     InputError
-        If the numbers need more than 4 GiB and more than twenty times the file, or there are more than 100,000 texts.
+        For content that :func:`~snapbeam.util.input_files.refuse_inflated` refuses, and for more than 100,000 texts.
     """
     import h5py
 
@@ -71,13 +68,7 @@ def refuse_large(path: str | os.PathLike[str], name: str = "path") -> None:
 
     with h5py.File(path, "r") as file:
         file.visititems(add)
-    found = os.stat(path)
-    stored = min(found.st_size, getattr(found, "st_blocks", found.st_size) * 512)
-    if size > max(_MEMORY, _COMPRESSED * stored):
-        raise InputError(
-            f"{name} = {str(path)!r}: would take {size / 2**30:.3g} GiB of memory, from {stored / 1e6:.3g} MB on the "
-            f"disk: must be at most {_MEMORY / 2**30:.0f} GiB, or {_COMPRESSED} times the file"
-        )
+    refuse_inflated(name, path, size)
     if texts > _MOST_TEXTS:
         raise InputError(f"{name} = {str(path)!r}: has {texts} texts: must be at most {_MOST_TEXTS}")
 
@@ -188,6 +179,7 @@ def write_netcdf(
     settings = mapping("encoding", {} if encoding is None else encoding)
     with netcdf_file(target) as file:
         for name, dataset in groups.items():
+            raise_held()
             group = None if name is None else file.create_group(name)
             store = H5NetCDFStore(file if group is None else group)
             dataset.dump_to_store(
@@ -197,14 +189,19 @@ def write_netcdf(
 
 @contextmanager
 def netcdf_file(path: str | os.PathLike[str]) -> Iterator[h5netcdf.File]:
-    """Give a NetCDF file to write to, which is put at *path* if all went well; errors as of :func:`write_netcdf`."""
+    """Give a NetCDF file to write to, which is put at *path* if all went well; errors as of :func:`write_netcdf`.
+
+    Signals are held back in the block, apart from calls of :func:`~snapbeam.util.interrupts.raise_held`.
+    """
     import h5netcdf
 
-    with atomic_path(path) as temporary, hdf5_stream(temporary, Path(path)) as stream:
+    with held_back(), atomic_path(path) as temporary, hdf5_stream(temporary, Path(path)) as stream:
         with h5netcdf.File(stream, "w", invalid_netcdf=False) as file:
             yield file
             if VERSION not in file.attrs:
                 file.attrs[VERSION] = __version__
+            if (request := request_hash()) is not None:
+                file.attrs[REQUEST] = request
 
 
 @contextmanager
@@ -213,7 +210,8 @@ def hdf5_stream(path: Path, target: Path | None = None) -> Iterator[io.RawIOBase
 
     *target* is the name to tell in errors, those of :func:`write_netcdf`.
     """
-    with _Stream(path) as stream:
+    with held_back() as incomplete, _Stream(path) as stream:
+        incomplete.add(path)
         yield stream
         stream.settle()
     if stream.trouble is not None:
