@@ -29,6 +29,7 @@ CODE = [
     "finite_elements.md",
     "getting-started.md",
     "long_maps.md",
+    "questions.md",
     "states.md",
     "status_codes.md",
     "strikers.md",
