@@ -34,5 +34,5 @@ def test_a_plain_file_stays_plain(tmp_path) -> None:
     sb.write_netcdf(xr.Dataset({"gap": ("time", [1.0])}), path)
     assert read_result(path).gap.values.tolist() == [1.0]
     assert split_group(path) == (path, None)
-    with pytest.raises(InputError, match=r"one\.nc"):
+    with pytest.raises(InputError, match=r"has no result 'group'; it is one result; give one\.nc alone"):
         read_result(f"{path}:group")

@@ -133,8 +133,9 @@ def read_result(path: str | os.PathLike[str], name: str = "path", *, lazily: boo
         raise InputError(
             f"{name} = {str(path)!r}: has the results {', '.join(groups)}; give one as {file.name}:{groups[0]}"
         )
-    if group is not None and groups and group not in groups:
-        raise InputError(f"{name} = {str(path)!r}: has no result {group!r}; it has {', '.join(groups)}")
+    if group is not None and file.is_file() and group not in groups:
+        others = f"it has {', '.join(groups)}" if groups else f"it is one result; give {file.name} alone"
+        raise InputError(f"{name} = {str(path)!r}: has no result {group!r}; {others}")
     return read_netcdf(file, name, group, lazily=lazily)
 
 
