@@ -72,3 +72,35 @@ def test_force_displacement_curve(tmp_path) -> None:
     refused = run("equilibria", *arch, "--plot", figure)
     assert refused.exit_code != 0
     assert "--force-displacement" in refused.output
+
+
+def test_the_displacement_of_an_eccentric_force_is_named(tmp_path) -> None:
+    """Off the centre w is not the displacement of the centre: text, dataset and figure say which it is."""
+    import matplotlib.pyplot as plt
+    import numpy as np
+
+    import snapbeam as sb
+    from snapbeam.model.default_values import BEAM
+
+    arch = ("--axial-load", 0, "--midspan-amplitude", 1e-3, "--modes", 3)
+    path = tmp_path / "curve.nc"
+    text = run("equilibria", *arch, "--force-displacement", "--location", 0.4, "-o", path).output
+    assert " ".join(text.split()).count("at the force's location (") == text.count(" at w = ") == 2
+    curve = read_netcdf(path, "file")
+    assert all(
+        "displacement at the force's location" in curve[name].attrs["long_name"]
+        for name in (
+            "displacement",
+            "critical_displacement",
+            "snap_through_displacement",
+            "snap_back_displacement",
+        )
+    )
+    beam = BEAM.replace(axial_load=0.0)
+    model = sb.ReducedModel.from_beam(beam, modes=3, imperfection=sb.Imperfection(midspan_amplitude=1e-3))
+    amplitude = curve["amplitude"].values
+    np.testing.assert_allclose(curve["displacement"], amplitude @ model.shape_at(0.4), rtol=1e-9, atol=1e-15)
+    assert np.abs(curve["displacement"].values - amplitude @ model.midspan_shape).max() > 1e-5
+    ax = sb.plot.plot_force_displacement(curve)
+    assert ax.get_xlabel().startswith("Displacement at the force's location, $w$")
+    plt.close("all")

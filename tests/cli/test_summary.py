@@ -115,3 +115,94 @@ def test_a_suggested_map_does_not_replace_the_map_it_starts_from(synthetic_map, 
     said = text(map_summary(synthetic_map, [file], 1.0))
     assert f"--from {shlex.quote(str(file))}" in said
     assert f"-o {following}.nc --plot {following}.png" in said
+
+
+def harvester_map(kinds, **more):
+    """A map over load resistance and the acceleration of a base, with the power of a harvester."""
+    labels = {"units": "ohm", "long_name": "load resistance", "parameter": "harvester.resistance"}
+    level = {
+        "units": "1",
+        "long_name": "acceleration amplitude over b omega_1^2, of the base",
+        "parameter": "base_excitation.acceleration_amplitude",
+    }
+    power = {"units": "W", "long_name": "power in the harvester's load, last quarter of the run"}
+    dims, values = ("harvester_resistance", "base_excitation_acceleration_amplitude"), [1e3, 1e4, 1e5]
+    table = np.array([[1e-6, 8e-4], [9e-6, 1.42e-3], [2e-6, np.nan]])
+    attrs = {
+        "modes": 2,
+        "cycles": 4,
+        "reference_frequency": 80.0,
+        "length_scale": 1e-3,
+        "harvester_type": "piezo",
+    }
+    data = {"response_class": (dims, np.array(kinds, dtype=np.int8))}
+    data["harvested_power_last_quarter"] = (dims, table, power)
+    data["status"] = (dims, np.zeros((3, 2), dtype=np.int8))
+    coords = {dims[0]: (dims[0], values, labels), dims[1]: (dims[1], [0.02, 0.4], level)}
+    return xr.Dataset(data, coords, attrs | more)
+
+
+def test_the_summary_of_a_map_of_a_harvester():
+    """The amplitude of the base in g, the resistance in ohm, the power in W; nothing of the paper's plane."""
+    said = text(map_summary(harvester_map([[0, 3]] * 3), []))
+    # 0.4 b omega_1^2 = 0.4 * 1 mm * (2 pi 80 Hz)^2 / 9.80665 m/s^2 = 10.31 g
+    assert "Lowest interwell acceleration amplitude of the base: 10.31 g at load resistance = 1 kohm" in said
+    assert "load, last quarter of the run: 1.42 mW at load resistance = 10 kohm, " in said
+    assert "acceleration amplitude of the base = 10.31 g; not known at 1 of 6 points" in said
+    assert "velocity" not in said
+    quiet = text(map_summary(harvester_map([[0, 0]] * 3), []))
+    assert "No run snapped through: raise the acceleration amplitude of the base." in quiet
+    without = harvester_map([[0, 3]] * 3)
+    del without.attrs["reference_frequency"]
+    said = text(map_summary(without, []))
+    assert "Lowest interwell acceleration amplitude of the base: 0.4 b omega_1^2 at" in said
+
+
+def test_a_map_without_an_amplitude_has_no_lowest_amplitude(tmp_path):
+    """A resistance is nothing that snapping through needs more of: the power is what matters, and its point."""
+    path = tmp_path / "map.nc"
+    path.write_bytes(bytes(1000))
+    one = harvester_map([[0, 3]] * 3).isel(base_excitation_acceleration_amplitude=1, drop=True)
+    said = text(map_summary(one, [path]))
+    assert "Lowest" not in said and "Highest power" in said
+    assert f"--from {shlex.quote(str(path))} --point harvester_resistance=10000.0 " in said
+    assert lowest_interwell(one) is None
+    fixed = {"base_excitation_acceleration_amplitude": 0.4}
+    for attrs, advice in (
+        ({}, "through."),
+        (fixed, "through: raise the acceleration amplitude of the base."),
+    ):
+        quiet = one.assign(response_class=xr.zeros_like(one["response_class"])).assign_attrs(attrs)
+        assert f"No run snapped {advice}" in text(map_summary(quiet, [])).splitlines()
+
+
+def test_a_named_statistic_is_in_the_summary(synthetic_map):
+    force = np.zeros(synthetic_map["response_class"].shape)
+    force[12, 7] = 3.25
+    labels = {"units": "N", "long_name": "maximum contact force"}
+    found = synthetic_map.assign(peak_force=(synthetic_map["response_class"].dims, force, labels))
+    place = found.isel(frequency_ratio=12, velocity_amplitude=7)
+    omega, velocity = float(place["frequency_ratio"]), float(place["velocity_amplitude"])
+    said = text(map_summary(found, [], variable="peak_force"))
+    assert f"Highest maximum contact force: 3.25 N at Omega = {omega:.4g}, V = {velocity:.4g}" in said
+    assert "Highest" not in text(map_summary(found, [], variable="response_class"))
+
+
+def test_the_power_of_a_harvester_with_one_well():
+    dataset = harvester_map([[0, 0]] * 3)
+    for name in ("min_midspan_displacement", "max_midspan_displacement"):
+        dataset[name] = dataset["harvested_power_last_quarter"].fillna(0.0).assign_attrs(units="1")
+    said = text(map_summary(dataset, [], bistable=False))
+    assert "1.42 mW at load resistance = 10 kohm" in said
+
+
+def test_a_threshold_over_the_acceleration_of_a_base_has_units():
+    """Amplitude, band and steps in g; the paper's own plane keeps its symbols."""
+    from snapbeam.cli.summary import coordinate_text, value_text
+
+    curve = harvester_map([[0, 3]] * 3)
+    name = "base_excitation_acceleration_amplitude"
+    assert coordinate_text(curve, name, 0.4) == "acceleration amplitude of the base = 10.31 g"
+    assert value_text(curve, name, 0.04, 2) == "1 g"
+    assert coordinate_text(curve, "modes", 2) == "N = 2"
+    assert value_text(curve, "harvester_resistance", 2.5e6) == "2.5 Mohm"

@@ -96,3 +96,72 @@ def test_the_command(shaken, tmp_path, monkeypatch):
     assert "2 values up and down" in answer.stdout
     assert xr.load_dataset("hysteresis.nc", engine="h5netcdf")["peak_voltage"].shape == (2, 2)
     assert (tmp_path / "power.png").stat().st_size > 5_000
+
+
+def recorded(system, duration):
+    """Replace the motion of the base by a record of sine bursts, 2000 samples per second."""
+    time = np.arange(int(duration * 2000.0) + 1) / 2000.0
+    record = 4.0 * np.sin(2.0 * np.pi * 120.0 * time) * np.sin(np.pi * time / duration) ** 2
+    motion = sb.RecordedAcceleration(record=record, sampling_frequency=2000.0)
+    return system.replace(base_excitation=sb.BaseExcitation(motion=motion))
+
+
+@pytest.mark.slow
+def test_a_record_restarts_at_every_value(shaken):
+    """The record holds one run but not two; each value sees it from its first sample and goes on from the last state."""
+    lasts = 12 / shaken.model.reference_frequency
+    system = recorded(shaken, 1.2 * lasts)
+    found = sb.dynamics.hysteresis(system, "harvester.resistance", [1e4, 1e5], STEPS)
+    assert (found["status"] == sb.RunStatus.OK).all()
+    state, power = None, []
+    for value in (1e4, 1e5, 1e5, 1e4):
+        run = sb.simulate(
+            system.replace(**{"harvester.resistance": value, "initial_state": state}),
+            STEPS,
+            sample_times=[0.0],
+        )
+        end = run.final_state
+        state = sb.State(amplitude=end.amplitude, velocity=end.velocity, circuit=end.circuit)
+        power.append(run.summary.harvested_power)
+    up, down = found["harvested_power"].values
+    np.testing.assert_array_equal([up[0], up[1], down[1], down[0]], power)
+
+
+def test_a_record_that_is_too_short_is_refused_before_the_first_run(shaken, monkeypatch):
+    """Also where only a later value makes the run longer than the record."""
+    monkeypatch.setattr(
+        "snapbeam.dynamics.swept_statistics.simulate", lambda *_, **__: pytest.fail("computed")
+    )
+    lasts = 12 / shaken.model.reference_frequency
+    with pytest.raises(sb.InputError, match=r"cycles: the run ends after .* but the recorded acceleration"):
+        sb.dynamics.hysteresis(recorded(shaken, 0.9 * lasts), "harvester.resistance", [1e4, 1e5], STEPS)
+    length = shaken.model.beam.length
+    with pytest.raises(sb.InputError, match=r"cycles: the run ends after"):
+        sb.dynamics.hysteresis(recorded(shaken, 1.2 * lasts), "beam.length", [length, 1.3 * length], STEPS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["record", "noise", "tip in space"])
+def test_a_tip_that_moves_once_is_refused(shaken, kind):
+    """A restart of the record would move the tip by a jump; a sweep from rest is accepted."""
+    from snapbeam.model.default_values import CONTACT
+
+    angle = 2.0 * np.pi * 100.0 * np.arange(4000) / 2e4
+    motion = {
+        "record": sb.RecordedMotion(
+            displacement=5e-5 * np.sin(angle),
+            velocity=5e-5 * 200.0 * np.pi * np.cos(angle),
+            sampling_frequency=2e4,
+            frequency=100.0,
+        ),
+        "noise": sb.BandLimitedNoise(low_ratio=0.8, high_ratio=1.4, velocity_rms=0.1, seed=1),
+        "tip in space": sb.FixedStop(),
+    }[kind]
+    system = sb.System(shaken.model, CONTACT, sb.Striker(drive=motion))
+    if kind == "tip in space":
+        base = dataclasses.replace(recorded(shaken, 1.0).base_excitation, striker_on_base=False)
+        system = system.replace(base_excitation=base)
+    location = [0.45, 0.5]
+    with pytest.raises(sb.InputError, match=r"does not repeat.*use sb\.sweep"):
+        sb.dynamics.hysteresis(system, "striker.location", location, sb.Integration(cycles=2))
+    sb.sweep(system, {"striker.location": location}, sb.Integration(cycles=2))

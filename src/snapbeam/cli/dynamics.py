@@ -66,6 +66,7 @@ _AXES = ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location"
 _OWN = "Analysis"
 _FEW = 4000
 """Maximum size of a variable in the JSON output."""
+_BOUNDS = "the unit of the parameter, such as 0.1:0.3"
 _SETTLING = "16 time constants of the slowest mode, at least 200 and at most 20,000"
 Output = Annotated[
     Path,
@@ -420,14 +421,12 @@ def branch(
 
     Example: snapbeam dynamics branch --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --bounds 0.005:0.3
     """
-    from snapbeam.cli.parameter_options import parse_window
     from snapbeam.dynamics.branches import continuation
     from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, periodic_orbit
 
     settings = configured(given)
     _checked(output, plot)
-    limits = parse_window(bounds)
-    assert limits is not None
+    limits = opt.parse_range("bounds (--bounds)", bounds, _BOUNDS)
     begun = time.monotonic()
     options = None if given.get("integration.accuracy") is None else settings.integration
     try:
@@ -483,7 +482,6 @@ def bifurcation_curve(
 
     Example: snapbeam dynamics bifurcation-curve --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --second-bounds 1.2:2
     """
-    from snapbeam.cli.parameter_options import parse_window
     from snapbeam.dynamics.bifurcation_curves import CURVES
     from snapbeam.dynamics.bifurcation_curves import bifurcation_curve as curve_of
     from snapbeam.dynamics.branches import continuation
@@ -492,8 +490,8 @@ def bifurcation_curve(
 
     settings = configured(given)
     _checked(output, plot)
-    limits, others = parse_window(bounds), parse_window(second_bounds)
-    assert limits is not None and others is not None
+    limits = opt.parse_range("bounds (--bounds)", bounds, _BOUNDS)
+    others = opt.parse_range("second_bounds (--second-bounds)", second_bounds, _BOUNDS)
     wanted = 1 if number is None else number
     begun = time.monotonic()
     options = None if given.get("integration.accuracy") is None else settings.integration

@@ -192,7 +192,7 @@ def _force_displacement(
         force, place = float(curve[f"{name}_force"]), float(curve[f"{name}_displacement"])
         if force == force:
             console.print(
-                f"{words}: {prefixed(force, 'N', 4)} at w = {prefixed(place, 'm', 4)} "
+                f"{words}: {prefixed(force, 'N', 4)} at w = {prefixed(place, 'm', 4)} at the force's location "
                 f"({curve.attrs[f'{name}_kind']} point)"
             )
         else:

@@ -39,6 +39,7 @@ __all__ = [
     "is_long",
     "kept_config",
     "number_option",
+    "parse_range",
     "parse_window",
     "point_text",
     "report",
@@ -486,17 +487,20 @@ Window = Annotated[
 
 
 def parse_window(text: str | None) -> tuple[float, float] | None:
-    """Return ``first:last`` as two numbers."""
+    """Return the cycles ``first:last`` as two numbers."""
+    return None if text is None else parse_range("window", text, "cycles, such as 0:10")
+
+
+def parse_range(name: str, text: str, what: str) -> tuple[float, float]:
+    """Return ``first:last`` as two numbers, the first less than the last."""
     from snapbeam.util.validation import InputError, finite
 
-    if text is None:
-        return None
     try:
-        first, last = (finite("window", float(part)) for part in text.split(":"))
+        first, last = (finite(name, float(part)) for part in text.split(":"))
     except ValueError:
-        raise InputError(f"window = {text!r}: must be first:last, in cycles, such as 0:10") from None
+        raise InputError(f"{name} = {text!r}: must be first:last, in {what}") from None
     if not first < last:
-        raise InputError(f"window = {text!r}: first must be less than last")
+        raise InputError(f"{name} = {text!r}: first must be less than last")
     return first, last
 
 

@@ -110,18 +110,13 @@ def simulate(
 
     system, integration = settings.system, settings.integration
     if recorded_drive is not None:
+        _require_striker(system)
         named = [
             name for name in ("frequency_ratio", "velocity_amplitude") if given[f"drive.{name}"] is not None
         ]
         if named:
             raise sb.InputError(f"{', '.join(named)}: must be left out with a recorded drive")
-        assert system.striker is not None
-        recorded = sb.Striker(
-            drive=sb.RecordedMotion.from_dataset(_recorded(recorded_drive)),
-            location=system.striker.location,
-            side=system.striker.side,
-        )
-        system = system.replace(striker=recorded)
+        system = system.replace(drive=sb.RecordedMotion.from_dataset(_recorded(recorded_drive)))
     start = time.monotonic()
     run = None
     with show_compilation(errors()), _share_done() as progress:
@@ -205,6 +200,31 @@ class _share_done:
             self._task = self._bar.add_task("run", total=1.0)
             self._bar.start()
         self._bar.update(self._task, completed=share)
+
+
+_OWN_RECORD = {
+    "base_excitation": "recorded_acceleration, record (m/s^2)",
+    "external_force": "recorded_force, record (N)",
+}
+"""Type and sampled quantity of a record that a section takes from a parameter file."""
+
+
+def _require_striker(system: Any) -> None:
+    """Refuse a recorded drive of a system without a striker; name the section that takes a record."""
+    if system.striker is not None:
+        return
+    from snapbeam.util.validation import InputError
+
+    moving = [section for section, _ in system.moving]
+    instead = next((section for section in moving if section in _OWN_RECORD), None)
+    way = (
+        "use a system with a [striker] and without a moving base, load or external force"
+        if instead is None
+        else f"give the record in the file: [{instead}] with type = {_OWN_RECORD[instead]} and sampling_frequency (Hz)"
+    )
+    raise InputError(
+        f"recorded_drive (--recorded-drive): moves a striker, but the system does not have one; {way}"
+    )
 
 
 def _recorded(path: Path) -> xr.Dataset:

@@ -15,8 +15,12 @@ from rich.table import Table
 
 from snapbeam.cli.console import duration, file_line
 from snapbeam.cli.parameter_options import point_text
+from snapbeam.model.parameter_axes import PHYSICAL
+from snapbeam.model.parameters import lookup, parameters
+from snapbeam.model.striker import numbered
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import ResponseClass, RunStatus
+from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,6 +34,7 @@ __all__ = [
     "map_summary",
     "parameter_table",
     "status_lines",
+    "value_text",
 ]
 
 
@@ -45,9 +50,10 @@ def map_summary(
     *,
     bistable: bool = True,
 ) -> RenderableType:
-    """Return the classes, the lowest interwell amplitude, what failed, the files and what to try next.
+    """Return the classes, the lowest interwell amplitude, the highest statistic, failures, files and next commands.
 
-    Of a beam with one well: the range of *variable*, or of the centre's displacement, in place of the classes.
+    The amplitude is that of an axis of the map that drives the system.  The statistic is *variable*, or the power of a
+    harvester.  For a beam with one well the range of *variable*, or of the centre's displacement, replaces the classes.
     """
     attrs = dataset.attrs
     runs = dataset["response_class"].size
@@ -61,27 +67,53 @@ def map_summary(
         lines += _ranges(
             dataset, (variable,) if variable else ("min_midspan_displacement", "max_midspan_displacement")
         )
+        best = None if variable else _highest(dataset, None)
+        lines += [] if best is None else [best[1]]
         lines += [*status_lines(dataset), *(f"Written: {file_line(path)}" for path in files)]
         return Group(*lines)
-    low = lowest_interwell(dataset)
+    low, interwell = lowest_interwell(dataset), bool((dataset["response_class"] >= _SNAPPED).any())
     failed = _failed_below(dataset, low)
-    if low is None:
-        lines_after = ["No run snapped through: raise the velocity amplitude."]
-    else:
-        raised = _raised(dataset)
-        lines_after = [f"Lowest interwell {raised.replace('_', ' ')}: {_where(low, raised, attrs)}"]
+    point, lines_after = low, []
+    if not interwell:
+        advice = f": raise the {raised}" if (raised := _strength_words(dataset)) else ""
+        lines_after.append(f"No run snapped through{advice}.")
+    elif low is not None and (name := _strength_axis(dataset)) is not None:
+        lines_after.append(f"Lowest interwell {_words(dataset, name)}: {_where(dataset, low, name)}")
         notch = deepest_notch(dataset)
         if notch is not None:
-            lines_after.append(f"Deepest notch of the threshold: {_where(notch, raised, attrs)}")
-            low = notch
+            lines_after.append(f"Deepest notch of the threshold: {_where(dataset, notch, name)}")
+            low = point = notch
+    best = _highest(dataset, variable)
+    if best is not None:
+        point = best[0]
+        lines_after.append(best[1])
     if failed:
         lines_after.append(
             f"{_count(failed, 'point')} of unknown response class may be interwell{' below it' if low else ''}."
         )
     lines_after += status_lines(dataset)
     lines_after += [f"Written: {file_line(path)}" for path in files]
-    lines_after += ["Next:", *(f"  {line}" for line in _suggestions(dataset, files, low))]
+    lines_after += ["Next:", *(f"  {line}" for line in _suggestions(dataset, files, point))]
     return Group(*lines, class_table(dataset), *lines_after)
+
+
+def _highest(dataset: xr.Dataset, variable: str | None) -> tuple[dict[str, Any], str] | None:
+    """Return the point and the line of the highest value of *variable*, by default of the power of a harvester."""
+    name = variable if variable not in (None, "response_class") else None
+    if name is None and "harvester_type" in dataset.attrs:
+        name = "harvested_power_last_quarter"
+    if name is None or name not in dataset or dataset[name].dtype.kind != "f":
+        return None
+    values = dataset[name]
+    unknown = int(values.isnull().sum())
+    if unknown == values.size:
+        return None
+    at = np.unravel_index(int(np.nanargmax(values.values)), values.shape)
+    point = _point(values, dict(zip(values.dims, at, strict=True)))
+    where = ", ".join(coordinate_text(dataset, each, point[each]) for each in point)
+    line = f"Highest {_long_name(dataset, name)}: {value_text(dataset, name, values.values[at])}"
+    line += f" at {where}" if where else ""
+    return point, line + (f"; not known at {unknown} of {values.size} points" if unknown else "")
 
 
 def _ranges(dataset: xr.Dataset, names: Sequence[str]) -> list[str]:
@@ -116,16 +148,90 @@ def _modes(dataset: xr.Dataset) -> str:
     return _count(int(dataset.attrs["modes"]), "mode") if "modes" in dataset.attrs else "its modes"
 
 
-def _raised(dataset: xr.Dataset) -> str:
-    """The axis whose least interwell value is of interest: the velocity amplitude, or the last one of numbers."""
-    if "velocity_amplitude" in dataset.dims or not dataset["response_class"].dims:
-        return "velocity_amplitude"
-    numbers = [
-        str(name)
-        for name in dataset["response_class"].dims
-        if name in dataset.coords and dataset[name].dtype.kind == "f"
+_SNAPPED = ResponseClass.TRANSIENT_1
+"""First class of an interwell response."""
+_DRIVING = ("drive", "base_excitation", "axial_load", "external_force")
+"""Sections whose amplitudes drive the system; of strikers after the first with a number."""
+_STRENGTH = re.compile("amplitude|velocity|acceleration|displacement|force$|change")
+"""Names of the parameters of an excitation that its strength follows from."""
+_NORMALISED = re.compile(r" over (b[^,]*)")
+_WITH_PREFIX = frozenset(("m", "m/s", "s", "N", "N/m", "Pa", "Hz", "ohm", "F", "H", "V", "A", "W", "J"))
+"""Units that take a prefix of the SI."""
+
+
+def _drives(parameter: str) -> bool:
+    """Return True for the dotted name of a parameter that the strength of an excitation follows from."""
+    section, _, field = parameter.partition(".")
+    return numbered(section)[0] in _DRIVING and _STRENGTH.search(field) is not None
+
+
+def _parameter(dataset: xr.Dataset, name: str) -> str:
+    """Return the dotted name of the parameter along an axis; the name itself if it is not a parameter."""
+    if "parameter" in dataset[name].attrs:
+        return str(dataset[name].attrs["parameter"])
+    try:
+        return lookup(name).name
+    except InputError:
+        return name
+
+
+def _strength_axis(dataset: xr.Dataset) -> str | None:
+    """Return the axis that the strength of the excitation varies along; None if there is not one."""
+    axes = [str(name) for name in dataset["response_class"].dims if name in dataset.coords]
+    names = [name for name in axes if dataset[name].dtype.kind == "f" and _drives(_parameter(dataset, name))]
+    return "velocity_amplitude" if "velocity_amplitude" in names else names[-1] if names else None
+
+
+def _strength_words(dataset: xr.Dataset) -> str | None:
+    """Return the words for the strength of the excitation: an axis, or else a fixed parameter; None if there is none."""
+    axis = _strength_axis(dataset)
+    if axis is not None:
+        return _words(dataset, axis)
+    fixed = [
+        row
+        for row in parameters().values()
+        if _drives(row.name) and (row.short in dataset.attrs or row.short in dataset.coords)
     ]
-    return numbers[-1] if numbers else "velocity_amplitude"
+    return _without_scale(fixed[0].quantity.long_name) if fixed else None
+
+
+def _without_scale(words: str) -> str:
+    return _NORMALISED.sub("", words).replace(", of the", " of the")
+
+
+def _long_name(dataset: xr.Dataset, name: str) -> str:
+    return str(dataset[name].attrs.get("long_name", name.replace("_", " ")))
+
+
+def _physical(dataset: xr.Dataset, name: str) -> tuple[float, str] | None:
+    """Return factor and unit of a ratio of a base's motion, where one reference frequency holds for all points."""
+    frequency, length = (dataset.attrs.get(each) for each in ("reference_frequency", "length_scale"))
+    parameter = _parameter(dataset, name)
+    for row in PHYSICAL.values():
+        if row.parameter == parameter and parameter.startswith("base_excitation.") and frequency and length:
+            return row.unit_of(float(length), 2.0 * np.pi * float(frequency)), row.unit
+    return None
+
+
+def _words(dataset: xr.Dataset, name: str) -> str:
+    """Return the words for an axis, without what normalises it."""
+    return name.replace("_", " ") if name in _SYMBOLS else _without_scale(_long_name(dataset, name))
+
+
+def value_text(dataset: xr.Dataset, name: str, value: Any, digits: int = 4) -> str:
+    """Return a value with its unit, in physical units where they are known, or with what normalises it."""
+    if not isinstance(value, float):
+        return str(value)
+    if name in _SYMBOLS:
+        return f"{value:.{digits}g}"
+    physical = _physical(dataset, name)
+    factor, unit = (1.0, dataset[name].attrs.get("units", "1")) if physical is None else physical
+    if unit in _WITH_PREFIX:
+        return prefixed(factor * value, unit, digits)
+    scale = _NORMALISED.search(_long_name(dataset, name))
+    if unit == "1":
+        unit = scale[1] if scale else ""
+    return f"{factor * value:.{digits}g} {unit}".rstrip()
 
 
 def _count(number: int, noun: str) -> str:
@@ -147,30 +253,31 @@ def class_table(dataset: xr.Dataset) -> Table:
 
 
 def lowest_interwell(dataset: xr.Dataset) -> dict[str, Any] | None:
-    """Return the coordinates of the interwell run of least velocity amplitude, or None.
+    """Return the coordinates of the interwell run of least excitation amplitude; None without such a run or axis.
 
-    Of a map without that axis it is the least value of its last axis of numbers.  Points of unknown class are left
-    out; they may be interwell at a smaller value.
+    Points of unknown class are left out; they may be interwell at a smaller value.
     """
-    response, raised = dataset["response_class"], _raised(dataset)
-    interwell = response.values >= ResponseClass.TRANSIENT_1
-    if not interwell.any():
+    response, raised = dataset["response_class"], _strength_axis(dataset)
+    interwell = response.values >= _SNAPPED
+    if raised is None or not interwell.any():
         return None
-    names = [str(name) for name in dataset.coords if name in response.dims or name in _PAPER]
-    if raised in dataset.coords:
-        amounts = dataset[raised].broadcast_like(response).transpose(*response.dims).values
-        at = np.unravel_index(np.argmin(np.where(interwell, amounts, np.inf)), response.shape)
-    else:
-        at = np.unravel_index(int(np.argmax(interwell)), response.shape)
-    point = response.isel(dict(zip(response.dims, at, strict=True)))
-    return {name: point[name].item() for name in names if name in point.coords}
+    amounts = dataset[raised].broadcast_like(response).transpose(*response.dims).values
+    at = np.unravel_index(np.argmin(np.where(interwell, amounts, np.inf)), response.shape)
+    return _point(response, dict(zip(response.dims, at, strict=True)))
+
+
+def _point(values: xr.DataArray, index: dict[Any, Any]) -> dict[str, Any]:
+    """Return the coordinates of a point of a map: those of its axes, and the paper's."""
+    point = values.isel(index)
+    names = [str(name) for name in values.coords if name in values.dims or name in _PAPER]
+    return {name: point[name].item() for name in names}
 
 
 def _failed_below(dataset: xr.Dataset, low: dict[str, Any] | None) -> int:
     """Return the number of points of unknown class that may be interwell below the lowest interwell run."""
-    response, raised = dataset["response_class"], _raised(dataset)
+    response, raised = dataset["response_class"], _strength_axis(dataset)
     unknown = response == ResponseClass.UNKNOWN
-    if low is not None and raised in low:
+    if low is not None and raised is not None:
         unknown = unknown & (dataset[raised] < low[raised])
     return int(unknown.sum())
 
@@ -187,7 +294,7 @@ def deepest_notch(dataset: xr.Dataset) -> dict[str, float] | None:
     if set(response.dims) != {"frequency_ratio", "velocity_amplitude"}:
         return None
     velocity = dataset["velocity_amplitude"]
-    interwell = response >= ResponseClass.TRANSIENT_1
+    interwell = response >= _SNAPPED
     lowest = velocity.where(interwell).min("velocity_amplitude").fillna(np.inf)
     known = ~((response == ResponseClass.UNKNOWN) & (velocity < lowest)).any("velocity_amplitude").values
     threshold = np.minimum(lowest.values, float(velocity.max()))[known]
@@ -202,20 +309,20 @@ def deepest_notch(dataset: xr.Dataset) -> dict[str, float] | None:
     return place | {"location": float(dataset["location"].squeeze())}
 
 
-def coordinate_text(name: str, value: Any) -> str:
-    """A coordinate in words, by the paper's symbol where it has one: ``V = 0.18``, ``side = below``."""
-    shown = f"{value:.4g}" if isinstance(value, float) else str(value)
-    return f"{_SYMBOLS.get(name, name)} = {shown}"
+def coordinate_text(dataset: xr.Dataset, name: str, value: Any) -> str:
+    """Return a coordinate by the paper's symbol where it has one, or by its words, with its unit: ``V = 0.18``."""
+    if name in _SYMBOLS:
+        return f"{_SYMBOLS[name]} = {value_text(dataset, name, value)}"
+    return f"{_words(dataset, name)} = {value_text(dataset, name, value)}"
 
 
-def _where(point: dict[str, Any], raised: str, attrs: dict[str, Any]) -> str:
-    """Coordinates of a point in words, in physical units beside where they are known."""
-    others = [coordinate_text(name, point[name]) for name in point if name != raised]
-    text = (
-        f"{coordinate_text(raised, point[raised])} at {', '.join(others)}"
-        if raised in point
-        else ", ".join(others)
-    )
+def _where(dataset: xr.Dataset, point: dict[str, Any], raised: str) -> str:
+    """Return the coordinates of a point, the amplitude first, and physical units where they are known."""
+    attrs = dataset.attrs
+    first = coordinate_text if raised in _SYMBOLS else value_text
+    text = first(dataset, raised, point[raised])
+    others = ", ".join(coordinate_text(dataset, name, point[name]) for name in point if name != raised)
+    text += f" at {others}" if others else ""
     freq, level = attrs.get("reference_frequency"), attrs.get("beam_buckling_level")
     if freq and level and {"frequency_ratio", "velocity_amplitude"} <= point.keys():
         velocity, omega = point["velocity_amplitude"], point["frequency_ratio"]

@@ -21,7 +21,7 @@ from snapbeam.cli.parameter_options import (
     configured,
     with_parameters,
 )
-from snapbeam.cli.summary import coordinate_text, status_lines
+from snapbeam.cli.summary import coordinate_text, status_lines, value_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -137,23 +137,24 @@ def _kinds(dataset: xr.Dataset) -> list[str]:
 def _curve(curve: xr.Dataset, parameter: str, across: str, chosen: dict[str, int]) -> list[str]:
     """Return the lines that describe one curve."""
     first, always = curve["lower_threshold"], curve["upper_threshold"]
-    named = [coordinate_text(name, curve[name].item()) for name in chosen]
+    named = [coordinate_text(curve, name, curve[name].item()) for name in chosen]
     if "modes" in curve.attrs and "modes" not in chosen:
-        named.append(coordinate_text("modes", int(curve.attrs["modes"])))
+        named.append(coordinate_text(curve, "modes", int(curve.attrs["modes"])))
     head = f"{', '.join(named)}: " if named else ""
     if bool(first.isnull().all()):
         line = f"{head}no interwell response found"
     else:
         at = first.isel({across: int(np.nanargmin(first.values))})
         line = (
-            f"{head}lowest threshold {coordinate_text(parameter, float(at))} "
-            f"at {coordinate_text(across, at[across].item())}"
+            f"{head}lowest threshold {coordinate_text(curve, parameter, float(at))} "
+            f"at {coordinate_text(curve, across, at[across].item())}"
         )
         width = always - first
         if bool(width.notnull().any()):
             of = f" over {int(width.notnull().sum())} points" if bool(width.isnull().any()) else ""
             step = float(np.max(np.diff(curve[parameter].values)))
-            line += f"; band {float(width.mean()):.2g} wide on average{of}, in steps of {step:.2g}"
+            wide, steps = (value_text(curve, parameter, each, 2) for each in (float(width.mean()), step))
+            line += f"; band {wide} wide on average{of}, in steps of {steps}"
     lines = [line]
     for kind, text in (
         ("no_interwell_in_range", f"no interwell response in range: extend the values of {parameter}"),
@@ -170,7 +171,7 @@ def _curve(curve: xr.Dataset, parameter: str, across: str, chosen: dict[str, int
     if bool(lower.any()):
         lowest = float(curve["lower_threshold_min"].where(lower).min())
         lines.append(
-            f"  failed runs leave the threshold open, down to {coordinate_text(parameter, lowest)}, "
+            f"  failed runs leave the threshold open, down to {coordinate_text(curve, parameter, lowest)}, "
             f"at {int(lower.sum())} of {first.size} points"
         )
     higher = always.notnull() & ~(curve["upper_threshold_max"] == always)

@@ -17,7 +17,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.model.drive.base import HORIZON
+from snapbeam.model.drive.base import HORIZON, Drive
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State, amplitude_scale
@@ -40,6 +40,7 @@ __all__ = [
     "common_cycles",
     "fixed_parameters",
     "flow_of",
+    "frequencies_of",
     "held_in_space",
     "leaving",
     "require_map",
@@ -218,6 +219,21 @@ _SAME_RATIO = 1e-12
 """Relative difference of a ratio of frequencies from a fraction that rounding can make."""
 
 
+def frequencies_of(
+    system: System, columns: Mapping[str, NDArray[np.float64]]
+) -> list[tuple[str, Drive, list[NDArray[np.float64]] | None]]:
+    """Section, drive and angular frequencies (rad/s) of every motion; None: it does not repeat."""
+    runs, found = cycles_of(system, columns).size, []
+    for section, drive in system.moving:
+        own = {
+            name.partition(".")[2]: values
+            for name, values in columns.items()
+            if name.startswith(f"{section}.")
+        }
+        found.append((section, drive, drive.frequencies(own or {"": np.zeros(runs)}, system.scale)))
+    return found
+
+
 def common_cycles(system: System, columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.int64]:
     """Cycles of the primary excitation after which every motion repeats, for each run, shape (runs,).
 
@@ -228,13 +244,7 @@ def common_cycles(system: System, columns: Mapping[str, NDArray[np.float64]]) ->
     """
     cycle = cycles_of(system, columns)
     found = np.ones(cycle.size, dtype=np.int64)
-    for section, drive in system.moving:
-        own = {
-            name.partition(".")[2]: values
-            for name, values in columns.items()
-            if name.startswith(f"{section}.")
-        }
-        rates = drive.frequencies(own or {"": np.zeros(cycle.size)}, system.scale)
+    for section, drive, rates in frequencies_of(system, columns):
         if rates is None:
             raise InputError(
                 f"{section}: a motion of type {drive.name!r} does not repeat; the dynamics tools need a common period of "

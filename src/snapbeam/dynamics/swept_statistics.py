@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from snapbeam.dynamics.flow import frequencies_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
+from snapbeam.model.striker import numbered
 from snapbeam.model.system import System
 from snapbeam.simulation.simulate import simulate
+from snapbeam.solver.assemble import make_ensemble, run_columns
 from snapbeam.solver.statistics import rows_for
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.status_codes import ResponseClass, RunStatus
@@ -39,8 +43,10 @@ def hysteresis(
     """Compute every statistic over one parameter, swept up and then down, and carry the state on.
 
     Each value is one run of :func:`snapbeam.simulate` that begins with the last state of the run before it: modes, phase
-    of the excitation, strikers and the circuit of a harvester.  The statistics whose names end in ``last_quarter``
-    leave out the transient of a value, if it is over after three quarters of its run.
+    of the excitation, strikers and the circuit of a harvester.  If an excitation does not repeat, such as a record, a
+    chirp or noise, every excitation restarts at each value, and only the state of the structure is carried on: all
+    values are exposed to the same excitation.  The statistics whose names end in ``last_quarter`` leave out the
+    transient of a value, if it is over after three quarters of its run.
 
     Parameters
     ----------
@@ -66,7 +72,8 @@ def hysteresis(
     Raises
     ------
     InputError
-        For bad input.
+        Before the first run: for bad input, for a value at which the run does not fit the record, and for a tip that
+        moves where an excitation does not repeat, because the restart would shift the tip by a jump.
 
     Examples
     --------
@@ -95,6 +102,10 @@ def hysteresis(
         raise InputError(
             "early_termination = True: ends runs before their last state; set early_termination = False"
         )
+    restarts = _restarts(system)
+    begun = system.start_state.phase
+    for value in points:
+        make_ensemble(system.replace(**{row.name: float(value)}), settings)
     told = counting(progress, "hysteresis", "values")
     rows = rows_for(len(system.further_contacts) + (system.striker is not None))
     tables: dict[str, Any] = {
@@ -109,6 +120,8 @@ def hysteresis(
             for key, table in tables.items():
                 table[i, k] = run.summary[key]
             state, done = run.final_state, done + 1
+            if restarts and state is not None:
+                state = dataclasses.replace(state, phase=begun, modal=None)
             if told is not None:
                 told(done, len(kinds) * points.size)
             if state is None:
@@ -126,6 +139,29 @@ def hysteresis(
         {"sweep": kinds, row.short: (row.short, points, labels)},
         attrs | {"title": "statistics swept up and down", "parameter": row.short},
     )
+
+
+def _restarts(system: System) -> bool:
+    """Return True if an excitation does not repeat, so that every excitation restarts at each value.
+
+    Raises
+    ------
+    InputError
+        If a tip moves then.
+    """
+    motions = frequencies_of(system, run_columns(system, {}))
+    single = [(section, drive) for section, drive, rates in motions if rates is None]
+    if not single:
+        return False
+    base = system.base_excitation
+    in_space = base is not None and system.striker is not None and not base.striker_on_base
+    if in_space or any(numbered(section)[0] == "drive" for section, _ in system.moving):
+        section, drive = single[0]
+        raise InputError(
+            f"{section}: a motion of type {drive.name!r} does not repeat, and its restart at each value would shift the "
+            "tip of a striker by a jump; use sb.sweep, in which every value begins at rest"
+        )
+    return True
 
 
 _OF_ONE_RUN = {

@@ -150,7 +150,7 @@ def force_displacement(
         ends = [potential.barrier(0), potential.barrier(len(potential.wells) - 1)]
         barriers = dict(zip(barriers, ends if side == "lower" else ends[::-1], strict=True))
     variables: dict[str, Any] = {
-        "displacement": ("point", alpha @ row, _attributes("m", "displacement at the force")),
+        "displacement": ("point", alpha @ row, _attributes("m", "displacement at the force's location")),
         "force": ("point", force, _attributes("N", "force")),
         "energy": (
             "point",
@@ -191,7 +191,7 @@ def force_displacement(
         "critical_displacement": (
             "critical_point",
             np.array([row @ branches[number].amplitude[at] for number, at, _ in special]),
-            _attributes("m", "displacement at the critical point"),
+            _attributes("m", "displacement at the force's location, at the critical point"),
         ),
         "critical_force": (
             "critical_point",
@@ -202,7 +202,11 @@ def force_displacement(
     for name in ("snap_through", "snap_back"):
         words = name.replace("_", "-")
         variables[f"{name}_force"] = ((), snaps[name][0], _attributes("N", f"{words} force"))
-        variables[f"{name}_displacement"] = ((), snaps[name][1], _attributes("m", f"displacement at {words}"))
+        variables[f"{name}_displacement"] = (
+            (),
+            snaps[name][1],
+            _attributes("m", f"displacement at the force's location, at {words}"),
+        )
     origins = {"energy_barrier": "from the well", "energy_barrier_back": "from the other well"}
     for name, value in barriers.items():
         variables[name] = ((), value, _attributes("J", f"energy barrier {origins[name]}, without a force"))

@@ -123,7 +123,7 @@ def plot_force_displacement(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
                     bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}, zorder=7,
                 )  # fmt: skip
         ax.axhline(0.0, color="#000000", linewidth=0.5, zorder=0)
-        ax.set_xlabel(f"Displacement at the force, $w$ ({unit_w})")
+        ax.set_xlabel(f"Displacement at the force's location, $w$ ({unit_w})")
         ax.set_ylabel(f"Force, $F$ ({unit_f})")
         margin = 0.05 * float(np.ptp(place[seen]))
         ax.set_xlim((place[seen].min() - margin) / prefix_w, (place[seen].max() + margin) / prefix_w)
