@@ -180,8 +180,29 @@ def test_gradient_and_tangent_of_random_systems():
         product = potential.tangent(alpha) @ change
         np.testing.assert_allclose(bend, product, rtol=0.0, atol=1e-7 * np.abs(product).max())
         for each in potential.equilibria:
-            terms = np.abs(potential._terms(each.amplitude)).sum(axis=0).max()
+            terms = np.abs(potential.terms(each.amplitude)).sum(axis=0).max()
             assert np.abs(potential.gradient(each.amplitude)).max() <= 1e-10 * terms
+
+
+@pytest.mark.slow
+def test_the_solver_pushes_as_the_potential_does():
+    """The velocity after three short times from rest gives the acceleration, which is minus the gradient."""
+    rng = np.random.default_rng(53)
+    for _ in range(500):
+        system = random_system(rng)
+        model, potential = system.model, system.potential
+        size = np.abs(model.well_amplitude).max() * np.exp(-np.arange(model.modes))
+        alpha = size * rng.normal(size=model.modes)
+        if not potential.holds(alpha):
+            continue
+        start = sb.State(amplitude=alpha, velocity=np.zeros(model.modes))
+        h, period = 2.0**-20, 1.0 / model.reference_frequency  # of whole ticks
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            rates = [sb.advance(system, start, periods=k * h).velocity / (k * h * period) for k in (1, 2, 4)]
+        force = model.mass @ (8.0 * rates[0] - 6.0 * rates[1] + rates[2]) / 3.0
+        terms = np.abs(potential.terms(alpha)).sum(axis=0).max()
+        assert np.abs(force + potential.gradient(alpha)).max() < 1e-10 * terms
 
 
 @pytest.mark.slow

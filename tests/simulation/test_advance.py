@@ -116,6 +116,13 @@ def test_calls_compose_from_anywhere(name: str) -> None:
     assert int(whole.statistics["impacts"]) > 0
 
 
+def test_less_than_a_tick_is_refused() -> None:
+    """It ran for ever."""
+    with pytest.raises(InputError, match=r"periods = 1e-09: must be at least \S+, a tick of the clock"):
+        sb.advance(system_of(2), periods=1e-9)
+    assert sb.advance(system_of(2), periods=1e-6).statistics["status"] == 0
+
+
 def test_parts_of_periods_compose_to_rounding() -> None:
     system = system_of(8)
     whole = sb.advance(system, periods=2)

@@ -113,9 +113,9 @@ class Potential:
 
     def gradient(self, alpha: _Array) -> _Array:
         """dU/dalpha, shape (N,): minus the generalised force."""
-        return self._terms(alpha).sum(axis=0)
+        return self.terms(alpha).sum(axis=0)
 
-    def _terms(self, alpha: _Array) -> _Array:
+    def terms(self, alpha: _Array) -> _Array:
         """Terms of the gradient, whose magnitudes are the measure of its rounding."""
         model = self.model
         pulled = model.pulled(alpha)
@@ -250,7 +250,7 @@ class Potential:
         """An equilibrium by damped Newton steps; None if they come to none within the ranges of the laws."""
         if not self.holds(alpha):
             return None
-        terms = self._terms(alpha)
+        terms = self.terms(alpha)
         for _ in range(_ITERATIONS):
             gradient = terms.sum(axis=0)
             if np.abs(gradient).max() <= _RESIDUAL * np.abs(terms).sum(axis=0).max():
@@ -263,7 +263,7 @@ class Potential:
             for _ in range(_HALVINGS):
                 tried = alpha - share * step
                 if self.holds(tried):
-                    terms = self._terms(tried)
+                    terms = self.terms(tried)
                     new = terms.sum(axis=0)
                     if float(new @ new) < (1.0 - 0.1 * share) * size:
                         break

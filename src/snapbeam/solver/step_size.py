@@ -406,6 +406,11 @@ def clocked(
         if not repeats:
             _whole_steps(cycle, lengths, float(HORIZON))  # refused if that cannot be counted
             table["period"] *= HORIZON
+    if (table["end"] < 1).any():
+        least = 1.0 / float(table["period"].max() if repeats else table["output_interval"].max())
+        raise InputError(
+            f"{'cycles' if periods is None else 'periods'} = {cycles:g}: must be at least {least:.2g}, a tick of the clock"
+        )
     require_affordable(integration, system.model.modes, lengths, table["end"] / SUBDIVISION)
     if periods is None:
         table["output_interval"] = table["end"]
