@@ -167,6 +167,11 @@ def test_a_map_without_an_amplitude_has_no_lowest_amplitude(tmp_path):
     assert "Lowest" not in said and "Highest power" in said
     assert f"--from {shlex.quote(str(path))} --point harvester_resistance=10000.0 " in said
     assert lowest_interwell(one) is None
+    struck = xr.zeros_like(one)
+    struck.attrs = {"modes": 2, "cycles": 4}
+    struck["response_class"][2] = ResponseClass.TRANSIENT_2
+    said = text(map_summary(struck, [path]))
+    assert "--point harvester_resistance=100000.0 " in said, "without a power the first interwell point"
     fixed = {"base_excitation_acceleration_amplitude": 0.4}
     for attrs, advice in (
         ({}, "through."),

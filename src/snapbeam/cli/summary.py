@@ -71,10 +71,11 @@ def map_summary(
         lines += [] if best is None else [best[1]]
         lines += [*status_lines(dataset), *(f"Written: {file_line(path)}" for path in files)]
         return Group(*lines)
-    low, interwell = lowest_interwell(dataset), bool((dataset["response_class"] >= _SNAPPED).any())
+    low, response = lowest_interwell(dataset), dataset["response_class"]
+    interwell = response.values >= _SNAPPED
     failed = _failed_below(dataset, low)
     point, lines_after = low, []
-    if not interwell:
+    if not interwell.any():
         advice = f": raise the {raised}" if (raised := _strength_words(dataset)) else ""
         lines_after.append(f"No run snapped through{advice}.")
     elif low is not None and (name := _strength_axis(dataset)) is not None:
@@ -83,6 +84,9 @@ def map_summary(
         if notch is not None:
             lines_after.append(f"Deepest notch of the threshold: {_where(dataset, notch, name)}")
             low = point = notch
+    else:
+        first = np.unravel_index(int(np.argmax(interwell)), interwell.shape)
+        point = _point(response, dict(zip(response.dims, first, strict=True)))
     best = _highest(dataset, variable)
     if best is not None:
         point = best[0]
