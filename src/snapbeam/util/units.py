@@ -22,7 +22,9 @@ def _registry() -> Any:
     import pint
 
     # decimal numbers: a prefix is exact
-    return pint.UnitRegistry(non_int_type=Decimal, on_redefinition="raise")
+    registry: Any = pint.UnitRegistry(non_int_type=Decimal, on_redefinition="raise")
+    registry.define("@alias ohm = Ohm")
+    return registry
 
 
 @cache
