@@ -20,6 +20,14 @@ from snapbeam.util.interrupts import held_back, raise_held
 posix = pytest.mark.skipif(sys.platform == "win32", reason="interrupts are POSIX signals here")
 
 
+@pytest.fixture(autouse=True)
+def own_handlers():
+    """Python's own handler, whatever shell or test came before."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @posix
 def test_signals_wait_for_a_place_where_they_may_be_handled():
     before = signal.getsignal(signal.SIGINT)
