@@ -268,7 +268,26 @@ class LocalSpring(LocalForce):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ElectrostaticForce(LocalForce):
+class _TowardsGap(LocalForce):
+    """A force from a fixed body at a distance g from the straight beam, up to which its law is valid."""
+
+    gap: float = quantity("m", "location of the electrode or magnet, from the straight beam", symbol="g")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.gap == 0.0:
+            raise InputError(
+                "local_force.gap = 0: must differ from 0; give the distance from the straight beam, with its sign"
+            )
+
+    @staticmethod
+    def displacement_range(law: Any) -> tuple[float, float]:
+        """Up to the electrode or magnet."""
+        return (-math.inf, law.gap) if law.gap > 0.0 else (law.gap, math.inf)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElectrostaticForce(_TowardsGap):
     """Attraction between a part of the beam and a fixed electrode, F = eps_0 A V^2/(2 (g - u)^2), as of parallel plates.
 
     On a spring of stiffness k it pulls in at V^2 = 8 k g^3/(27 eps_0 A), at u = g/3.
@@ -290,12 +309,7 @@ class ElectrostaticForce(LocalForce):
 
     voltage: float = quantity("V", "voltage of the electrode", symbol="V")
     area: float = quantity("m^2", "area of the electrode", low=0.0, symbol="A")
-    gap: float = quantity("m", "location of the electrode, from the straight beam", symbol="g")
     name = "electrostatic_force"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _require_gap(self.gap)
 
     @staticmethod
     def force(law: Any, displacement: float) -> float:
@@ -310,14 +324,9 @@ class ElectrostaticForce(LocalForce):
         """Of the electrode and its source, -eps_0 A V^2/(2 |g - u|)."""
         return -0.5 * _PERMITTIVITY * law.area * law.voltage * law.voltage / abs(law.gap - displacement)
 
-    @staticmethod
-    def displacement_range(law: Any) -> tuple[float, float]:
-        """Up to the electrode."""
-        return (-math.inf, law.gap) if law.gap > 0.0 else (law.gap, math.inf)
-
 
 @dataclass(frozen=True, kw_only=True)
-class MagneticForce(LocalForce):
+class MagneticForce(_TowardsGap):
     """Attraction or repulsion by a magnet, F = a/(g - u)^2 towards it, as of two poles in line.
 
     Parameters
@@ -334,12 +343,7 @@ class MagneticForce(LocalForce):
     """
 
     strength: float = quantity("N m^2", "strength of the magnet", symbol="a")
-    gap: float = quantity("m", "location of the magnet, from the straight beam", symbol="g")
     name = "magnetic_force"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _require_gap(self.gap)
 
     @staticmethod
     def force(law: Any, displacement: float) -> float:
@@ -351,18 +355,6 @@ class MagneticForce(LocalForce):
     def energy(law: Any, displacement: float) -> float:
         """-a/|g - u|."""
         return -law.strength / abs(law.gap - displacement)
-
-    @staticmethod
-    def displacement_range(law: Any) -> tuple[float, float]:
-        """Up to the magnet."""
-        return (-math.inf, law.gap) if law.gap > 0.0 else (law.gap, math.inf)
-
-
-def _require_gap(gap: float) -> None:
-    if gap == 0.0:
-        raise InputError(
-            "local_force.gap = 0: must differ from 0; give the distance from the straight beam, with its sign"
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
