@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
 import snapbeam as sb
-from snapbeam.model import default_values
+from snapbeam.model import default_values, equilibrium_paths
 from snapbeam.model.equilibria import equilibria_of
 from snapbeam.util.validation import InputError
 
@@ -252,6 +254,36 @@ def test_local_forces_anywhere() -> None:
     for each in system.potential.equilibria:
         away = np.abs(curve.amplitude.values - each.amplitude).max(axis=1)
         assert away.min() < 1e-2 * np.abs(model.well_amplitude).max()
+
+
+def test_antisymmetric_wells() -> None:
+    """A stiff spring at the centre of a beam beyond its second critical load leaves two antisymmetric wells."""
+    beam = sb.Beam(
+        length=5e-4, thickness=2e-6, width=2e-5, density=2330.0, young_modulus=160e9, axial_load=1e-3
+    )
+    model = sb.ReducedModel.from_beam(beam, modes=4)
+    system = sb.System(model, local_force=sb.LocalSpring(stiffness=50.0, location=0.5))
+    potential = system.potential
+    assert len(potential.wells) == 2 and all(abs(potential.center(each)) < 1e-12 for each in potential.wells)
+    curve = sb.force_displacement(system, 0.25)
+    snap, row = float(curve.snap_through_force), model.shape_at(0.25)
+    assert float(curve.snap_back_force) == pytest.approx(-snap, rel=1e-9)
+    # one well is left just beyond that force, two just below it
+    for share, count in ((0.999, 2), (1.001, 1)):
+        assert len(dataclasses.replace(potential, constant=share * snap * row).wells) == count
+    # a force at the centre, a node of the wells, straightens both alike: they meet at a bifurcation, without a snap
+    curve = sb.force_displacement(system, 0.5)
+    assert curve.attrs["snap_through_kind"] == curve.attrs["snap_back_kind"] == "none"
+    assert curve.branch_kind.values.tolist() == ["primary", "secondary", "secondary"]
+    assert curve.critical_kind.values.tolist() == ["bifurcation"] * 2
+    assert curve.attrs["incomplete_branches"] == 0
+
+
+def test_a_branch_that_was_not_followed_to_its_end_is_told(monkeypatch) -> None:
+    monkeypatch.setattr(equilibrium_paths, "_STEPS", 30)
+    with pytest.warns(sb.DiagnosticWarning, match="branches end for want of steps"):
+        curve = sb.force_displacement(arch(2.0, 1), 0.5)
+    assert curve.attrs["incomplete_branches"] == 1
 
 
 def test_wells_and_refusals() -> None:

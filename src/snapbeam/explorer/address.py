@@ -138,7 +138,7 @@ def _value(text: str) -> Any:
 
 
 def _changes(text: str) -> dict[str, Any]:
-    """What differs from the map's system; whether it makes a system is seen when it is made."""
+    """Differences from the map's system, which are checked when the system is made."""
     parts = [part.partition(":") for part in text.split(",")]
     changes = {name: _value(value) for name, _, value in parts}
     for name, colon, value in parts:

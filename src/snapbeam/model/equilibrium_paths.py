@@ -46,6 +46,8 @@ _ASIDE = 4e-3
 """First step on a path that branches off."""
 _FORCES = 40
 """Forces, between the largest ones of singular points, under which closed paths are looked for."""
+_BESIDE = 0.02
+"""Distance from the end of the range of a law, over that of the end from the straight beam."""
 _SAME = 1e-3
 """Distance from a path, up to which a point lies on it."""
 
@@ -69,6 +71,8 @@ class EquilibriumPath:
     secondary: bool
     """Whether it branches off from another one."""
     closed: bool
+    complete: bool
+    """Whether it was followed to its ends: the range, another path, or the end of the range of a law."""
 
 
 class _Point(NamedTuple):
@@ -92,6 +96,8 @@ class _Tracer:
     low: float
     high: float
     paths: list[EquilibriumPath] = field(default_factory=list)
+    lost: bool = False
+    """Whether the path that is being followed ended for want of steps."""
 
     def __post_init__(self) -> None:
         self.length = float(np.abs(self.potential.size).max())
@@ -211,6 +217,7 @@ class _Tracer:
             if new is None:
                 step *= 0.5
                 if step < _SHORTEST:
+                    self.lost |= not self._is_at_end_of_a_law(here.y)
                     return points, singular, False
                 continue
             between = self.singular_between(here, new)
@@ -235,13 +242,23 @@ class _Tracer:
             if beyond or (self.potential.local_forces and abs(new.y[-1]) > _LARGEST):
                 return points, singular, False
             step = min(_STEP * max(1.0, abs(float(new.y[-1]))), 1.5 * step)
+        self.lost = True
         return points, singular, False
+
+    def _is_at_end_of_a_law(self, y: _Array) -> bool:
+        """Whether a local force acts beside the end of the range of its law, which the path cannot pass."""
+        for row, law in zip(self.potential.rows, self.potential.local_forces, strict=True):
+            u = float(row @ self.amplitude(y))
+            if any(abs(end - u) <= _BESIDE * abs(end) for end in law.displacement_range(law.numbers)):
+                return True
+        return False
 
     def add(self, start: _Point, secondary: bool) -> None:
         """Follow the path through a point to both sides, and then those that branch off from it.
 
         A path that turns out to branch off itself is left, for the one that it branches off from.
         """
+        self.lost = False
         forth, special, closed = self.follow(start)
         back: list[_Point] = []
         turned: dict[int, str] = {}
@@ -268,6 +285,7 @@ class _Tracer:
                 singular=tuple(Singular(at, kinds[at]) for at in sorted(kinds)),
                 secondary=secondary,
                 closed=closed,
+                complete=not self.lost,
             )
         )
         forks = [points[at] for at, kind in kinds.items() if kind == "bifurcation"]

@@ -12,6 +12,7 @@ from snapbeam.model.equilibrium_paths import EquilibriumPath, equilibrium_paths,
 from snapbeam.model.potential import Potential
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
+from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.validation import InputError, InputTypeError, checked, choice, interval, shown, within
 
 if TYPE_CHECKING:
@@ -134,6 +135,10 @@ def force_displacement(
     margin = _MARGIN * np.ptp(places) or size
     low, high = (min(places) - margin, max(places) + margin) if given is None else given
 
+    lost = sum(not each.complete for each in branches)
+    if lost:
+        message = f"{lost} of {len(branches)} branches end for want of steps, and those beyond are missing"
+        tell([Diagnostic("incomplete-curve", message, {"incomplete_branches": float(lost)})])
     kept = [(low <= each.amplitude @ row) & (each.amplitude @ row <= high) for each in branches]
     force = np.concatenate([each.force[inside] for each, inside in zip(branches, kept, strict=True)])
     alpha = np.concatenate([each.amplitude[inside] for each, inside in zip(branches, kept, strict=True)])
@@ -221,6 +226,7 @@ def force_displacement(
             "wells": len(potential.wells),
             "snap_through_kind": snaps["snap_through"][2],
             "snap_back_kind": snaps["snap_back"][2],
+            "incomplete_branches": lost,
             "modes": model.modes,
         },
     )
@@ -265,7 +271,7 @@ def _snaps(
     """Force, displacement and kind of the critical points where the stable paths of the two sides end."""
     none = math.nan, math.nan, "none"
     push = 1.0 if side == "lower" else -1.0
-    stable = [(path, *part) for path in branches if not path.secondary for part in stable_parts(path)]
+    stable = [(path, *part) for path in branches for part in stable_parts(path)]
 
     def distance(part: tuple[EquilibriumPath, int, int], well: _Array) -> float:
         path, first, last = part
