@@ -42,7 +42,9 @@ def _system(parts: Parts) -> sb.System:
     several = [given] if isinstance(given, dict) else given
     strikers: Any = [sb.Striker(**({"drive": drive} | each)) for each in several]
     return sb.System(
-        model, own.pop("contact", default_values.CONTACT), strikers if strikers[1:] else strikers[0], **own
+        model,
+        contacts=[sb.Contact(own.pop("contact", default_values.CONTACT), strikers if strikers[1:] else strikers[0])],
+        **own,
     )
 
 

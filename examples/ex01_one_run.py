@@ -16,10 +16,9 @@ system = sb.System(
     sb.ReducedModel.from_beam(
         paper.BEAM, modes=32, damping_ratio=paper.DAMPING_RATIO
     ),
-    contact=paper.CONTACT,
-    striker=sb.Shaker(
+    contacts=[sb.Contact(paper.CONTACT, sb.Shaker(
         frequency_ratio=1.21, velocity_amplitude=0.18, location=paper.LOCATION
-    ),
+    ))],
 )
 run = sb.simulate(system, sb.Integration(cycles=40))
 

@@ -15,10 +15,9 @@ from snapbeam.plot.map import plot_response_map
 
 system = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=4, damping_ratio=paper.DAMPING_RATIO),
-    contact=paper.CONTACT,
-    striker=sb.Shaker(
+    contacts=[sb.Contact(paper.CONTACT, sb.Shaker(
         frequency_ratio=1.0, velocity_amplitude=0.1, location=paper.LOCATION
-    ),
+    ))],
 )
 axes = {
     "frequency_ratio": np.linspace(0.1, 4.0, 16),

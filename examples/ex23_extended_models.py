@@ -31,7 +31,7 @@ burst = sb.Burst(
 shaker = sb.Striker(
     drive=burst, mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7
 )
-system = sb.System(model, lossy, shaker)
+system = sb.System(model, contacts=[sb.Contact(lossy, shaker)])
 plot_system(system)
 
 # %%
@@ -56,7 +56,7 @@ sphere = sb.Striker(
     side="above",
     location=0.5,
 )
-thrown = sb.System(model, paper.CONTACT, sphere)
+thrown = sb.System(model, contacts=[sb.Contact(paper.CONTACT, sphere)])
 plot_system(thrown)
 
 # %%
@@ -92,8 +92,7 @@ print(
 plot_system(
     sb.System(
         uneven,
-        paper.CONTACT,
-        sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2)),
+        contacts=[sb.Contact(paper.CONTACT, sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2)))],
     )
 )
 
@@ -115,10 +114,9 @@ piezo = sb.PiezoelectricHarvester.from_material(
 )
 shaken = sb.System(
     model,
-    paper.CONTACT,
-    stop,
+    contacts=[sb.Contact(paper.CONTACT, stop)],
+    harvesters=[piezo],
     base_excitation=sb.BaseExcitation(motion=motion),
-    harvester=piezo,
 )
 plot_system(shaken)
 
@@ -135,9 +133,8 @@ load = sb.AxialLoadModulation(
 plot_system(
     sb.System(
         model,
-        paper.CONTACT,
-        sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.2),
+        contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.2))],
+        harvesters=[coil],
         axial_load=load,
-        harvester=coil,
     )
 )

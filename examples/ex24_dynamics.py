@@ -21,8 +21,7 @@ from snapbeam.plot.dynamics import plot_basins, plot_diagram, plot_survival
 
 two = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=2),
-    paper.CONTACT,
-    sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.25),
+    contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.25))],
 )
 points = xr.Dataset(
     {
@@ -49,8 +48,7 @@ plot_survival(lifetimes, labels=["1.21, 0.25", "2.5, 0.55"])
 
 one = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.03),
-    paper.CONTACT,
-    sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.05),
+    contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.05))],
 )
 diagram = sb.dynamics.bifurcation_diagram(
     one, "velocity_amplitude", np.linspace(0.02, 0.3, 113)

@@ -21,8 +21,7 @@ from snapbeam.plot.uncertainty import plot_probability, plot_quantiles, plot_tor
 
 system = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=1),
-    paper.CONTACT,
-    sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
+    contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))],
 )
 uncertainty = sb.uncertainty.ParameterUncertainty(
     of={

@@ -32,8 +32,7 @@ print(
 
 system = sb.System(
     model,
-    contact,
-    sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2, location=0.47),
+    contacts=[sb.Contact(contact, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2, location=0.47))],
 )
 print(system.diagnostics() or "nothing is doubtful")
 

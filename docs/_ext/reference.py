@@ -295,7 +295,7 @@ def _questions() -> dict[str, Any]:
                 "cuda", modes=system.model.modes, law=ensemble.law, drive=ensemble.drive,
                 striker_with_mass=ensemble.structure.body_mass is not None,
                 unequal_wells=ensemble.structure.unequal_wells is not None,
-                environment=system.has_environment, several_strikers=bool(system.further_contacts),
+                environment=system.has_environment, several_strikers=len(system.contacts) > 1,
             )  # fmt: skip
         except sb.InputError as error:
             if "by the CPU engine alone" in str(error):
@@ -326,7 +326,7 @@ def _parts() -> dict[str, Any]:
 
     def struck(drive: Any = sine, contact: Any = hertz, of: Any = model, **parts: Any) -> Any:
         striker = {name: parts.pop(name) for name in ("gap", "mass", "suspension_stiffness") if name in parts}
-        return sb.System(of, contact, sb.Striker(drive=drive, **striker), **parts)
+        return sb.System(of, contacts=[sb.Contact(contact, sb.Striker(drive=drive, **striker))], **parts)
 
     def several(ratio: float, contact: Any = hertz) -> Any:
         other = sb.Sine(frequency_ratio=ratio, velocity_amplitude=0.1)
@@ -419,28 +419,35 @@ def _refused_systems() -> dict[str, Any]:
         return sb.System(of, **around)
 
     return {
-        "contact `restitution` with two modes": lambda: sb.System(model, newton, first),
-        "contact `restitution` with several strikers": lambda: sb.System(one, [newton, hertz], [first, stop]),
-        "contact `restitution` with a base": lambda: sb.System(one, newton, first, base_excitation=base),
-        "contact `restitution` with a changing load": lambda: sb.System(one, newton, first, axial_load=load),
-        "contact `restitution` with a harvester": lambda: sb.System(one, newton, first, harvester=harvester),
-        "contact `restitution` with a striker with a mass": lambda: sb.System(one, newton, heavy),
-        "contact `restitution` with a local force": lambda: sb.System(one, newton, first, local_force=drag),
+        "contact `restitution` with two modes": lambda: sb.System(model, contacts=[sb.Contact(newton, first)]),
+        "contact `restitution` with several strikers": lambda: sb.System(one, contacts=[sb.Contact(newton, first), sb.Contact(hertz, stop)]),
+        "contact `restitution` with a base": lambda: sb.System(one, contacts=[sb.Contact(newton, first)], base_excitation=base),
+        "contact `restitution` with a changing load": lambda: sb.System(one, contacts=[sb.Contact(newton, first)], axial_load=load),
+        "contact `restitution` with a harvester": lambda: sb.System(one, contacts=[sb.Contact(newton, first)], harvesters=[harvester]),
+        "contact `restitution` with a striker with a mass": lambda: sb.System(one, contacts=[sb.Contact(newton, heavy)]),
+        "contact `restitution` with a local force": lambda: sb.System(one, contacts=[sb.Contact(newton, first)], forces=[drag]),
         "a local force with damping, with a harvester": lambda: sb.System(
-            model, hertz, first, local_force=drag, harvester=harvester
+            model,
+            contacts=[sb.Contact(hertz, first)],
+            forces=[drag],
+            harvesters=[harvester],
         ),
         "a local force with damping, with a contact that loses energy": lambda: sb.System(
-            model, lossy, first, local_force=drag
+            model,
+            contacts=[sb.Contact(lossy, first)],
+            forces=[drag],
         ),
         "a contact that loses energy with a harvester": lambda: sb.System(
-            model, lossy, first, harvester=harvester
+            model,
+            contacts=[sb.Contact(lossy, first)],
+            harvesters=[harvester],
         ),
-        "a further contact that loses energy": lambda: sb.System(model, [hertz, lossy], [first, stop]),
-        "a further striker with a mass": lambda: sb.System(model, hertz, [first, heavy]),
-        "several strikers, the first with a record": lambda: sb.System(model, hertz, [record, stop]),
-        "several strikers, another with a record": lambda: sb.System(model, hertz, [first, record]),
-        "a record with a base": lambda: sb.System(model, hertz, record, base_excitation=base),
-        "a record with a changing load": lambda: sb.System(model, hertz, record, axial_load=load),
+        "a further contact that loses energy": lambda: sb.System(model, contacts=[sb.Contact(hertz, first), sb.Contact(lossy, stop)]),
+        "a further striker with a mass": lambda: sb.System(model, contacts=[sb.Contact(hertz, first), sb.Contact(hertz, heavy)]),
+        "several strikers, the first with a record": lambda: sb.System(model, contacts=[sb.Contact(hertz, record), sb.Contact(hertz, stop)]),
+        "several strikers, another with a record": lambda: sb.System(model, contacts=[sb.Contact(hertz, first), sb.Contact(hertz, record)]),
+        "a record with a base": lambda: sb.System(model, contacts=[sb.Contact(hertz, record)], base_excitation=base),
+        "a record with a changing load": lambda: sb.System(model, contacts=[sb.Contact(hertz, record)], axial_load=load),
         "a base with a half sine": lambda: sb.BaseExcitation(motion=half),
         "a base with a chirp that does not carry the striker": lambda: sb.BaseExcitation(
             motion=chirp, striker_on_base=False

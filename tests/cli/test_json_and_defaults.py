@@ -296,7 +296,7 @@ def test_no_striker_is_added_to_a_base(tmp_path, capsys):
     ):
         with pytest.raises(InputError, match="there is no striker to drive, base_excitation moves the beam"):
             configured({"config": path} | given)
-    own = {"striker.location": 0.5, "contact.stiffness": 1e8}
+    own = {"contact.location": 0.5, "contact.stiffness": 1e8}
     both = configured({"config": path, "drive.frequency_ratio": 1.0} | own)
     assert both.system.striker is not None
 

@@ -79,7 +79,12 @@ def test_the_advised_record_is_accepted(folder, section):
 @pytest.mark.slow
 def test_a_recorded_drive_leaves_the_gap_of_the_striker(folder):
     system = sb.System(
-        MODEL, CONTACT, sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-3)
+        MODEL,
+        contacts=[
+            sb.Contact(
+                CONTACT, sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-3)
+            )
+        ],
     )
     system.save("system.toml")
     command = [

@@ -15,7 +15,7 @@ import snapbeam as sb
 from snapbeam.model import default_values
 
 SINE = {"drive.frequency_ratio": (0.3, 3.5), "drive.velocity_amplitude": (0.02, 0.6)}
-PLACE = {"striker.location": (0.15, 0.85)}
+PLACE = {"contact.location": (0.15, 0.85)}
 SHAKEN = {
     "base_excitation.frequency_ratio": (0.4, 2.0),
     "base_excitation.acceleration_amplitude": (0.05, 0.6),
@@ -64,7 +64,7 @@ def mirror_image(system: sb.System) -> sb.System:
                 each.striker, side="above" if each.striker.side == "below" else "below"
             ),
         )
-        for each in system.further_contacts
+        for each in system.contacts[1:]
     )
     if model.imperfection is not None:
         assert model.beam is not None
@@ -85,7 +85,7 @@ def mirror_image(system: sb.System) -> sb.System:
         "harvester": system.harvester,
         "further_contacts": others,
     }
-    return sb.System(model, system.contact, striker, **more)  # type: ignore[arg-type]
+    return sb.System(model, contacts=[sb.Contact(system.contact, striker)], **more)  # type: ignore[arg-type]
 
 
 def struck(drive: sb.Drive, contact: sb.ContactLaw = default_values.CONTACT, **striker: object):
@@ -184,7 +184,7 @@ SYSTEMS: dict[str, ExtendedSystem] = {
         struck(sine(), sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)), SINE | PLACE
     ),
     "kelvin_voigt": ExtendedSystem(struck(sine(), sb.KelvinVoigt(2e6, 20.0)), SINE | PLACE),
-    "a gap": ExtendedSystem(struck(sine(), gap=4e-5), SINE | {"striker.gap": (-5e-5, 1e-4)}, own_kernel=False),
+    "a gap": ExtendedSystem(struck(sine(), gap=4e-5), SINE | {"contact.gap": (-5e-5, 1e-4)}, own_kernel=False),
     "a phase": ExtendedSystem(
         struck(sb.DisplacementSine(frequency_ratio=1.3, displacement_amplitude=0.2, phase=0.7)),
         {"drive.frequency_ratio": (0.3, 3.0), "drive.displacement_amplitude": (0.02, 0.5), "drive.phase": (-3.0, 3.0)},
@@ -218,7 +218,7 @@ SYSTEMS: dict[str, ExtendedSystem] = {
         struck(TWO), SINE | {"drive.second_amplitude": (0.0, 0.3), "drive.second_phase": (-3.0, 3.0)}
     ),
     "recorded": ExtendedSystem(record, PLACE, cycles=11),
-    "still": ExtendedSystem(struck(sb.FixedStop(), gap=-1e-4), {"striker.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
+    "still": ExtendedSystem(struck(sb.FixedStop(), gap=-1e-4), {"contact.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
     "a body": ExtendedSystem(
         struck(sine(), mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7), SINE | PLACE, decides=False
     ),
@@ -234,7 +234,7 @@ SYSTEMS: dict[str, ExtendedSystem] = {
                     side="above", gap=0.1 * LEVEL),
             ],
         },
-        SINE | {"striker_2.gap": (-2e-5, 1e-4), "drive_2.displacement_amplitude": (0.0, 0.2)},
+        SINE | {"contact.2.gap": (-2e-5, 1e-4), "drive.2.displacement_amplitude": (0.0, 0.2)},
         decides=False,
     ),
     "unequal wells": ExtendedSystem(struck(sine()), SINE | PLACE, imperfection=UNEVEN, fewest=2),

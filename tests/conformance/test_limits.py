@@ -18,7 +18,9 @@ def end(striker: sb.Striker | None = None, modes: int = 3, **parts) -> np.ndarra
     """Amplitudes after one cycle at level reference, over the first one at rest."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     striker = sb.Striker(drive=SHAKER) if striker is None else striker
-    system = sb.System(model, parts.pop("contact", default_values.CONTACT), striker, **parts)
+    system = sb.System(
+        model, contacts=[sb.Contact(parts.pop("contact", default_values.CONTACT), striker)], **parts
+    )
     run = sb.simulate(system, sb.Integration(cycles=1, accuracy="reference"))
     return np.asarray(run.final_state.amplitude / abs(model.well_amplitude[0]))
 

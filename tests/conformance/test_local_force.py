@@ -118,7 +118,7 @@ def test_against_an_independent_solution(name, share, friction):
     """Free motion within a well and across both: displacements agree, and the energy balance closes."""
     force = FORCES.get(name, friction)
     start = struck_start(MODEL, share)
-    system = sb.System(MODEL, local_force=force, initial_state=start)
+    system = sb.System(MODEL, forces=[force], initial_state=start)
     check_against_independent(system, force, start, 4, 1e-6)
 
 
@@ -156,7 +156,7 @@ def test_with_impacts(name, side, friction):
     striker = sb.Striker(
         drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.18), side=side, location=1 / 2.1
     )
-    system = sb.System(MODEL, default_values.CONTACT, striker, local_force=force)
+    system = sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, striker)], forces=[force])
     run = sb.simulate(system, sb.Integration(cycles=1, accuracy="reference"))
     start = sb.State(amplitude=run.dataset["modal_amplitude"].values[0], velocity=np.zeros(MODEL.modes))
     check_against_independent(system, force, start, 2, 1e-5)
@@ -170,7 +170,10 @@ def test_on_a_moving_base(name):
     force, start = FORCES[name], struck_start(MODEL, 0.3)
     motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.3)
     system = sb.System(
-        MODEL, local_force=force, initial_state=start, base_excitation=sb.BaseExcitation(motion=motion)
+        MODEL,
+        forces=[force],
+        initial_state=start,
+        base_excitation=sb.BaseExcitation(motion=motion),
     )
     check_against_independent(system, force, start, 4, 1e-6)
 
@@ -183,7 +186,7 @@ def test_energy_of_quadratic_damping():
         [[mass]], [0.0], contact_shape=[1.0], length_scale=1e-3, reference_frequency=10.0
     )
     drag = sb.QuadraticDamping(coefficient=coefficient)
-    system = sb.System(model, local_force=drag, initial_state=sb.State(amplitude=[0.0], velocity=[speed]))
+    system = sb.System(model, forces=[drag], initial_state=sb.State(amplitude=[0.0], velocity=[speed]))
     run = sb.simulate(system, sb.Integration(cycles=2))
     exact = speed / (1.0 + coefficient * speed * run.dataset["time"].values / mass)
     np.testing.assert_allclose(run.dataset["modal_velocity"].values[:, 0], exact, rtol=1e-8)
@@ -192,18 +195,18 @@ def test_energy_of_quadratic_damping():
 
 
 def test_file_and_dotted_names(tmp_path):
-    system = sb.System(MODEL, local_force=FORCES["spring"])
+    system = sb.System(MODEL, forces=[FORCES["spring"]])
     system.save(tmp_path / "system.toml")
     assert sb.System.load(tmp_path / "system.toml") == system
-    stiffer = system.replace(**{"local_force.stiffness": 50.0})
+    stiffer = system.replace(**{"force.stiffness": 50.0})
     assert stiffer.local_force.stiffness == 50.0 and stiffer.hash != system.hash
-    assert system.get("local_force.location") == 0.3
+    assert system.get("force.location") == 0.3
 
 
 @pytest.mark.parametrize(
     ("force", "more", "words"),
     [
-        (sb.LocalSpring(stiffness=1.0), {}, "local_force.location = None"),
+        (sb.LocalSpring(stiffness=1.0), {}, "force.location = None"),
         (sb.LocalSpring(stiffness=1.0, shape=[1.0, 0.0, 0.0]), {}, "leave shape out"),
         (3.0, {}, "local_force = 3.0: must be a LocalSpring"),
         (
@@ -215,11 +218,11 @@ def test_file_and_dotted_names(tmp_path):
 )
 def test_refusals(force, more, words):
     with pytest.raises(InputError, match=words):
-        sb.System(MODEL, local_force=force, **more)
+        sb.System(MODEL, forces=[force], **more)
 
 
 def test_tangents_are_refused():
-    system = sb.System(MODEL, local_force=FORCES["spring"])
+    system = sb.System(MODEL, forces=[FORCES["spring"]])
     start = sb.State(amplitude=MODEL.well_amplitude, velocity=np.zeros(MODEL.modes))
     with pytest.raises(InputError, match="tangent with a local force"):
         sb.advance(system, start, tangent=np.zeros((1, 2, MODEL.modes)))

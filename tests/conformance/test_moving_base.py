@@ -90,7 +90,7 @@ def test_mirrored_and_going_on() -> None:
         striker = sb.Striker(drive=sb.FixedStop(), gap=0.05 * LEVEL, side=side)
         return sb.System(
             model(3),
-            striker=striker,
+            contacts=[sb.Contact(None, striker)],
             base_excitation=sb.BaseExcitation(motion=motion, direction=direction),
             **parts,
         )
@@ -161,7 +161,7 @@ def test_refusals_and_the_way_there_and_back() -> None:
     with pytest.raises(InputError, match="direction = 'left'"):
         sb.BaseExcitation(motion=motion, direction="left")
     with pytest.raises(InputError, match="use a HertzContact"):
-        sb.System(model(1), sb.Restitution(0.5), striker, base_excitation=base)
+        sb.System(model(1), contacts=[sb.Contact(sb.Restitution(0.5), striker)], base_excitation=base)
     plain = sb.ReducedModel.from_matrices(
         [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, well_amplitude=[-1.0]
     )
@@ -169,7 +169,7 @@ def test_refusals_and_the_way_there_and_back() -> None:
         sb.System(plain, base_excitation=base)
     with pytest.raises(InputError, match="integrated by the CPU engine alone"):
         resolve("cuda", environment=True)
-    system = sb.System(model(2), default_values.CONTACT, striker, base_excitation=base)
+    system = sb.System(model(2), contacts=[sb.Contact(default_values.CONTACT, striker)], base_excitation=base)
     assert sb.System.from_mapping(system.to_mapping()) == system
     changed = system.replace(
         **{"base_excitation.acceleration_amplitude": 0.3, "base_excitation.direction": "down"}

@@ -58,8 +58,7 @@ def test_units_identity_and_refusals() -> None:
     with pytest.raises(InputError, match="'recorded_acceleration' with a changing axial load"):
         sb.System(
             model,
-            default_values.CONTACT,
-            sb.Striker(drive=motion),
+            contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=motion))],
             axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0)),
         )
 
@@ -124,7 +123,7 @@ def test_a_record_of_a_sine_acts_as_the_sine(side: str, on_base: bool) -> None:
         sb.RecordedAcceleration(record=-amplitude * np.sin(omega * t), sampling_frequency=rate),
     ):
         base = sb.BaseExcitation(motion=motion, striker_on_base=on_base)
-        system = sb.System(model, default_values.CONTACT, stop, base_excitation=base)
+        system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, stop)], base_excitation=base)
         run = sb.simulate(
             system,
             sb.Integration(cycles=5, accuracy="reference"),

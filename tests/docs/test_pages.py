@@ -283,8 +283,8 @@ def test_crossings_end_runs_that_energy_does_not(name):
 def test_a_proven_well_does_not_prove_the_class():
     """The page of questions: after more cycles no proven well is another one, while the class may become transient."""
     system = sb.System(
-        sb.ReducedModel.from_beam(default_values.BEAM, modes=2), default_values.CONTACT,
-        sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1),
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
+        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))],
     )  # fmt: skip
     axes = {
         "drive.frequency_ratio": np.linspace(0.3, 3.0, 30),

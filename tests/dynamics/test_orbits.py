@@ -17,7 +17,10 @@ from snapbeam.model import default_values
 def system_of(modes: int, ratio: float, velocity: float, damping: float = 0.005) -> sb.System:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes, damping_ratio=damping)
     return sb.System(
-        model, default_values.CONTACT, sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity)
+        model,
+        contacts=[
+            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity))
+        ],
     )
 
 
@@ -25,7 +28,9 @@ def oscillator(ratio: float, restitution: float, amplitude: float = 1.0) -> sb.S
     """Of natural frequency 1 rad/s and mass 1, struck by a wall amplitude sin(ratio t) about its rest position."""
     model = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0)
     drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=amplitude * ratio)
-    return sb.System(model, sb.Restitution(restitution), sb.Striker(drive=drive, gap=0.0))
+    return sb.System(
+        model, contacts=[sb.Contact(sb.Restitution(restitution), sb.Striker(drive=drive, gap=0.0))]
+    )
 
 
 def exact_orbit(ratio: float, restitution: float, periods: int) -> tuple[float, np.ndarray]:
@@ -111,7 +116,9 @@ def test_determinant_of_a_bouncing_ball(restitution: float, stroke: float) -> No
     table = sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=stroke, phase=phase)
     above = sb.State(amplitude=[stroke * math.sin(phase)], velocity=[math.pi], striker_position=0.0)
     weight = sb.ExternalForce(history=sb.ConstantForce(force=-1.0))
-    system = sb.System(ball, law, sb.Striker(drive=table), above, external_force=weight)
+    system = sb.System(
+        ball, contacts=[sb.Contact(law, sb.Striker(drive=table))], forces=[weight], initial_state=above
+    )
     orbit = sb.dynamics.periodic_orbit(system, transient=30)
     pressed, later = contact_of_a_ball(law, stroke, orbit.flow.phase, orbit.coordinates)
     np.testing.assert_allclose(later, orbit.coordinates, rtol=0.0, atol=1e-9)
@@ -129,7 +136,7 @@ def test_a_constant_force_repeats_after_any_time(with_striker: bool) -> None:
         if with_striker
         else ()
     )
-    orbit = sb.dynamics.periodic_orbit(sb.System(model, *striker, external_force=load), transient=100)
+    orbit = sb.dynamics.periodic_orbit(sb.System(model, forces=[load], *striker), transient=100)
     assert orbit.residual < 1e-10
     period = orbit.flow.period
     run = sb.simulate(
@@ -227,7 +234,7 @@ def test_coarse_derivatives_are_told(monkeypatch) -> None:
 def test_what_does_not_converge_says_why() -> None:
     with pytest.raises(sb.dynamics.OrbitNotFoundError, match="try another period"):
         sb.dynamics.periodic_orbit(logistic(3.9), [0.3], 7, iterations=2)
-    free = sb.System(sb.ReducedModel.from_beam(default_values.BEAM, 1), default_values.CONTACT)
+    free = sb.System(sb.ReducedModel.from_beam(default_values.BEAM, 1))
     with pytest.raises(sb.InputError, match="striker = None"):
         sb.dynamics.periodic_orbit(free)
     with pytest.raises(sb.InputError, match="guess of 3 numbers"):

@@ -62,8 +62,8 @@ def test_random_states_come_back_from_their_addresses():
     def point():
         return {
             "drive.frequency_ratio": abs(value()), "drive.velocity_amplitude": abs(value()),
-            "striker.location": float(rng.uniform(0.1, 0.9)), "model.modes": int(rng.integers(1, 60)),
-            "striker.side": str(rng.choice(["above", "below"])), "integration.early_termination": bool(rng.integers(2)),
+            "contact.location": float(rng.uniform(0.1, 0.9)), "model.modes": int(rng.integers(1, 60)),
+            "contact.side": str(rng.choice(["above", "below"])), "integration.early_termination": bool(rng.integers(2)),
         }  # fmt: skip
 
     for _ in range(200):

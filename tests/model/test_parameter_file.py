@@ -27,8 +27,8 @@ def test_nothing_given_is_the_paper():
     assert system.contact == CONTACT
     assert system.model.modes == config.model.modes == 32
     assert system.model.damping_ratio.tolist() == [0.005] * 32
-    assert system.get("striker.location") == pytest.approx(1.0 / 2.1)
-    assert system.get("striker.side") == "below"
+    assert system.get("contact.location") == pytest.approx(1.0 / 2.1)
+    assert system.get("contact.side") == "below"
     axes = config.axes(DEFAULT_AXES)
     assert list(axes) == ["drive.frequency_ratio", "drive.velocity_amplitude"]
     assert axes["drive.frequency_ratio"].shape == (64,)
@@ -176,7 +176,7 @@ REFUSALS = [
         "[sweep] modes = '1,x': must be a whole number, whole numbers separated by commas",
     ),
     ({"sweep": {"model.modes": "1:32:3"}}, "[sweep] modes = 16.5: must be an integer in [1, 256]"),
-    ({"sweep": {"striker.side": "below,left"}}, "[sweep] side = 'left': must be one of 'below', 'above'"),
+    ({"sweep": {"contact.side": "below,left"}}, "[sweep] side = 'left': must be one of 'below', 'above'"),
     (
         {"sweep": {"velocity_m_s": "-0.1:0.2:4"}},
         "[sweep] drive.velocity_m_s = -0.1 m/s: is velocity_amplitude = -0.580416, which must",
@@ -360,13 +360,13 @@ def test_physical_units_are_ratios_of_the_system():
     assert system.get("drive.velocity_amplitude") == pytest.approx(
         0.031 / (2.0 * np.pi * freq * level), rel=1e-14
     )
-    assert system.get("striker.location") == pytest.approx(0.04 / 0.161, rel=1e-14)
+    assert system.get("contact.location") == pytest.approx(0.04 / 0.161, rel=1e-14)
     axes = config_from_mapping(
         {"sweep": {"frequency_hz": "50:100:3", "velocity_m_s": [0.01, 0.03], "location_m": "0.02:0.08:4"}}
     ).axes()
-    assert list(axes) == ["drive.frequency_ratio", "drive.velocity_amplitude", "striker.location"]
+    assert list(axes) == ["drive.frequency_ratio", "drive.velocity_amplitude", "contact.location"]
     np.testing.assert_allclose(axes["drive.frequency_ratio"] * freq, [50.0, 75.0, 100.0], rtol=1e-14)
-    np.testing.assert_allclose(axes["striker.location"] * 0.161, [0.02, 0.04, 0.06, 0.08], rtol=1e-14)
+    np.testing.assert_allclose(axes["contact.location"] * 0.161, [0.02, 0.04, 0.06, 0.08], rtol=1e-14)
     for name in PHYSICAL:
         assert [row.parameter for row in PHYSICAL.values()].count(PHYSICAL[name].parameter) == 1
         np.testing.assert_allclose(

@@ -67,8 +67,12 @@ def test_every_argument_of_a_model_of_a_beam_is_in_it() -> None:
 def test_a_system_has_no_parameter_beside_it() -> None:
     system = sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
-        default_values.CONTACT,
-        sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-4),
+        contacts=[
+            sb.Contact(
+                default_values.CONTACT,
+                sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-4),
+            )
+        ],
     )
     words = {"contact.type", "drive.type"}
     assert set(system.parameters) - words <= set(TABLE)
@@ -102,8 +106,8 @@ def test_every_row_is_said_in_words() -> None:
     [
         ("beam.thickness", "Thickness in the direction of bending $h$ (m)", "(0, inf)"),
         ("drive.velocity_amplitude", r"Velocity amplitude over b omega_1 $V$", "[0, inf)"),
-        ("striker.location", r"Location of the striker over the length $x_\mathrm{s}$", "(0, 1)"),
-        ("striker.side", "Side that the striker pushes from", "below or above"),
+        ("contact.location", r"Location of the striker over the length $x_\mathrm{s}$", "(0, 1)"),
+        ("contact.side", "Side that the striker pushes from", "below or above"),
         ("model.modes", "Number of buckling modes $N$", "[1, 256]"),
         ("model.damping_ratio", r"Damping ratio of every linear mode $\zeta$", "[0, 1)"),
         ("contact.stiffness", "Contact stiffness $k_c$ (N/m$^{1.5}$)", "(0, inf)"),
@@ -131,7 +135,7 @@ def test_label_and_limits(name: str, label: str, limits: str) -> None:
         ("contact_stiffness", "contact.stiffness"),
         ("stiffness", "contact.stiffness"),
         ("restitution_coefficient", "contact.coefficient"),
-        ("location", "striker.location"),
+        ("location", "contact.location"),
         ("step", "integration.step"),
         ("frequency", "drive.frequency"),
         ("initial_state.amplitude[3]", "initial_state.amplitude[3]"),
@@ -219,8 +223,12 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
         )
         system = sb.System(
             sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
-            laws.get(kind, default_values.CONTACT),
-            sb.Striker(drive=drives.get(kind, sb.Sine(**pair))),
+            contacts=[
+                sb.Contact(
+                    laws.get(kind, default_values.CONTACT),
+                    sb.Striker(drive=drives.get(kind, sb.Sine(**pair))),
+                )
+            ],
             **({row.section: around[row.section](kind)} if row.section in around else {}),
         )
         columns = run_columns(system, {name: np.array([0.1, 0.2, 0.3])})

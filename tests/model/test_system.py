@@ -14,7 +14,7 @@ from snapbeam.util.validation import InputError, InputTypeError
 
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
 SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
-PLAIN = sb.System(MODEL, default_values.CONTACT, SHAKER)
+PLAIN = sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, SHAKER)])
 
 
 def record(samples: int = 400, last: float = 0.0) -> sb.Striker:
@@ -52,20 +52,23 @@ SYSTEMS = {
     "free": sb.System(MODEL, initial_state=start()),
     "matrices": sb.System(
         BY_MATRICES,
-        sb.HertzContact(1e3),
-        sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, side="above"),
+        contacts=[
+            sb.Contact(
+                sb.HertzContact(1e3), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, side="above")
+            )
+        ],
     ),
-    "gap": PLAIN.replace(**{"striker.gap": -1e-4, "drive.phase": 1.0}),
+    "gap": PLAIN.replace(**{"contact.gap": -1e-4, "drive.phase": 1.0}),
     "load": PLAIN.replace(**{"beam.axial_load": 36.0}),
     "damping by mode": sb.System(
         sb.ReducedModel.from_beam(
             default_values.BEAM, modes=2, damping_ratio=[0.01, 0.02], reference_frequency=80.0
         ),
-        default_values.CONTACT,
-        SHAKER,
+        contacts=[sb.Contact(default_values.CONTACT, SHAKER)],
     ),
     "restitution": sb.System(
-        sb.ReducedModel.from_beam(default_values.BEAM, modes=1), sb.Restitution(0.6), SHAKER
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
+        contacts=[sb.Contact(sb.Restitution(0.6), SHAKER)],
     ),
 }
 
@@ -154,10 +157,10 @@ CHANGES = {
     "imperfection.uniform_load": 0.05,
     "imperfection.gravity": 0.1,
     "contact.stiffness": 2e8,
-    "striker.location": 0.3,
-    "striker.side": "above",
-    "striker.gap": 1e-5,
-    "striker.mass": 0.02,
+    "contact.location": 0.3,
+    "contact.side": "above",
+    "contact.gap": 1e-5,
+    "contact.mass": 0.02,
     "drive.frequency_ratio": 1.3,
     "drive.velocity_amplitude": 0.2,
     "drive.phase": 0.5,
@@ -197,7 +200,7 @@ def test_every_parameter_of_scope_run_can_be_changed() -> None:
         and (not row.kinds or own[row.section] in row.kinds)
     }
     # of a body alone, or of a rise or a force that is there; a profile is no number
-    others = {"striker.suspension_stiffness", "striker.suspension_damping"}
+    others = {"contact.suspension_stiffness", "contact.suspension_damping"}
     others |= {f"imperfection.{name}" for name in ("shape", "point_location", "profile")}
     assert names - set(CHANGES) == others
 
@@ -321,14 +324,14 @@ def test_hash_is_the_same_tomorrow() -> None:
 
 
 def test_replace_keeps_everything_else() -> None:
-    changed = PLAIN.replace(**{"beam.thickness": 5e-4, "striker.location": 0.3})
+    changed = PLAIN.replace(**{"beam.thickness": 5e-4, "contact.location": 0.3})
     assert changed.model.beam == dataclasses.replace(default_values.BEAM, thickness=5e-4)
     assert changed.model.beam.buckling_level == default_values.BEAM.buckling_level
     assert changed.model.beam.axial_load > default_values.BEAM.axial_load
     assert changed.striker == dataclasses.replace(PLAIN.striker, location=0.3)
     assert changed.contact is PLAIN.contact
     assert changed.model.modes == 3
-    assert PLAIN.get("striker.location") == pytest.approx(1.0 / 2.1), "the first one is as it was"
+    assert PLAIN.get("contact.location") == pytest.approx(1.0 / 2.1), "the first one is as it was"
     assert PLAIN.replace() == PLAIN
 
 
@@ -340,7 +343,7 @@ def test_whole_parts() -> None:
     )
     assert PLAIN.replace(striker=None, contact=None, initial_state=start()).striker is None
     shaken = PLAIN.replace(striker=sb.Shaker(frequency_ratio=3.0, velocity_amplitude=0.1, location=0.2))
-    assert (shaken.get("drive.frequency_ratio"), shaken.get("striker.location")) == (3.0, 0.2)
+    assert (shaken.get("drive.frequency_ratio"), shaken.get("contact.location")) == (3.0, 0.2)
     both = PLAIN.replace(model=sb.ReducedModel.from_beam(default_values.BEAM, 2), **{"beam.width": 0.02})
     assert (both.model.modes, both.get("beam.width")) == (2, 0.02)
 
@@ -398,7 +401,7 @@ def test_another_number_of_modes_keeps_the_start() -> None:
         ({"beam": default_values.STRAIGHT_BEAM}, "a run needs a buckled beam: axial_load = 0 N must exceed"),
         ({"beam.buckling_level": 1e-3, "beam.axial_load": 30.0}, "give exactly one of the two"),
         ({"model.modes": 0}, r"modes = 0: must be an integer in \[1, 256\]"),
-        ({"striker.location": 1.0}, r"location = 1.0: must be a number in \(0, 1\)"),
+        ({"contact.location": 1.0}, r"location = 1.0: must be a number in \(0, 1\)"),
         ({"contact": None}, "contact = None: a striker needs a law of contact"),
         ({"contact": 3.0}, r"contact = 3.0: must be a law of contact, such as HertzContact\(stiffness\)"),
         ({"contact": sb.Restitution(0.5)}, "with modes = 3: Newton's law needs one mode"),
@@ -431,7 +434,7 @@ def test_refusals_name_what_is_not_there() -> None:
     with pytest.raises(InputError, match="beam: this model was given by matrices, it has no beam"):
         SYSTEMS["matrices"].replace(**{"beam.length": 0.2})
     with pytest.raises(InputTypeError):
-        sb.System(MODEL, default_values.CONTACT, "shaker")  # type: ignore[arg-type]
+        sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, "shaker")])  # type: ignore[arg-type]
     with pytest.raises(dataclasses.FrozenInstanceError):
         PLAIN.contact = sb.HertzContact(1.0)  # type: ignore[misc]
 

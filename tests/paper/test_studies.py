@@ -56,8 +56,8 @@ def test_the_stored_harvester_is_of_a_real_material():
     """Its coupling is that of PZT-5H, and the stored medians are those that the page states."""
     system = sb.System(
         sb.ReducedModel.from_beam(paper.BEAM, modes=1),
+        harvesters=[PIEZO],
         base_excitation=sb.BaseExcitation(motion=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.1)),
-        harvester=PIEZO,
     )
     assert "unphysical-coupling" not in {each.code for each in system.diagnostics()}
     found = xr.load_dataset(DATA / "harvesting.nc", group="power", engine="h5netcdf")

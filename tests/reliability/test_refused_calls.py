@@ -28,8 +28,7 @@ POINTS = MeasuredPoints(np.ones(2), np.full(2, 0.1), np.full(2, np.nan), np.zero
 def system():
     return sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
-        default_values.CONTACT,
-        sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3),
+        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))],
     )
 
 

@@ -76,7 +76,7 @@ def test_refusals(changes: dict[str, Any], error: type[Exception], message: str)
         sb.simulate(sb.System(**system), sb.Integration(**given), sample_times=times)
 
 
-SYSTEM = sb.System(BUCKLED, default_values.CONTACT, SHAKER)
+SYSTEM = sb.System(BUCKLED, contacts=[sb.Contact(default_values.CONTACT, SHAKER)])
 
 
 @pytest.mark.parametrize(

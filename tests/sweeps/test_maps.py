@@ -82,7 +82,8 @@ def test_every_point_is_its_run(modes: int) -> None:
         for j in (0, 2):
             shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=VELOCITY[j])
             response = sb.simulate(
-                sb.System(model_of(modes), default_values.CONTACT, shaker), sb.Integration(cycles=4)
+                sb.System(model_of(modes), contacts=[sb.Contact(default_values.CONTACT, shaker)]),
+                sb.Integration(cycles=4),
             ).summary
             point = {name: ds[name].values[i, j].item() for name in STATISTICS}
             np.testing.assert_equal(point, dict(response))

@@ -18,7 +18,7 @@ CYCLES, ERROR = 4, 5e-6
 def nominal_system(modes: int = 1, velocity: float = 0.12) -> sb.System:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes, damping_ratio=0.005)
     shaker = sb.Shaker(frequency_ratio=1.4, velocity_amplitude=velocity, location=0.3)
-    return sb.System(model, default_values.CONTACT, shaker)
+    return sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)])
 
 
 def measured(nominal: sb.System, logs: np.ndarray, draw: np.random.Generator) -> sb.uncertainty.Waveform:

@@ -122,7 +122,7 @@ def equilibria(
         model = identify_imperfection(
             model.beam, lower_frequency, upper_frequency, identify, model.modes, model.imperfection
         )
-        potential = Potential.of(model, None, None)
+        potential = Potential.of(model, ())
         assert model.beam is not None
         assert model.imperfection is not None
         unit = {"midspan_amplitude": "m", "point_load": "N", "uniform_load": "N/m"}[identify]

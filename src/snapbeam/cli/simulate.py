@@ -204,7 +204,7 @@ class _share_done:
 
 _OWN_RECORD = {
     "base_excitation": "recorded_acceleration, record (m/s^2)",
-    "external_force": "recorded_force, record (N)",
+    "force": "recorded_force, record (N)",
 }
 """Type and sampled quantity of a record that a section takes from a parameter file."""
 

@@ -101,7 +101,7 @@ def force_displacement(
     if isinstance(system, System):
         potential = system.potential
     elif isinstance(system, ReducedModel):
-        potential = Potential.of(system, None, None)
+        potential = Potential.of(system, ())
     elif isinstance(system, Potential):
         potential = system
     else:
@@ -241,7 +241,7 @@ def _well(potential: Potential, given: str | None) -> tuple[str, str]:
     wells = potential.wells
     if not wells:
         raise InputError(
-            f"local_force = {', '.join(map(shown, potential.local_forces))}: leaves no well, such as beyond pull-in; give a "
+            f"forces = {', '.join(map(shown, potential.local_forces))}: leave no well, such as beyond pull-in; give a "
             "weaker force"
         )
     only = "upper" if potential.center(wells[0]) > 0.0 else "lower"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -71,12 +72,14 @@ class Potential:
     local_forces: tuple[LocalForce, ...]
 
     @classmethod
-    def of(cls, model: ReducedModel, external: ExternalForce | None, local: LocalForce | None) -> Potential:
-        """The potential energy of a structure, the constant part of an external force and a local force."""
+    def of(cls, model: ReducedModel, forces: Sequence[LocalForce | ExternalForce]) -> Potential:
+        """The potential energy of a structure, of the local forces and of the constant parts of external forces."""
         constant = np.zeros(model.modes)
-        if external is not None and external.history.constant_part != 0.0:
-            constant = external.history.constant_part * external.row(model)
-        return cls(model, constant, () if local is None or not local.is_conservative else (local,))
+        for each in forces:
+            if isinstance(each, ExternalForce) and each.history.constant_part != 0.0:
+                constant = constant + each.history.constant_part * each.row(model)
+        local = tuple(each for each in forces if isinstance(each, LocalForce) and each.is_conservative)
+        return cls(model, constant, local)
 
     @cached_property
     def structure(self) -> ReducedModel:
@@ -178,7 +181,7 @@ class Potential:
             if self._adds_up(listed):
                 return tuple(sorted(listed, key=lambda each: each.energy))
         raise InputError(
-            f"local_force: {len(found)} equilibria were found, whose numbers of unstable directions "
+            f"forces: {len(found)} equilibria were found, whose numbers of unstable directions "
             f"{[each.unstable_directions for each in listed]} do not add up; check displacement_range of the law"
         )
 

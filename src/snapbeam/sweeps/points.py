@@ -22,6 +22,7 @@ from snapbeam.model.parameter_axes import (
     unit_of,
 )
 from snapbeam.model.parameters import Parameter, lookup, parameters, short_names
+from snapbeam.model.quantity import split_name
 from snapbeam.util.provenance import array_hash
 from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, shown
 
@@ -350,7 +351,7 @@ def _is_label(name: str) -> bool:
         For a name that is almost the name of a parameter.
     """
     table = parameters()
-    known = [*table, *short_names(), *(full.partition(".")[2] for full in table)]
+    known = [*table, *short_names(), *(split_name(full)[1] for full in table)]
     if name in known:
         return False
     try:
