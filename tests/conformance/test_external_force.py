@@ -92,9 +92,9 @@ def test_force_on_a_beam_beside_a_stop():
 
     beam = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
     force = sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=0.9, amplitude=0.4), location=0.4)
-    own = {"contact": default_values.CONTACT, "striker": sb.Striker(drive=sb.FixedStop(), gap=1e-5)}
+    stop = sb.Contact(default_values.CONTACT, sb.Striker(drive=sb.FixedStop(), gap=1e-5))
     run = sb.simulate(
-        sb.System(beam, forces=[force], **own),
+        sb.System(beam, contacts=[stop], forces=[force]),
         sb.Integration(cycles=6, accuracy="reference"),
         sample_times=np.linspace(0.0, 0.01, 50),
     )
@@ -143,7 +143,7 @@ def test_refusals():
         sb.System(model(), base_excitation=sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=1.0, acceleration_amplitude=1.0)))  # fmt: skip
     with pytest.raises(InputError, match=r"base_shape of shape \(3,\)"):
         model(base_shape=[1.0, 1.0, 1.0])
-    with pytest.raises(InputError, match=r"external_force\.shape of shape \(3,\): must be \(2,\)"):
+    with pytest.raises(InputError, match=r"force\.shape of shape \(3,\): must be \(2,\)"):
         sb.System(model(), forces=[sb.ExternalForce(history=harmonic, shape=[1.0, 0.0, 0.0])])
     with pytest.raises(InputError, match="has no length; give shape"):
         sb.System(model(), forces=[sb.ExternalForce(history=harmonic, location=0.5)])

@@ -93,7 +93,7 @@ def test_a_coil_without_a_magnet(plain) -> None:
     """K to 0: its force goes with K squared."""
     errors = [
         np.abs(
-            end(harvester=sb.ElectromagneticHarvester(force_factor=constant, resistance=30.0)) - plain
+            end(harvesters=[sb.ElectromagneticHarvester(force_factor=constant, resistance=30.0)]) - plain
         ).max()
         for constant in (0.1, 0.01, 0.0)
     ]

@@ -204,8 +204,8 @@ def mixture(seed: int, modes: int) -> Mixture:
         words.append(f"{name} through {law.name}" + (" by a body" if body else ""))
     system = sb.System(
         model,
-        contacts=[sb.Contact(laws, strikers)],
-        harvesters=[harvester],
+        contacts=list(map(sb.Contact, laws, strikers)),
+        harvesters=[] if harvester is None else [harvester],
         base_excitation=base,
         axial_load=axial,
     )

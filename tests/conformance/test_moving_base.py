@@ -58,10 +58,8 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
     motion = sb.AccelerationSine(frequency_ratio=ratio, acceleration_amplitude=strength)
     own = {"base_excitation": sb.BaseExcitation(motion=motion, striker_on_base=stop != "in space")}
     if stop != "none":
-        own |= {
-            "contact": default_values.CONTACT,
-            "striker": sb.Striker(drive=sb.FixedStop(), gap=gap, location=LOCATION),
-        }
+        striker = sb.Striker(drive=sb.FixedStop(), gap=gap, location=LOCATION)
+        own["contacts"] = [sb.Contact(default_values.CONTACT, striker)]
     system = sb.System(model(modes), **own)
     for accuracy, bound in (("standard", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
@@ -84,15 +82,13 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
 def test_mirrored_and_going_on() -> None:
     """The mirrored system's mirrored run, and three periods in one go and one by one, bit for bit."""
     motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.3)
-    parts = {"contact": default_values.CONTACT}
 
     def system(side: str, direction: str) -> sb.System:
         striker = sb.Striker(drive=sb.FixedStop(), gap=0.05 * LEVEL, side=side)
         return sb.System(
             model(3),
-            contacts=[sb.Contact(None, striker)],
+            contacts=[sb.Contact(default_values.CONTACT, striker)],
             base_excitation=sb.BaseExcitation(motion=motion, direction=direction),
-            **parts,
         )
 
     once, mirrored = (

@@ -200,7 +200,7 @@ def test_a_shock_beside_other_motions_ends_with_a_step(name) -> None:
     shock = sb.HalfSine(displacement_amplitude=0.3, duration=0.7)
     if name == "one of two":
         strikers = [sb.Striker(drive=sine), sb.Striker(drive=shock, location=0.3)]
-        system = sb.System(model, [default_values.CONTACT, default_values.CONTACT], strikers)
+        system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, each) for each in strikers])
     else:
         base = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.2))
         system = sb.System(

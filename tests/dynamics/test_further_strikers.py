@@ -43,7 +43,9 @@ def struck(
         sb.Striker(drive=second, location=0.3, side=sides[1], gap=second_gap),
     ]
     return sb.System(
-        model(modes, damping_ratio), contacts=[sb.Contact(sb.HertzContact(stiffness), strikers)], **around
+        model(modes, damping_ratio),
+        contacts=[sb.Contact(sb.HertzContact(stiffness), each) for each in strikers],
+        **around,
     )
 
 

@@ -13,7 +13,9 @@ from snapbeam.model import default_values
 from snapbeam.model.axial_load import LOADS
 from snapbeam.model.contact.base import LAWS
 from snapbeam.model.drive.base import DRIVES
+from snapbeam.model.external_force import FORCES
 from snapbeam.model.harvester import HARVESTERS
+from snapbeam.model.local_force import LOCAL_FORCES
 from snapbeam.model.parameters import Parameter, lookup, parameters, short_names
 from snapbeam.model.quantity import RUN, STRUCTURE, quantities
 from snapbeam.model.reduced_model import MODEL_QUANTITIES
@@ -24,12 +26,12 @@ CLASSES = {
     "beam": [sb.Beam],
     "boundary": [sb.BoundaryConditions],
     "imperfection": [sb.Imperfection],
-    "striker": [sb.Striker],
     "integration": [sb.Integration],
-    "contact": list(LAWS.values()),
+    "contact": [sb.Striker, *LAWS.values()],
     "drive": list(DRIVES.values()),
     "base_excitation": [sb.BaseExcitation, *(kind for kind in DRIVES.values() if kind.can_excite_base())],
     "axial_load": list(LOADS.values()),
+    "force": [sb.ExternalForce, *FORCES.values(), *LOCAL_FORCES.values()],
     "harvester": list(HARVESTERS.values()),
 }
 
@@ -210,10 +212,10 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
     around = {
         "base_excitation": lambda kind: sb.BaseExcitation(motion=drives.get(kind, sb.Sine(**pair))),
         "axial_load": lambda kind: sb.AxialLoadModulation(motion=loads[kind]),
-        "external_force": lambda kind: sb.ExternalForce(history=forces[kind], location=0.5),
-        "harvester": lambda kind: sb.PiezoelectricHarvester(
-            moment_per_volt=1e-3, capacitance=1e-8, resistance=1e4
-        ),
+        "forces": lambda kind: [sb.ExternalForce(history=forces[kind], location=0.5)],
+        "harvesters": lambda kind: [
+            sb.PiezoelectricHarvester(moment_per_volt=1e-3, capacitance=1e-8, resistance=1e4)
+        ],
     }
     for name, row in TABLE.items():
         if not row.is_run:
@@ -229,7 +231,7 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
                     sb.Striker(drive=drives.get(kind, sb.Sine(**pair))),
                 )
             ],
-            **({row.section: around[row.section](kind)} if row.section in around else {}),
+            **{part: around[part](kind) for part in (row.section, f"{row.section}s") if part in around},
         )
         columns = run_columns(system, {name: np.array([0.1, 0.2, 0.3])})
         assert columns[name].tolist() == [0.1, 0.2, 0.3]

@@ -47,7 +47,7 @@ BY_MATRICES = sb.ReducedModel.from_matrices(
 )
 SYSTEMS = {
     "plain": PLAIN,
-    "recorded": PLAIN.replace(striker=record()),
+    "recorded": PLAIN.replace(**{"contact.striker": record()}),
     "start": PLAIN.replace(initial_state=start(striker_position=1e-4, phase=0.3, contact_time=-1.0)),
     "free": sb.System(MODEL, initial_state=start()),
     "matrices": sb.System(
@@ -193,8 +193,7 @@ def test_every_parameter_of_scope_run_can_be_changed() -> None:
             "integration",
             "base_excitation",
             "axial_load",
-            "external_force",
-            "local_force",
+            "force",
             "harvester",
         )  # which the paper's system has none of
         and (not row.kinds or own[row.section] in row.kinds)
@@ -284,7 +283,7 @@ def test_every_law_and_drive_is_asked() -> None:
 @pytest.mark.slow
 def test_every_sample_and_the_start_are_hashed() -> None:
     """Two runs with different records or starts do not carry the same parameter hash."""
-    one, other = (PLAIN.replace(striker=record(last=shift)) for shift in (0.0, 1e-12))
+    one, other = (PLAIN.replace(**{"contact.striker": record(last=shift)}) for shift in (0.0, 1e-12))
     assert one.hash != other.hash
     begun, elsewhere = (
         PLAIN.replace(initial_state=start(velocity=[0.0, 0.0, v])) for v in (0.1, 0.1 + 1e-15)
@@ -329,7 +328,7 @@ def test_replace_keeps_everything_else() -> None:
     assert changed.model.beam.buckling_level == default_values.BEAM.buckling_level
     assert changed.model.beam.axial_load > default_values.BEAM.axial_load
     assert changed.striker == dataclasses.replace(PLAIN.striker, location=0.3)
-    assert changed.contact is PLAIN.contact
+    assert changed.contact_law is PLAIN.contact_law
     assert changed.model.modes == 3
     assert PLAIN.get("contact.location") == pytest.approx(1.0 / 2.1), "the first one is as it was"
     assert PLAIN.replace() == PLAIN
@@ -341,8 +340,10 @@ def test_whole_parts() -> None:
         PLAIN.replace(drive=sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.1)).get("drive.frequency_ratio")
         == 2.0
     )
-    assert PLAIN.replace(striker=None, contact=None, initial_state=start()).striker is None
-    shaken = PLAIN.replace(striker=sb.Shaker(frequency_ratio=3.0, velocity_amplitude=0.1, location=0.2))
+    assert PLAIN.replace(contacts=[], initial_state=start()).striker is None
+    shaken = PLAIN.replace(
+        **{"contact.striker": sb.Shaker(frequency_ratio=3.0, velocity_amplitude=0.1, location=0.2)}
+    )
     assert (shaken.get("drive.frequency_ratio"), shaken.get("contact.location")) == (3.0, 0.2)
     both = PLAIN.replace(model=sb.ReducedModel.from_beam(default_values.BEAM, 2), **{"beam.width": 0.02})
     assert (both.model.modes, both.get("beam.width")) == (2, 0.02)
@@ -388,7 +389,7 @@ def test_another_number_of_modes_keeps_the_start() -> None:
             {"model.mass": 1.0},
             r"model\.mass: cannot be changed; must be one of modes, damping_ratio, reference_frequency",
         ),
-        ({"striker.frequency_ratio": 1.0}, "must be one of location, side, gap"),
+        ({"contact.frequency_ratio": 1.0}, "must be one of stiffness, location, side, gap"),
         ({"drive.displacement": [1.0]}, "must be one of frequency_ratio, velocity_amplitude, phase"),
         (
             {"initial_state.amplitude": 1.0},
@@ -402,12 +403,19 @@ def test_another_number_of_modes_keeps_the_start() -> None:
         ({"beam.buckling_level": 1e-3, "beam.axial_load": 30.0}, "give exactly one of the two"),
         ({"model.modes": 0}, r"modes = 0: must be an integer in \[1, 256\]"),
         ({"contact.location": 1.0}, r"location = 1.0: must be a number in \(0, 1\)"),
-        ({"contact": None}, "contact = None: a striker needs a law of contact"),
-        ({"contact": 3.0}, r"contact = 3.0: must be a law of contact, such as HertzContact\(stiffness\)"),
-        ({"contact": sb.Restitution(0.5)}, "with modes = 3: Newton's law needs one mode"),
+        ({"contact": None}, r"contacts\[0\] = None: must be a Contact\(law, striker\)"),
+        ({"contact.2.gap": 1e-5}, r"contact\.2: this system has 1 contact"),
+        (
+            {"contact.stop.gap": 1e-5},
+            r"contact\.stop\.gap: this system has no contact 'stop'; must be one of 1",
+        ),
+        ({"force": 1.0}, "force: this system has no force"),
+        ({"contacts": 1.0}, "contacts = 1.0: must be a list or tuple"),
+        ({"contact.law": 3.0}, r"law = 3.0: must be a law of contact, such as HertzContact\(stiffness\)"),
+        ({"contact.law": sb.Restitution(0.5)}, "with modes = 3: Newton's law needs one mode"),
         ({"model": 3}, "model = 3: must be a ReducedModel"),
         ({"drive": 3}, "drive = 3: must be a drive"),
-        ({"striker": 3}, "striker = 3: must be a Striker or a Shaker"),
+        ({"contact.striker": 3}, "striker = 3: must be a Striker or a Shaker"),
         ({"initial_state": 3}, "initial_state = 3: must be a State"),
         (
             {"initial_state": sb.State(amplitude=np.zeros(2))},
@@ -429,14 +437,14 @@ def test_refusals_name_what_is_not_there() -> None:
         InputError, match=r"beam\.thicknes: is not a parameter of this system; it has beam\.length"
     ):
         PLAIN.get("beam.thicknes")
-    with pytest.raises(InputError, match="drive: this system has none"):
+    with pytest.raises(InputError, match="drive: this system has no contacts"):
         SYSTEMS["free"].replace(**{"drive.frequency_ratio": 1.0})
     with pytest.raises(InputError, match="beam: this model was given by matrices, it has no beam"):
         SYSTEMS["matrices"].replace(**{"beam.length": 0.2})
     with pytest.raises(InputTypeError):
         sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, "shaker")])  # type: ignore[arg-type]
     with pytest.raises(dataclasses.FrozenInstanceError):
-        PLAIN.contact = sb.HertzContact(1.0)  # type: ignore[misc]
+        PLAIN.contacts = sb.HertzContact(1.0)  # type: ignore[misc]
 
 
 def test_described() -> None:

@@ -73,7 +73,7 @@ def test_voltage_of_a_coil(shaken, inductance):
     coil = sb.ElectromagneticHarvester(
         force_factor=1.5, resistance=30.0, coil_resistance=10.0, inductance=inductance, location=0.4
     )
-    run = sb.simulate(shaken.replace(harvester=coil), sb.Integration(cycles=20))
+    run = sb.simulate(shaken.replace(harvesters=[coil]), sb.Integration(cycles=20))
     power, square = late_means(run)
     assert run.summary.harvested_power_last_quarter == pytest.approx(power, rel=2e-3)
     assert run.summary.rms_voltage_last_quarter**2 == pytest.approx(square, rel=2e-3)

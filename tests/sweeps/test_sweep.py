@@ -219,7 +219,7 @@ def test_an_axis_over(name: str, system) -> None:
 
 @pytest.mark.slow
 def test_restitution(system) -> None:
-    one = system.replace(**{"model.modes": 1}).replace(contact=sb.Restitution(0.5))
+    one = system.replace(**{"model.modes": 1}).replace(**{"contact.law": sb.Restitution(0.5)})
     ds = sb.sweep(one, {"restitution_coefficient": [0.0, 0.4, 0.9], "damping_ratio": [0.001, 0.01]}, ASKED)
     for i, j in itertools.product(range(3), range(2)):
         changed = one.replace(
@@ -242,7 +242,7 @@ def test_recorded_drives(system) -> None:
             frequency=95.0,
         ),
     )
-    shaken = system.replace(striker=record)
+    shaken = system.replace(**{"contact.striker": record})
     ds = sb.sweep(shaken, {"location": [0.3, 0.5], "modes": [1, 2]}, sb.Integration())
     assert ds.attrs["cycles"] == pytest.approx(record.drive.duration * 95.0)
     for i, j in itertools.product(range(2), range(2)):
@@ -417,7 +417,7 @@ def test_parameters_that_are_only_in_order_together(system) -> None:
         (
             lambda s: sb.sweep(sb.System(s.model), {"modes": [1, 2]}),
             InputError,
-            "striker = None: .* needs an initial_state",
+            r"contacts = \[\]: .* needs an initial_state",
         ),
         (
             lambda s: sb.sweep(s, {"beam.buckling_level": [3e-4], "beam.axial_load": [30.0]}),

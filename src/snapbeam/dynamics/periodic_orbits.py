@@ -628,7 +628,7 @@ def periodic_orbit(
     flow = flow_of(system, integration, "reference")
     if isinstance(flow, Stroboscope):
         if flow.system.primary_excitation is None:
-            raise InputError("striker = None: a beam without excitation has no orbit except its equilibrium")
+            raise InputError("contacts = []: a beam without excitation has no orbit except its equilibrium")
         if phase is not None:
             flow = Stroboscope(flow.system, flow.integration, phase)
     elif phase is not None:

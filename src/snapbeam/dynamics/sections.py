@@ -95,7 +95,7 @@ def poincare_section(
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if system.primary_excitation is None:
-        raise InputError("striker = None: a section needs a drive, a base excitation or an axial load")
+        raise InputError("contacts = []: a section needs a drive, a base excitation or an axial load")
     total = integer("periods", periods, 1, 10**6)
     flow = Stroboscope(system, Integration() if integration is None else integration, phase)
     level = _level(section)

@@ -21,6 +21,7 @@ from snapbeam.simulation.save import code_flags
 from snapbeam.simulation.simulate import attributes_of
 from snapbeam.solver.assemble import cycles_of, make_ensemble, plans_of, run_columns
 from snapbeam.solver.registry import resolve
+from snapbeam.solver.restrictions import check_integrable
 from snapbeam.solver.statistics import STATISTICS, statistics_of
 from snapbeam.solver.step_size import Plan, require_resolved
 from snapbeam.sweeps.points import (
@@ -426,6 +427,7 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
     if isinstance(points, PointList):
         points = list_in_ratios(system, points)
     require_parameters(system, points)
+    check_integrable(system)
     law = type(system.contact_law) if system.contact_law is not None else None
     resolved = resolve(
         integration.engine,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.integration import Integration
+from snapbeam.model.mapping import resolved
 from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, physical_name
 from snapbeam.model.parameters import lookup
 from snapbeam.model.system import System
@@ -117,6 +118,8 @@ def threshold(
     >>> found["lower_threshold"].dims
     ('frequency_ratio',)
     """
+    if isinstance(system, System) and isinstance(parameter, str):
+        parameter = resolved(system, parameter)
     row = parameter_of_axis(physical_name(str(parameter)) or lookup(parameter).name)
     if not row.is_run or row.quantity.kind is not float:
         raise InputError(
