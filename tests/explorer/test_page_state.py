@@ -16,13 +16,13 @@ POINT = {"drive": {"frequency_ratio": 1.3, "velocity_amplitude": 0.25}}
 SHORT = {"extends": "paper", "model": {"modes": 6}, "integration": {"cycles": 30}, **POINT}
 FILES = {
     "imperfection": SHORT | {"imperfection": {"midspan_amplitude": 1e-5}},
-    "second striker": SHORT | {"striker_2": {"location": 0.3, "gap": 2e-5, "side": "above"}},
+    "second striker": SHORT | {"contact": [{}, {"location": 0.3, "gap": 2e-5, "side": "above"}]},
     "load instead of level": SHORT | {"beam": {"axial_load": 60.0}},
     "boundary": SHORT | {"boundary": {"left_rotational_stiffness": 5.0}},
     "Newton": SHORT | {"model": {"modes": 1}, "contact": {"coefficient": 0.6}},
     "initial state": SHORT | {"initial_state": {"amplitude[1]": 1.0, "amplitude[3]": -1e-3, "velocity[5]": 2e-5}},
-    "two sines": SHORT | {"striker_2": {"location": 0.7}, "drive_2": {"type": "sine", "frequency_ratio": 0.4, "velocity_amplitude": 0.1}},
-    "mass": SHORT | {"striker": {"location": 0.4, "mass": 0.01, "suspension_stiffness": 900.0}},
+    "two sines": SHORT | {"contact": [{}, {"location": 0.7, "drive": {"type": "sine", "frequency_ratio": 0.4, "velocity_amplitude": 0.1}}]},
+    "mass": SHORT | {"contact": {"location": 0.4, "mass": 0.01, "suspension_stiffness": 900.0}},
     "tolerance": SHORT | {"integration": {"cycles": 12, "tolerance": 1e-7, "early_termination": True}},
 }  # fmt: skip
 

@@ -83,4 +83,4 @@ def test_they_are_told_in_words() -> None:
     assert sb.STATISTICS.get("impulse_contact_4").unit == "N s"
     assert sb.STATISTICS.get("response_contact_2") is None
     with pytest.raises(KeyError):
-        sb.STATISTICS["impacts_striker_x"]
+        sb.STATISTICS["impacts_contact_x"]
