@@ -318,7 +318,7 @@ def trials_of(
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if system.striker is None:
-        raise InputError("striker = None: must be a Striker; the outcomes are those of a struck beam")
+        raise InputError("contacts = []: must hold a Contact; the outcomes are those of a struck beam")
     uncertainty = ParameterUncertainty() if uncertainty is None else uncertainty
     if not isinstance(uncertainty, ParameterUncertainty):
         raise InputTypeError(f"uncertainty = {shown(uncertainty)}: must be a ParameterUncertainty")
