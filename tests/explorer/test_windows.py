@@ -207,7 +207,7 @@ def test_what_each_of_two_strikers_does_is_shown_and_kept(one_mode, jobs) -> Non
     )
     window = compute(_window(two, (30, 30), 10), jobs, Token(), lambda _: None)
     found = window_dataset(window)
-    assert found.peak_force_contact_2.attrs == {"units": "N", "long_name": "peak contact force, striker 2"}
+    assert found.peak_force_contact_2.attrs == {"units": "N", "long_name": "peak contact force, contact 2"}
     order = list(layers_of(found))
     assert order[0] == "response_class"
     at = order.index("peak_force")
