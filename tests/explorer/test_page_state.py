@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from urllib.parse import parse_qs
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.explorer.address import Address
+from snapbeam.explorer.cards import SystemCard
 from snapbeam.explorer.maps import difference, patched, sections_of, system_from
+from snapbeam.explorer.style import look_of
 from snapbeam.model.parameter_file import config_from_mapping
 
 POINT = {"drive": {"frequency_ratio": 1.3, "velocity_amplitude": 0.25}}
@@ -97,6 +100,7 @@ def test_changes_that_are_none_are_told(text):
         "initial_state.amplitude:[[1];2]",
         "initial_state.x:1",
         "initial_state.velocity:[1;2;3;4;5;6]",
+        "contact.3.gap:1e-5",
         "beam:",
     ],
 )
@@ -104,6 +108,21 @@ def test_changes_that_make_no_system_are_refused(text, system):
     changes = Address.read({"set": [text.encode()]}).changes
     with pytest.raises(sb.InputError):
         system_from(patched(sections_of(system, sb.Integration()), changes))
+
+
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
+def test_another_law_leaves_the_striker_and_the_other_contact():
+    base, how = made("second striker")
+    page = SimpleNamespace(
+        shown_system=lambda: (base, how), post=lambda call: call(), look=look_of("default")
+    )
+    card = SystemCard(page)
+    assert card.changed_fields() == {}
+    card.law.value = "power"
+    card.fields["contact.force_at_1um"].value, card.fields["contact.exponent"].value = "0.1", "1.5"
+    law = sb.PowerLaw(force_at_1um=0.1, exponent=1.5)
+    found = system_from(patched(sections_of(base, how), card.changed_fields()))[0]
+    assert found == base.replace(**{"contact.law": law})
 
 
 def _turn(page, title):
