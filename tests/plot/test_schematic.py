@@ -73,7 +73,7 @@ def test_what_surrounds_the_beam_is_drawn_and_named(model) -> None:
         return shapes, words(figure)
 
     plain, said = drawn()
-    for around in ({"base_excitation": base}, {"harvester": piezo}, {"harvester": coil}):
+    for around in ({"base_excitation": base}, {"harvesters": [piezo]}, {"harvesters": [coil]}):
         shapes, more = drawn(**around)
         assert shapes > plain, around
         assert len(more) > len(said), around

@@ -90,7 +90,8 @@ WORDS = [
 def _valid(name: str, draw: random.Random) -> Any:
     """An argument that suits a parameter of such a name, or one that does not."""
     pool = {
-        "model": MODEL, "contact": default_values.CONTACT, "striker": SHAKER, "shaker": SHAKER, "system": SYSTEM,
+        "model": MODEL, "contact": default_values.CONTACT, "contacts": SYSTEM.contacts,
+        "law": default_values.CONTACT, "striker": SHAKER, "shaker": SHAKER, "system": SYSTEM,
         "integration": SHORT, "beam": default_values.BEAM, "modes": 1, "cycles": 1, "periods": 1.0, "count": 2,
         "axes": {"drive.velocity_amplitude": [0.1, 0.2]}, "frequency_ratio": [0.8, 1.0],
         "velocity_amplitude": [0.1, 0.2], "location": 0.4, "length": 0.161, "thickness": 0.4e-3, "width": 15e-3,

@@ -151,8 +151,8 @@ def test_the_code_of_a_foreign_law_counts(monkeypatch):
         name = "other"
 
     mine, own = system(), system()
-    own = own.replace(contact=OtherLaw(stiffness=4e8))
-    assert provenance_of(mine.replace(contact=sb.HertzContact(stiffness=4e8))).code == code_hash()
+    own = own.replace(**{"contact.law": OtherLaw(stiffness=4e8)})
+    assert provenance_of(mine.replace(**{"contact.law": sb.HertzContact(stiffness=4e8)})).code == code_hash()
     assert provenance_of(own).code.startswith(f"{code_hash()}+")
     assert differences([provenance_of(mine), provenance_of(own)]) == ["state of its code"]
     assert differences([]) == []

@@ -38,7 +38,7 @@ def run(system) -> Run:
 
 
 @pytest.mark.parametrize(
-    "section", ["drive", "contact", "base_excitation", "axial_load", "harvester", "drive_2"]
+    "section", ["drive", "contact", "base_excitation", "axial_load", "harvester", "force", "drive.2"]
 )
 @pytest.mark.parametrize("value", ["[1, 2]", "{a = 1}", "3"])
 def test_a_type_that_is_no_word(tmp_path, section, value):

@@ -40,7 +40,7 @@ def test_a_statistic_of_one() -> None:
     wanted = [each.peak_force_contact_2 for each in ends]
     assert min(wanted) > 0.0 and wanted != [each.peak_force_contact_1 for each in ends]
     assert float(found["effect"][0]) == pytest.approx(0.5 * (wanted[1] - wanted[0]), rel=1e-6)
-    assert found.attrs["quantity_units"] == "N" and found.attrs["quantity"] == "peak contact force, striker 2"
+    assert found.attrs["quantity_units"] == "N" and found.attrs["quantity"] == "peak contact force, contact 2"
 
 
 @pytest.mark.slow
@@ -58,7 +58,7 @@ def test_an_objective_and_a_constraint_of_one() -> None:
     runs = problem.runs_of(np.array([[0.2]]), numbers)[0]
     assert estimate.objectives[0, 0] == pytest.approx(runs["peak_force_contact_2"].mean(), rel=1e-12)
     assert not np.array_equal(runs["peak_force_contact_2"], runs["peak_force"])
-    assert goal.long_name == "mean peak contact force, striker 2" and goal._quantity.unit == "N"
+    assert goal.long_name == "mean peak contact force, contact 2" and goal._quantity.unit == "N"
 
 
 def test_who_is_not_there_is_refused() -> None:
@@ -78,9 +78,9 @@ def test_they_are_told_in_words() -> None:
     """Wherever a statistic is shown, the second striker's has its unit and its words."""
     found = sb.simulate(between_two(), HOW).summary
     line = next(each for each in found.to_text().splitlines() if each.startswith("peak_force_contact_2"))
-    assert line.endswith("peak contact force, striker 2") and " N " in line
+    assert line.endswith("peak contact force, contact 2") and " N " in line
     assert "peak_force_contact_2" in sb.STATISTICS and "peak_force_contact_2" not in list(sb.STATISTICS)
     assert sb.STATISTICS.get("impulse_contact_4").unit == "N s"
     assert sb.STATISTICS.get("response_contact_2") is None
     with pytest.raises(KeyError):
-        sb.STATISTICS["impacts_striker_x"]
+        sb.STATISTICS["impacts_contact_x"]

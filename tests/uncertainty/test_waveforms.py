@@ -111,7 +111,7 @@ def test_refusals() -> None:
     nominal = nominal_system()
     given = {"system": nominal, "time": [0.0, 1e-3], "displacement": [0.0, 0.0], "standard_error": 1e-6}
     for change, words in (
-        ({"system": nominal.replace(striker=None)}, "must have a striker with a sine"),
+        ({"system": nominal.replace(contacts=[])}, "must have a striker with a sine"),
         ({"time": [1e-3, 0.0]}, "ascending"),
         ({"displacement": [0.0]}, "must hold a number, or NaN, for each time"),
         ({"standard_error": 0.0}, "standard_error"),

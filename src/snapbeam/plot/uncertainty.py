@@ -423,7 +423,7 @@ def _name(data: xr.Dataset, at: int, local: bool) -> str:
     row = lookup(name)
     section, text = split_name(name)
     text = text.replace("_", " ")
-    if section == "contact":
+    if section == "contact" and row.kinds:
         text = f"contact {text}"
     if not local:
         return text

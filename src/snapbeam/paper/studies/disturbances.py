@@ -156,7 +156,7 @@ def _repeat(model: sb.ReducedModel, omega: float, drive: float) -> list[float] |
     for kept in (np.ones_like(alone), alone):
         start = sb.State(amplitude=alpha * kept, velocity=velocity * kept)
         again = sb.simulate(
-            sb.System(model, contacts=[sb.Contact(CONTACT, record)], initial_state=start),
+            sb.System(model, contacts=[record], initial_state=start),
             sb.Integration(cycles=cycles, accuracy="reference"),
             sample_times=[0.25 * first],
         )
