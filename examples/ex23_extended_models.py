@@ -92,7 +92,14 @@ print(
 plot_system(
     sb.System(
         uneven,
-        contacts=[sb.Contact(paper.CONTACT, sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2)))],
+        contacts=[
+            sb.Contact(
+                paper.CONTACT,
+                sb.Striker(
+                    drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2)
+                ),
+            )
+        ],
     )
 )
 
@@ -133,7 +140,11 @@ load = sb.AxialLoadModulation(
 plot_system(
     sb.System(
         model,
-        contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.2))],
+        contacts=[
+            sb.Contact(
+                paper.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.2)
+            )
+        ],
         harvesters=[coil],
         axial_load=load,
     )
