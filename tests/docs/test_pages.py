@@ -139,7 +139,7 @@ def test_parameter_files_of_pages_are_valid(tmp_path):
     read = 0
     for page in PAGES:
         for block in blocks(page, "toml"):
-            sections = set(re.findall(r"^\[(\w+)\]", block, re.MULTILINE))
+            sections = set(re.findall(r"^\[+(\w+)", block, re.MULTILINE))
             if not sections <= set(SECTIONS):
                 continue
             file = tmp_path / f"{page.stem}{read}.toml"
