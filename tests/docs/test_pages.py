@@ -149,6 +149,21 @@ def test_parameter_files_of_pages_are_valid(tmp_path):
     assert read >= 4
 
 
+def test_file_of_several_contacts_is_the_system_beside_it(tmp_path, monkeypatch):
+    """The page on systems writes one system in Python and, with arrays of tables, as a file."""
+    page, scope = ROOT / "docs" / "systems.md", {}
+    monkeypatch.chdir(tmp_path)
+    code = [block for block in blocks(page, "python") if "shaker = " in block or "stopped = " in block]
+    exec(code[0].partition("print(")[0], scope)
+    exec(code[1], scope)
+    (tmp_path / "stopped.toml").write_text(blocks(page, "toml")[0], encoding="utf-8")
+    read = load_config(tmp_path / "stopped.toml").system
+    assert read.replace(**{"model.modes": 8}) == scope["closer"]
+    command = next(words for words in commands(page) if "stopped.toml" in words)
+    changed = dict(word.split("=") for word in command if word.startswith(("contact.", "force.")))
+    assert set(changed) <= set(read.parameters)
+
+
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)
 def test_commands_exist_with_their_options(path):
     for words in commands(path):
