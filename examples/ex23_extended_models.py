@@ -89,12 +89,8 @@ print(
     f"first frequency about the lower well {uneven.well_frequencies[0, 0]:.1f} Hz, "
     f"upper {uneven.well_frequencies[1, 0]:.1f} Hz"
 )
-plot_system(
-    sb.System(
-        uneven,
-        contacts=[sb.Contact(paper.CONTACT, sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2)))],
-    )
-)
+shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2)
+plot_system(sb.System(uneven, contacts=[sb.Contact(paper.CONTACT, shaker)]))
 
 # %%
 # A harvester on a moving base
@@ -130,10 +126,11 @@ coil = sb.ElectromagneticHarvester(
 load = sb.AxialLoadModulation(
     motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0)
 )
+shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.2)
 plot_system(
     sb.System(
         model,
-        contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.2))],
+        contacts=[sb.Contact(paper.CONTACT, shaker)],
         harvesters=[coil],
         axial_load=load,
     )

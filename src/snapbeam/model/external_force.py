@@ -306,7 +306,12 @@ class ExternalForce:
         scope=STRUCTURE,
     )  # fmt: skip
     shape: Any = quantity(
-        "1", "external force on each coordinate", default=None, optional=True, kind=object, scope=STRUCTURE
+        "1",
+        "force on each coordinate per unit of the force",
+        default=None,
+        optional=True,
+        kind=object,
+        scope=STRUCTURE,
     )
     label: str = ""
 

@@ -96,7 +96,7 @@ class LocalForce:
         scope=STRUCTURE,
     )
     shape: Any = quantity(
-        "1", "coordinate of the local force, per modal amplitude", default=None, optional=True, kind=object,
+        "1", "force on each coordinate per unit of the force", default=None, optional=True, kind=object,
         scope=STRUCTURE,
     )  # fmt: skip
     label: str = ""
