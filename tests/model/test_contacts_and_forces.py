@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
+from snapbeam.cli.parameter_options import configured
 from snapbeam.model import default_values
 from snapbeam.model.parameter_file import config_from_mapping, config_text, load_config
 from snapbeam.util.validation import InputError, InputTypeError
@@ -86,11 +87,16 @@ location = 0.5
     config = load_config(tmp_path / "mine.toml")
     system = config.system
     assert [each.label for each in system.contacts] == ["", "stop"]
-    assert system.contacts[1].law == system.contacts[0].law and system.get("contact.stop.gap") == pytest.approx(5e-5)
+    assert system.contacts[1].law == system.contacts[0].law and system.get(
+        "contact.stop.gap"
+    ) == pytest.approx(5e-5)
     assert system.get("force.stiffness") == 2000.0 and system.get("force.weight.force") == 1e-3
     for written in (config_text(config), config_text(config.whole())):
         (tmp_path / "again.toml").write_text(written)
         assert load_config(tmp_path / "again.toml").system == system
+    given = {"config": tmp_path / "mine.toml", "set_": ["contact.stop.gap=60um", "force.weight.force=2e-3"]}
+    changed = configured(given).system
+    assert changed.get("contact.2.gap") == pytest.approx(6e-5) and changed.get("force.2.force") == 2e-3
     for section in ("contact", "force"):
         with pytest.raises(
             InputError, match=rf"{section} = \[\]: must be a table, or an array of at least one"

@@ -329,11 +329,13 @@ def configured(
             sections.setdefault(section, {})[field] = _value(name, value)
     for text in given.get("set_") or ():
         name, value = _assignment(text, "set")
+        name = config.resolved(name)
         full = name if split_name(name)[1] in ("type", "label") else lookup(name).name
         section, field = split_name(full)
         sections.setdefault(section, {})[field] = _value(full, value)
     for text in given.get("sweep") or ():
         name, value = _assignment(text, "sweep")
+        name = config.resolved(name)
         if name in axes:
             raise InputError(f"sweep = {text!r}: {name} is given twice; give each axis once")
         axes[name] = value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -313,7 +313,7 @@ class ExternalForce:
         kind=object,
         scope=STRUCTURE,
     )
-    label: str = ""
+    label: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.history, ForceHistory):

@@ -99,7 +99,7 @@ class LocalForce:
         "1", "force on each coordinate per unit of the force", default=None, optional=True, kind=object,
         scope=STRUCTURE,
     )  # fmt: skip
-    label: str = ""
+    label: str = dataclasses.field(default="", repr=False)
 
     name: ClassVar[str] = ""
     """In parameter files and attributes."""

@@ -32,7 +32,7 @@ from snapbeam.model.parameter_axes import (
 from snapbeam.model.parameters import SECTIONS as SYSTEM_SECTIONS
 from snapbeam.model.parameters import Parameter, kinds_of, lookup, parameters, row_of
 from snapbeam.model.potential import Potential
-from snapbeam.model.quantity import check_label, numbered, quantities, split_name
+from snapbeam.model.quantity import check_label, numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
@@ -439,6 +439,17 @@ class Config:
     def section(self, name: str) -> dict[str, Any]:
         """What was given of a section."""
         return dict(self.given.get(name, {}))
+
+    def resolved(self, name: str) -> str:
+        """The dotted name by number of a parameter that is given by the label of a contact or force."""
+        kind, _, rest = name.partition(".")
+        label, dot, field = rest.partition(".")
+        labelled = "contact" if kind == "drive" else kind
+        for section, values in self.given.items():
+            own, number = numbered(section)
+            if dot and own == labelled and values.get("label") == label:
+                return f"{section_of(kind, number)}.{field}"
+        return name
 
     def _with_axes(self, name: str) -> dict[str, Any]:
         """What was given of a section; a key that has an axis only takes the first value of the axis."""

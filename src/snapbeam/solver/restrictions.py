@@ -37,9 +37,13 @@ def check_integrable(system: System) -> None:
             "out, or make a force along one row of their sum"
         )
     if len(system.harvesters) > 1:
-        raise InputError(f"harvesters: {len(system.harvesters)} circuits; must be at most 1 in a run")
+        raise InputError(
+            f"harvesters: {len(system.harvesters)} circuits; must be at most 1 in a run; leave the others out"
+        )
     if len(contacts) > MOST_STRIKERS:
-        raise InputError(f"contacts: {len(contacts)}; must be at most {MOST_STRIKERS} in a run")
+        raise InputError(
+            f"contacts: {len(contacts)}; must be at most {MOST_STRIKERS} in a run; leave some out"
+        )
     for number, each in enumerate(contacts, 1):
         section, law, striker = section_of("contact", number), each.law, each.striker
         if law.impulsive and (acting or len(contacts) > 1):

@@ -324,9 +324,7 @@ def _code(system: System) -> str:
     """Return the hash of the code of the package, and of a contact law or drive that is defined outside it."""
     parts: list[object] = [part for each in system.contacts for part in (each.law, each.striker.drive)]
     parts += [*system.forces, *system.harvesters]
-    foreign = tuple(
-        type(part) for part in parts if not type(part).__module__.startswith("snapbeam.")
-    )
+    foreign = tuple(type(part) for part in parts if not type(part).__module__.startswith("snapbeam."))
     mark = fingerprint(foreign) if foreign else ""
     if not mark:
         return code_hash() if not foreign else f"{code_hash()}+?"
