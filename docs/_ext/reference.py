@@ -300,7 +300,7 @@ def _questions() -> dict[str, Any]:
                 "cuda", modes=system.model.modes, law=ensemble.law, drive=ensemble.drive,
                 striker_with_mass=ensemble.structure.body_mass is not None,
                 unequal_wells=ensemble.structure.unequal_wells is not None,
-                environment=system.has_environment, several_strikers=len(system.contacts) > 1,
+                environment=bool(system.surroundings), several_strikers=len(system.contacts) > 1,
             )  # fmt: skip
         except sb.InputError as error:
             if "by the CPU engine alone" in str(error):

@@ -151,17 +151,21 @@ def test_refusals():
         sb.ExternalForce(history=sb.FixedStop())
     with pytest.raises(InputError, match="a base needs a motion"):
         sb.BaseExcitation(motion=harmonic)
-    with pytest.raises(InputError, match="one excitation row"):
-        sb.System(
+    with pytest.raises(InputError, match="one row of excitation"):
+        sb.simulate(sb.System(
             model(base_shape=BASE),
             forces=[sb.ExternalForce(history=harmonic)],
             base_excitation=sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=1.0, acceleration_amplitude=1.0)),
-        )  # fmt: skip
+        ))  # fmt: skip
     with pytest.raises(InputError, match="at least 4"):
         sb.RecordedForce(record=[1.0, 2.0], sampling_frequency=10.0)
     with pytest.raises(InputError, match="with an external force: sticking"):
-        sb.System(
-            sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0]),
-            contacts=[sb.Contact(sb.Restitution(coefficient=0.8), sb.Striker(drive=sb.FixedStop(), gap=1.0))],
-            forces=[sb.ExternalForce(history=harmonic)],
+        sb.simulate(
+            sb.System(
+                sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0]),
+                contacts=[
+                    sb.Contact(sb.Restitution(coefficient=0.8), sb.Striker(drive=sb.FixedStop(), gap=1.0))
+                ],
+                forces=[sb.ExternalForce(history=harmonic)],
+            )
         )

@@ -56,11 +56,9 @@ def test_units_identity_and_refusals() -> None:
         motion + sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.1)
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
     with pytest.raises(InputError, match="'recorded_acceleration' with a changing axial load"):
-        sb.System(
-            model,
-            contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=motion))],
-            axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0)),
-        )
+        load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0))
+        contacts = [sb.Contact(default_values.CONTACT, sb.Striker(drive=motion))]
+        sb.simulate(sb.System(model, contacts=contacts, axial_load=load))
 
 
 def shaken(direction: str = "up", **parts) -> sb.System:

@@ -129,7 +129,7 @@ def test_never_ended_early_wrongly(name, modes) -> None:
     decided, wrong = early_decisions(name, modes, 4000)
     print(f"{name}, N = {modes}: {decided} of 4000 decided early, {wrong} wrongly")
     assert wrong == 0
-    if not extended.system(extended.fewest).has_environment:
+    if not extended.system(extended.fewest).surroundings:
         assert decided > 40
 
 

@@ -52,7 +52,7 @@ def test_names_by_number_and_by_label():
     assert wall.contacts[1].law == HERTZ and wall.contacts[1].striker == STOP
     assert wall.contacts[2].striker.drive == SHAKER.striker().drive
     assert wall.forces[1] == SYSTEM.forces[0]
-    assert SYSTEM.replace(contacts=SYSTEM.contacts[:1], forces=[]).has_environment is False
+    assert SYSTEM.replace(contacts=SYSTEM.contacts[:1], forces=[]).surroundings == ()
 
 
 def test_files(tmp_path):

@@ -24,7 +24,7 @@ def test_nothing_given_is_the_paper():
     config = Config()
     system = config.system
     assert system.model.beam == BEAM
-    assert system.contact == CONTACT
+    assert system.contact_law == CONTACT
     assert system.model.modes == config.model.modes == 32
     assert system.model.damping_ratio.tolist() == [0.005] * 32
     assert system.get("contact.location") == pytest.approx(1.0 / 2.1)

@@ -412,7 +412,7 @@ def test_parameters_that_are_only_in_order_together(system) -> None:
                 sb.System(s.model, initial_state=sb.State(amplitude=[0.0, 0.0])), {"location": [0.3]}
             ),
             InputError,
-            r"striker\.location: is not a parameter of this system",
+            r"contact\.location: is not a parameter of this system",
         ),
         (
             lambda s: sb.sweep(sb.System(s.model), {"modes": [1, 2]}),

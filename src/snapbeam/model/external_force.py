@@ -315,6 +315,13 @@ class ExternalForce:
     )
     label: str = field(default="", repr=False)
 
+    noun: ClassVar[str] = "an external force"
+    """In messages."""
+    has_excitation_row: ClassVar[bool] = True
+    """Whether it pushes along a row as time goes."""
+    rate_dependent: ClassVar[bool] = False
+    """Whether its force depends on the velocity of the structure."""
+
     def __post_init__(self) -> None:
         if not isinstance(self.history, ForceHistory):
             raise InputTypeError(

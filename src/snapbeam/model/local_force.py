@@ -103,6 +103,10 @@ class LocalForce:
 
     name: ClassVar[str] = ""
     """In parameter files and attributes."""
+    noun: ClassVar[str] = "a local force"
+    """In messages."""
+    has_excitation_row: ClassVar[bool] = False
+    """Whether it pushes along a row as time goes."""
     dissipative: ClassVar[bool] = False
     """Whether the force depends on the velocity too."""
 
@@ -170,6 +174,11 @@ class LocalForce:
     def is_limited(cls) -> bool:
         """Whether the law is valid for some displacements only."""
         return cls.displacement_range is not LocalForce.displacement_range
+
+    @property
+    def rate_dependent(self) -> bool:
+        """Whether the force depends on the velocity of the structure."""
+        return self.dissipative
 
     @property
     def is_conservative(self) -> bool:

@@ -18,7 +18,7 @@ from snapbeam.model.parameters import SECTIONS, kinds_of
 from snapbeam.model.quantity import NUMBERED, numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
-from snapbeam.model.striker import Contact, Shaker, Striker
+from snapbeam.model.striker import Contact, Striker
 from snapbeam.util.validation import InputError, InputTypeError, mapping, shown
 
 __all__ = [
@@ -375,9 +375,9 @@ def _contact_replacing(
     if moving not in whole and moving not in inside and section not in inside:
         return contact
     values = dict(inside.get(section, {}))
-    law, striker = values.pop("law", contact.law), values.pop("striker", contact.striker)
-    label = values.pop("label", contact.label)
-    striker = striker.striker() if isinstance(striker, Shaker) else striker
+    whole_parts = {name: values.pop(name, getattr(contact, name)) for name in ("law", "striker", "label")}
+    contact = Contact(**whole_parts)
+    law, striker = contact.law, contact.striker
     drive = whole.get(moving, striker.drive)
     if moving in inside:
         drive = _changed(drive, moving, inside[moving])
@@ -388,7 +388,7 @@ def _contact_replacing(
         striker = dataclasses.replace(striker, **of_striker)
     if values:
         law = _changed(law, section, values, list(quantities(Striker)))
-    return Contact(law, striker, label)
+    return Contact(law, striker, contact.label)
 
 
 def _changed(part: Any, section: str, values: Mapping[str, Any], others: list[str] | None = None) -> Any:

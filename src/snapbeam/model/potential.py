@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -186,17 +187,46 @@ class Potential:
         )
 
     def _adds_up(self, found: list[Equilibrium]) -> bool:
-        """Check the equilibria by their index: the sum of (-1)^(unstable directions) over all of them is 1 (Morse).
+        """Check the equilibria by their indices: sum of (-1)^(unstable directions) = 1 - chi (Morse).
 
-        It is one less for every end of the range of a law at which the force pulls beyond that end.
+        chi is the Euler characteristic of the part of the boundary beyond which laws pull, a union of faces of the convex
+        set in which all laws are valid: over every group of faces that have a point in common, the sum of
+        (-1)^(1 + faces).
         """
-        pulls = 0
-        for law in self.local_forces:
-            for end, sign in zip(law.displacement_range(law.numbers), (-1.0, 1.0), strict=True):
+        from scipy.optimize import linprog
+
+        ranges = np.array([law.displacement_range(law.numbers) for law in self.local_forces])
+        faces = []
+        for j, law in enumerate(self.local_forces):
+            for end, sign in zip(ranges[j], (-1.0, 1.0), strict=True):
                 if math.isfinite(end):
                     beside = end - sign * 1e-9 * max(abs(end), self._length)
-                    pulls += sign * law.force_at(beside) > 0.0
-        return sum((-1) ** each.unstable_directions for each in found) == 1 - pulls
+                    if sign * law.force_at(beside) > 0.0:
+                        faces.append((j, end / self._length))
+        above = np.concatenate((self.rows, -self.rows))
+        bounds = np.concatenate((ranges[:, 1], -ranges[:, 0]))
+        limited = np.isfinite(bounds)
+        scale = float(np.abs(self.size).max()) / self._length
+
+        def meet(group: tuple[tuple[int, float], ...]) -> bool:
+            rows = np.array([self.rows[j] for j, _ in group])
+            ends = np.array([end for _, end in group])
+            solution = linprog(
+                np.zeros(self.model.modes),
+                A_ub=scale * above[limited],
+                b_ub=bounds[limited] / self._length,
+                A_eq=scale * rows,
+                b_eq=ends,
+                bounds=(None, None),
+            )
+            return solution.status == 0
+
+        chi = sum(
+            (-1) ** (1 + count) * meet(group)
+            for count in range(1, 1 + len(faces))
+            for group in combinations(faces, count)
+        )
+        return sum((-1) ** each.unstable_directions for each in found) == 1 - chi
 
     def _is_same(self, one: _Array, other: _Array) -> bool:
         return bool(np.abs(one - other).max() <= _SAME * np.abs(self.size).max())

@@ -264,9 +264,10 @@ class System:
         return self.harvesters[0] if self.harvesters else None
 
     @property
-    def has_environment(self) -> bool:
-        """Whether a base moves, the axial load changes, a force acts, or there is a harvester."""
-        return bool(self.forces or self.harvesters or self.base_excitation or self.axial_load)
+    def surroundings(self) -> tuple[Any, ...]:
+        """What acts on the structure beside strikers: forces, a moving base, a changing axial load, harvesters."""
+        parts = (*self.forces, self.base_excitation, self.axial_load, *self.harvesters)
+        return tuple(each for each in parts if each is not None)
 
     @property
     def primary_excitation(self) -> tuple[str, Drive] | None:

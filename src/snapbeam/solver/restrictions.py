@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from snapbeam.model.drive.combined import MOST_STRIKERS
-from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.quantity import section_of
 from snapbeam.model.system import System
 from snapbeam.util.validation import InputError, shown
@@ -20,18 +19,8 @@ def check_integrable(system: System) -> None:
     ------
     InputError
     """
-    base, load, contacts = system.base_excitation, system.axial_load, system.contacts
-    external = [each for each in system.forces if isinstance(each, ExternalForce)]
-    damped = [each for each in system.local_forces if each.dissipative]
-    surroundings = {
-        "an external force": bool(external),
-        "a moving base": base is not None,
-        "a harvester": bool(system.harvesters),
-        "a changing axial load": load is not None,
-        "a local force": bool(system.local_forces),
-    }
-    acting = [words for words, given in surroundings.items() if given]
-    if len(external) + (base is not None) > 1:
+    contacts, surroundings = system.contacts, system.surroundings
+    if sum(each.has_excitation_row for each in surroundings) > 1:
         raise InputError(
             "forces: the solver has one row of excitation, for a base excitation or one external force; leave the others "
             "out, or make a force along one row of their sum"
@@ -44,12 +33,13 @@ def check_integrable(system: System) -> None:
         raise InputError(
             f"contacts: {len(contacts)}; must be at most {MOST_STRIKERS} in a run; leave some out"
         )
+    beside = "several strikers" if len(contacts) > 1 else surroundings[0].noun if surroundings else ""
     for number, each in enumerate(contacts, 1):
         section, law, striker = section_of("contact", number), each.law, each.striker
-        if law.impulsive and (acting or len(contacts) > 1):
+        if law.impulsive and beside:
             raise InputError(
-                f"{section} = {law!r} with {acting[0] if acting else 'several strikers'}: sticking under Newton's law includes "
-                "the tip's force only; use a HertzContact, or a HuntCrossley with the same restitution"
+                f"{section} = {law!r} with {beside}: sticking under Newton's law includes the tip's force only; use a "
+                "HertzContact, or a HuntCrossley with the same restitution"
             )
         if number > 1 and law.rate_dependent:
             raise InputError(
@@ -61,8 +51,7 @@ def check_integrable(system: System) -> None:
                 f"{section}.mass = {striker.mass:g}: of several strikers the first alone may be a body, since the "
                 "reduced structure contains one body; leave the mass out, or make this one the first"
             )
-        beside = "several strikers" if len(contacts) > 1 else acting[0] if acting else ""
-        if striker.drive.samples().size and (len(contacts) > 1 or external or base or load):
+        if striker.drive.samples().size and (len(contacts) > 1 or len(system.moving) > 1):
             raise InputError(
                 f"{section_of('drive', number)} = {striker.drive.name!r} with {beside}: {_RECORD}"
             )
@@ -71,7 +60,7 @@ def check_integrable(system: System) -> None:
         for number, each in enumerate(contacts, 1)
         if each.law.rate_dependent
     ]
-    several = [*rate_dependent, *map(shown, damped), *map(shown, system.harvesters)]
+    several = [*rate_dependent, *(shown(each) for each in surroundings if each.rate_dependent)]
     if len(several) > 1:
         raise InputError(
             f"{' with '.join(several)}: the solver has one velocity-dependent force; leave the others out, or let "

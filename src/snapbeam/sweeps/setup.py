@@ -211,7 +211,7 @@ class SweepSetup:
                     drive=ensemble.drive,
                     striker_with_mass=ensemble.structure.body_mass is not None,
                     unequal_wells=ensemble.structure.model.transverse_force is not None,
-                    environment=system.has_environment,
+                    environment=bool(system.surroundings),
                     several_strikers=len(system.contacts) > 1,
                 )[1]
                 books = engine.run_ensemble(ensemble, threads, report)
@@ -437,7 +437,7 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         law=law,
         striker_with_mass=system.striker is not None and system.striker.mass is not None,
         unequal_wells=system.model.transverse_force is not None,
-        environment=system.has_environment,
+        environment=bool(system.surroundings),
         several_strikers=len(system.contacts) > 1,
         **({} if system.striker is None else {"drive": type(system.striker.drive)}),
     )[0]
