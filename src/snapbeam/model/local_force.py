@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -190,7 +191,7 @@ class LocalForce:
         """The named tuple of the law's constants, as kernels see them; an attribute of the class, ``Numbers``."""
         return numbers_type(cls, (item.name for item in dataclasses.fields(cls) if item.name not in _PLACES))
 
-    @property
+    @cached_property
     def numbers(self) -> Any:
         """The law's constants."""
         kind = self.numbers_type()

@@ -699,6 +699,11 @@ class Config:
         return Potential.of(parts["model"], parts["forces"])
 
     @property
+    def static_system(self) -> System:
+        """The model with the forces that were given, for questions about its equilibria."""
+        return System(**self._parts(*(name for name in self._around if numbered(name)[0] == "force")))
+
+    @property
     def free_structure(self) -> ReducedModel:
         """The model, for questions about its free motion; refused (InputError) if anything else acts on it."""
         acting = [*self._around, *(name for name in _STRIKING if self.section(name))]

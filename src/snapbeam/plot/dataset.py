@@ -19,7 +19,7 @@ from snapbeam.plot.dynamics import (
     plot_section,
     plot_survival,
 )
-from snapbeam.plot.force_displacement import plot_force_displacement
+from snapbeam.plot.force_displacement import plot_equilibrium_branches, plot_force_displacement
 from snapbeam.plot.map import plot_response_map, plot_statistic
 from snapbeam.plot.run import (
     plot_energies,
@@ -154,6 +154,10 @@ _KINDS = (
     _Kind(
         "force-displacement curve", {"snap_through_force"}, {"branch_number"},
         lambda _: {"force": plot_force_displacement},
+    ),
+    _Kind(
+        "equilibrium branches", {"critical_value", "natural_frequency"}, {"critical_point"},
+        lambda _: {"midspan_displacement": plot_equilibrium_branches},
     ),
     _Kind("map", {"response_class"}, set(), _map),
 )  # fmt: skip
