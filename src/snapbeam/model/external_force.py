@@ -335,6 +335,11 @@ class ExternalForce:
             shape.setflags(write=False)
             object.__setattr__(self, "shape", shape)
 
+    @property
+    def constant_part(self) -> float:
+        """Part of the force that does not change in time, N."""
+        return self.history.constant_part
+
     def row(self, model: ReducedModel) -> _Array:
         """Return h of a model, shape (N,).
 

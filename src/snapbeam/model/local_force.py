@@ -108,6 +108,8 @@ class LocalForce:
     """In messages."""
     has_excitation_row: ClassVar[bool] = False
     """Whether it pushes along a row as time goes."""
+    constant_part: ClassVar[float] = 0.0
+    """Part of the force that does not depend on the motion, N."""
     dissipative: ClassVar[bool] = False
     """Whether the force depends on the velocity too."""
 

@@ -78,27 +78,19 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
         section["reference_frequency"] = model.given_reference_frequency
     sections["model"] = section
     for number, each in enumerate(system.contacts, 1):
-        striker, labelled = each.striker, {"label": each.label} if each.label else {}
-        # without a mass there is no suspension
-        left_out = ("suspension_stiffness", "suspension_damping") if striker.mass is None else ()
-        own = {name: value for name, value in _own(striker).items() if name not in left_out}
-        law = {"type": each.law.name} | _fields(each.law)
-        sections[section_of("contact", number)] = law | own | labelled
-        sections[section_of("drive", number)] = {"type": striker.drive.name} | _fields(striker.drive)
-    base, load = system.base_excitation, system.axial_load
-    if base is not None:
-        sections["base_excitation"] = {"type": base.motion.name} | _own(base) | _fields(base.motion)
-    if load is not None:
-        sections["axial_load"] = {"type": load.motion.name} | _fields(load.motion)
-    for number, force in enumerate(system.forces, 1):
-        if isinstance(force, ExternalForce):
-            own = {"type": force.history.name} | _own(force) | _fields(force.history)
-            own |= {"label": force.label} if force.label else {}
-        else:
-            own = {"type": force.name} | _fields(force)
-        sections[section_of("force", number)] = own
-    for number, harvester in enumerate(system.harvesters, 1):
-        sections[section_of("harvester", number)] = {"type": harvester.name} | _fields(harvester)
+        striker = _fields(each.striker)
+        drive = striker.pop("drive")
+        if each.striker.mass is None:  # without a mass there is no suspension
+            del striker["suspension_stiffness"], striker["suspension_damping"]
+        labelled = {"label": each.label} if each.label else {}
+        sections[section_of("contact", number)] = _described(each.law) | striker | labelled
+        sections[section_of("drive", number)] = _described(drive)
+    for name in _MOVED:
+        if getattr(system, name) is not None:
+            sections[name] = _described(getattr(system, name))
+    for kind in ("force", "harvester"):
+        for number, each in enumerate(getattr(system, _TUPLES[kind]), 1):
+            sections[section_of(kind, number)] = _described(each)
     if start is not None:
         values = {name: getattr(start, name) for name in _START}
         if start.contact_time.size == 1:
@@ -111,10 +103,13 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
     return sections
 
 
-def _own(part: Any) -> dict[str, Any]:
-    """The quantities of a part that are given."""
-    found = {name: getattr(part, name) for name in quantities(type(part))}
-    return {name: value for name, value in found.items() if value is not None}
+def _described(part: Any) -> dict[str, Any]:
+    """The section of a part: its type, or that of its motion, and the fields of both."""
+    values = _fields(part)
+    motion = values.pop("history", values.pop("motion", None))
+    if motion is None:
+        return {"type": part.name} | values
+    return {"type": motion.name} | values | _fields(motion)
 
 
 def _fields(part: Any) -> dict[str, Any]:
@@ -143,12 +138,9 @@ def parts_from_mapping(sections: Mapping[str, Any]) -> dict[str, Any]:
         law = contacts[0].law if contacts and not own else _chosen(own, section)
         contacts.append(Contact(law, striker, label))
     parts: dict[str, Any] = {"model": _model(sections), "contacts": tuple(contacts)}
-    if "base_excitation" in sections:
-        own = dict(sections["base_excitation"])
-        around = _taken(own, quantities(BaseExcitation))
-        parts["base_excitation"] = BaseExcitation(motion=_chosen(own, "base_excitation"), **around)
-    if "axial_load" in sections:
-        parts["axial_load"] = AxialLoadModulation(motion=_chosen(sections["axial_load"], "axial_load"))
+    for name, kind in _MOVED.items():
+        if name in sections:
+            parts[name] = _moved(kind, "motion", sections[name], name)
     parts["forces"] = tuple(
         _force(section, values) for section, values in _numbered_sections(sections, "force")
     )
@@ -164,11 +156,16 @@ def parts_from_mapping(sections: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _force(section: str, values: Mapping[str, Any]) -> Any:
+    if values.get("type") not in FORCES:
+        return _chosen(values, section)
+    return _moved(ExternalForce, "history", values, section)
+
+
+def _moved(kind: Any, motion: str, values: Mapping[str, Any], section: str) -> Any:
+    """A part with a motion, whose section names the type of that."""
     own = dict(values)
-    if own.get("type") not in FORCES:
-        return _chosen(own, section)
-    of_force = _taken(own, (*quantities(ExternalForce), "label"))
-    return ExternalForce(history=_chosen(own, section), **of_force)
+    rest = _taken(own, [item.name for item in dataclasses.fields(kind)])
+    return kind(**{motion: _chosen(own, section)}, **rest)
 
 
 def _taken(values: dict[str, Any], names: Any) -> dict[str, Any]:
@@ -290,6 +287,8 @@ def _only(values: Mapping[str, Any], section: str, known: list[str]) -> None:
 _OF_MODEL = ("modes", "damping_ratio", "reference_frequency")
 
 
+_MOVED = {"base_excitation": BaseExcitation, "axial_load": AxialLoadModulation}
+"""Parts with a motion, by the section of a system."""
 _TUPLES = {"contact": "contacts", "force": "forces", "harvester": "harvesters"}
 """Parts of a system that are tuples, by the section of one of them."""
 _PARTS = ("model", "base_excitation", "axial_load", "initial_state", *_TUPLES.values())

@@ -77,9 +77,9 @@ class Potential:
         """The potential energy of a structure, of the local forces and of the constant parts of external forces."""
         constant = np.zeros(model.modes)
         for each in forces:
-            if isinstance(each, ExternalForce) and each.history.constant_part != 0.0:
-                constant = constant + each.history.constant_part * each.row(model)
-        local = tuple(each for each in forces if isinstance(each, LocalForce) and each.is_conservative)
+            if each.constant_part != 0.0:
+                constant = constant + each.constant_part * each.row(model)
+        local = tuple(each for each in forces if not each.has_excitation_row and each.is_conservative)
         return cls(model, constant, local)
 
     @cached_property

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from snapbeam.model.axial_load import AxialLoadModulation
 from snapbeam.model.base_excitation import BaseExcitation, rigid_mass
@@ -19,6 +20,7 @@ from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.diagnostics import doubts_of
 from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.drive.fixed_stop import FixedStop
+from snapbeam.model.equilibria import Equilibrium
 from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.harvester import Harvester
 from snapbeam.model.local_force import LocalForce
@@ -234,8 +236,9 @@ class System:
         if self.axial_load is not None:
             found.append(("axial_load", self.axial_load.motion))
         for number, each in enumerate(self.forces, 1):
-            if isinstance(each, ExternalForce):
-                found.append((section_of("force", number), each.history))
+            history = getattr(each, "history", None)
+            if history is not None:
+                found.append((section_of("force", number), history))
         return tuple(found)
 
     @property
@@ -251,12 +254,14 @@ class System:
     @property
     def local_forces(self) -> tuple[LocalForce, ...]:
         """The forces that depend on the displacement or velocity of a point."""
-        return tuple(each for each in self.forces if isinstance(each, LocalForce))
+        found: tuple[Any, ...] = tuple(each for each in self.forces if not each.has_excitation_row)
+        return found
 
     @property
     def external_force(self) -> ExternalForce | None:
         """The first force that depends on time."""
-        return next((each for each in self.forces if isinstance(each, ExternalForce)), None)
+        found: list[Any] = [each for each in self.forces if each.has_excitation_row]
+        return found[0] if found else None
 
     @property
     def harvester(self) -> Harvester | None:
@@ -309,6 +314,59 @@ class System:
             )
         return State(amplitude=local.wells[well].amplitude)
 
+    def poles(self, equilibrium: Equilibrium | None = None) -> NDArray[np.complex128]:
+        """Poles of small oscillations about an equilibrium, with damping, local forces and circuits.
+
+        Of m a'' + C a' + K a = sum_j theta_j z_j and M_j z_j' = -theta_j . a' - rho_j z_j, with the tangent stiffness K of the
+        potential energy and the damping C of the modes and, at rest, of the local forces.  Contacts are open.
+
+        Parameters
+        ----------
+        equilibrium : Equilibrium, optional
+            One of ``potential.equilibria``; by default that of the rest state.
+
+        Returns
+        -------
+        array of shape (2 N + circuits with inertia,)
+            s, rad/s, by abs(s) and Im(s): frequencies abs(s)/(2 pi) Hz, damping ratios -Re(s)/abs(s).
+
+        Examples
+        --------
+        A piezoelectric layer with an open circuit stiffens a mass on a spring, omega^2 = k/m + theta^2/(m C):
+
+        >>> import snapbeam as sb
+        >>> model = sb.ReducedModel.from_matrices(
+        ...     [[1.0]], [1.0], contact_shape=[1.0], patch_shape=[1.0], reference_frequency=1.0
+        ... )
+        >>> layer = sb.PiezoelectricHarvester(moment_per_volt=0.5, capacitance=1.0, resistance=1e12)
+        >>> print(abs(sb.System(model, harvesters=[layer]).poles())[-1].round(6))
+        1.118034
+        """
+        model, potential = self.model, self.potential
+        alpha = self.rest_state.amplitude if equilibrium is None else equilibrium.amplitude
+        n, modes = model.modes, model.linear_modes
+        damping = modes.T @ model.damping_matrix @ modes
+        for force in self.local_forces:
+            row = force.row(model)
+            if force.dissipative:
+                coefficient = force.damping_coefficient(force.numbers, float(row @ alpha), 0.0)
+                damping = damping + coefficient * np.outer(modes.T @ row, modes.T @ row)
+        circuits = []
+        for each in self.harvesters:
+            theta, loss = modes.T @ each.row(model), float(each.loss(np.float64(each.resistance)))
+            if each.inertia > 0.0:
+                circuits.append((theta / np.sqrt(each.inertia), loss / each.inertia))
+            else:
+                damping = damping + np.outer(theta, theta) / loss
+        matrix = np.zeros((2 * n + len(circuits),) * 2)
+        matrix[:n, n : 2 * n] = np.eye(n)
+        matrix[n : 2 * n, :n] = -potential.in_modes(potential.tangent(alpha))
+        matrix[n : 2 * n, n : 2 * n] = -damping
+        for i, (theta, rate) in enumerate(circuits, 2 * n):
+            matrix[n : 2 * n, i], matrix[i, n : 2 * n], matrix[i, i] = theta, -theta, -rate
+        found = np.linalg.eigvals(matrix)
+        return np.asarray(found[np.lexsort((found.imag, np.abs(found)))])
+
     @property
     def start_state(self) -> State:
         """The state that runs begin in: the initial state, or at rest."""
@@ -316,7 +374,8 @@ class System:
 
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Diagnostics: values that look like another unit, and assumptions of the model that do not hold."""
-        return doubts_of(self.unloaded_potential, self.striker, self.harvester, self.moving)
+        parts = [(section_of("harvester", number), each) for number, each in enumerate(self.harvesters, 1)]
+        return doubts_of(self.unloaded_potential, self.striker, [*parts, *self.moving])
 
     # ------------------------------------------------------------------ identity and files
 
