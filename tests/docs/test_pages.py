@@ -29,7 +29,6 @@ CODE = [
     "finite_elements.md",
     "getting-started.md",
     "long_maps.md",
-    "questions.md",
     "states.md",
     "status_codes.md",
     "strikers.md",
@@ -45,6 +44,7 @@ CODE = [
     pytest.param("lifetimes.md", marks=pytest.mark.slow),
     pytest.param("optimisation.md", marks=pytest.mark.slow),
     pytest.param("orbits.md", marks=pytest.mark.slow),
+    pytest.param("questions.md", marks=pytest.mark.slow),
 ]
 """Pages whose Python blocks run in order in one namespace; those that take more than a few seconds are slow."""
 ELSEWHERE = {

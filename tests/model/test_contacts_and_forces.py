@@ -157,6 +157,7 @@ def test_questions_of_more_than_a_run_can_have():
                 run(system.replace(**parts))
 
 
+@pytest.mark.slow
 def test_springs_at_one_place_are_one_spring():
     """Two springs side by side are one of the summed stiffness: potential, and a run to rounding."""
     start = sb.State(amplitude=0.9 * MODEL.well_amplitude)
@@ -171,6 +172,7 @@ def test_springs_at_one_place_are_one_spring():
     np.testing.assert_allclose(ends[0].amplitude, ends[1].amplitude, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_sweep_over_labels():
     system = sb.System(MODEL, contacts=[sb.Contact(HERTZ, SHAKER), sb.Contact(HERTZ, STOP, label="stop")])
     how = sb.Integration(cycles=2)

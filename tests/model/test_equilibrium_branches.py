@@ -17,14 +17,14 @@ from snapbeam.util.validation import InputError
 BEAM = default_values.BEAM
 
 
-@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("side", [1.0, pytest.param(-1.0, marks=pytest.mark.slow)])
 def test_pull_in_voltage(side: float) -> None:
     """V^2 = 8 k g^3/(27 eps_0 A) at a third of the gap; the frequency goes to zero there."""
     k, gap, area, mass = 2.0, 3e-6, 4e-8, 1e-9
     plate = sb.ReducedModel.from_matrices([[mass]], [[k]], contact_shape=[1.0], length_scale=gap)
     electrode = sb.ElectrostaticForce(voltage=1.0, area=area, gap=side * gap, label="electrode")
     system = sb.System(plate, forces=[electrode])
-    found = sb.equilibrium_branches(system, "force.electrode.voltage", (0.0, 8.0))
+    found = sb.model.equilibrium_branches(system, "force.electrode.voltage", (0.0, 8.0))
     exact = math.sqrt(8.0 * k * gap**3 / (27.0 * 8.8541878188e-12 * area))
     assert found.critical_kind.values.tolist() == ["limit"]
     assert float(found.critical_value[0]) == pytest.approx(exact, rel=1e-9)
@@ -64,6 +64,7 @@ def test_buckling_is_a_bifurcation() -> None:
                 assert abs(float(model.midspan_shape @ alpha)) == pytest.approx(level, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_a_limit_point_is_the_snap_through_force() -> None:
     """Over a constant force at the centre, as force_displacement finds it."""
     model = sb.ReducedModel.from_beam(BEAM, modes=3, imperfection=sb.Imperfection(midspan_amplitude=4e-6))
@@ -73,15 +74,12 @@ def test_a_limit_point_is_the_snap_through_force() -> None:
     curve = sb.force_displacement(system, 0.45)
     limits = curve.critical_force.values[curve.critical_kind.values == "limit"]
     end = 1.2 * float(np.abs(limits).max())
-    found = sb.equilibrium_branches(system, "force.push.force", (-end, end))
+    found = sb.model.equilibrium_branches(system, "force.push.force", (-end, end))
     own = found.critical_value.values[found.critical_kind.values == "limit"]
     np.testing.assert_allclose(np.sort(own), np.sort(limits), rtol=1e-6)
 
 
-def test_refusals_and_the_command(tmp_path, monkeypatch) -> None:
-    from typer.testing import CliRunner
-
-    monkeypatch.chdir(tmp_path)
+def test_refusals() -> None:
     system = sb.System(sb.ReducedModel.from_beam(BEAM, modes=1))
     for parameter, values, message in (
         ("force.voltage", (0.0, 1.0), "parameter = 'force.voltage': must be a number that the system has"),
@@ -90,7 +88,14 @@ def test_refusals_and_the_command(tmp_path, monkeypatch) -> None:
         ("beam.buckling_level", (-1e-4, 1e-4), "buckling_level = -0.0001"),
     ):
         with pytest.raises(InputError, match=message):
-            sb.equilibrium_branches(system, parameter, values)
+            sb.model.equilibrium_branches(system, parameter, values)
+
+
+@pytest.mark.slow
+def test_the_command(tmp_path, monkeypatch) -> None:
+    from typer.testing import CliRunner
+
+    monkeypatch.chdir(tmp_path)
     text = """
 extends = "paper"
 [model]

@@ -167,7 +167,7 @@ def random_system(rng: np.random.Generator) -> sb.System:
 def test_gradient_and_tangent_of_random_systems():
     """Differences of the energy and of the gradient; every equilibrium has no gradient."""
     rng = np.random.default_rng(2)
-    for _ in range(15):
+    for _ in range(6):
         potential = random_system(rng).potential
         size = float(np.abs(potential.model.well_amplitude).max())
         alpha = potential.model.well_amplitude + 0.1 * size * rng.standard_normal(potential.model.modes)

@@ -58,7 +58,7 @@ def equilibrium_branches(system: System, parameter: str, values: tuple[float, fl
     >>> import snapbeam as sb
     >>> plate = sb.ReducedModel.from_matrices([[1e-9]], [[2.0]], contact_shape=[1.0], length_scale=3e-6)
     >>> electrode = sb.ElectrostaticForce(voltage=1.0, area=4e-8, gap=3e-6)
-    >>> found = sb.equilibrium_branches(sb.System(plate, forces=[electrode]), "force.voltage", (0.0, 8.0))
+    >>> found = sb.model.equilibrium_branches(sb.System(plate, forces=[electrode]), "force.voltage", (0.0, 8.0))
     >>> print(f"{float(found.critical_value[0]):.4f} V, {found.critical_kind.item(0)}")
     6.7213 V, limit
     """
@@ -73,8 +73,8 @@ def equilibrium_branches(system: System, parameter: str, values: tuple[float, fl
             f"{', '.join(key for key, value in system.parameters.items() if isinstance(value, float))}"
         )
     low, high = interval("values", values)
-    for value in (low, high):
-        system.replace(**{name: value})
+    for end in (low, high):
+        system.replace(**{name: end})
 
     def potential_of(value: float) -> Potential:
         return system.replace(**{name: value}).potential

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -79,8 +79,8 @@ class Potential:
         for each in forces:
             if each.constant_part != 0.0:
                 constant = constant + each.constant_part * each.row(model)
-        local = tuple(each for each in forces if not each.has_excitation_row and each.is_conservative)
-        return cls(model, constant, local)
+        local: list[Any] = [each for each in forces if not each.has_excitation_row]
+        return cls(model, constant, tuple(each for each in local if each.is_conservative))
 
     @cached_property
     def structure(self) -> ReducedModel:

@@ -353,7 +353,7 @@ class System:
                 damping = damping + coefficient * np.outer(modes.T @ row, modes.T @ row)
         circuits = []
         for each in self.harvesters:
-            theta, loss = modes.T @ each.row(model), float(each.loss(np.float64(each.resistance)))
+            theta, loss = modes.T @ each.row(model), float(each.loss(np.array([each.resistance]))[0])
             if each.inertia > 0.0:
                 circuits.append((theta / np.sqrt(each.inertia), loss / each.inertia))
             else:

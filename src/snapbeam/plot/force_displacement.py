@@ -188,7 +188,7 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of :func:`snapbeam.equilibrium_branches`.
+        Of :func:`snapbeam.model.equilibrium_branches`.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
 
@@ -206,7 +206,7 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
     >>> import snapbeam as sb
     >>> plate = sb.ReducedModel.from_matrices([[1e-9]], [[2.0]], contact_shape=[1.0], length_scale=3e-6)
     >>> electrode = sb.ElectrostaticForce(voltage=1.0, area=4e-8, gap=3e-6)
-    >>> found = sb.equilibrium_branches(sb.System(plate, forces=[electrode]), "force.voltage", (0.0, 8.0))
+    >>> found = sb.model.equilibrium_branches(sb.System(plate, forces=[electrode]), "force.voltage", (0.0, 8.0))
     >>> ax = sb.plot.plot_equilibrium_branches(found)
     """
     if not {"midspan_displacement", "unstable_directions", "critical_value"} <= set(dataset.variables):
