@@ -288,6 +288,10 @@ class _Tracer:
         at(share)
         return found[share]
 
+    def _at_value(self, value: float, a: _Point, b: _Point) -> _Point:
+        """The point between two points at a force or value of the parameter."""
+        return self.between(a, b, lambda point: self.value(point.y) - value)
+
     def singular_between(self, a: _Point, b: _Point) -> tuple[_Point, str] | None:
         """The singular point between two neighbours, and its kind; None without one.
 
@@ -370,9 +374,7 @@ class _Tracer:
                 if self.family.ends_at_range:
                     points.pop()
                     if before != end:
-                        points.append(
-                            self.between(here, new, lambda point, end=end: self.value(point.y) - end)
-                        )
+                        points.append(self._at_value(end, here, new))
                 return points, singular, False
             if self.potential(new.y).local_forces and abs(new.y[-1]) > _LARGEST:
                 return points, singular, False
