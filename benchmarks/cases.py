@@ -105,7 +105,7 @@ class Case:
             velocity_amplitude=self.velocity_amplitude * factor,
             location=self.location,
         )
-        return sb.System(self.model, CONTACT, shaker)
+        return sb.System(self.model, contacts=[sb.Contact(CONTACT, shaker)])
 
     def ensemble(
         self, plan: Plan, cycles: int, *, factor: float = 1.0, early_termination: bool = False

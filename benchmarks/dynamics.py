@@ -57,7 +57,7 @@ class Cost(NamedTuple):
 
 def _system(modes: int, ratio: float, velocity: float, damping: float = 0.005) -> sb.System:
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity)
-    system = sb.System(model_of(modes), CONTACT, shaker)
+    system = sb.System(model_of(modes), contacts=[sb.Contact(CONTACT, shaker)])
     return system.replace(**{"model.damping_ratio": damping})
 
 

@@ -36,11 +36,14 @@ def ensemble_of(
     modes: int, points: dict[str, np.ndarray], early: bool, cycles: int = default_values.CYCLES
 ) -> Ensemble:
     """The runs of *points* at level standard."""
-    system = sb.System(model_of(modes), CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1))
+    system = sb.System(
+        model_of(modes),
+        contacts=[sb.Contact(CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1))],
+    )
     columns = {
         "drive.frequency_ratio": points["frequency_ratio"],
         "drive.velocity_amplitude": points["velocity_amplitude"],
-        "striker.location": points["location"],
+        "contact.location": points["location"],
     }
     return make_ensemble(system, sb.Integration(cycles=cycles, early_termination=early), columns)
 

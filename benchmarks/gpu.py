@@ -61,7 +61,7 @@ def ensemble_of(
         "drive.velocity_amplitude": np.asarray(velocity, float),
     }
     return make_ensemble(
-        sb.System(model_of(modes), CONTACT, shaker),
+        sb.System(model_of(modes), contacts=[sb.Contact(CONTACT, shaker)]),
         sb.Integration(cycles=cycles, early_termination=early_termination),
         points,
     )
@@ -222,7 +222,7 @@ def fig_7b(smoke: bool, output: Path) -> dict[str, Any]:
     for early in (False,) if smoke else (True, False):
         seconds, dataset = timed(
             lambda early=early: sb.sweep(
-                sb.System(model_of(modes), CONTACT, shaker),
+                sb.System(model_of(modes), contacts=[sb.Contact(CONTACT, shaker)]),
                 axes,
                 sb.Integration(cycles=cycles, engine="cuda", early_termination=early),
                 progress=_progress,

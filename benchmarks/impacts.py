@@ -56,7 +56,9 @@ def flow_of(ratio: float) -> Stroboscope:
     """The oscillator, of natural frequency 1 and mass 1, struck at rest by a wall sin(ratio t)."""
     model = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0)
     drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=ratio)
-    system = sb.System(model, sb.Restitution(RESTITUTION), sb.Striker(drive=drive, gap=0.0))
+    system = sb.System(
+        model, contacts=[sb.Contact(sb.Restitution(RESTITUTION), sb.Striker(drive=drive, gap=0.0))]
+    )
     return Stroboscope(system, phase=PHASE)
 
 

@@ -83,7 +83,7 @@ def _simulate(case: Case, tolerance: float) -> tuple[np.ndarray, sb.ErrorEstimat
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         run = sb.simulate(
-            sb.System(case.model, CONTACT, case.shaker),
+            sb.System(case.model, contacts=[sb.Contact(CONTACT, case.shaker)]),
             sb.Integration(cycles=ERROR_CYCLES, tolerance=tolerance),
             sample_times=case.times,
         )

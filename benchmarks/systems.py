@@ -38,35 +38,32 @@ def _system(parts: Parts) -> sb.System:
     """The paper's, but for what is given."""
     own = dict(parts)
     model = _model(own.pop("beam", default_values.BEAM), own.pop("imperfection", None))
-    drive, given = own.pop("drive", SINE), own.pop("striker", {})
-    several = [given] if isinstance(given, dict) else given
-    strikers: Any = [sb.Striker(**({"drive": drive} | each)) for each in several]
-    return sb.System(
-        model, own.pop("contact", default_values.CONTACT), strikers if strikers[1:] else strikers[0], **own
-    )
+    drive, law = own.pop("drive", SINE), own.pop("law", default_values.CONTACT)
+    strikers = [sb.Striker(**({"drive": drive} | each)) for each in own.pop("strikers", [{}])]
+    return sb.System(model, contacts=[sb.Contact(law, striker) for striker in strikers], **own)
 
 
 MODELS: dict[str, Parts] = {
-    "`power`": {"contact": sb.PowerLaw.from_stiffness(4e11, 2.0)},
-    "`hunt_crossley`": {"contact": sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)},
-    "`kelvin_voigt`": {"contact": sb.KelvinVoigt(2e6, 20.0)},
-    "a gap": {"striker": {"gap": 4e-5}},
+    "`power`": {"law": sb.PowerLaw.from_stiffness(4e11, 2.0)},
+    "`hunt_crossley`": {"law": sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)},
+    "`kelvin_voigt`": {"law": sb.KelvinVoigt(2e6, 20.0)},
+    "a gap": {"strikers": [{"gap": 4e-5}]},
     "`burst`": {"drive": sb.Burst(frequency_ratio=1.0, velocity_amplitude=0.2, duration_cycles=1e6, ramp_up_cycles=2.0, ramp_down_cycles=1.0)},
     "`chirp`": {"drive": sb.Chirp(start_ratio=0.5, stop_ratio=3.0, velocity_amplitude=0.2, sweep_cycles=40.0)},
     "`two_tone`": {
         "drive": sb.TwoTone(frequency_ratio=1.0, velocity_amplitude=0.2, second_ratio=2.0, second_amplitude=0.1)
     },
     "`band_limited_noise`": {"drive": sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2)},
-    "a body of 20 g": {"striker": {"mass": 0.02, "suspension_stiffness": 700.0, "suspension_damping": 0.7}},
-    "a stop above, too": {"striker": [{}, {"drive": sb.FixedStop(), "location": 0.3, "side": "above", "gap": 4e-5}]},
+    "a body of 20 g": {"strikers": [{"mass": 0.02, "suspension_stiffness": 700.0, "suspension_damping": 0.7}]},
+    "a stop above, too": {"strikers": [{}, {"drive": sb.FixedStop(), "location": 0.3, "side": "above", "gap": 4e-5}]},
     "unequal wells": {"imperfection": sb.Imperfection(midspan_amplitude=4e-6)},
     "other ends": {"beam": default_values.BEAM.replace(boundary=sb.BoundaryConditions(left_rotational_stiffness=40.0, right_rotational_stiffness=40.0))},
     "a moving base": {
         "base_excitation": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1))
     },
     "a changing load": {"axial_load": sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))},
-    "a piezo": {"harvester": PIEZO},
-    "a coil": {"harvester": COIL},
+    "a piezo": {"harvesters": [PIEZO]},
+    "a coil": {"harvesters": [COIL]},
 }  # fmt: skip
 """What differs from the paper's system."""
 

@@ -12,14 +12,14 @@ rest in its lower well and moves as
 import snapbeam as sb
 from snapbeam import paper
 
+shaker = sb.Shaker(
+    frequency_ratio=1.21, velocity_amplitude=0.18, location=paper.LOCATION
+)
 system = sb.System(
     sb.ReducedModel.from_beam(
         paper.BEAM, modes=32, damping_ratio=paper.DAMPING_RATIO
     ),
-    contact=paper.CONTACT,
-    striker=sb.Shaker(
-        frequency_ratio=1.21, velocity_amplitude=0.18, location=paper.LOCATION
-    ),
+    contacts=[sb.Contact(paper.CONTACT, shaker)],
 )
 run = sb.simulate(system, sb.Integration(cycles=40))
 

@@ -13,12 +13,12 @@ import snapbeam as sb
 from snapbeam import paper
 from snapbeam.plot.map import plot_response_map
 
+shaker = sb.Shaker(
+    frequency_ratio=1.0, velocity_amplitude=0.1, location=paper.LOCATION
+)
 system = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=4, damping_ratio=paper.DAMPING_RATIO),
-    contact=paper.CONTACT,
-    striker=sb.Shaker(
-        frequency_ratio=1.0, velocity_amplitude=0.1, location=paper.LOCATION
-    ),
+    contacts=[sb.Contact(paper.CONTACT, shaker)],
 )
 axes = {
     "frequency_ratio": np.linspace(0.1, 4.0, 16),

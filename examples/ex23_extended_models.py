@@ -31,7 +31,7 @@ burst = sb.Burst(
 shaker = sb.Striker(
     drive=burst, mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7
 )
-system = sb.System(model, lossy, shaker)
+system = sb.System(model, contacts=[sb.Contact(lossy, shaker)])
 plot_system(system)
 
 # %%
@@ -56,7 +56,7 @@ sphere = sb.Striker(
     side="above",
     location=0.5,
 )
-thrown = sb.System(model, paper.CONTACT, sphere)
+thrown = sb.System(model, contacts=[sb.Contact(paper.CONTACT, sphere)])
 plot_system(thrown)
 
 # %%
@@ -89,13 +89,8 @@ print(
     f"first frequency about the lower well {uneven.well_frequencies[0, 0]:.1f} Hz, "
     f"upper {uneven.well_frequencies[1, 0]:.1f} Hz"
 )
-plot_system(
-    sb.System(
-        uneven,
-        paper.CONTACT,
-        sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2)),
-    )
-)
+shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2)
+plot_system(sb.System(uneven, contacts=[sb.Contact(paper.CONTACT, shaker)]))
 
 # %%
 # A harvester on a moving base
@@ -115,10 +110,9 @@ piezo = sb.PiezoelectricHarvester.from_material(
 )
 shaken = sb.System(
     model,
-    paper.CONTACT,
-    stop,
+    contacts=[sb.Contact(paper.CONTACT, stop)],
+    harvesters=[piezo],
     base_excitation=sb.BaseExcitation(motion=motion),
-    harvester=piezo,
 )
 plot_system(shaken)
 
@@ -132,12 +126,12 @@ coil = sb.ElectromagneticHarvester(
 load = sb.AxialLoadModulation(
     motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0)
 )
+shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.2)
 plot_system(
     sb.System(
         model,
-        paper.CONTACT,
-        sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.2),
+        contacts=[sb.Contact(paper.CONTACT, shaker)],
+        harvesters=[coil],
         axial_load=load,
-        harvester=coil,
     )
 )

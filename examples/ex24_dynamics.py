@@ -19,10 +19,10 @@ import snapbeam as sb
 from snapbeam import paper
 from snapbeam.plot.dynamics import plot_basins, plot_diagram, plot_survival
 
+shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.25)
 two = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=2),
-    paper.CONTACT,
-    sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.25),
+    contacts=[sb.Contact(paper.CONTACT, shaker)],
 )
 points = xr.Dataset(
     {
@@ -47,10 +47,10 @@ plot_survival(lifetimes, labels=["1.21, 0.25", "2.5, 0.55"])
 # One mode with more damping and a slow shaker, so that few motions exist. The bifurcation diagram is swept up and down. The
 # stable and unstable orbits of a branch, and their bifurcations, are plotted over it.
 
+shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.05)
 one = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.03),
-    paper.CONTACT,
-    sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.05),
+    contacts=[sb.Contact(paper.CONTACT, shaker)],
 )
 diagram = sb.dynamics.bifurcation_diagram(
     one, "velocity_amplitude", np.linspace(0.02, 0.3, 113)

@@ -19,10 +19,10 @@ import snapbeam as sb
 from snapbeam import paper
 from snapbeam.plot.uncertainty import plot_probability, plot_quantiles, plot_tornado
 
+shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
 system = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=1),
-    paper.CONTACT,
-    sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
+    contacts=[sb.Contact(paper.CONTACT, shaker)],
 )
 uncertainty = sb.uncertainty.ParameterUncertainty(
     of={

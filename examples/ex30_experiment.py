@@ -153,7 +153,8 @@ motion = sb.Striker(
     location=paper.LOCATION,
 )
 truth = sb.simulate(
-    sb.System(truth_model, paper.CONTACT, motion), sb.Integration(cycles=cycles)
+    sb.System(truth_model, contacts=[sb.Contact(paper.CONTACT, motion)]),
+    sb.Integration(cycles=cycles),
 )
 camera = lab.SyntheticCamera(shape=(192, 64), snr_db=30.0)
 stage = lab.SyntheticStage(shaker_width=0.4e-3)
@@ -222,7 +223,8 @@ recorded = sb.Striker(
     location=paper.LOCATION,
 )
 simulated = sb.simulate(
-    sb.System(model, paper.CONTACT, recorded), sb.Integration(cycles=cycles)
+    sb.System(model, contacts=[sb.Contact(paper.CONTACT, recorded)]),
+    sb.Integration(cycles=cycles),
 )
 
 shaker_seen = lab.make_signal(
@@ -285,7 +287,7 @@ for ratio, amplitude in (
     )
     times = np.arange(int(cycles / (ratio * first) * 1e4)) / 1e4
     test = sb.simulate(
-        sb.System(truth_model, paper.CONTACT, shaker),
+        sb.System(truth_model, contacts=[sb.Contact(paper.CONTACT, shaker)]),
         sb.Integration(cycles=cycles),
         sample_times=times,
     ).dataset
@@ -328,6 +330,7 @@ dots = MeasuredPoints(
 # have the same coordinates only if both are normalised alike: by the first frequency about a well and the buckling
 # level.
 
+shaker = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1)
 calibrated = sb.System(
     sb.ReducedModel.from_beam(
         calibration.beam,
@@ -335,8 +338,7 @@ calibrated = sb.System(
         damping_ratio=calibration.damping_ratio,
         reference_frequency=calibration.well_frequency,
     ),
-    paper.CONTACT,
-    sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1),
+    contacts=[sb.Contact(paper.CONTACT, shaker)],
 )
 ds = sb.sweep(
     calibrated,

@@ -36,8 +36,6 @@ damping_ratio = 0.005
 radius = 5e-6
 young_modulus = [160e9, 160e9]
 poisson_ratio = [0.22, 0.22]
-
-[striker]
 location = 0.47
 
 [sweep]

@@ -30,10 +30,10 @@ print(
     "above 6.2 the first mode would be antisymmetric"
 )
 
+shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2, location=0.47)
 system = sb.System(
     model,
-    contact,
-    sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2, location=0.47),
+    contacts=[sb.Contact(contact, shaker)],
 )
 print(system.diagnostics() or "nothing is doubtful")
 

@@ -15,10 +15,10 @@ import snapbeam as sb
 from snapbeam import paper
 from snapbeam.plot.uncertainty import plot_designs
 
+shaker = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1)
 system = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=paper.DAMPING_RATIO),
-    paper.CONTACT,
-    sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1).striker(),
+    contacts=[sb.Contact(paper.CONTACT, shaker)],
 )
 uncertainty = sb.uncertainty.ParameterUncertainty(
     of={

@@ -38,7 +38,7 @@ def requested(
     shaker = sb.Shaker(**own | {name: value for name, value in values.items() if name not in axes}, side=side)
     if not axes:
         axes = xr.Dataset({"location": ("point", [values["location"]])})
-    return sb.System(model, contact, shaker), axes, sb.Integration(**given)
+    return sb.System(model, contacts=[sb.Contact(contact, shaker)]), axes, sb.Integration(**given)
 
 
 def setup_of(model: sb.ReducedModel, contact: sb.ContactLaw | None, **given: Any) -> SweepSetup:

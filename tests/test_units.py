@@ -67,8 +67,7 @@ def check(dataset: xr.Dataset) -> int:
 
 SYSTEM = sb.System(
     sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
-    default_values.CONTACT,
-    sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
+    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))],
 )
 ASKED = sb.Integration(cycles=2)
 
@@ -96,7 +95,16 @@ def test_a_run_of_several_strikers(tmp_path) -> None:
     """What is told of each striker has units too, as it stands and as it comes back from the file."""
     stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=2e-5)
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
-    run = sb.simulate(sb.System(model, default_values.CONTACT, [SYSTEM.striker, stop]), ASKED)
+    run = sb.simulate(
+        sb.System(
+            model,
+            contacts=[
+                sb.Contact(default_values.CONTACT, SYSTEM.striker),
+                sb.Contact(default_values.CONTACT, stop),
+            ],
+        ),
+        ASKED,
+    )
     told = {"striker", "striker_displacements", "striker_penetrations", "striker_forces"}
     assert told <= set(run.dataset.variables)
     assert check(run.dataset) == len(SCHEMA) - len(OF_OTHERS - told)
@@ -106,12 +114,12 @@ def test_a_run_of_several_strikers(tmp_path) -> None:
 
 AXES = {
     "structure and run": {"beam.buckling_level": [3e-4, 3.5e-4], "frequency_ratio": [1.0, 1.2]},
-    "contact": {"contact.stiffness": [1e8, 4e8], "striker.gap": [0.0, 1e-5]},
+    "contact": {"contact.stiffness": [1e8, 4e8], "contact.gap": [0.0, 1e-5]},
     "initial_state": {
         "initial_state.amplitude[1]": [-1.0, 1.0],
         "initial_state.striker_position": [-4e-4, -3.5e-4],
     },
-    "words": {"striker.side": ["below", "above"], "integration.cycles": [2, 3]},
+    "words": {"contact.side": ["below", "above"], "integration.cycles": [2, 3]},
 }
 
 

@@ -29,19 +29,21 @@ _SECTIONS = {
     "boundary": "Stiffness of the supports; without this section both ends are clamped.",
     "imperfection": "Initial deflection and constant transverse loads, which make the wells unequal; without this section the "
     "beam is perfect.",
-    "contact": "The contact law, selected by `type`: {laws}. You can give materials instead of `stiffness`: `radius` of the "
-    "sphere (m), `young_modulus` (Pa) and `poisson_ratio`, the last two as lists of two numbers, of sphere and beam. You can "
-    "give `restitution` and `speed` (m/s) instead of `damping_factor`.",
-    "striker": "The striker. `location_m` (m) can replace `location`.",
+    "contact": "A striker and the law of its contact with the beam. The law is selected by `type`: {laws}. You can give "
+    "materials instead of `stiffness`: `radius` of the sphere (m), `young_modulus` (Pa) and `poisson_ratio`, the last two as "
+    "lists of two numbers, of sphere and beam. You can give `restitution` and `speed` (m/s) instead of `damping_factor`. Keys "
+    "without a type are those of the striker; `location_m` (m) can replace `location`. Several contacts are an array "
+    "`[[contact]]`, the drive of each below it as `[contact.drive]`. A `label` replaces the number in the names of their "
+    "parameters; see [systems](systems.md#names-of-parameters).",
     "drive": "The motion of the striker, selected by `type`: {drives}. `frequency_hz` (Hz), `velocity_m_s` (m/s) and "
     "`displacement_um` (µm) can replace the ratios. A recorded motion is available from Python and with `--recorded-drive` only.",
     "base_excitation": "The motion of the base, selected by `type` as in `[drive]`; without this section the base is at rest. "
     "`frequency_hz` (Hz), `velocity_m_s` (m/s) and `amplitude_g` (g) can replace the ratios.",
     "axial_load": "The change of the axial load in time, selected by `type`: {loads}; without this section the load is "
     "constant.",
-    "external_force": "A force on the structure as a function of time, selected by `type`: {forces}.",
-    "local_force": "A force that depends on the displacement or velocity of one point, selected by `type`: {local_forces}. "
-    "A law of your own has its own type; see [Your own parts](extending.md#local-force).",
+    "force": "A force on the structure, selected by `type`: as a function of time {forces}; of the displacement or velocity of "
+    "one point {local_forces}. A law of your own has its own type; see [Your own parts](extending.md#local-force). Several "
+    "forces are an array `[[force]]`, each with a `label` if you like.",
     "harvester": "The circuit of an energy harvester, selected by `type`: {harvesters}.",
     "integration": "Solver settings.",
 }
@@ -76,8 +78,7 @@ def parameter_tables() -> str:
             name: kind for name, kind in DRIVES.items() if name != "sum" and kind.can_excite_base()
         },
         "axial_load": LOADS,
-        "external_force": FORCES,
-        "local_force": LOCAL_FORCES,
+        "force": {**FORCES, **LOCAL_FORCES},
         "harvester": HARVESTERS,
     }
     listed = {
@@ -99,7 +100,7 @@ def parameter_tables() -> str:
             meaning = row.quantity.long_name + (f", {symbol}" if symbol else "")
             meaning += f"; in datasets `{row.short}`" if row.short != key else ""
             owners = ", ".join(
-                f"`{each}`" for each, kind in types.get(section, {}).items() if key in _fields(kind)
+                f"`{each}`" for each, kind in types.get(section, {}).items() if key in _keys(kind)
             )
             level = "run" if row.is_run else "model"
             rows.append((f"`{key}`", meaning, unit, limits, shown or "–", level, owners))
@@ -116,7 +117,7 @@ def parameter_tables() -> str:
 def _keys_by_type(types: Mapping[str, Any], keys: Sequence[str]) -> str:
     """Return a table of the keys that each type has."""
     rows = [
-        (f"`{name}`", ", ".join(key for key in keys if key.strip("`") in _fields(kind)) or "–")
+        (f"`{name}`", ", ".join(key for key in keys if key.strip("`") in _keys(kind)) or "–")
         for name, kind in types.items()
     ]
     return _table(("type", "its keys"), rows)
@@ -126,9 +127,13 @@ def _listed(names: Iterable[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
 
 
-def _fields(kind: Any) -> set[str]:
-    """Names of the fields of a contact law, drive, load or harvester."""
-    return {each.name for each in dataclasses.fields(kind)}
+def _keys(kind: Any) -> set[str]:
+    """Keys of a contact law, drive, load, force or harvester; a force in time has a location of its own."""
+    from snapbeam.model.external_force import FORCES, ExternalForce
+    from snapbeam.model.quantity import quantities
+
+    own = {each.name for each in dataclasses.fields(kind)}
+    return own | set(quantities(ExternalForce)) if kind in FORCES.values() else own
 
 
 def _number(value: Any) -> str:
@@ -251,7 +256,7 @@ def support_tables() -> str:
     return (
         _table(("system", *questions), rows)
         + f"\nThe numbers are those of the reasons:\n\n{listed}\n\n"
-        + "These systems are refused as a whole:\n\n"
+        + "These systems are refused as a whole, when they are made or when a run of them is assembled:\n\n"
         + _table(("system", "reason"), [(words, _plain_text(reason)) for words, reason in refused])
     )
 
@@ -295,7 +300,7 @@ def _questions() -> dict[str, Any]:
                 "cuda", modes=system.model.modes, law=ensemble.law, drive=ensemble.drive,
                 striker_with_mass=ensemble.structure.body_mass is not None,
                 unequal_wells=ensemble.structure.unequal_wells is not None,
-                environment=system.has_environment, several_strikers=bool(system.further_contacts),
+                environment=bool(system.surroundings), several_strikers=len(system.contacts) > 1,
             )  # fmt: skip
         except sb.InputError as error:
             if "by the CPU engine alone" in str(error):
@@ -326,12 +331,14 @@ def _parts() -> dict[str, Any]:
 
     def struck(drive: Any = sine, contact: Any = hertz, of: Any = model, **parts: Any) -> Any:
         striker = {name: parts.pop(name) for name in ("gap", "mass", "suspension_stiffness") if name in parts}
-        return sb.System(of, contact, sb.Striker(drive=drive, **striker), **parts)
+        return sb.System(of, contacts=[sb.Contact(contact, sb.Striker(drive=drive, **striker))], **parts)
 
     def several(ratio: float, contact: Any = hertz) -> Any:
         other = sb.Sine(frequency_ratio=ratio, velocity_amplitude=0.1)
-        strikers = [sb.Striker(drive=sine), sb.Striker(drive=other, location=0.3, side="above", gap=5e-5)]
-        return sb.System(model, [contact, hertz], strikers)
+        above = sb.Striker(drive=other, location=0.3, side="above", gap=5e-5)
+        return sb.System(
+            model, contacts=[sb.Contact(contact, sb.Striker(drive=sine)), sb.Contact(hertz, above)]
+        )
 
     def based(motion: Any) -> Any:
         return struck(stop, gap=5e-5, base_excitation=sb.BaseExcitation(motion=motion))
@@ -388,18 +395,22 @@ def _parts() -> dict[str, Any]:
         ),
         "a load with a ramp": struck(axial_load=sb.AxialLoadModulation(motion=sb.LoadRamp(change=1.0, duration=3.0))),
         "an external force": struck(
-            external_force=sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=0.9, amplitude=0.1), location=0.4)
+            forces=[sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=0.9, amplitude=0.1), location=0.4)]
         ),
-        "a local force": struck(local_force=spring),
-        "a local force with damping": struck(local_force=drag),
-        "a harvester": struck(harvester=piezo),
+        "a local force": struck(forces=[spring]),
+        "a local force with damping": struck(forces=[drag]),
+        "several local forces, one with damping, and an external force": struck(
+            forces=[spring, drag, sb.ExternalForce(history=sb.ConstantForce(force=0.01), location=0.4)]
+        ),
+        "a harvester": struck(harvesters=[piezo]),
     }  # fmt: skip
 
 
 def _refused_systems() -> dict[str, Any]:
-    """Functions that make systems whose parts do not go together."""
+    """Functions that make systems whose parts do not go together, and assemble a run of them."""
     import snapbeam as sb
     from snapbeam.model import default_values
+    from snapbeam.solver.restrictions import check_integrable
 
     hertz, newton, lossy = default_values.CONTACT, sb.Restitution(0.9), sb.HuntCrossley(4e8, 1.0)
     one, model = (sb.ReducedModel.from_beam(default_values.BEAM, modes=modes) for modes in (1, 2))
@@ -407,46 +418,53 @@ def _refused_systems() -> dict[str, Any]:
     record = parts["drive `recorded_motion`"].striker
     load, harvester = parts["a load with a sine"].axial_load, parts["a harvester"].harvester
     base = parts["a base with a sine"].base_excitation
-    drag = parts["a local force with damping"].local_force
+    drag = parts["a local force with damping"].forces[0]
     first = parts["the paper's"].striker
     stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5)
     heavy = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5, mass=2e-3)
+    push = parts["an external force"].external_force
     matrices = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0)
     chirp = parts["drive `chirp`"].striker.drive
     half = parts["drive `half_sine`"].striker.drive
 
-    def free(of: Any = model, **around: Any) -> Any:
-        return sb.System(of, **around)
+    def struck(*contacts: tuple[Any, Any], of: Any = model, **around: Any) -> Any:
+        return lambda: check_integrable(
+            sb.System(of, contacts=[sb.Contact(*each) for each in contacts], **around)
+        )
 
+    newtonian, elastic, losing = (newton, first), (hertz, first), (lossy, first)
     return {
-        "contact `restitution` with two modes": lambda: sb.System(model, newton, first),
-        "contact `restitution` with several strikers": lambda: sb.System(one, [newton, hertz], [first, stop]),
-        "contact `restitution` with a base": lambda: sb.System(one, newton, first, base_excitation=base),
-        "contact `restitution` with a changing load": lambda: sb.System(one, newton, first, axial_load=load),
-        "contact `restitution` with a harvester": lambda: sb.System(one, newton, first, harvester=harvester),
-        "contact `restitution` with a striker with a mass": lambda: sb.System(one, newton, heavy),
-        "contact `restitution` with a local force": lambda: sb.System(one, newton, first, local_force=drag),
-        "a local force with damping, with a harvester": lambda: sb.System(
-            model, hertz, first, local_force=drag, harvester=harvester
+        "contact `restitution` with two modes": struck(newtonian),
+        "contact `restitution` with a striker with a mass": struck((newton, heavy), of=one),
+        "contact `restitution` with several strikers": struck(newtonian, (hertz, stop), of=one),
+        "contact `restitution` with a base": struck(newtonian, of=one, base_excitation=base),
+        "contact `restitution` with a changing load": struck(newtonian, of=one, axial_load=load),
+        "contact `restitution` with a harvester": struck(newtonian, of=one, harvesters=[harvester]),
+        "contact `restitution` with an external force": struck(newtonian, of=one, forces=[push]),
+        "contact `restitution` with a local force": struck(newtonian, of=one, forces=[drag]),
+        "a local force with damping, with a harvester": struck(
+            elastic, forces=[drag], harvesters=[harvester]
         ),
-        "a local force with damping, with a contact that loses energy": lambda: sb.System(
-            model, lossy, first, local_force=drag
-        ),
-        "a contact that loses energy with a harvester": lambda: sb.System(
-            model, lossy, first, harvester=harvester
-        ),
-        "a further contact that loses energy": lambda: sb.System(model, [hertz, lossy], [first, stop]),
-        "a further striker with a mass": lambda: sb.System(model, hertz, [first, heavy]),
-        "several strikers, the first with a record": lambda: sb.System(model, hertz, [record, stop]),
-        "several strikers, another with a record": lambda: sb.System(model, hertz, [first, record]),
-        "a record with a base": lambda: sb.System(model, hertz, record, base_excitation=base),
-        "a record with a changing load": lambda: sb.System(model, hertz, record, axial_load=load),
+        "two local forces with damping": struck(elastic, forces=[drag, drag]),
+        "a local force with damping, with a contact that loses energy": struck(losing, forces=[drag]),
+        "a contact that loses energy with a harvester": struck(losing, harvesters=[harvester]),
+        "a further contact that loses energy": struck(elastic, (lossy, stop)),
+        "a further striker with a mass": struck(elastic, (hertz, heavy)),
+        "two external forces": struck(elastic, forces=[push, push]),
+        "an external force with a base": struck(elastic, forces=[push], base_excitation=base),
+        "two harvesters": struck(elastic, harvesters=[harvester, harvester]),
+        "five contacts": struck(elastic, *4 * [(hertz, stop)]),
+        "several strikers, the first with a record": struck((hertz, record), (hertz, stop)),
+        "several strikers, another with a record": struck(elastic, (hertz, record)),
+        "a record with a base": struck((hertz, record), base_excitation=base),
+        "a record with a changing load": struck((hertz, record), axial_load=load),
+        "a record with an external force": struck((hertz, record), forces=[push]),
         "a base with a half sine": lambda: sb.BaseExcitation(motion=half),
         "a base with a chirp that does not carry the striker": lambda: sb.BaseExcitation(
             motion=chirp, striker_on_base=False
         ),
-        "a base under a structure given by matrices": lambda: free(matrices, base_excitation=base),
-        "a changing load on a structure given by matrices": lambda: free(matrices, axial_load=load),
+        "a base under a structure given by matrices": struck(of=matrices, base_excitation=base),
+        "a changing load on a structure given by matrices": struck(of=matrices, axial_load=load),
         "a suspension without a mass": lambda: sb.Striker(drive=sb.FixedStop(), suspension_stiffness=1e3),
         "an overdamped suspension": lambda: sb.Striker(
             drive=sb.FixedStop(), mass=1e-3, suspension_stiffness=1.0, suspension_damping=1.0

@@ -50,7 +50,7 @@ from .model.local_force import QuadraticDamping as QuadraticDamping
 from .model.quantity import quantity as quantity
 from .model.reduced_model import ReducedModel as ReducedModel
 from .model.state import State as State
-from .model.striker import ContactPair as ContactPair
+from .model.striker import Contact as Contact
 from .model.striker import Shaker as Shaker
 from .model.striker import Striker as Striker
 from .model.system import System as System

@@ -245,7 +245,7 @@ def test_what_is_given_beside_a_store_is_compared_with_the_store(tmp_path, monke
     before = xr.load_dataset("map.nc").response_class
     run("map", "--checkpoint", "kept", "--cycles", "12", "--length", "0.1", "-o", "again.nc")
     np.testing.assert_array_equal(xr.load_dataset("again.nc").response_class, before)
-    refused = RUNNER.invoke(app, ["map", "--checkpoint", "kept", "--cycles", "13"])
+    refused = RUNNER.invoke(app, ["map", "--checkpoint", "kept", "--cycles", "13", "-o", "other.nc"])
     assert refused.exit_code == 2
     differences = [line for line in refused.stderr.splitlines() if "in the checkpoint" in line]
     assert len(differences) == 1 and "cycles: 12 in the checkpoint, 13 requested" in differences[0]
@@ -296,7 +296,7 @@ def test_no_striker_is_added_to_a_base(tmp_path, capsys):
     ):
         with pytest.raises(InputError, match="there is no striker to drive, base_excitation moves the beam"):
             configured({"config": path} | given)
-    own = {"striker.location": 0.5, "contact.stiffness": 1e8}
+    own = {"contact.location": 0.5, "contact.stiffness": 1e8}
     both = configured({"config": path, "drive.frequency_ratio": 1.0} | own)
     assert both.system.striker is not None
 

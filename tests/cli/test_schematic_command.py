@@ -35,8 +35,8 @@ def test_refused_by_name(tmp_path) -> None:
 def test_extended_models_in_a_parameter_file(tmp_path) -> None:
     file = tmp_path / "world.toml"
     file.write_text(
-        'extends = "paper"\n[contact]\ntype = "kelvin_voigt"\nlinear_stiffness = 2e6\nlinear_damping = 20.0\n[drive]\ntype = "burst"\n'
-        "frequency_ratio = 1.2\nvelocity_amplitude = 0.2\nduration_cycles = 5.0\n[striker]\nmass = 0.02\n",
+        'extends = "paper"\n[contact]\ntype = "kelvin_voigt"\nlinear_stiffness = 2e6\nlinear_damping = 20.0\nmass = 0.02\n[drive]\ntype = "burst"\n'
+        "frequency_ratio = 1.2\nvelocity_amplitude = 0.2\nduration_cycles = 5.0\n",
         encoding="utf-8",
     )
     system = load_config(file).system
@@ -44,8 +44,8 @@ def test_extended_models_in_a_parameter_file(tmp_path) -> None:
     assert system.get("drive.duration_cycles") == 5.0
     assert system.replace(**{"drive.ramp_up_cycles": 2.0}).get("drive.ramp_up_cycles") == 2.0
     lossy = config_from_mapping({"extends": "paper", "contact": {"restitution": 0.5, "speed": 0.05}}).system
-    assert lossy.contact.restitution(0.05) == pytest.approx(0.5, abs=1e-12)
-    assert lossy.contact.stiffness == 4e8
+    assert lossy.contact_law.restitution(0.05) == pytest.approx(0.5, abs=1e-12)
+    assert lossy.contact_law.stiffness == 4e8
     for wrong, words in (
         ({"restitution": 0.5}, "restitution and speed belong together"),
         ({"restitution": 0.5, "speed": 0.05, "damping_factor": 1.0}, "give no other"),

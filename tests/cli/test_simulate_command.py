@@ -13,8 +13,8 @@ from snapbeam.model.default_values import BEAM, CONTACT
 
 MODEL = sb.ReducedModel.from_beam(BEAM, modes=1, damping_ratio=0.02)
 RECORD = [0.0, 1.0, 2.0, 1.0, 0.0, -1.0, -2.0, -1.0] * 20
-SPRING = {"local_force": sb.LocalSpring(stiffness=1.0, location=0.5)}
-FORCE = {"external_force": sb.ExternalForce(history=sb.ConstantForce(force=0.01), location=0.5)}
+SPRING = {"forces": [sb.LocalSpring(stiffness=1.0, location=0.5)]}
+FORCE = {"forces": [sb.ExternalForce(history=sb.ConstantForce(force=0.01), location=0.5)]}
 SHAKEN = {
     "base_excitation": sb.BaseExcitation(
         motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.02)
@@ -48,8 +48,8 @@ def refused(*arguments):
     ("parts", "way"),
     [
         (SHAKEN, "[base_excitation] with type = recorded_acceleration, record (m/s^2)"),
-        (FORCE, "[external_force] with type = recorded_force, record (N)"),
-        (SPRING, "use a system with a [striker] and without a moving base, load or external force"),
+        (FORCE, "[force] with type = recorded_force, record (N)"),
+        (SPRING, "use a system with a [contact] and without a moving base, load or external force"),
     ],
 )
 def test_a_recorded_drive_needs_a_striker(folder, parts, way):
@@ -60,18 +60,20 @@ def test_a_recorded_drive_needs_a_striker(folder, parts, way):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("section", ["base_excitation", "external_force"])
-def test_the_advised_record_is_accepted(folder, section):
+@pytest.mark.parametrize("part", ["base_excitation", "forces"])
+def test_the_advised_record_is_accepted(folder, part):
     """The types that the message names, in a file."""
     parts = {
         "base_excitation": sb.BaseExcitation(
             motion=sb.RecordedAcceleration(record=RECORD, sampling_frequency=2e3)
         ),
-        "external_force": sb.ExternalForce(
-            history=sb.RecordedForce(record=1e-3 * np.array(RECORD), sampling_frequency=2e3), location=0.5
-        ),
+        "forces": [
+            sb.ExternalForce(
+                history=sb.RecordedForce(record=1e-3 * np.array(RECORD), sampling_frequency=2e3), location=0.5
+            )
+        ],
     }
-    sb.System(MODEL, **{section: parts[section]}).save("system.toml")
+    sb.System(MODEL, **{part: parts[part]}).save("system.toml")
     answer = CliRunner().invoke(app, ["simulate", "--config", "system.toml", "--cycles", "2"])
     assert answer.exit_code == 0, answer.output
 
@@ -79,7 +81,12 @@ def test_the_advised_record_is_accepted(folder, section):
 @pytest.mark.slow
 def test_a_recorded_drive_leaves_the_gap_of_the_striker(folder):
     system = sb.System(
-        MODEL, CONTACT, sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-3)
+        MODEL,
+        contacts=[
+            sb.Contact(
+                CONTACT, sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-3)
+            )
+        ],
     )
     system.save("system.toml")
     command = [

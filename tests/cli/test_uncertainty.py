@@ -17,7 +17,7 @@ extends = "paper"
 modes = 1
 [drive]
 frequency_ratio = 0.02
-[striker]
+[contact]
 location = 0.3
 [integration]
 cycles = 1

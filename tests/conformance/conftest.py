@@ -79,10 +79,12 @@ class EnsembleIntegrator:
             resolve(self.name, law=type(contact), drive=type(striker.drive))
         except InputError as refusal:
             pytest.skip(str(refusal))
-        given = (own if drive is None else {}) | {"striker.location": location}
+        given = (own if drive is None else {}) | {"contact.location": location}
         columns = np.broadcast_arrays(*map(np.atleast_1d, given.values()))
         points = {name: np.array(column, dtype=float) for name, column in zip(given, columns, strict=True)}
-        ensemble = make_ensemble(sb.System(model, contact, striker, start), how, points)
+        ensemble = make_ensemble(
+            sb.System(model, contacts=[sb.Contact(contact, striker)], initial_state=start), how, points
+        )
         if limit is not None:
             ensemble = dataclasses.replace(ensemble, max_steps=limit)
         return EnsembleResult(ensemble, self.engine.run_ensemble(ensemble, threads, None))

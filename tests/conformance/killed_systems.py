@@ -40,10 +40,10 @@ VALUES: dict[str, list[Any]] = {
     "boundary.left_rotational_stiffness": [20.0, 60.0],
     "boundary.right_rotational_stiffness": [20.0, 60.0],
     "boundary.axial_support_stiffness": [1e7, 1e8],
-    "striker.gap": [1e-6, 2e-5],
-    "striker.mass": [0.01, 0.03],
-    "striker.suspension_stiffness": [500.0, 900.0],
-    "striker.suspension_damping": [0.3, 0.9],
+    "contact.gap": [1e-6, 2e-5],
+    "contact.mass": [0.01, 0.03],
+    "contact.suspension_stiffness": [500.0, 900.0],
+    "contact.suspension_damping": [0.3, 0.9],
     "imperfection.midspan_amplitude": [1e-6, 3e-6],
     "imperfection.antisymmetric_amplitude": [1e-6, 3e-6],
     "imperfection.point_load": [0.003, 0.006],
@@ -164,7 +164,7 @@ UNSEEN = {
     "integration.high_frequency_ratio",
 }
 """What two cycles may not show."""
-NOTHING = {("still", "striker.gap"), ("a measured shape", "imperfection.point_location")}
+NOTHING = {("still", "contact.gap"), ("a measured shape", "imperfection.point_location")}
 """What changes nothing: nothing moves there from rest, and a load of zero stands nowhere."""
 
 
@@ -184,8 +184,8 @@ def main() -> None:
             names.remove("model.modes")
         if system.base_excitation is not None and type(system.base_excitation.motion).name == "chirp":
             names.remove("base_excitation.striker_on_base")  # a sweep is refused under a striker in space
-        if "striker.suspension_damping" in names and not system.get("striker.suspension_stiffness"):
-            names.remove("striker.suspension_damping")  # of a suspension, which a mass in flight has not
+        if "contact.suspension_damping" in names and not system.get("contact.suspension_stiffness"):
+            names.remove("contact.suspension_damping")  # of a suspension, which a mass in flight has not
         chosen = (
             arguments.only.split(",") if arguments.only else [name for name in names if name not in NOT_SWEPT]
         )

@@ -400,7 +400,7 @@ def small_system(modes: int = 1, damping_ratio: float = 0.005, **drive: float) -
     """The paper's beam with few modes."""
     sine = sb.Sine(**({"frequency_ratio": 1.21, "velocity_amplitude": 0.18} | drive))
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, damping_ratio=damping_ratio)
-    return sb.System(model, default_values.CONTACT, sb.Striker(drive=sine))
+    return sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=sine))])
 
 
 PLANE = {"frequency_ratio": [0.8, 1.4], "velocity_amplitude": [0.06, 0.15, 0.3]}

@@ -15,7 +15,7 @@ import snapbeam as sb
 from snapbeam.model import default_values
 
 SINE = {"drive.frequency_ratio": (0.3, 3.5), "drive.velocity_amplitude": (0.02, 0.6)}
-PLACE = {"striker.location": (0.15, 0.85)}
+PLACE = {"contact.location": (0.15, 0.85)}
 SHAKEN = {
     "base_excitation.frequency_ratio": (0.4, 2.0),
     "base_excitation.acceleration_amplitude": (0.05, 0.6),
@@ -56,40 +56,26 @@ class ExtendedSystem:
 
 def mirror_image(system: sb.System) -> sb.System:
     """Upside down: striker, wells, base and records."""
-    model, striker, base = system.model, system.striker, system.base_excitation
-    others = tuple(
-        dataclasses.replace(
-            each,
-            striker=dataclasses.replace(
-                each.striker, side="above" if each.striker.side == "below" else "below"
-            ),
-        )
-        for each in system.further_contacts
-    )
+    model, base = system.model, system.base_excitation
     if model.imperfection is not None:
         assert model.beam is not None
         model = sb.ReducedModel.from_beam(
             model.beam, modes=model.modes, imperfection=model.imperfection.mirrored
         )
-    if striker is not None:
-        drive = striker.drive
+    contacts = []
+    for each in system.contacts:
+        drive, side = each.striker.drive, "above" if each.striker.side == "below" else "below"
         if isinstance(drive, sb.RecordedMotion):
             drive = dataclasses.replace(drive, displacement=-drive.displacement, velocity=-drive.velocity)
-        side = "above" if striker.side == "below" else "below"
-        striker = dataclasses.replace(striker, side=side, drive=drive)
+        striker = dataclasses.replace(each.striker, side=side, drive=drive)
+        contacts.append(dataclasses.replace(each, striker=striker))
     if base is not None:
         base = dataclasses.replace(base, direction="down" if base.direction == "up" else "up")
-    more = {
-        "base_excitation": base,
-        "axial_load": system.axial_load,
-        "harvester": system.harvester,
-        "further_contacts": others,
-    }
-    return sb.System(model, system.contact, striker, **more)  # type: ignore[arg-type]
+    return dataclasses.replace(system, model=model, contacts=contacts, base_excitation=base)
 
 
 def struck(drive: sb.Drive, contact: sb.ContactLaw = default_values.CONTACT, **striker: object):
-    return lambda model: {"contact": contact, "striker": sb.Striker(drive=drive, **striker)}
+    return lambda model: {"contacts": [sb.Contact(contact, sb.Striker(drive=drive, **striker))]}
 
 
 def sine(velocity: float = 0.2) -> sb.Sine:
@@ -100,8 +86,7 @@ def on_a_base(motion: sb.Drive, **more: object):
     """A stop beside a beam that is shaken."""
     stop = sb.Striker(drive=sb.FixedStop(), gap=0.05 * LEVEL)
     return lambda model: {
-        "contact": default_values.CONTACT,
-        "striker": stop,
+        "contacts": [sb.Contact(default_values.CONTACT, stop)],
         "base_excitation": sb.BaseExcitation(motion=motion, **more),
     }
 
@@ -123,22 +108,20 @@ def record(model: sb.ReducedModel) -> dict[str, object]:
         sampling_frequency=rate,
         frequency=frequency,
     )
-    return {"contact": default_values.CONTACT, "striker": sb.Striker(drive=drive)}
+    return {"contacts": [sb.Contact(default_values.CONTACT, sb.Striker(drive=drive))]}
 
 
 def loaded(motion: sb.LoadMotion):
     return lambda model: {
-        "contact": default_values.CONTACT,
-        "striker": sb.Striker(drive=sine()),
+        "contacts": [sb.Contact(default_values.CONTACT, sb.Striker(drive=sine()))],
         "axial_load": sb.AxialLoadModulation(motion=motion),
     }
 
 
 def harvested(harvester: sb.Harvester):
     return lambda model: {
-        "contact": default_values.CONTACT,
-        "striker": sb.Striker(drive=sine()),
-        "harvester": harvester,
+        "contacts": [sb.Contact(default_values.CONTACT, sb.Striker(drive=sine()))],
+        "harvesters": [harvester],
     }
 
 
@@ -184,7 +167,7 @@ SYSTEMS: dict[str, ExtendedSystem] = {
         struck(sine(), sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)), SINE | PLACE
     ),
     "kelvin_voigt": ExtendedSystem(struck(sine(), sb.KelvinVoigt(2e6, 20.0)), SINE | PLACE),
-    "a gap": ExtendedSystem(struck(sine(), gap=4e-5), SINE | {"striker.gap": (-5e-5, 1e-4)}, own_kernel=False),
+    "a gap": ExtendedSystem(struck(sine(), gap=4e-5), SINE | {"contact.gap": (-5e-5, 1e-4)}, own_kernel=False),
     "a phase": ExtendedSystem(
         struck(sb.DisplacementSine(frequency_ratio=1.3, displacement_amplitude=0.2, phase=0.7)),
         {"drive.frequency_ratio": (0.3, 3.0), "drive.displacement_amplitude": (0.02, 0.5), "drive.phase": (-3.0, 3.0)},
@@ -218,7 +201,7 @@ SYSTEMS: dict[str, ExtendedSystem] = {
         struck(TWO), SINE | {"drive.second_amplitude": (0.0, 0.3), "drive.second_phase": (-3.0, 3.0)}
     ),
     "recorded": ExtendedSystem(record, PLACE, cycles=11),
-    "still": ExtendedSystem(struck(sb.FixedStop(), gap=-1e-4), {"striker.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
+    "still": ExtendedSystem(struck(sb.FixedStop(), gap=-1e-4), {"contact.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
     "a body": ExtendedSystem(
         struck(sine(), mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7), SINE | PLACE, decides=False
     ),
@@ -227,14 +210,16 @@ SYSTEMS: dict[str, ExtendedSystem] = {
     ),
     "two strikers": ExtendedSystem(
         lambda model: {
-            "contact": [default_values.CONTACT, sb.PowerLaw.from_stiffness(4e11, 2.0)],
-            "striker": [
-                sb.Striker(drive=sine()),
-                sb.Striker(drive=sb.DisplacementSine(frequency_ratio=2.6, displacement_amplitude=0.05), location=0.3,
-                    side="above", gap=0.1 * LEVEL),
+            "contacts": [
+                sb.Contact(default_values.CONTACT, sb.Striker(drive=sine())),
+                sb.Contact(
+                    sb.PowerLaw.from_stiffness(4e11, 2.0),
+                    sb.Striker(drive=sb.DisplacementSine(frequency_ratio=2.6, displacement_amplitude=0.05), location=0.3,
+                        side="above", gap=0.1 * LEVEL),
+                ),
             ],
         },
-        SINE | {"striker_2.gap": (-2e-5, 1e-4), "drive_2.displacement_amplitude": (0.0, 0.2)},
+        SINE | {"contact.2.gap": (-2e-5, 1e-4), "drive.2.displacement_amplitude": (0.0, 0.2)},
         decides=False,
     ),
     "unequal wells": ExtendedSystem(struck(sine()), SINE | PLACE, imperfection=UNEVEN, fewest=2),
@@ -279,11 +264,13 @@ SYSTEMS: dict[str, ExtendedSystem] = {
     ),
     "a bit of all": ExtendedSystem(
         lambda model: {
-            "contact": default_values.CONTACT,
-            "striker": sb.Striker(drive=sine(), mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7, gap=1e-5),
+            "contacts": [sb.Contact(
+                default_values.CONTACT,
+                sb.Striker(drive=sine(), mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7, gap=1e-5),
+            )],
             "base_excitation": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1)),
             "axial_load": sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0)),
-            "harvester": PIEZO,
+            "harvesters": [PIEZO],
         },
         SINE | PLACE,
         beam=SPRUNG,

@@ -58,7 +58,9 @@ def test_trajectory(modes, pair, cycles, measured) -> None:
     # the two ends of the run differ by rounding
     times = truth.time * (1.0 - 1e-13)
     run = sb.simulate(
-        sb.System(model, default_values.CONTACT, shaker), sb.Integration(cycles=cycles), sample_times=times
+        sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)]),
+        sb.Integration(cycles=cycles),
+        sample_times=times,
     )
     bound = min(1e-3, 3.0 * measured)
     np.testing.assert_allclose(run.dataset.displacement_at_striker, truth.displacement, rtol=0.0, atol=bound)
@@ -82,7 +84,7 @@ def test_reference_accuracy(modes, pair, cycles, measured) -> None:
     shaker = sb.Shaker(frequency_ratio=pair[0], velocity_amplitude=pair[1])
     times = truth.time * (1.0 - 1e-13)
     run = sb.simulate(
-        sb.System(model, default_values.CONTACT, shaker),
+        sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)]),
         sb.Integration(cycles=cycles, accuracy="reference"),
         sample_times=times,
     )

@@ -14,7 +14,7 @@ MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.
 
 
 def system_of(drive: sb.Chirp) -> sb.System:
-    return sb.System(MODEL, default_values.CONTACT, sb.Striker(drive=drive))
+    return sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive))])
 
 
 @pytest.mark.slow

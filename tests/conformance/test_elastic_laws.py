@@ -54,7 +54,7 @@ def test_against_an_independent_solution(name: str, modes: int) -> None:
     shaker = sb.Shaker(frequency_ratio=RATIO, velocity_amplitude=VELOCITY)
     for accuracy, bound in (("standard", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(
-            sb.System(model, law, shaker),
+            sb.System(model, contacts=[sb.Contact(law, shaker)]),
             sb.Integration(cycles=cycles, accuracy=accuracy),
             sample_times=times,
         )

@@ -57,7 +57,7 @@ def test_against_an_independent_solution(elongation, buckled) -> None:
         rate, (0.0, times[-1]), np.r_[start, np.zeros(3)], "DOP853", times, rtol=1e-11, atol=1e-13
     )
     history = sb.HarmonicForce(frequency_ratio=1.0, amplitude=1.5)
-    system = sb.System(reduced, external_force=sb.ExternalForce(history=history, shape=row))
+    system = sb.System(reduced, forces=[sb.ExternalForce(history=history, shape=row)])
     run = sb.simulate(system, sb.Integration(cycles=4, accuracy="reference"), sample_times=times)
     np.testing.assert_allclose(run.dataset["modal_amplitude"].values, expected.y[:3].T, atol=2e-8)
     assert sb.System.from_mapping(system.to_mapping()) == system

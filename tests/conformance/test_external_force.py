@@ -51,7 +51,7 @@ def held_against(system: sb.System, row, force, bound: float, cycles: int = 6) -
 def test_harmonic_force_with_a_mean():
     w = 2.0 * math.pi * model().reference_frequency
     force = sb.HarmonicForce(frequency_ratio=1.3, amplitude=2.0, mean=0.5, phase=0.7)
-    system = sb.System(model(), external_force=sb.ExternalForce(history=force, shape=ROW))
+    system = sb.System(model(), forces=[sb.ExternalForce(history=force, shape=ROW)])
     held_against(system, ROW, lambda t: 0.5 + 2.0 * math.sin(1.3 * w * t + 0.7), 1e-5)
 
 
@@ -63,9 +63,9 @@ def test_recorded_and_constant_force():
     samples = np.sin(9.0 * t) + 0.5 * np.cos(31.0 * t) - 0.2
     system = sb.System(
         model(),
-        external_force=sb.ExternalForce(
-            history=sb.RecordedForce(record=samples, sampling_frequency=rate), shape=ROW
-        ),
+        forces=[
+            sb.ExternalForce(history=sb.RecordedForce(record=samples, sampling_frequency=rate), shape=ROW)
+        ],
     )
     held_against(
         system, ROW, lambda t: math.sin(9.0 * t) + 0.5 * math.cos(31.0 * t) - 0.2, 2e-4
@@ -73,7 +73,7 @@ def test_recorded_and_constant_force():
     with pytest.raises(InputError, match="the recorded force lasts"):
         sb.simulate(system, sb.Integration(cycles=9))
     constant = sb.ExternalForce(history=sb.ConstantForce(force=-3.0))
-    held_against(sb.System(model(), external_force=constant), np.array([1.0, 0.5]), lambda t: -3.0, 1e-5)
+    held_against(sb.System(model(), forces=[constant]), np.array([1.0, 0.5]), lambda t: -3.0, 1e-5)
 
 
 @pytest.mark.slow
@@ -92,9 +92,9 @@ def test_force_on_a_beam_beside_a_stop():
 
     beam = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
     force = sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=0.9, amplitude=0.4), location=0.4)
-    own = {"contact": default_values.CONTACT, "striker": sb.Striker(drive=sb.FixedStop(), gap=1e-5)}
+    stop = sb.Contact(default_values.CONTACT, sb.Striker(drive=sb.FixedStop(), gap=1e-5))
     run = sb.simulate(
-        sb.System(beam, external_force=force, **own),
+        sb.System(beam, contacts=[stop], forces=[force]),
         sb.Integration(cycles=6, accuracy="reference"),
         sample_times=np.linspace(0.0, 0.01, 50),
     )
@@ -113,14 +113,14 @@ def test_weight_of_a_free_mass_on_a_moving_stop():
     ball = sb.ReducedModel.from_matrices([[0.5]], [0.0], contact_shape=[1.0], reference_frequency=10.0)
     weight = sb.ExternalForce(history=sb.ConstantForce(force=-0.5 * 9.81))
     free = sb.simulate(
-        sb.System(ball, external_force=weight),
+        sb.System(ball, forces=[weight]),
         sb.Integration(cycles=3),
         sample_times=np.linspace(0.0, 0.29, 30),
     )
     t = free.dataset["time"].values
     np.testing.assert_allclose(free.dataset["modal_amplitude"][:, 0], -4.905 * t * t, atol=1e-12)
     table = sb.Striker(drive=sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=0.001), gap=0.01)
-    system = sb.System(ball, sb.HertzContact(stiffness=1e8), table, external_force=weight)
+    system = sb.System(ball, contacts=[sb.Contact(sb.HertzContact(stiffness=1e8), table)], forces=[weight])
     run = sb.simulate(system, sb.Integration(cycles=20, accuracy="reference"))
     assert run.summary.impacts >= 3
     assert abs(run.dataset.attrs["energy_error"]) < 1e-8
@@ -128,11 +128,11 @@ def test_weight_of_a_free_mass_on_a_moving_stop():
 
 def test_file_and_dotted_names(tmp_path):
     force = sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=1.3, amplitude=2.0), shape=ROW)
-    system = sb.System(model(base_shape=BASE), external_force=force)
+    system = sb.System(model(base_shape=BASE), forces=[force])
     system.save(tmp_path / "forced.toml")
     assert sb.System.load(tmp_path / "forced.toml") == system
-    stronger = system.replace(**{"external_force.amplitude": 3.0, "external_force.shape": [0.0, 1.0]})
-    assert stronger.get("external_force.amplitude") == 3.0
+    stronger = system.replace(**{"force.amplitude": 3.0, "force.shape": [0.0, 1.0]})
+    assert stronger.get("force.amplitude") == 3.0
     assert stronger.model.base_shape is not None
     assert system.replace(**{"model.damping_ratio": 0.1}).model.base_shape.tolist() == BASE.tolist()
 
@@ -143,26 +143,29 @@ def test_refusals():
         sb.System(model(), base_excitation=sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=1.0, acceleration_amplitude=1.0)))  # fmt: skip
     with pytest.raises(InputError, match=r"base_shape of shape \(3,\)"):
         model(base_shape=[1.0, 1.0, 1.0])
-    with pytest.raises(InputError, match=r"external_force\.shape of shape \(3,\): must be \(2,\)"):
-        sb.System(model(), external_force=sb.ExternalForce(history=harmonic, shape=[1.0, 0.0, 0.0]))
+    with pytest.raises(InputError, match=r"force\.shape of shape \(3,\): must be \(2,\)"):
+        sb.System(model(), forces=[sb.ExternalForce(history=harmonic, shape=[1.0, 0.0, 0.0])])
     with pytest.raises(InputError, match="has no length; give shape"):
-        sb.System(model(), external_force=sb.ExternalForce(history=harmonic, location=0.5))
+        sb.System(model(), forces=[sb.ExternalForce(history=harmonic, location=0.5)])
     with pytest.raises(InputTypeError, match="use a HarmonicForce"):
         sb.ExternalForce(history=sb.FixedStop())
     with pytest.raises(InputError, match="a base needs a motion"):
         sb.BaseExcitation(motion=harmonic)
-    with pytest.raises(InputError, match="one excitation row"):
-        sb.System(
+    with pytest.raises(InputError, match="one row of excitation"):
+        sb.simulate(sb.System(
             model(base_shape=BASE),
-            external_force=sb.ExternalForce(history=harmonic),
+            forces=[sb.ExternalForce(history=harmonic)],
             base_excitation=sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=1.0, acceleration_amplitude=1.0)),
-        )  # fmt: skip
+        ))  # fmt: skip
     with pytest.raises(InputError, match="at least 4"):
         sb.RecordedForce(record=[1.0, 2.0], sampling_frequency=10.0)
     with pytest.raises(InputError, match="with an external force: sticking"):
-        sb.System(
-            sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0]),
-            sb.Restitution(coefficient=0.8),
-            sb.Striker(drive=sb.FixedStop(), gap=1.0),
-            external_force=sb.ExternalForce(history=harmonic),
+        sb.simulate(
+            sb.System(
+                sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0]),
+                contacts=[
+                    sb.Contact(sb.Restitution(coefficient=0.8), sb.Striker(drive=sb.FixedStop(), gap=1.0))
+                ],
+                forces=[sb.ExternalForce(history=harmonic)],
+            )
         )

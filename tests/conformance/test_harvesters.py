@@ -27,7 +27,7 @@ def add_base_acceleration(
     strength: float = 0.25,
 ) -> sb.System:
     motion = sb.AccelerationSine(frequency_ratio=ratio, acceleration_amplitude=strength)
-    return sb.System(model(modes), base_excitation=sb.BaseExcitation(motion=motion), harvester=harvester)
+    return sb.System(model(modes), harvesters=[harvester], base_excitation=sb.BaseExcitation(motion=motion))
 
 
 def compare(
@@ -127,7 +127,9 @@ def test_struck_with_a_nearly_open_circuit(modes, ratio, velocity, resistance, c
         moment_per_volt=THETA, capacitance=CAPACITANCE, resistance=resistance, patch_start=0.0, patch_end=0.25
     )
     system = sb.System(
-        model(modes), default_values.CONTACT, sb.Striker(drive=drive, gap=gap), harvester=layers
+        model(modes),
+        contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, gap=gap))],
+        harvesters=[layers],
     )
     for accuracy, bound in (("standard", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
@@ -143,11 +145,17 @@ def test_a_layer_that_does_not_couple_changes_nothing() -> None:
     """theta to 0: the struck beam without a harvester, to the error of the level."""
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1)
     steps = sb.Integration(cycles=1, accuracy="reference")
-    bare = sb.simulate(sb.System(model(3), default_values.CONTACT, shaker), steps).final_state.amplitude
+    bare = sb.simulate(
+        sb.System(model(3), contacts=[sb.Contact(default_values.CONTACT, shaker)]), steps
+    ).final_state.amplitude
     errors = []
     for coupling in (1e-4, 1e-5, 0.0):
-        system = sb.System(model(3), default_values.CONTACT, shaker, harvester=PIEZO.__class__(
-            moment_per_volt=coupling, capacitance=CAPACITANCE, resistance=2e4))  # fmt: skip
+        system = sb.System(
+            model(3),
+            contacts=[sb.Contact(default_values.CONTACT, shaker)],
+            harvesters=[PIEZO.__class__(
+            moment_per_volt=coupling, capacitance=CAPACITANCE, resistance=2e4)],
+        )  # fmt: skip
         errors.append(np.abs(sb.simulate(system, steps).final_state.amplitude - bare).max() / abs(bare[0]))
     assert errors[0] > 30.0 * errors[1]
     assert errors[2] < 1e-9
@@ -187,13 +195,15 @@ def test_refusals() -> None:
             moment_per_volt=1e-3, capacitance=1e-9, resistance=1e4, patch_start=0.5, patch_end=0.4
         )
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1)
-    with pytest.raises(InputError, match=r"use a HertzContact"):
-        sb.System(model(1), sb.HuntCrossley(4e8, 1.0), shaker, harvester=PIEZO)
+    with pytest.raises(InputError, match=r"one velocity-dependent force"):
+        contacts = [sb.Contact(sb.HuntCrossley(4e8, 1.0), shaker)]
+        sb.simulate(sb.System(model(1), contacts=contacts, harvesters=[PIEZO]))
     with pytest.raises(InputError, match="tangent with a harvester"):
         sb.advance(
-            sb.System(model(1), default_values.CONTACT, shaker, harvester=PIEZO), tangent=np.zeros((1, 2, 1))
+            sb.System(model(1), contacts=[sb.Contact(default_values.CONTACT, shaker)], harvesters=[PIEZO]),
+            tangent=np.zeros((1, 2, 1)),
         )
-    system = sb.System(model(1), default_values.CONTACT, shaker, harvester=PIEZO)
+    system = sb.System(model(1), contacts=[sb.Contact(default_values.CONTACT, shaker)], harvesters=[PIEZO])
     assert sb.System.from_mapping(system.to_mapping()) == system
     assert system.replace(**{"harvester.resistance": 5e3}).get("harvester.resistance") == 5e3
 

@@ -58,12 +58,16 @@ def test_runs_of_different_contact_are_what_they_are_alone(integrate_ensemble, m
     shaker = sb.Shaker(frequency_ratio=1.3, velocity_amplitude=0.25)
     integration = sb.Integration(cycles=3)
     whole = make_ensemble(
-        sb.System(model_of(2), default_values.CONTACT, shaker), integration, {"contact.stiffness": stiffness}
+        sb.System(model_of(2), contacts=[sb.Contact(default_values.CONTACT, shaker)]),
+        integration,
+        {"contact.stiffness": stiffness},
     )
     accumulators_of_runs = integrate_ensemble.engine.run_ensemble(whole, None, None)
     assert len(set(accumulators_of_runs["steps"].tolist())) == 3
     for i, value in enumerate(stiffness):
-        alone = make_ensemble(sb.System(model_of(2), sb.HertzContact(float(value)), shaker), integration)
+        alone = make_ensemble(
+            sb.System(model_of(2), contacts=[sb.Contact(sb.HertzContact(float(value)), shaker)]), integration
+        )
         assert alone.runs["tick"][0] == whole.runs["tick"][i]
         assert alone.runs["max_halvings"][0] == whole.runs["max_halvings"][i]
         found = integrate_ensemble.engine.run_ensemble(alone, None, None)

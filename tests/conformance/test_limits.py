@@ -18,7 +18,9 @@ def end(striker: sb.Striker | None = None, modes: int = 3, **parts) -> np.ndarra
     """Amplitudes after one cycle at level reference, over the first one at rest."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     striker = sb.Striker(drive=SHAKER) if striker is None else striker
-    system = sb.System(model, parts.pop("contact", default_values.CONTACT), striker, **parts)
+    system = sb.System(
+        model, contacts=[sb.Contact(parts.pop("contact", default_values.CONTACT), striker)], **parts
+    )
     run = sb.simulate(system, sb.Integration(cycles=1, accuracy="reference"))
     return np.asarray(run.final_state.amplitude / abs(model.well_amplitude[0]))
 
@@ -91,7 +93,7 @@ def test_a_coil_without_a_magnet(plain) -> None:
     """K to 0: its force goes with K squared."""
     errors = [
         np.abs(
-            end(harvester=sb.ElectromagneticHarvester(force_factor=constant, resistance=30.0)) - plain
+            end(harvesters=[sb.ElectromagneticHarvester(force_factor=constant, resistance=30.0)]) - plain
         ).max()
         for constant in (0.1, 0.01, 0.0)
     ]

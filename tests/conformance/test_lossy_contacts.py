@@ -26,8 +26,9 @@ def thrown(law: sb.ContactLaw) -> sb.System:
         [[MASS]], [0.0], contact_shape=[1.0], length_scale=LEVEL, reference_frequency=80.0
     )
     return sb.System(
-        model, law, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0),
-        sb.State(amplitude=[0.0], velocity=[-SPEED]),
+        model,
+        contacts=[sb.Contact(law, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0))],
+        initial_state=sb.State(amplitude=[0.0], velocity=[-SPEED]),
     )  # fmt: skip
 
 
@@ -66,7 +67,10 @@ def test_no_loss_is_hertz() -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1)
     runs = [
-        sb.simulate(sb.System(model, law, shaker), sb.Integration(cycles=1, accuracy="reference"))
+        sb.simulate(
+            sb.System(model, contacts=[sb.Contact(law, shaker)]),
+            sb.Integration(cycles=1, accuracy="reference"),
+        )
         for law in (sb.HertzContact(4e8), sb.HuntCrossley(4e8, 0.0), sb.HuntCrossley(4e8, 1e-9))
     ]
     ends = [run.final_state.amplitude / abs(model.well_amplitude[0]) for run in runs]
@@ -116,7 +120,7 @@ def test_trajectory(name, modes, cycles, at_standard, at_reference) -> None:
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity)
     for accuracy, measured in (("standard", at_standard), ("reference", at_reference)):
         run = sb.simulate(
-            sb.System(model, law, shaker),
+            sb.System(model, contacts=[sb.Contact(law, shaker)]),
             sb.Integration(cycles=cycles, accuracy=accuracy),
             sample_times=times,
         )
@@ -180,7 +184,9 @@ def test_refusals() -> None:
     ):
         resolve("cuda", law=type(law))
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
-    system = sb.System(model, law, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1))
+    system = sb.System(
+        model, contacts=[sb.Contact(law, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1))]
+    )
     with pytest.raises(
         InputError, match="the tangent flow exists for laws whose force depends on the penetra"
     ):

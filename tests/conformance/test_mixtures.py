@@ -202,7 +202,13 @@ def mixture(seed: int, modes: int) -> Mixture:
         )
         breaks += corners
         words.append(f"{name} through {law.name}" + (" by a body" if body else ""))
-    system = sb.System(model, laws, strikers, base_excitation=base, axial_load=axial, harvester=harvester)
+    system = sb.System(
+        model,
+        contacts=list(map(sb.Contact, laws, strikers)),
+        harvesters=[] if harvester is None else [harvester],
+        base_excitation=base,
+        axial_load=axial,
+    )
     around = Around(base_row, striker_on_base, load, coupling, inertia, loss, tuple(sorted(breaks)))
     return Mixture(system, beam, tips, around, words)
 

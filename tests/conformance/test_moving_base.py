@@ -58,10 +58,8 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
     motion = sb.AccelerationSine(frequency_ratio=ratio, acceleration_amplitude=strength)
     own = {"base_excitation": sb.BaseExcitation(motion=motion, striker_on_base=stop != "in space")}
     if stop != "none":
-        own |= {
-            "contact": default_values.CONTACT,
-            "striker": sb.Striker(drive=sb.FixedStop(), gap=gap, location=LOCATION),
-        }
+        striker = sb.Striker(drive=sb.FixedStop(), gap=gap, location=LOCATION)
+        own["contacts"] = [sb.Contact(default_values.CONTACT, striker)]
     system = sb.System(model(modes), **own)
     for accuracy, bound in (("standard", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
@@ -84,15 +82,13 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
 def test_mirrored_and_going_on() -> None:
     """The mirrored system's mirrored run, and three periods in one go and one by one, bit for bit."""
     motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.3)
-    parts = {"contact": default_values.CONTACT}
 
     def system(side: str, direction: str) -> sb.System:
         striker = sb.Striker(drive=sb.FixedStop(), gap=0.05 * LEVEL, side=side)
         return sb.System(
             model(3),
-            striker=striker,
+            contacts=[sb.Contact(default_values.CONTACT, striker)],
             base_excitation=sb.BaseExcitation(motion=motion, direction=direction),
-            **parts,
         )
 
     once, mirrored = (
@@ -161,7 +157,8 @@ def test_refusals_and_the_way_there_and_back() -> None:
     with pytest.raises(InputError, match="direction = 'left'"):
         sb.BaseExcitation(motion=motion, direction="left")
     with pytest.raises(InputError, match="use a HertzContact"):
-        sb.System(model(1), sb.Restitution(0.5), striker, base_excitation=base)
+        contacts = [sb.Contact(sb.Restitution(0.5), striker)]
+        sb.simulate(sb.System(model(1), contacts=contacts, base_excitation=base))
     plain = sb.ReducedModel.from_matrices(
         [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, well_amplitude=[-1.0]
     )
@@ -169,7 +166,7 @@ def test_refusals_and_the_way_there_and_back() -> None:
         sb.System(plain, base_excitation=base)
     with pytest.raises(InputError, match="integrated by the CPU engine alone"):
         resolve("cuda", environment=True)
-    system = sb.System(model(2), default_values.CONTACT, striker, base_excitation=base)
+    system = sb.System(model(2), contacts=[sb.Contact(default_values.CONTACT, striker)], base_excitation=base)
     assert sb.System.from_mapping(system.to_mapping()) == system
     changed = system.replace(
         **{"base_excitation.acceleration_amplitude": 0.3, "base_excitation.direction": "down"}

@@ -34,7 +34,9 @@ def model_of(modes: int, left: float | None, right: float | None, axial: float |
 
 def struck(model: sb.ReducedModel, velocity: float = 0.3) -> sb.System:
     drive = sb.Sine(frequency_ratio=1.21, velocity_amplitude=velocity)
-    return sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, location=LOCATION))
+    return sb.System(
+        model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=LOCATION))]
+    )
 
 
 @pytest.mark.parametrize("ends", ENDS.values(), ids=ENDS)

@@ -36,7 +36,7 @@ def system_of(names: tuple[str, ...], **phases: float) -> sb.System:
     at, parts = PHASES | phases, {}
     if "striker" in names:
         drive = sb.Sine(frequency_ratio=RATIO, velocity_amplitude=VELOCITY, phase=at["striker"])
-        parts |= {"contact": default_values.CONTACT, "striker": sb.Striker(drive=drive, location=LOCATION)}
+        parts["contacts"] = [sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=LOCATION))]
     if "base" in names:
         motion = sb.AccelerationSine(frequency_ratio=RATIO, acceleration_amplitude=HARDEST, phase=at["base"])
         parts["base_excitation"] = sb.BaseExcitation(motion=motion)

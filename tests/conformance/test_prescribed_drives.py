@@ -152,7 +152,7 @@ def test_against_an_independent_solution(name, modes) -> None:
     tip = Tip(lambda t, _: case.motion(t), lambda d, _: HERTZ * d**1.5, breaks=case.breaks)
     truth = follow(beam, tip, times)
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
-    system = sb.System(model, default_values.CONTACT, sb.Striker(drive=case.drive))
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=case.drive))])
     for accuracy, bound in (("standard", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
         data = run.dataset
@@ -177,7 +177,8 @@ def test_a_shock_that_ends_in_touch(name) -> None:
     drive, cycles = ENDS[name]
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
     run = sb.simulate(
-        sb.System(model, default_values.CONTACT, sb.Striker(drive=drive)), sb.Integration(cycles=cycles)
+        sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive))]),
+        sb.Integration(cycles=cycles),
     )
     data = run.dataset
     ends = (
@@ -199,10 +200,14 @@ def test_a_shock_beside_other_motions_ends_with_a_step(name) -> None:
     shock = sb.HalfSine(displacement_amplitude=0.3, duration=0.7)
     if name == "one of two":
         strikers = [sb.Striker(drive=sine), sb.Striker(drive=shock, location=0.3)]
-        system = sb.System(model, [default_values.CONTACT, default_values.CONTACT], strikers)
+        system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, each) for each in strikers])
     else:
         base = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.2))
-        system = sb.System(model, default_values.CONTACT, sb.Striker(drive=shock), base_excitation=base)
+        system = sb.System(
+            model,
+            contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=shock))],
+            base_excitation=base,
+        )
     data = sb.simulate(system, sb.Integration(cycles=2)).dataset
     near = np.abs(data.time.values - 0.7 / model.reference_frequency)
     assert near.min() < 1e-8

@@ -46,12 +46,16 @@ def system_of(given: Numbers) -> sb.System:
     )
     return sb.System(
         sb.ReducedModel.from_beam(beam, modes=given.modes, damping_ratio=given.damping_ratio),
-        contact=sb.HertzContact(stiffness=given.contact_stiffness),
-        striker=sb.Shaker(
-            frequency_ratio=given.frequency_ratio,
-            velocity_amplitude=given.velocity_amplitude,
-            location=given.location,
-        ),
+        contacts=[
+            sb.Contact(
+                sb.HertzContact(stiffness=given.contact_stiffness),
+                sb.Shaker(
+                    frequency_ratio=given.frequency_ratio,
+                    velocity_amplitude=given.velocity_amplitude,
+                    location=given.location,
+                ),
+            )
+        ],
     )
 
 

@@ -64,8 +64,12 @@ def bounced(of: Drawn) -> Bounced:
     truth = own.run(times)
     system = sb.System(
         MODEL,
-        contact=sb.Restitution(coefficient),
-        striker=sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, location=location),
+        contacts=[
+            sb.Contact(
+                sb.Restitution(coefficient),
+                sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, location=location),
+            )
+        ],
     )
     words = f"e {coefficient:.4g}, Omega {ratio:.4g}, V {velocity:.4g}, x {location:.4g}, {truth.hits} hits"
     error = {}

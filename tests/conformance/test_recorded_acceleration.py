@@ -56,12 +56,9 @@ def test_units_identity_and_refusals() -> None:
         motion + sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.1)
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
     with pytest.raises(InputError, match="'recorded_acceleration' with a changing axial load"):
-        sb.System(
-            model,
-            default_values.CONTACT,
-            sb.Striker(drive=motion),
-            axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0)),
-        )
+        load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0))
+        contacts = [sb.Contact(default_values.CONTACT, sb.Striker(drive=motion))]
+        sb.simulate(sb.System(model, contacts=contacts, axial_load=load))
 
 
 def shaken(direction: str = "up", **parts) -> sb.System:
@@ -124,7 +121,7 @@ def test_a_record_of_a_sine_acts_as_the_sine(side: str, on_base: bool) -> None:
         sb.RecordedAcceleration(record=-amplitude * np.sin(omega * t), sampling_frequency=rate),
     ):
         base = sb.BaseExcitation(motion=motion, striker_on_base=on_base)
-        system = sb.System(model, default_values.CONTACT, stop, base_excitation=base)
+        system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, stop)], base_excitation=base)
         run = sb.simulate(
             system,
             sb.Integration(cycles=5, accuracy="reference"),

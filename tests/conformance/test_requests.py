@@ -43,7 +43,7 @@ def request_of(rng: np.random.Generator) -> KernelOutput:
     contact = sb.Restitution(coefficient) if newton else default_values.CONTACT
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes, damping_ratio=0.005)
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, location=location)
-    system = sb.System(model, contact=contact, striker=shaker)
+    system = sb.System(model, contacts=[sb.Contact(contact, shaker)])
     end = cycles / (ratio * model.reference_frequency)
     times = np.linspace(0.0, end, 200 * cycles + 1)[1:] * (1.0 - 1e-12)
     with warnings.catch_warnings():

@@ -19,8 +19,12 @@ def test_impacts_against_an_independent_solution(seed: int) -> None:
     velocity, location = float(rng.uniform(0.05, 0.65)), float(rng.uniform(0.25, 0.75))
     system = sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
-        sb.Restitution(coefficient),
-        sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, location=location),
+        contacts=[
+            sb.Contact(
+                sb.Restitution(coefficient),
+                sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, location=location),
+            )
+        ],
     )
     run = sb.simulate(system, sb.Integration(cycles=6), sample_times=[0.0])
     assert np.isnan(run.summary.peak_force), "an impact of no duration has no force"

@@ -27,7 +27,8 @@ def compare(modes, striker, tip, period, cycles, at_standard, at_reference) -> s
     times = np.linspace(0.0, cycles * period, 1201) * (1.0 - 1e-13)
     truth = follow(PaperBeam(modes), tip, times)
     system = sb.System(
-        sb.ReducedModel.from_beam(default_values.BEAM, modes=modes), default_values.CONTACT, striker
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=modes),
+        contacts=[sb.Contact(default_values.CONTACT, striker)],
     )
     for accuracy, bound in (("standard", at_standard), ("reference", at_reference)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
@@ -113,7 +114,11 @@ def test_sphere_meets_a_free_mass() -> None:
         )
         striker = sb.Striker(drive=sb.ConstantVelocity(speed=0.3), mass=mass, gap=0.1 * LEVEL)
         run = sb.simulate(
-            sb.System(model, default_values.CONTACT, striker, sb.State(amplitude=[0.0])),
+            sb.System(
+                model,
+                contacts=[sb.Contact(default_values.CONTACT, striker)],
+                initial_state=sb.State(amplitude=[0.0]),
+            ),
             sb.Integration(cycles=1, accuracy="reference"),
         )
         v = 0.3 * LEVEL * 2.0 * math.pi * 80.0
@@ -129,7 +134,9 @@ def test_heavy_body_is_the_shaker() -> None:
     drive = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.15)
 
     def end(**more):
-        system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, **more))
+        system = sb.System(
+            model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, **more))]
+        )
         return sb.simulate(system, sb.Integration(cycles=1, accuracy="reference")).final_state.amplitude
 
     shaker, scale = end(), abs(model.well_amplitude[0])
@@ -147,7 +154,9 @@ def test_going_on_and_mirror() -> None:
     body = {"mass": 0.01, "suspension_stiffness": 300.0, "suspension_damping": 0.4}
     drive = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.25)
     below, above = (
-        sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, side=side, **body))
+        sb.System(
+            model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, side=side, **body))]
+        )
         for side in ("below", "above")
     )
     once, mirrored = sb.advance(below, periods=3), sb.advance(above, periods=3)
@@ -181,11 +190,13 @@ def test_early_termination_is_off_and_refusals() -> None:
     with pytest.raises(InputError, match="a striker without a mass moves as prescribed; give its mass"):
         sb.Striker(drive=drive, suspension_stiffness=10.0)
     with pytest.raises(InputError, match="leave the mass out, or use a HertzContact"):
-        sb.System(model, sb.Restitution(0.5), sb.Striker(drive=drive, mass=0.1))
+        sb.System(model, contacts=[sb.Contact(sb.Restitution(0.5), sb.Striker(drive=drive, mass=0.1))])
     with pytest.raises(InputError, match="a striker with a mass is integrated by the CPU engine alone"):
         resolve("cuda", striker_with_mass=True)
-    system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, mass=0.1))
+    system = sb.System(
+        model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, mass=0.1))]
+    )
     with pytest.raises(InputError, match="give no tangent, or no mass"):
         sb.advance(system, tangent=np.zeros((1, 2, 1)))
     assert sb.System.from_mapping(system.to_mapping()) == system
-    assert system.replace(**{"striker.mass": 0.2}).get("striker.mass") == 0.2
+    assert system.replace(**{"contact.mass": 0.2}).get("contact.mass") == 0.2

@@ -28,7 +28,7 @@ def numbers_of(drive: sb.Drive, scale):
 def test_motion_is_the_sum_and_begins_at_zero() -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
     total = SINE + BURST + KICK
-    system = sb.System(model, default_values.CONTACT, sb.Striker(drive=total))
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=total))])
     scale = system.scale
     numbers = numbers_of(total, scale)
     parts = [(drive, numbers_of(drive, scale)) for drive in (SINE, BURST, KICK)]
@@ -48,7 +48,7 @@ def test_kept_and_told() -> None:
     total = sb.SumDrive.of(SINE, BURST)
     assert pickle.loads(pickle.dumps(total)) == total
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
-    system = sb.System(model, default_values.CONTACT, sb.Striker(drive=total))
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=total))])
     assert sb.System.from_mapping(system.to_mapping()) == system
     assert system.to_mapping()["drive"]["type"] == "sine+burst"
     assert system.replace(**{"drive.duration_cycles_2": 4.0}).get("drive.duration_cycles_2") == 4.0
@@ -81,7 +81,7 @@ def test_against_an_independent_solution(modes: int, cycles: int) -> None:
     times = np.linspace(0.0, cycles * 2.0 * math.pi / (1.21 * first), 301) * (1.0 - 1e-13)
     truth = solve_several(PaperBeam(modes), [Tip(motion)], times)
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
-    system = sb.System(model, default_values.CONTACT, sb.Striker(drive=SINE + BURST))
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=SINE + BURST))])
     for accuracy, bound in (("standard", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
         np.testing.assert_allclose(

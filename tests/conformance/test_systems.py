@@ -58,7 +58,7 @@ def test_none_is_missing() -> None:
     }
     systems = [extended.system() for extended in SYSTEMS.values()]
     there = {(section, type(drive).name) for each in systems for section, drive in each.moving}
-    there |= {("contact", type(each.contact).name) for each in systems}
+    there |= {("contact", type(contact.law).name) for each in systems for contact in each.contacts}
     there |= {("harvester", type(each.harvester).name) for each in systems if each.harvester is not None}
     there |= {("drive", type(each.striker.drive).name) for each in systems}
     shaking = [name for name, kind in DRIVES.items() if kind.can_excite_base() and name != "still"]
@@ -76,7 +76,7 @@ def test_none_is_missing() -> None:
     missing = {
         name
         for name, row in parameters().items()
-        if row.section not in ("integration", "initial_state", "external_force", "local_force")
+        if row.section not in ("integration", "initial_state", "force")
     } - own
     assert missing <= elsewhere
 
@@ -129,7 +129,7 @@ def test_never_ended_early_wrongly(name, modes) -> None:
     decided, wrong = early_decisions(name, modes, 4000)
     print(f"{name}, N = {modes}: {decided} of 4000 decided early, {wrong} wrongly")
     assert wrong == 0
-    if not extended.system(extended.fewest).has_environment:
+    if not extended.system(extended.fewest).surroundings:
         assert decided > 40
 
 

@@ -59,8 +59,7 @@ def test_burst(modes, at_standard, at_reference) -> None:
     )
     system = sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=modes),
-        default_values.CONTACT,
-        sb.Striker(drive=drive),
+        contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive))],
     )
     for accuracy, bound in (("standard", at_standard), ("reference", at_reference)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
@@ -90,8 +89,7 @@ def test_going_on_is_going_on() -> None:
     )
     system = sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=3),
-        default_values.CONTACT,
-        sb.Striker(drive=drive),
+        contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive))],
     )
     once = sb.advance(system, periods=3)
     step = sb.advance(system, sb.advance(system, sb.advance(system)))
@@ -108,7 +106,8 @@ def test_one_tone_alone_is_the_sine() -> None:
     one = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.2)
     ends = [
         sb.simulate(
-            sb.System(model, default_values.CONTACT, sb.Striker(drive=drive)), sb.Integration(cycles=2)
+            sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive))]),
+            sb.Integration(cycles=2),
         ).final_state
         for drive in (two, one)
     ]
@@ -122,7 +121,7 @@ def test_other_amplitudes_and_a_stop() -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
 
     def end(drive):
-        system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive))
+        system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive))])
         return sb.simulate(system, sb.Integration(cycles=1)).final_state.amplitude
 
     sine = end(sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.25))

@@ -40,7 +40,10 @@ def model_of(modes: int, **given: float) -> sb.ReducedModel:
 
 def struck_system(model: sb.ReducedModel, ratio: float, velocity: float, **more) -> sb.System:
     drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity)
-    return sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, location=LOCATION, **more))
+    return sb.System(
+        model,
+        contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=LOCATION, **more))],
+    )
 
 
 @pytest.mark.slow
@@ -171,11 +174,14 @@ def test_a_run_knows_nothing_of_the_others_of_its_batch() -> None:
             midspan_amplitude=4e-6, antisymmetric_amplitude=3e-6, point_load=0.01, uniform_load=0.02
         ),
     )
-    system = sb.System(model, default_values.CONTACT, sb.Shaker(frequency_ratio=1.3, velocity_amplitude=0.2))
+    system = sb.System(
+        model,
+        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.3, velocity_amplitude=0.2))],
+    )
     places = np.linspace(0.15, 0.85, 41)
-    together = make_ensemble(system, sb.Integration(), {"striker.location": places})
+    together = make_ensemble(system, sb.Integration(), {"contact.location": places})
     for i, place in enumerate(places):
-        alone = make_ensemble(system, sb.Integration(), {"striker.location": np.array([place])})
+        alone = make_ensemble(system, sb.Integration(), {"contact.location": np.array([place])})
         assert together.runs["rest_contact"][i] == alone.runs["rest_contact"][0]
         assert together.highest[i] == alone.highest[0]
 

@@ -69,7 +69,7 @@ def test_against_an_event_driven_solution() -> None:
         default_values.BEAM, modes=1, imperfection=sb.Imperfection(midspan_amplitude=RISE)
     )
     striker = sb.Shaker(frequency_ratio=RATIO, velocity_amplitude=VELOCITY)
-    system = sb.System(model, sb.Restitution(KEEPS), striker)
+    system = sb.System(model, contacts=[sb.Contact(sb.Restitution(KEEPS), striker)])
     times = np.linspace(0.0, CYCLES / (RATIO * model.reference_frequency), 301) * (1.0 - 1e-13)
     truth, hits = bounced(times)
     assert hits > 3

@@ -234,7 +234,7 @@ def twin_well(drive: float) -> sb.System:
         damping_ratio=0.075 / math.sqrt(2.0), reference_frequency=0.5 / math.pi,
     )  # fmt: skip
     force = sb.HarmonicForce(amplitude=drive, frequency_ratio=1.0)
-    return sb.System(model, external_force=sb.ExternalForce(history=force, shape=[1.0]))
+    return sb.System(model, forces=[sb.ExternalForce(history=force, shape=[1.0])])
 
 
 @pytest.mark.slow

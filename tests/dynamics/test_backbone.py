@@ -130,7 +130,7 @@ def test_with_a_stop_the_solver_comes_back(side: str) -> None:
     """Motion about a well against a stop: after a period :func:`snapbeam.simulate` is where it began."""
     free = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.0)
     stop = sb.Striker(drive=sb.FixedStop(), gap=5e-5, side=side)
-    system = sb.System(free, sb.HertzContact(1e6), stop)
+    system = sb.System(free, contacts=[sb.Contact(sb.HertzContact(1e6), stop)])
     well = "lower" if side == "below" else "upper"
     curve = sb.dynamics.backbone_curve(system, well=well, amplitude_limit=0.6, max_points=60)
     alone = sb.dynamics.backbone_curve(free, well=well, amplitude_limit=0.6, max_points=60)
@@ -150,7 +150,10 @@ def test_with_a_stop_the_solver_comes_back(side: str) -> None:
 
 
 def test_refusals() -> None:
-    shaken = sb.System(ONE, default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))
+    shaken = sb.System(
+        ONE,
+        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))],
+    )
     with pytest.raises(InputError, match="its striker moves"):
         sb.dynamics.backbone_curve(shaken)
     load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0))
@@ -160,7 +163,7 @@ def test_refusals() -> None:
         sb.dynamics.backbone_curve(ONE, well="middle")
     with pytest.raises(InputError, match="mode = 2"):
         sb.dynamics.backbone_curve(ONE, mode=2)
-    lossy = sb.System(ONE, sb.HuntCrossley(1e8, 0.5), sb.Striker(drive=sb.FixedStop()))
+    lossy = sb.System(ONE, contacts=[sb.Contact(sb.HuntCrossley(1e8, 0.5), sb.Striker(drive=sb.FixedStop()))])
     with pytest.raises(InputError, match="loses energy"):
         sb.dynamics.backbone_curve(lossy)
     with pytest.raises(InputError, match="must be System or ReducedModel"):

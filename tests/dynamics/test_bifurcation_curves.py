@@ -90,7 +90,7 @@ def test_a_fold_with_a_second_multiplier_of_minus_one() -> None:
 def struck(ratio: float, velocity: float) -> sb.System:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.05)
     drive = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity)
-    return sb.System(model, default_values.CONTACT, drive)
+    return sb.System(model, contacts=[sb.Contact(default_values.CONTACT, drive)])
 
 
 def test_folds_of_the_beam_are_those_of_its_branches() -> None:

@@ -144,7 +144,7 @@ def damped(ratio: float, velocity: float) -> sb.System:
         [[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0, damping_ratio=0.05
     )
     drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity)
-    return sb.System(model, sb.Restitution(0.8), sb.Striker(drive=drive, gap=1.0))
+    return sb.System(model, contacts=[sb.Contact(sb.Restitution(0.8), sb.Striker(drive=drive, gap=1.0))])
 
 
 def flight(ratio: float) -> tuple[float, float]:

@@ -42,7 +42,11 @@ def struck(
         sb.Striker(drive=first, gap=gap, side=sides[0]),
         sb.Striker(drive=second, location=0.3, side=sides[1], gap=second_gap),
     ]
-    return sb.System(model(modes, damping_ratio), sb.HertzContact(stiffness), strikers, **around)
+    return sb.System(
+        model(modes, damping_ratio),
+        contacts=[sb.Contact(sb.HertzContact(stiffness), each) for each in strikers],
+        **around,
+    )
 
 
 def size_of(system: sb.System) -> float:
@@ -152,7 +156,7 @@ def test_runs_and_states_agree(pressed, tmp_path) -> None:
 @SLOW
 def test_mirror_image(pressed) -> None:
     system, begun, between = pressed
-    changes = {"striker.side": "above", "striker_2.side": "below"}
+    changes = {"contact.side": "above", "contact.2.side": "below"}
     mirrored = sb.advance(
         system.replace(**changes), sb.State(amplitude=-begun.amplitude, phase=begun.phase), 4
     )
@@ -291,7 +295,7 @@ def test_phases_of_each_striker_count(shift: float) -> None:
     np.testing.assert_allclose(
         one.amplitude, runs[1].final_state.amplitude, rtol=0.0, atol=1e-8 * size_of(system)
     )
-    for name in ("drive.phase", "drive_2.phase"):
+    for name in ("drive.phase", "drive.2.phase"):
         moved = sb.simulate(system.replace(**{name: 0.0}), EXACT.replace(cycles=2), sample_times=times)
         assert np.abs(moved.final_state.amplitude - runs[1].final_state.amplitude).max() > 1e-3 * size_of(
             system
@@ -321,7 +325,7 @@ def test_questions_of_dynamics() -> None:
         basin = sb.dynamics.basins_of_attraction(found, grid, periods=100).basin
     assert basin.shape == (4, 2) and int(basin.max()) >= 0
     diagram = sb.dynamics.bifurcation_diagram(
-        system, "drive_2.velocity_amplitude", [0.04, 0.05], periods=(100, 8), grazing=True
+        system, "drive.2.velocity_amplitude", [0.04, 0.05], periods=(100, 8), grazing=True
     )
     assert not diagram.failed.any() and float(diagram.clearance.max()) > 0.0
     lives = sb.dynamics.lifetime_map(system, integration=sb.Integration(cycles=100), initial_conditions=4)
@@ -332,7 +336,7 @@ def test_questions_of_dynamics() -> None:
         sb.InputError, match=r"drive_2\.frequency_ratio: the common period of all motions must have"
     ):
         sb.dynamics.lyapunov_spectrum(
-            system, periods=20, axes={"drive_2.frequency_ratio": np.array([1.2, 1.8])}
+            system, periods=20, axes={"drive.2.frequency_ratio": np.array([1.2, 1.8])}
         )
     with pytest.raises(
         sb.InputError, match="drive_2: no common period with drive; the ratio of its frequency"
@@ -354,7 +358,7 @@ def test_a_single_striker_with_two_tones() -> None:
         second_amplitude=0.02,
         second_phase=0.4,
     )
-    system = sb.System(model(2, 0.05), default_values.CONTACT, sb.Striker(drive=drive))
+    system = sb.System(model(2, 0.05), contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive))])
     flow = Stroboscope(system)
     assert flow.cycles_per_period == 2
     found = sb.dynamics.lyapunov_spectrum(system, periods=20, transient=5, k=4)

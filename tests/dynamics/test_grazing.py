@@ -28,7 +28,7 @@ def shift(over: float) -> float:
     """How much earlier the engine's oscillator is back at its height, having touched a stop *over* short of its end."""
     model = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0)
     stop = sb.Striker(drive=sb.FixedStop(), gap=SWING - over)
-    system = sb.System(model, sb.HertzContact(STIFFNESS), stop)
+    system = sb.System(model, contacts=[sb.Contact(sb.HertzContact(STIFFNESS), stop)])
     start = sb.State(amplitude=np.array([SWING]), velocity=np.zeros(1))
     back = sb.advance(system, start, 1, integration=sb.Integration(accuracy="reference"))
     q, p = float(back.amplitude[0]), float(back.velocity[0])

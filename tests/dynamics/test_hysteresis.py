@@ -23,7 +23,7 @@ def shaken():
     layers = sb.PiezoelectricHarvester(moment_per_volt=-1.245e-4, capacitance=3.085e-7, resistance=1e4)
     motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.02)
     model = sb.ReducedModel.from_beam(BEAM, modes=2, damping_ratio=0.02)
-    return sb.System(model, base_excitation=sb.BaseExcitation(motion=motion), harvester=layers)
+    return sb.System(model, harvesters=[layers], base_excitation=sb.BaseExcitation(motion=motion))
 
 
 @pytest.mark.slow
@@ -157,11 +157,11 @@ def test_a_tip_that_moves_once_is_refused(shaken, kind):
         "noise": sb.BandLimitedNoise(low_ratio=0.8, high_ratio=1.4, velocity_rms=0.1, seed=1),
         "tip in space": sb.FixedStop(),
     }[kind]
-    system = sb.System(shaken.model, CONTACT, sb.Striker(drive=motion))
+    system = sb.System(shaken.model, contacts=[sb.Contact(CONTACT, sb.Striker(drive=motion))])
     if kind == "tip in space":
         base = dataclasses.replace(recorded(shaken, 1.0).base_excitation, striker_on_base=False)
         system = system.replace(base_excitation=base)
     location = [0.45, 0.5]
     with pytest.raises(sb.InputError, match=r"does not repeat.*use sb\.sweep"):
-        sb.dynamics.hysteresis(system, "striker.location", location, sb.Integration(cycles=2))
-    sb.sweep(system, {"striker.location": location}, sb.Integration(cycles=2))
+        sb.dynamics.hysteresis(system, "contact.location", location, sb.Integration(cycles=2))
+    sb.sweep(system, {"contact.location": location}, sb.Integration(cycles=2))

@@ -17,7 +17,10 @@ MEASURED = {(1.21, 0.25): 32.0, (1.625, 0.3): 46.0, (2.5, 0.55): 89.0, (3.5, 0.6
 
 def system_of(modes: int, ratio: float = 1.625, velocity: float = 0.3) -> sb.System:
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity)
-    return sb.System(sb.ReducedModel.from_beam(default_values.BEAM, modes), default_values.CONTACT, shaker)
+    return sb.System(
+        sb.ReducedModel.from_beam(default_values.BEAM, modes),
+        contacts=[sb.Contact(default_values.CONTACT, shaker)],
+    )
 
 
 AXES = {"frequency_ratio": [1.2, 1.625], "velocity_amplitude": [0.01, 0.2, 0.3]}
@@ -149,10 +152,8 @@ def test_refusals(given, words: str) -> None:
 
 
 def test_a_free_beam_is_refused() -> None:
-    with pytest.raises(sb.InputError, match="striker = None"):
-        sb.dynamics.lifetime_map(
-            sb.System(sb.ReducedModel.from_beam(default_values.BEAM, 1), default_values.CONTACT)
-        )
+    with pytest.raises(sb.InputError, match=r"contacts = \[\]"):
+        sb.dynamics.lifetime_map(sb.System(sb.ReducedModel.from_beam(default_values.BEAM, 1)))
 
 
 def test_no_start_presses_the_tip() -> None:
@@ -164,7 +165,7 @@ def test_no_start_presses_the_tip() -> None:
     assert (ds.runs_never == 64).all() and (ds.end_probability.sel(well="first") == 1.0).all()
     system = system_of(4)
     for side, away in (("below", 1.0), ("above", -1.0)):
-        turned = system.replace(**{"striker.side": side})
+        turned = system.replace(**{"contact.side": side})
         for number in range(6):
             place = np.array([0.1, 0.35, 0.5])
             many = sb.dynamics.InitialConditions(count=6).state(turned, number, location=place)
@@ -172,6 +173,6 @@ def test_no_start_presses_the_tip() -> None:
             moved = np.sum(turned.model.shape_at(place) * (many.amplitude - rest.amplitude), axis=-1)
             assert (away * moved > 0.0).all()
             one = sb.dynamics.InitialConditions(count=6).state(
-                turned.replace(**{"striker.location": 0.35}), number
+                turned.replace(**{"contact.location": 0.35}), number
             )
             np.testing.assert_array_equal(one.amplitude, many.amplitude[1])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
@@ -17,7 +16,10 @@ from snapbeam.model import default_values
 def system_of(modes: int, ratio: float, velocity: float, damping: float = 0.005) -> sb.System:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes, damping_ratio=damping)
     return sb.System(
-        model, default_values.CONTACT, sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity)
+        model,
+        contacts=[
+            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity))
+        ],
     )
 
 
@@ -25,7 +27,9 @@ def oscillator(ratio: float, restitution: float, amplitude: float = 1.0) -> sb.S
     """Of natural frequency 1 rad/s and mass 1, struck by a wall amplitude sin(ratio t) about its rest position."""
     model = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0)
     drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=amplitude * ratio)
-    return sb.System(model, sb.Restitution(restitution), sb.Striker(drive=drive, gap=0.0))
+    return sb.System(
+        model, contacts=[sb.Contact(sb.Restitution(restitution), sb.Striker(drive=drive, gap=0.0))]
+    )
 
 
 def exact_orbit(ratio: float, restitution: float, periods: int) -> tuple[float, np.ndarray]:
@@ -47,7 +51,7 @@ KELVIN_VOIGT = sb.KelvinVoigt(1e6, 5.0)
 
 def test_the_map_of_a_force_that_begins_with_a_jump_is_smooth() -> None:
     """The onset falls between two ticks: without its part of a tick the period map has steps of 2e-9."""
-    system = dataclasses.replace(system_of(1, 1.6, 0.03), contact=KELVIN_VOIGT)
+    system = system_of(1, 1.6, 0.03).replace(**{"contact.law": KELVIN_VOIGT})
     state = sb.advance(system, periods=60)
     length = abs(float(system.model.well_amplitude[0]))
     offset = np.linspace(-1.0, 1.0, 101)
@@ -63,7 +67,7 @@ def test_the_map_of_a_force_that_begins_with_a_jump_is_smooth() -> None:
 @pytest.mark.parametrize("transient", range(60, 165, 7))
 def test_orbits_of_a_force_that_begins_with_a_jump(transient: int) -> None:
     """At the default tolerance, from 15 states."""
-    system = dataclasses.replace(system_of(1, 1.6, 0.03), contact=KELVIN_VOIGT)
+    system = system_of(1, 1.6, 0.03).replace(**{"contact.law": KELVIN_VOIGT})
     assert sb.dynamics.periodic_orbit(system, transient=transient).residual < 1e-9
 
 
@@ -111,7 +115,9 @@ def test_determinant_of_a_bouncing_ball(restitution: float, stroke: float) -> No
     table = sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=stroke, phase=phase)
     above = sb.State(amplitude=[stroke * math.sin(phase)], velocity=[math.pi], striker_position=0.0)
     weight = sb.ExternalForce(history=sb.ConstantForce(force=-1.0))
-    system = sb.System(ball, law, sb.Striker(drive=table), above, external_force=weight)
+    system = sb.System(
+        ball, contacts=[sb.Contact(law, sb.Striker(drive=table))], forces=[weight], initial_state=above
+    )
     orbit = sb.dynamics.periodic_orbit(system, transient=30)
     pressed, later = contact_of_a_ball(law, stroke, orbit.flow.phase, orbit.coordinates)
     np.testing.assert_allclose(later, orbit.coordinates, rtol=0.0, atol=1e-9)
@@ -124,12 +130,10 @@ def test_a_constant_force_repeats_after_any_time(with_striker: bool) -> None:
     """The orbit under a constant load closes, and runs from it return to it; a load alone leaves the equilibrium."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, 1, damping_ratio=0.02)
     load = sb.ExternalForce(history=sb.ConstantForce(force=1e-3), location=0.5)
-    striker = (
-        (default_values.CONTACT, sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03))
-        if with_striker
-        else ()
-    )
-    orbit = sb.dynamics.periodic_orbit(sb.System(model, *striker, external_force=load), transient=100)
+    shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    contacts = [sb.Contact(default_values.CONTACT, shaker)] if with_striker else []
+    system = sb.System(model, contacts=contacts, forces=[load])
+    orbit = sb.dynamics.periodic_orbit(system, transient=100)
     assert orbit.residual < 1e-10
     period = orbit.flow.period
     run = sb.simulate(
@@ -227,8 +231,8 @@ def test_coarse_derivatives_are_told(monkeypatch) -> None:
 def test_what_does_not_converge_says_why() -> None:
     with pytest.raises(sb.dynamics.OrbitNotFoundError, match="try another period"):
         sb.dynamics.periodic_orbit(logistic(3.9), [0.3], 7, iterations=2)
-    free = sb.System(sb.ReducedModel.from_beam(default_values.BEAM, 1), default_values.CONTACT)
-    with pytest.raises(sb.InputError, match="striker = None"):
+    free = sb.System(sb.ReducedModel.from_beam(default_values.BEAM, 1))
+    with pytest.raises(sb.InputError, match=r"contacts = \[\]"):
         sb.dynamics.periodic_orbit(free)
     with pytest.raises(sb.InputError, match="guess of 3 numbers"):
         sb.dynamics.periodic_orbit(system_of(1, 1.6, 0.03), [0.1, 0.2, 0.3])

@@ -22,8 +22,10 @@ SHAKEN = {
     "base": sb.System(MODEL, base_excitation=BASE),
     "load": sb.System(MODEL, axial_load=LOAD),
     "both": sb.System(MODEL, base_excitation=BASE, axial_load=LOAD),
-    "struck": sb.System(MODEL, contact=default_values.CONTACT, striker=STRIKER, base_excitation=BASE),
-    "struck under a load": sb.System(MODEL, contact=default_values.CONTACT, striker=STRIKER, axial_load=LOAD),
+    "struck": sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, STRIKER)], base_excitation=BASE),
+    "struck under a load": sb.System(
+        MODEL, contacts=[sb.Contact(default_values.CONTACT, STRIKER)], axial_load=LOAD
+    ),
 }
 
 
@@ -96,14 +98,22 @@ def test_a_map_at_a_phase_of_the_base():
     x = shifted.coordinates()
     np.testing.assert_allclose(flow.advance(x, 3).states, shifted.advance(x, 3).states, atol=1e-12)
     stop = sb.Striker(drive=sb.FixedStop(), gap=5e-5)
-    beside = Stroboscope(sb.System(MODEL, default_values.CONTACT, stop, base_excitation=BASE), phase=1.0)
+    beside = Stroboscope(
+        sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, stop)], base_excitation=BASE), phase=1.0
+    )
     assert float(beside.starting(beside.state(x[0])).initial_state.phase) == 1.0
 
 
 def test_a_start_with_a_tip_of_its_own_keeps_all_parts():
     """Holding the tip where the start says takes nothing else away: the base goes on moving, the load changing."""
     start = sb.State(amplitude=MODEL.well_amplitude, striker_position=-1.2 * MODEL.length_scale)
-    system = sb.System(MODEL, default_values.CONTACT, STRIKER, start, base_excitation=BASE, axial_load=LOAD)
+    system = sb.System(
+        MODEL,
+        contacts=[sb.Contact(default_values.CONTACT, STRIKER)],
+        initial_state=start,
+        base_excitation=BASE,
+        axial_load=LOAD,
+    )
     held = Stroboscope(system).system
     assert held.base_excitation == BASE and held.axial_load == LOAD
-    assert np.isnan(held.initial_state.striker_position) and held.get("striker.gap") > 0.0
+    assert np.isnan(held.initial_state.striker_position) and held.get("contact.gap") > 0.0

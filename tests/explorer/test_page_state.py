@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from urllib.parse import parse_qs
 
 import numpy as np
@@ -9,20 +10,22 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.explorer.address import Address
+from snapbeam.explorer.cards import SystemCard
 from snapbeam.explorer.maps import difference, patched, sections_of, system_from
+from snapbeam.explorer.style import look_of
 from snapbeam.model.parameter_file import config_from_mapping
 
 POINT = {"drive": {"frequency_ratio": 1.3, "velocity_amplitude": 0.25}}
 SHORT = {"extends": "paper", "model": {"modes": 6}, "integration": {"cycles": 30}, **POINT}
 FILES = {
     "imperfection": SHORT | {"imperfection": {"midspan_amplitude": 1e-5}},
-    "second striker": SHORT | {"striker_2": {"location": 0.3, "gap": 2e-5, "side": "above"}},
+    "second striker": SHORT | {"contact": [{}, {"location": 0.3, "gap": 2e-5, "side": "above"}]},
     "load instead of level": SHORT | {"beam": {"axial_load": 60.0}},
     "boundary": SHORT | {"boundary": {"left_rotational_stiffness": 5.0}},
     "Newton": SHORT | {"model": {"modes": 1}, "contact": {"coefficient": 0.6}},
     "initial state": SHORT | {"initial_state": {"amplitude[1]": 1.0, "amplitude[3]": -1e-3, "velocity[5]": 2e-5}},
-    "two sines": SHORT | {"striker_2": {"location": 0.7}, "drive_2": {"type": "sine", "frequency_ratio": 0.4, "velocity_amplitude": 0.1}},
-    "mass": SHORT | {"striker": {"location": 0.4, "mass": 0.01, "suspension_stiffness": 900.0}},
+    "two sines": SHORT | {"contact": [{}, {"location": 0.7, "drive": {"type": "sine", "frequency_ratio": 0.4, "velocity_amplitude": 0.1}}]},
+    "mass": SHORT | {"contact": {"location": 0.4, "mass": 0.01, "suspension_stiffness": 900.0}},
     "tolerance": SHORT | {"integration": {"cycles": 12, "tolerance": 1e-7, "early_termination": True}},
 }  # fmt: skip
 
@@ -62,8 +65,8 @@ def test_random_states_come_back_from_their_addresses():
     def point():
         return {
             "drive.frequency_ratio": abs(value()), "drive.velocity_amplitude": abs(value()),
-            "striker.location": float(rng.uniform(0.1, 0.9)), "model.modes": int(rng.integers(1, 60)),
-            "striker.side": str(rng.choice(["above", "below"])), "integration.early_termination": bool(rng.integers(2)),
+            "contact.location": float(rng.uniform(0.1, 0.9)), "model.modes": int(rng.integers(1, 60)),
+            "contact.side": str(rng.choice(["above", "below"])), "integration.early_termination": bool(rng.integers(2)),
         }  # fmt: skip
 
     for _ in range(200):
@@ -97,6 +100,7 @@ def test_changes_that_are_none_are_told(text):
         "initial_state.amplitude:[[1];2]",
         "initial_state.x:1",
         "initial_state.velocity:[1;2;3;4;5;6]",
+        "contact.3.gap:1e-5",
         "beam:",
     ],
 )
@@ -104,6 +108,21 @@ def test_changes_that_make_no_system_are_refused(text, system):
     changes = Address.read({"set": [text.encode()]}).changes
     with pytest.raises(sb.InputError):
         system_from(patched(sections_of(system, sb.Integration()), changes))
+
+
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
+def test_another_law_leaves_the_striker_and_the_other_contact():
+    base, how = made("second striker")
+    page = SimpleNamespace(
+        shown_system=lambda: (base, how), post=lambda call: call(), look=look_of("default")
+    )
+    card = SystemCard(page)
+    assert card.changed_fields() == {}
+    card.law.value = "power"
+    card.fields["contact.force_at_1um"].value, card.fields["contact.exponent"].value = "0.1", "1.5"
+    law = sb.PowerLaw(force_at_1um=0.1, exponent=1.5)
+    found = system_from(patched(sections_of(base, how), card.changed_fields()))[0]
+    assert found == base.replace(**{"contact.law": law})
 
 
 def _turn(page, title):

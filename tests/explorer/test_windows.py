@@ -195,20 +195,23 @@ def test_what_each_of_two_strikers_does_is_shown_and_kept(one_mode, jobs) -> Non
     from snapbeam.explorer.maps import SystemSource, layers_of
 
     stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=2e-5)
-    two = sb.System(one_mode.model, one_mode.contact, [one_mode.striker, stop])
+    two = sb.System(
+        one_mode.model,
+        contacts=[sb.Contact(one_mode.contact_law, one_mode.striker), sb.Contact(one_mode.contact_law, stop)],
+    )
     axes = {NAMES[0]: np.linspace(0.9, 1.4, 3), NAMES[1]: np.linspace(0.1, 0.4, 3)}
     offered = SystemSource(two, axes, sb.Integration(cycles=4), "two").variables()
-    assert {"peak_force_striker_1", "peak_force_striker_2"} <= set(offered)
+    assert {"peak_force_contact_1", "peak_force_contact_2"} <= set(offered)
     assert not any(
         "_striker_" in name for name in SystemSource(one_mode, axes, sb.Integration(), "one").variables()
     )
     window = compute(_window(two, (30, 30), 10), jobs, Token(), lambda _: None)
     found = window_dataset(window)
-    assert found.peak_force_striker_2.attrs == {"units": "N", "long_name": "peak contact force, striker 2"}
+    assert found.peak_force_contact_2.attrs == {"units": "N", "long_name": "peak contact force, contact 2"}
     order = list(layers_of(found))
     assert order[0] == "response_class"
     at = order.index("peak_force")
-    assert order[at : at + 3] == ["peak_force", "peak_force_striker_1", "peak_force_striker_2"]
+    assert order[at : at + 3] == ["peak_force", "peak_force_contact_1", "peak_force_contact_2"]
 
 
 @pytest.mark.parametrize("log", [False, True])

@@ -33,7 +33,7 @@ def write_test(folder, name, ratio, velocity, *, seed=0, spoiled=None):
     motion = sb.Striker(
         drive=sb.RecordedMotion.from_dataset(lab.recorded_drive(true, 1e5)), location=LOCATION
     )
-    run = sb.simulate(sb.System(MODEL, CONTACT, motion), sb.Integration(cycles=CYCLES))
+    run = sb.simulate(sb.System(MODEL, contacts=[sb.Contact(CONTACT, motion)]), sb.Integration(cycles=CYCLES))
     clean = ResponseClass(run.summary.response_class).label
     if spoiled == "begins in motion":
         run = run.dataset.isel(time=run.dataset.time.values > 3.3 / frequency)
@@ -65,7 +65,7 @@ def coarse_map(cycles=CYCLES):
     """A small map of the same beam."""
     shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2, location=LOCATION)
     return sb.sweep(
-        sb.System(MODEL, CONTACT, shaker),
+        sb.System(MODEL, contacts=[sb.Contact(CONTACT, shaker)]),
         {
             "frequency_ratio": np.linspace(0.3, 3.9, 13),
             "velocity_amplitude": np.linspace(0.05, 0.6, 12),

@@ -225,7 +225,9 @@ def test_slow_striker_snaps_a_pinned_beam_at_the_closed_form() -> None:
 
     def crosses(share: float) -> bool:
         drive = sb.Sine(frequency_ratio=0.02, velocity_amplitude=share * level)
-        system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, location=location))
+        system = sb.System(
+            model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=location))]
+        )
         return sb.simulate(system, sb.Integration(cycles=1)).summary.zero_crossings > 0
 
     assert not crosses(0.85)
@@ -234,8 +236,8 @@ def test_slow_striker_snaps_a_pinned_beam_at_the_closed_form() -> None:
 
 def test_by_name_and_in_files(tmp_path) -> None:
     system = sb.System(
-        sb.ReducedModel.from_beam(beam_with(3.0, None), modes=3), default_values.CONTACT,
-        sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1),
+        sb.ReducedModel.from_beam(beam_with(3.0, None), modes=3),
+        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))],
     )  # fmt: skip
     assert system.get("boundary.left_rotational_stiffness") == pytest.approx(3.0 * UNIT)
     system.save(tmp_path / "a.toml")

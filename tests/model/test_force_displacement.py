@@ -203,7 +203,7 @@ def test_local_forces_where_the_force_acts_add_to_it(modes: int, law: str) -> No
         "electrode": sb.MagneticForce(strength=2e-9, gap=0.5 * level, location=location),
     }[law]
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
-    curve = sb.force_displacement(sb.System(model, local_force=force), location, well="lower")
+    curve = sb.force_displacement(sb.System(model, forces=[force]), location, well="lower")
     alpha, row = curve.amplitude.values, model.shape_at(location)
     w = curve.displacement.values
     assert w.max() < force.displacement_range(force.numbers)[1]
@@ -232,7 +232,7 @@ def test_local_forces_where_the_force_acts_add_to_it(modes: int, law: str) -> No
 def test_local_forces_anywhere() -> None:
     """A spring and its force elsewhere: every point against a minimum or a root that SciPy finds from nearby."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=6)
-    system = sb.System(model, local_force=sb.LocalSpring(stiffness=60.0, location=0.3))
+    system = sb.System(model, forces=[sb.LocalSpring(stiffness=60.0, location=0.3)])
     curve = sb.force_displacement(system, 0.5)
     row = model.shape_at(0.5)
     for i in np.linspace(0, curve.sizes["point"] - 1, 23).astype(int):
@@ -262,7 +262,7 @@ def test_antisymmetric_wells() -> None:
         length=5e-4, thickness=2e-6, width=2e-5, density=2330.0, young_modulus=160e9, axial_load=1e-3
     )
     model = sb.ReducedModel.from_beam(beam, modes=4)
-    system = sb.System(model, local_force=sb.LocalSpring(stiffness=50.0, location=0.5))
+    system = sb.System(model, forces=[sb.LocalSpring(stiffness=50.0, location=0.5)])
     potential = system.potential
     assert len(potential.wells) == 2 and all(abs(potential.center(each)) < 1e-12 for each in potential.wells)
     curve = sb.force_displacement(system, 0.25)

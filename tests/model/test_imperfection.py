@@ -88,7 +88,10 @@ def test_gone_past_a_fold() -> None:
     assert not past.is_bistable
     assert len(past.equilibria) == 1
     np.testing.assert_array_equal(past.wells[0], past.wells[1])
-    system = sb.System(past, default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))
+    system = sb.System(
+        past,
+        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))],
+    )
     assert "monostable" in [each.code for each in system.diagnostics()]
     with pytest.raises(InputError, match="this imperfection leaves one"):
         past.saddle_energy  # noqa: B018
@@ -212,8 +215,7 @@ def test_measured_wells_are_explained() -> None:
 def test_by_dotted_name_and_in_files(tmp_path) -> None:
     system = sb.System(
         model_of(midspan_amplitude=1e-5, antisymmetric_amplitude=2e-6),
-        default_values.CONTACT,
-        sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1),
+        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))],
     )
     assert system.get("imperfection.midspan_amplitude") == 1e-5
     other = system.replace(**{"imperfection.point_load": 0.01, "beam.thickness": 4.2e-4, "model.modes": 5})
@@ -260,8 +262,8 @@ def test_by_dotted_name_and_in_files(tmp_path) -> None:
 @pytest.mark.slow
 def test_swept_by_name() -> None:
     system = sb.System(
-        sb.ReducedModel.from_beam(default_values.BEAM, modes=2), default_values.CONTACT,
-        sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2),
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
+        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2))],
     )  # fmt: skip
     axes = {"imperfection.midspan_amplitude": [-1e-5, 0.0, 1e-5], "velocity_amplitude": [0.1, 0.3]}
     swept = sb.sweep(system, axes, sb.Integration(cycles=6))

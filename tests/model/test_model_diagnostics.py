@@ -23,7 +23,7 @@ def nothing_told(monkeypatch):
 def system(beam: sb.Beam = default_values.BEAM, modes: int = 1, **drive) -> sb.System:
     model = sb.ReducedModel.from_beam(beam, modes)
     given = {"frequency_ratio": 1.2, "velocity_amplitude": 0.1} | drive
-    return sb.System(model, default_values.CONTACT, sb.Shaker(**given))
+    return sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(**given))])
 
 
 def codes(of: sb.System) -> list[str]:
@@ -173,8 +173,8 @@ def test_a_coupling_that_no_material_has_is_doubted():
     def codes(harvester):
         system = sb.System(
             sb.ReducedModel.from_beam(beam, 2),
+            harvesters=[harvester],
             base_excitation=sb.BaseExcitation(motion=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.1)),
-            harvester=harvester,
         )
         return {each.code: each for each in system.diagnostics()}
 

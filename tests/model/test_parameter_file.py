@@ -24,11 +24,11 @@ def test_nothing_given_is_the_paper():
     config = Config()
     system = config.system
     assert system.model.beam == BEAM
-    assert system.contact == CONTACT
+    assert system.contact_law == CONTACT
     assert system.model.modes == config.model.modes == 32
     assert system.model.damping_ratio.tolist() == [0.005] * 32
-    assert system.get("striker.location") == pytest.approx(1.0 / 2.1)
-    assert system.get("striker.side") == "below"
+    assert system.get("contact.location") == pytest.approx(1.0 / 2.1)
+    assert system.get("contact.side") == "below"
     axes = config.axes(DEFAULT_AXES)
     assert list(axes) == ["drive.frequency_ratio", "drive.velocity_amplitude"]
     assert axes["drive.frequency_ratio"].shape == (64,)
@@ -70,8 +70,8 @@ REFUSALS = [
     ({"contact": {"radius": 0.0025}}, "belong together; one is missing"),
     ({"contact": {"radius": 0.0025, "stiffness": 4e8}}, "not both"),
     ({"contact": {"radius": 2e-3, "young_modulus": [3.5, 200.0], "poisson_ratio": [0.3, 0.3]}}, "in GPa?"),
-    ({"striker": {"location": 1.2}}, "[striker] location = 1.2: must be a number in (0, 1)"),
-    ({"striker": {"side": "left"}}, "side = 'left': must be one of 'below', 'above'"),
+    ({"contact": {"location": 1.2}}, "[contact] location = 1.2: must be a number in (0, 1)"),
+    ({"contact": {"side": "left"}}, "side = 'left': must be one of 'below', 'above'"),
     ({"sweep": {"frequency_ratio": "0.1:4"}}, "or start:stop:count, such as 0.1:4:64"),
     ({"sweep": {"frequency_ratio": "4:0.1:64"}}, "start must be less than stop"),
     ({"sweep": {"frequency_ratio": "0.1:4:many"}}, "the count 'many' must be a whole number"),
@@ -141,11 +141,11 @@ REFUSALS = [
         "[drive] give frequency_ratio or frequency_hz, not both",
     ),
     (
-        {"striker": {"location_m": 0.2}},
-        "[striker] location_m = 0.2 m: is location = 1.24224, which must be a number in (0, 1)",
+        {"contact": {"location_m": 0.2}},
+        "[contact] location_m = 0.2 m: is location = 1.24224, which must be a number in (0, 1)",
     ),
-    ({"striker": {"location_m": 0.05, "location": 0.3}}, "[striker] give location or location_m, not both"),
-    ({"striker": {"gap": "1 mm^2"}}, "[striker] gap = '1 mm^2': the unit 'mm^2' does not fit; must be in m"),
+    ({"contact": {"location_m": 0.05, "location": 0.3}}, "[contact] give location or location_m, not both"),
+    ({"contact": {"gap": "1 mm^2"}}, "[contact] gap = '1 mm^2': the unit 'mm^2' does not fit; must be in m"),
     (
         {"shaker": {"frequency_ratio": 1.0}, "drive": {"frequency_ratio": 2.0}},
         "[shaker]: unknown section",
@@ -176,7 +176,7 @@ REFUSALS = [
         "[sweep] modes = '1,x': must be a whole number, whole numbers separated by commas",
     ),
     ({"sweep": {"model.modes": "1:32:3"}}, "[sweep] modes = 16.5: must be an integer in [1, 256]"),
-    ({"sweep": {"striker.side": "below,left"}}, "[sweep] side = 'left': must be one of 'below', 'above'"),
+    ({"sweep": {"contact.side": "below,left"}}, "[sweep] side = 'left': must be one of 'below', 'above'"),
     (
         {"sweep": {"velocity_m_s": "-0.1:0.2:4"}},
         "[sweep] drive.velocity_m_s = -0.1 m/s: is velocity_amplitude = -0.580416, which must",
@@ -206,7 +206,7 @@ def test_every_fault_is_named():
 OWN = (
     "[beam]\nlength = 0.1\nwidth = 0.01\nthickness = 3e-4\ndensity = 7850\nyoung_modulus = 2e11\n"
     "buckling_level = 5e-4\n[model]\nmodes = 2\ndamping_ratio = 0.01\n[contact]\nstiffness = 1e8\n"
-    "[striker]\nlocation = 0.4\n[drive]\nfrequency_hz = 20\nvelocity_amplitude = 0.1\n"
+    "location = 0.4\n[drive]\nfrequency_hz = 20\nvelocity_amplitude = 0.1\n"
 )
 
 
@@ -239,7 +239,7 @@ def test_override_replaces_what_it_contradicts():
     beam = changed.system.model.beam
     assert beam.buckling_level == 3e-4
     assert beam.length == 0.2
-    assert changed.system.contact.stiffness == 1e8
+    assert changed.system.contact_law.stiffness == 1e8
     with pytest.raises(InputError, match="give exactly one"):
         override(changed, {"beam": {"buckling_level": 3e-4, "axial_load": 30.0}})
 
@@ -251,8 +251,7 @@ def test_an_option_takes_a_contradicting_value_or_axis_away():
             "extends": "paper",
             "sweep": {"frequency_ratio": "0.1:2:3", "modes": [1, 2]},
             "drive": {"velocity_m_s": 0.05},
-            "striker": {"location_m": 0.05},
-            "contact": {"stiffness": 1e8},
+            "contact": {"stiffness": 1e8, "location_m": 0.05},
             "model": {"reference_frequency": 80.0},
         }
     )
@@ -261,7 +260,7 @@ def test_an_option_takes_a_contradicting_value_or_axis_away():
         return override(config, sections).to_mapping()
 
     assert after({"drive": {"velocity_amplitude": 0.3}})["drive"] == {"velocity_amplitude": 0.3}
-    assert after({"striker": {"location": 0.3}})["striker"] == {"location": 0.3}
+    assert after({"contact": {"location": 0.3}})["contact"] == {"stiffness": 1e8, "location": 0.3}
     assert after({"model": {"modes": 3}})["sweep"] == {"drive.frequency_ratio": "0.1:2:3"}
     for value in ({"frequency_ratio": 1.2}, {"frequency_hz": 99.0}):
         changed = after({"drive": value})
@@ -271,7 +270,10 @@ def test_an_option_takes_a_contradicting_value_or_axis_away():
         "model.modes": [1, 2],
         "drive.frequency_hz": "50:100:3",
     }
-    assert after({"contact": {"coefficient": 0.3}, "model": {"modes": 1}})["contact"] == {"coefficient": 0.3}
+    assert after({"contact": {"coefficient": 0.3}, "model": {"modes": 1}})["contact"] == {
+        "coefficient": 0.3,
+        "location_m": 0.05,
+    }
 
 
 def test_an_axis_gives_a_required_parameter():
@@ -351,7 +353,7 @@ def test_physical_units_are_ratios_of_the_system():
         {
             "extends": "paper",
             "drive": {"frequency_hz": 100.0, "velocity_m_s": 0.031},
-            "striker": {"location_m": 0.04},
+            "contact": {"location_m": 0.04},
         }
     )
     system = config.system
@@ -360,13 +362,13 @@ def test_physical_units_are_ratios_of_the_system():
     assert system.get("drive.velocity_amplitude") == pytest.approx(
         0.031 / (2.0 * np.pi * freq * level), rel=1e-14
     )
-    assert system.get("striker.location") == pytest.approx(0.04 / 0.161, rel=1e-14)
+    assert system.get("contact.location") == pytest.approx(0.04 / 0.161, rel=1e-14)
     axes = config_from_mapping(
         {"sweep": {"frequency_hz": "50:100:3", "velocity_m_s": [0.01, 0.03], "location_m": "0.02:0.08:4"}}
     ).axes()
-    assert list(axes) == ["drive.frequency_ratio", "drive.velocity_amplitude", "striker.location"]
+    assert list(axes) == ["drive.frequency_ratio", "drive.velocity_amplitude", "contact.location"]
     np.testing.assert_allclose(axes["drive.frequency_ratio"] * freq, [50.0, 75.0, 100.0], rtol=1e-14)
-    np.testing.assert_allclose(axes["striker.location"] * 0.161, [0.02, 0.04, 0.06, 0.08], rtol=1e-14)
+    np.testing.assert_allclose(axes["contact.location"] * 0.161, [0.02, 0.04, 0.06, 0.08], rtol=1e-14)
     for name in PHYSICAL:
         assert [row.parameter for row in PHYSICAL.values()].count(PHYSICAL[name].parameter) == 1
         np.testing.assert_allclose(

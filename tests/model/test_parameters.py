@@ -13,7 +13,9 @@ from snapbeam.model import default_values
 from snapbeam.model.axial_load import LOADS
 from snapbeam.model.contact.base import LAWS
 from snapbeam.model.drive.base import DRIVES
+from snapbeam.model.external_force import FORCES
 from snapbeam.model.harvester import HARVESTERS
+from snapbeam.model.local_force import LOCAL_FORCES
 from snapbeam.model.parameters import Parameter, lookup, parameters, short_names
 from snapbeam.model.quantity import RUN, STRUCTURE, quantities
 from snapbeam.model.reduced_model import MODEL_QUANTITIES
@@ -24,12 +26,12 @@ CLASSES = {
     "beam": [sb.Beam],
     "boundary": [sb.BoundaryConditions],
     "imperfection": [sb.Imperfection],
-    "striker": [sb.Striker],
     "integration": [sb.Integration],
-    "contact": list(LAWS.values()),
+    "contact": [sb.Striker, *LAWS.values()],
     "drive": list(DRIVES.values()),
     "base_excitation": [sb.BaseExcitation, *(kind for kind in DRIVES.values() if kind.can_excite_base())],
     "axial_load": list(LOADS.values()),
+    "force": [sb.ExternalForce, *FORCES.values(), *LOCAL_FORCES.values()],
     "harvester": list(HARVESTERS.values()),
 }
 
@@ -44,8 +46,10 @@ def test_every_quantity_of_every_class_is_in_it(section: str) -> None:
             if section == "base_excitation" and kind is not sb.BaseExcitation:
                 assert own.long_name == f"{item.long_name}, of the base"
                 own = dataclasses.replace(own, long_name=item.long_name)
+            if name == "location" and section == "force":
+                own = dataclasses.replace(own, closed=item.closed)
             assert own == item
-            if section in ("contact", "drive", "axial_load", "harvester"):
+            if section in ("contact", "drive", "axial_load", "force", "harvester") and hasattr(kind, "name"):
                 assert kind.name in TABLE[f"{section}.{name}"].kinds
 
 
@@ -55,6 +59,7 @@ def test_every_field_of_every_class_is_a_quantity(section: str) -> None:
     for kind in CLASSES[section]:
         fields = {item.name for item in dataclasses.fields(kind) if item.init}
         parts = {sb.Striker: {"drive"}, sb.Beam: {"boundary"}, sb.BaseExcitation: {"motion"}}.get(kind, set())
+        parts |= {"history", "label"} if section == "force" else set()
         assert fields - parts == set(quantities(kind)), kind
 
 
@@ -67,8 +72,12 @@ def test_every_argument_of_a_model_of_a_beam_is_in_it() -> None:
 def test_a_system_has_no_parameter_beside_it() -> None:
     system = sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
-        default_values.CONTACT,
-        sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-4),
+        contacts=[
+            sb.Contact(
+                default_values.CONTACT,
+                sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-4),
+            )
+        ],
     )
     words = {"contact.type", "drive.type"}
     assert set(system.parameters) - words <= set(TABLE)
@@ -102,8 +111,8 @@ def test_every_row_is_said_in_words() -> None:
     [
         ("beam.thickness", "Thickness in the direction of bending $h$ (m)", "(0, inf)"),
         ("drive.velocity_amplitude", r"Velocity amplitude over b omega_1 $V$", "[0, inf)"),
-        ("striker.location", r"Location of the striker over the length $x_\mathrm{s}$", "(0, 1)"),
-        ("striker.side", "Side that the striker pushes from", "below or above"),
+        ("contact.location", r"Location of the striker over the length $x_\mathrm{s}$", "(0, 1)"),
+        ("contact.side", "Side that the striker pushes from", "below or above"),
         ("model.modes", "Number of buckling modes $N$", "[1, 256]"),
         ("model.damping_ratio", r"Damping ratio of every linear mode $\zeta$", "[0, 1)"),
         ("contact.stiffness", "Contact stiffness $k_c$ (N/m$^{1.5}$)", "(0, inf)"),
@@ -131,7 +140,7 @@ def test_label_and_limits(name: str, label: str, limits: str) -> None:
         ("contact_stiffness", "contact.stiffness"),
         ("stiffness", "contact.stiffness"),
         ("restitution_coefficient", "contact.coefficient"),
-        ("location", "striker.location"),
+        ("location", "contact.location"),
         ("step", "integration.step"),
         ("frequency", "drive.frequency"),
         ("initial_state.amplitude[3]", "initial_state.amplitude[3]"),
@@ -206,10 +215,10 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
     around = {
         "base_excitation": lambda kind: sb.BaseExcitation(motion=drives.get(kind, sb.Sine(**pair))),
         "axial_load": lambda kind: sb.AxialLoadModulation(motion=loads[kind]),
-        "external_force": lambda kind: sb.ExternalForce(history=forces[kind], location=0.5),
-        "harvester": lambda kind: sb.PiezoelectricHarvester(
-            moment_per_volt=1e-3, capacitance=1e-8, resistance=1e4
-        ),
+        "forces": lambda kind: [sb.ExternalForce(history=forces[kind], location=0.5)],
+        "harvesters": lambda kind: [
+            sb.PiezoelectricHarvester(moment_per_volt=1e-3, capacitance=1e-8, resistance=1e4)
+        ],
     }
     for name, row in TABLE.items():
         if not row.is_run:
@@ -219,9 +228,13 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
         )
         system = sb.System(
             sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
-            laws.get(kind, default_values.CONTACT),
-            sb.Striker(drive=drives.get(kind, sb.Sine(**pair))),
-            **({row.section: around[row.section](kind)} if row.section in around else {}),
+            contacts=[
+                sb.Contact(
+                    laws.get(kind, default_values.CONTACT),
+                    sb.Striker(drive=drives.get(kind, sb.Sine(**pair))),
+                )
+            ],
+            **{part: around[part](kind) for part in (row.section, f"{row.section}s") if part in around},
         )
         columns = run_columns(system, {name: np.array([0.1, 0.2, 0.3])})
         assert columns[name].tolist() == [0.1, 0.2, 0.3]

@@ -57,7 +57,9 @@ def test_a_fast_shaker_needs_far_less_than_a_slow_one() -> None:
 def waveforms() -> sb.Run:
     """The run of Fig. 5, Omega = 1.21 and V = 0.18 with 32 modes."""
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
-    return sb.simulate(sb.System(model_of(32), paper.CONTACT, shaker), sb.Integration(cycles=12))
+    return sb.simulate(
+        sb.System(model_of(32), contacts=[sb.Contact(paper.CONTACT, shaker)]), sb.Integration(cycles=12)
+    )
 
 
 def test_snap_through_of_figure_5() -> None:
@@ -88,7 +90,7 @@ def test_shaker_at_the_centre() -> None:
     """Claim 14: the antisymmetric modes are never excited, exactly."""
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3, location=0.5)
     alpha = sb.simulate(
-        sb.System(model_of(8), paper.CONTACT, shaker), sb.Integration(cycles=5)
+        sb.System(model_of(8), contacts=[sb.Contact(paper.CONTACT, shaker)]), sb.Integration(cycles=5)
     ).dataset.modal_amplitude.values
     assert not alpha[:, 1::2].any()
     assert alpha[:, 2].any()

@@ -167,5 +167,8 @@ def test_first_impact_carries_one_mode_over_at_a_quarter():
     for amplitude, snaps in ((0.248, False), (0.252, True)):
         shaker = sb.Shaker(frequency_ratio=6.0, velocity_amplitude=amplitude)
         # up to the top of the first flight; near the threshold it is slow, the wall comes back below
-        run = sb.simulate(sb.System(model, sb.HertzContact(stiffness=4e10), shaker), sb.Integration(cycles=6))
+        run = sb.simulate(
+            sb.System(model, contacts=[sb.Contact(sb.HertzContact(stiffness=4e10), shaker)]),
+            sb.Integration(cycles=6),
+        )
         assert (run.summary.max_midspan_displacement > 0.0) == snaps

@@ -56,8 +56,8 @@ def test_the_stored_harvester_is_of_a_real_material():
     """Its coupling is that of PZT-5H, and the stored medians are those that the page states."""
     system = sb.System(
         sb.ReducedModel.from_beam(paper.BEAM, modes=1),
+        harvesters=[PIEZO],
         base_excitation=sb.BaseExcitation(motion=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.1)),
-        harvester=PIEZO,
     )
     assert "unphysical-coupling" not in {each.code for each in system.diagnostics()}
     found = xr.load_dataset(DATA / "harvesting.nc", group="power", engine="h5netcdf")
@@ -179,7 +179,7 @@ def test_longest_window_forgives_single_points():
 def test_a_drive_with_a_start_up_transient():
     """Its velocity is that of its displacement, 1 + excess times as great at first and steady at the end."""
     model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
-    drive = disturbances._record(model, 1.2, 0.2, 12, excess=0.2).drive
+    drive = disturbances._record(model, 1.2, 0.2, 12, excess=0.2).striker.drive
     numeric = np.gradient(drive.displacement, 1.0 / drive.sampling_frequency)
     np.testing.assert_allclose(drive.velocity[1:-1], numeric[1:-1], atol=2e-3 * np.abs(drive.velocity).max())
     steady = 0.2 * paper.BEAM.buckling_level * 2.0 * np.pi * model.reference_frequency

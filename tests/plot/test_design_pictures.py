@@ -84,7 +84,7 @@ def test_quantiles() -> None:
 
 
 def test_tornado() -> None:
-    names = ["contact.stiffness", "striker.location"]
+    names = ["contact.stiffness", "contact.location"]
     half = np.array([0.01, -0.03])
     dataset = xr.Dataset(
         {"effect": ("parameter", half), "effect_low": ("parameter", half - 0.002),

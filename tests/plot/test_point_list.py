@@ -26,7 +26,7 @@ def points() -> xr.Dataset:
         "velocity_amplitude": rng.uniform(0.05, 0.4, count), "frequency_ratio": rng.uniform(0.5, 2.0, count),
         "beam_thickness": rng.choice([3.9e-4, 4.1e-4], count), "side": rng.choice(["below", "above"], count),
     }  # fmt: skip
-    full = {"beam_thickness": "beam.thickness", "side": "striker.side"}
+    full = {"beam_thickness": "beam.thickness", "side": "contact.side"}
     return xr.Dataset(
         {"response_class": ("point", rng.integers(0, 4, count).astype("i1")), "peak_force": ("point", force)},
         coords={

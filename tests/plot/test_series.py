@@ -25,8 +25,9 @@ def _close():
 def run():
     system = sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=3),
-        contact=default_values.CONTACT,
-        striker=sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
+        contacts=[
+            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))
+        ],
     )
     return sb.simulate(system, sb.Integration(cycles=12))
 

@@ -14,7 +14,10 @@ from snapbeam.util.datasets import xr
 
 SHORT = sb.Integration(cycles=20)
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.05)
-SYSTEM = sb.System(MODEL, default_values.CONTACT, sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03))
+SYSTEM = sb.System(
+    MODEL,
+    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03))],
+)
 AXES = {"drive.frequency_ratio": [0.8, 1.2, 1.6], "drive.velocity_amplitude": [0.1, 0.2, 0.3]}
 
 

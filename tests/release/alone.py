@@ -23,8 +23,8 @@ EXTRAS = ("lab", "video", "cluster", "explorer", "cuda")
 
 _SYSTEM = (
     "import snapbeam as sb; from snapbeam.model import default_values; "
-    "system = sb.System(sb.ReducedModel.from_beam(default_values.BEAM, modes=1), default_values.CONTACT, "
-    "sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2)); "
+    "system = sb.System(sb.ReducedModel.from_beam(default_values.BEAM, modes=1), contacts=[sb.Contact(default_values.CONTACT, "
+    "sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2))]); "
 )
 _CORE = (
     f"{_SYSTEM}run = sb.simulate(system, sb.Integration(cycles=3)); "

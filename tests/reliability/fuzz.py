@@ -48,7 +48,7 @@ _LONG_COMMANDS = ("reproduce", "explore")
 
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
 SHAKER = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3)
-SYSTEM = sb.System(MODEL, default_values.CONTACT, SHAKER)
+SYSTEM = sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, SHAKER)])
 SHORT = sb.Integration(cycles=1)
 DATASET = xr.Dataset({"a": ("x", [1.0, 2.0])})
 
@@ -83,14 +83,15 @@ WORDS = [
     "a\udcff.toml",
     "", "-1", "0", "1", "2", "0.3", "1e400", "nan", "inf", "1e-300", "abc", "0.1:2:3", "0.1:2:1000000000", "2:1:3",
     "1/0", "1/2.1", "9" * 5000, "x.nc", "x.toml", "x.csv", "x.png", ".", "/", "nowhere/x.nc", "\u00b5m", "a,b", "1,2",
-    "--", "-", "true", "below", "drive.frequency_ratio=0.1:2:3", "striker.location=nan", "beam.length", "[]", "{}",
+    "--", "-", "true", "below", "drive.frequency_ratio=0.1:2:3", "contact.location=nan", "beam.length", "[]", "{}",
 ]  # fmt: skip
 
 
 def _valid(name: str, draw: random.Random) -> Any:
     """An argument that suits a parameter of such a name, or one that does not."""
     pool = {
-        "model": MODEL, "contact": default_values.CONTACT, "striker": SHAKER, "shaker": SHAKER, "system": SYSTEM,
+        "model": MODEL, "contact": default_values.CONTACT, "contacts": SYSTEM.contacts,
+        "law": default_values.CONTACT, "striker": SHAKER, "shaker": SHAKER, "system": SYSTEM,
         "integration": SHORT, "beam": default_values.BEAM, "modes": 1, "cycles": 1, "periods": 1.0, "count": 2,
         "axes": {"drive.velocity_amplitude": [0.1, 0.2]}, "frequency_ratio": [0.8, 1.0],
         "velocity_amplitude": [0.1, 0.2], "location": 0.4, "length": 0.161, "thickness": 0.4e-3, "width": 15e-3,

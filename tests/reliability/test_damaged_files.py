@@ -18,7 +18,12 @@ from snapbeam.util.netcdf import read_netcdf
 def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("written")
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
-    system = sb.System(model, default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1))
+    system = sb.System(
+        model,
+        contacts=[
+            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1))
+        ],
+    )
     sb.simulate(system, sb.Integration(cycles=2)).save(folder / "run.nc")
     swept(
         model, default_values.CONTACT, frequency_ratio=[1.0, 1.5], velocity_amplitude=[0.1, 0.2], cycles=5

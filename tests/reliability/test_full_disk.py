@@ -98,7 +98,9 @@ def test_blocks_that_do_not_fit(mounted, tmp_path, monkeypatch, tried):
 
 def test_a_run_that_cannot_be_saved_is_not_lost(mounted, tmp_path, monkeypatch, model, contact):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    system = sb.System(model, contact, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))
+    system = sb.System(
+        model, contacts=[sb.Contact(contact, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))]
+    )
     run = sb.simulate(system, sb.Integration(cycles=5))
     with pytest.raises(NoRoomError) as refused:
         run.save(mounted("disk", "size=20k") / "run.nc")

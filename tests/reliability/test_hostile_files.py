@@ -240,8 +240,8 @@ def test_the_limit_follows_the_size_of_the_file(tmp_path, monkeypatch):
     """Stored numbers are read however many they are."""
     monkeypatch.setattr("snapbeam.util.input_files.LARGEST_CONTENT", 1000)
     system = sb.System(
-        sb.ReducedModel.from_beam(default_values.BEAM, modes=1), default_values.CONTACT,
-        sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3),
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
+        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))],
     )  # fmt: skip
     run = sb.simulate(system, sb.Integration(cycles=1))
     run.save(tmp_path / "run.nc")

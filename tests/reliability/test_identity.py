@@ -38,7 +38,10 @@ OTHERS = {
 def system(**changes):
     model = sb.ReducedModel.from_matrices(**MATRICES | changes)
     return sb.System(
-        model, sb.HertzContact(stiffness=4e8), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3)
+        model,
+        contacts=[
+            sb.Contact(sb.HertzContact(stiffness=4e8), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))
+        ],
     )
 
 
@@ -72,7 +75,10 @@ def test_representations_are_short():
                 buckling_level=0.335e-3), modes=200,
     )  # fmt: skip
     whole = sb.System(
-        model, sb.HertzContact(stiffness=4e8), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3)
+        model,
+        contacts=[
+            sb.Contact(sb.HertzContact(stiffness=4e8), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))
+        ],
     )
     assert max(len(repr(each)) for each in (model, whole)) < 1000
 
@@ -145,8 +151,8 @@ def test_the_code_of_a_foreign_law_counts(monkeypatch):
         name = "other"
 
     mine, own = system(), system()
-    own = own.replace(contact=OtherLaw(stiffness=4e8))
-    assert provenance_of(mine.replace(contact=sb.HertzContact(stiffness=4e8))).code == code_hash()
+    own = own.replace(**{"contact.law": OtherLaw(stiffness=4e8)})
+    assert provenance_of(mine.replace(**{"contact.law": sb.HertzContact(stiffness=4e8)})).code == code_hash()
     assert provenance_of(own).code.startswith(f"{code_hash()}+")
     assert differences([provenance_of(mine), provenance_of(own)]) == ["state of its code"]
     assert differences([]) == []

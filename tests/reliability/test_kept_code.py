@@ -15,8 +15,10 @@ from snapbeam.solver.compilation import is_private, private_folder
 RUN = """
 import snapbeam as sb
 from snapbeam.model import default_values
-system = sb.System(sb.ReducedModel.from_beam(default_values.BEAM, modes=1), contact=default_values.CONTACT,
-                   striker=sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))
+system = sb.System(
+    sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
+    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))],
+)
 run = sb.simulate(system, sb.Integration(cycles=1))
 print(run.summary.status.name, float(run.dataset.displacement_at_striker[-1]).hex())
 """

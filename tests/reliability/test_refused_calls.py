@@ -28,8 +28,7 @@ POINTS = MeasuredPoints(np.ones(2), np.full(2, 0.1), np.full(2, np.nan), np.zero
 def system():
     return sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
-        default_values.CONTACT,
-        sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3),
+        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))],
     )
 
 
@@ -39,7 +38,7 @@ def run(system) -> Run:
 
 
 @pytest.mark.parametrize(
-    "section", ["drive", "contact", "base_excitation", "axial_load", "harvester", "drive_2"]
+    "section", ["drive", "contact", "base_excitation", "axial_load", "harvester", "force", "drive.2"]
 )
 @pytest.mark.parametrize("value", ["[1, 2]", "{a = 1}", "3"])
 def test_a_type_that_is_no_word(tmp_path, section, value):

@@ -24,7 +24,12 @@ MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
 def system(frequency_ratio=1.0, modes=2):
     model = MODEL if modes == 2 else sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     return sb.System(
-        model, default_values.CONTACT, sb.Shaker(frequency_ratio=frequency_ratio, velocity_amplitude=0.3)
+        model,
+        contacts=[
+            sb.Contact(
+                default_values.CONTACT, sb.Shaker(frequency_ratio=frequency_ratio, velocity_amplitude=0.3)
+            )
+        ],
     )
 
 
@@ -100,7 +105,7 @@ def test_axes_of_too_many_points():
     many = {
         "drive.frequency_ratio": np.linspace(0.5, 2, 10_000),
         "drive.velocity_amplitude": np.linspace(0.1, 1, 10_000),
-        "striker.location": np.linspace(0.1, 0.5, 1000),
+        "contact.location": np.linspace(0.1, 0.5, 1000),
     }
     assert "points" in quick(sb.sweep, system(), many)
 

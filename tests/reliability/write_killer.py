@@ -21,8 +21,8 @@ import snapbeam as sb
 from snapbeam.model import default_values
 
 SYSTEM = sb.System(
-    sb.ReducedModel.from_beam(default_values.BEAM, modes=1), default_values.CONTACT,
-    sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.2),
+    sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
+    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.2))],
 )  # fmt: skip
 HOW = sb.Integration(cycles=3, threads=1)
 RATIOS, VELOCITIES = np.linspace(0.4, 2.0, 4), np.linspace(0.05, 0.6, 3)

@@ -16,8 +16,7 @@ from snapbeam.util.diagnostics import DiagnosticWarning
 
 VIOLENT = sb.System(
     sb.ReducedModel.from_beam(default_values.BEAM, 1),
-    contact=default_values.CONTACT,
-    striker=sb.Shaker(frequency_ratio=6.8, velocity_amplitude=30.0),
+    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=6.8, velocity_amplitude=30.0))],
 )
 
 

@@ -37,7 +37,7 @@ def shaken():
     layers = sb.PiezoelectricHarvester(moment_per_volt=-1.245e-4, capacitance=3.085e-7, resistance=1e4)
     motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.0548)
     model = sb.ReducedModel.from_beam(BEAM, modes=2, damping_ratio=0.02)
-    return sb.System(model, base_excitation=sb.BaseExcitation(motion=motion), harvester=layers)
+    return sb.System(model, harvesters=[layers], base_excitation=sb.BaseExcitation(motion=motion))
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def test_voltage_of_a_coil(shaken, inductance):
     coil = sb.ElectromagneticHarvester(
         force_factor=1.5, resistance=30.0, coil_resistance=10.0, inductance=inductance, location=0.4
     )
-    run = sb.simulate(shaken.replace(harvester=coil), sb.Integration(cycles=20))
+    run = sb.simulate(shaken.replace(harvesters=[coil]), sb.Integration(cycles=20))
     power, square = late_means(run)
     assert run.summary.harvested_power_last_quarter == pytest.approx(power, rel=2e-3)
     assert run.summary.rms_voltage_last_quarter**2 == pytest.approx(square, rel=2e-3)
@@ -148,7 +148,10 @@ def test_bistable_piezoelectric_oscillator_of_the_literature() -> None:
     force = sb.HarmonicForce(frequency_ratio=0.8, amplitude=0.115, phase=0.5 * np.pi)
     for start in (sb.State(amplitude=[-1.0]), sb.State(amplitude=[1.0], velocity=[1.3])):
         system = sb.System(
-            model, external_force=sb.ExternalForce(history=force), harvester=layers, initial_state=start
+            model,
+            forces=[sb.ExternalForce(history=force)],
+            harvesters=[layers],
+            initial_state=start,
         )
         power = sb.simulate(system, sb.Integration(cycles=400)).summary.harvested_power_last_quarter
         assert power / 0.1 == pytest.approx(0.017855962, rel=3e-6)
@@ -166,7 +169,7 @@ def test_layers_on_the_matrices_of_a_beam(shaken: sb.System) -> None:
     force = sb.HarmonicForce(frequency_ratio=0.9, amplitude=0.02)
     powers = [
         sb.simulate(
-            sb.System(model, external_force=sb.ExternalForce(history=force, **more), harvester=layers),
+            sb.System(model, forces=[sb.ExternalForce(history=force, **more)], harvesters=[layers]),
             sb.Integration(cycles=20),
         ).summary.harvested_power
         for model, more in ((beam, {"location": 0.5}), (given, {}))
@@ -174,7 +177,7 @@ def test_layers_on_the_matrices_of_a_beam(shaken: sb.System) -> None:
     assert powers[0] > 0.0
     assert powers[1] == pytest.approx(powers[0], rel=1e-6)
     assert given.patch_shape is not None
-    again = sb.System(given, external_force=sb.ExternalForce(history=force), harvester=layers)
+    again = sb.System(given, forces=[sb.ExternalForce(history=force)], harvesters=[layers])
     changed = again.replace(**{"model.damping_ratio": 0.03})
     assert changed.model.patch_shape.tolist() == given.patch_shape.tolist()
 
@@ -185,8 +188,8 @@ def test_layers_need_their_row() -> None:
     with pytest.raises(sb.InputError, match=r"give patch_shape to ReducedModel\.from_matrices"):
         sb.System(
             model,
-            harvester=layers,
-            external_force=sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=1.0, amplitude=0.1)),
+            forces=[sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=1.0, amplitude=0.1))],
+            harvesters=[layers],
         )
     with pytest.raises(sb.InputError, match=r"patch_shape of shape \(2,\)"):
         sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], patch_shape=[1.0, 2.0])

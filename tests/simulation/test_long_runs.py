@@ -16,8 +16,7 @@ from snapbeam.solver.cpu import driver
 
 SYSTEM = sb.System(
     sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
-    default_values.CONTACT,
-    sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.02),
+    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.02))],
 )
 
 
@@ -68,8 +67,8 @@ PROGRAM = """
 import snapbeam as sb
 from snapbeam.model import default_values
 system = sb.System(
-    sb.ReducedModel.from_beam(default_values.BEAM, modes=32), default_values.CONTACT,
-    sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.02),
+    sb.ReducedModel.from_beam(default_values.BEAM, modes=32),
+    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.02))],
 )
 sb.simulate(system, sb.Integration(cycles=1), sample_times=[0.0])
 print("ready", flush=True)

@@ -37,11 +37,15 @@ def test_a_recorded_sine_is_the_sinusoidal_shaker(model, side):
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.05, side=side)
     times = np.linspace(0.0, 7.9 / (1.21 * model.reference_frequency), 900)
     exact = sb.simulate(
-        sb.System(model, default_values.CONTACT, shaker), sb.Integration(cycles=8), sample_times=times
+        sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)]),
+        sb.Integration(cycles=8),
+        sample_times=times,
     )
     drive = sine_record(model, 1.21, 0.05, 8, side)
     run = sb.simulate(
-        sb.System(model, default_values.CONTACT, drive), sb.Integration(cycles=8), sample_times=times
+        sb.System(model, contacts=[sb.Contact(default_values.CONTACT, drive)]),
+        sb.Integration(cycles=8),
+        sample_times=times,
     )
     assert run.summary.impacts == exact.summary.impacts
     for name, bound in (("displacement_at_striker", 1e-5), ("striker_displacement", 1e-8)):
@@ -50,16 +54,20 @@ def test_a_recorded_sine_is_the_sinusoidal_shaker(model, side):
 
 def test_the_whole_record_is_the_default_and_more_is_refused(model):
     drive = sine_record(model, 1.0, 0.05, 3)
-    run = sb.simulate(sb.System(model, default_values.CONTACT, drive))
+    run = sb.simulate(sb.System(model, contacts=[sb.Contact(default_values.CONTACT, drive)]))
     assert run.dataset.attrs["cycles"] == pytest.approx(drive.drive.duration * drive.drive.frequency)
     assert run.dataset.attrs["drive_type"] == "recorded_motion"
     with pytest.raises(sb.InputError, match=r"cycles = 9.*at most the 3\.\d cycles"):
-        sb.simulate(sb.System(model, default_values.CONTACT, drive), sb.Integration(cycles=9))
+        sb.simulate(
+            sb.System(model, contacts=[sb.Contact(default_values.CONTACT, drive)]), sb.Integration(cycles=9)
+        )
 
 
 def test_the_energy_balance_closes(model):
     drive = sine_record(model, 1.21, 0.18, 6)
-    ds = sb.simulate(sb.System(model, default_values.CONTACT, drive), sb.Integration(cycles=6)).dataset
+    ds = sb.simulate(
+        sb.System(model, contacts=[sb.Contact(default_values.CONTACT, drive)]), sb.Integration(cycles=6)
+    ).dataset
     residual = ds.energy_beam + ds.energy_contact + ds.energy_dissipated - ds.striker_work
     assert float(abs(residual).max()) < 1e-4 * ds.attrs["gross_work"]
 

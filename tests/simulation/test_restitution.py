@@ -29,8 +29,7 @@ def test_free_mass_rebounds_with_its_coefficient():
         run = sb.simulate(
             sb.System(
                 model,
-                sb.Restitution(coefficient),
-                wall,
+                contacts=[sb.Contact(sb.Restitution(coefficient), wall)],
                 initial_state=sb.State(amplitude=[0.0], velocity=[-speed]),
             ),
             sb.Integration(cycles=1),
@@ -45,7 +44,10 @@ def test_free_mass_rebounds_with_its_coefficient():
 @pytest.mark.parametrize(("ratio", "amplitude"), [(1.21, 0.18), (0.5, 0.3)])
 def test_energy_balance_closes_and_the_tip_stays_outside(one_mode, coefficient, ratio, amplitude):
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=amplitude)
-    run = sb.simulate(sb.System(one_mode, sb.Restitution(coefficient), shaker), sb.Integration(cycles=20))
+    run = sb.simulate(
+        sb.System(one_mode, contacts=[sb.Contact(sb.Restitution(coefficient), shaker)]),
+        sb.Integration(cycles=20),
+    )
     assert run.summary.status is sb.RunStatus.OK
     assert ledger(run) < 1e-4
     assert (
@@ -55,7 +57,9 @@ def test_energy_balance_closes_and_the_tip_stays_outside(one_mode, coefficient, 
 
 def test_a_plastic_impact_sticks_until_the_force_would_pull(one_mode):
     shaker = sb.Shaker(frequency_ratio=0.1, velocity_amplitude=0.05)
-    run = sb.simulate(sb.System(one_mode, sb.Restitution(0.0), shaker), sb.Integration(cycles=4))
+    run = sb.simulate(
+        sb.System(one_mode, contacts=[sb.Contact(sb.Restitution(0.0), shaker)]), sb.Integration(cycles=4)
+    )
     assert run.summary.contact_time_fraction > 0.3
     together = run.impacts.duration.values > 0.0
     assert together.any()
@@ -69,7 +73,9 @@ def test_a_plastic_impact_sticks_until_the_force_would_pull(one_mode):
 def test_a_plastic_landing_is_one_impact(one_mode):
     """Landing and sustained contact are one impact, whose impulse is that of the landing and that of the force after it."""
     shaker = sb.Shaker(frequency_ratio=0.1, velocity_amplitude=0.05)
-    run = sb.simulate(sb.System(one_mode, sb.Restitution(0.0), shaker), sb.Integration(cycles=4))
+    run = sb.simulate(
+        sb.System(one_mode, contacts=[sb.Contact(sb.Restitution(0.0), shaker)]), sb.Integration(cycles=4)
+    )
     impacts, force = run.impacts, run.dataset.contact_force
     apart = impacts.onset.values[1:] - (impacts.onset + impacts.duration).values[:-1]
     assert apart.size >= 3
@@ -92,7 +98,8 @@ def test_a_plastic_landing_that_nothing_presses_is_one_impact():
     wall = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0)
     start = sb.State(amplitude=[0.02 * speed], velocity=[-speed])
     run = sb.simulate(
-        sb.System(model, sb.Restitution(0.0), wall, initial_state=start), sb.Integration(cycles=20)
+        sb.System(model, contacts=[sb.Contact(sb.Restitution(0.0), wall)], initial_state=start),
+        sb.Integration(cycles=20),
     )
     assert run.impacts.impulse.values == pytest.approx([mass * speed], rel=1e-12)
 
@@ -102,8 +109,12 @@ def test_mirror_image_is_exact(one_mode):
         sb.simulate(
             sb.System(
                 one_mode,
-                sb.Restitution(0.6),
-                sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18, side=side),
+                contacts=[
+                    sb.Contact(
+                        sb.Restitution(0.6),
+                        sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18, side=side),
+                    )
+                ],
             ),
             sb.Integration(cycles=20),
         )
@@ -119,7 +130,8 @@ def test_one_mode_has_one_shape(one_mode, coefficient):
     """Extremes at the striker and at the centre are in the ratio of the shape, exactly: no hit is passed over."""
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3, location=0.3)
     outcome = sb.simulate(
-        sb.System(one_mode, sb.Restitution(coefficient), shaker), sb.Integration(cycles=30)
+        sb.System(one_mode, contacts=[sb.Contact(sb.Restitution(coefficient), shaker)]),
+        sb.Integration(cycles=30),
     ).summary
     ratio = float(one_mode.midspan_shape[0] / one_mode.shape_at(0.3)[0])
     for name in ("min", "max"):
@@ -130,11 +142,18 @@ def test_one_mode_has_one_shape(one_mode, coefficient):
 def test_no_force_is_told_of_an_impact_that_lasts_no_time(one_mode):
     """As the table of impacts says of each; where the bodies stay together there is one."""
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
-    run = sb.simulate(sb.System(one_mode, sb.Restitution(0.6), shaker), sb.Integration(cycles=10))
+    run = sb.simulate(
+        sb.System(one_mode, contacts=[sb.Contact(sb.Restitution(0.6), shaker)]), sb.Integration(cycles=10)
+    )
     assert run.summary.impacts > 0 and np.isnan(run.summary.peak_force)
     assert np.isnan(run.impacts.peak_force.values).all()
     held = sb.simulate(
-        sb.System(one_mode, sb.Restitution(0.0), sb.Shaker(frequency_ratio=0.1, velocity_amplitude=0.05)),
+        sb.System(
+            one_mode,
+            contacts=[
+                sb.Contact(sb.Restitution(0.0), sb.Shaker(frequency_ratio=0.1, velocity_amplitude=0.05))
+            ],
+        ),
         sb.Integration(cycles=2),
     )
     assert held.summary.peak_force == pytest.approx(float(np.nanmax(held.impacts.peak_force)), rel=1e-9)
@@ -148,7 +167,7 @@ def test_early_termination_is_kept_and_reported(one_mode, coefficient):
         shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=float(amplitude))
         full, early = (
             sb.simulate(
-                sb.System(one_mode, sb.Restitution(coefficient), shaker),
+                sb.System(one_mode, contacts=[sb.Contact(sb.Restitution(coefficient), shaker)]),
                 sb.Integration(cycles=60, early_termination=flag),
                 sample_times=[0.0],
             )
@@ -168,7 +187,12 @@ def test_a_map_takes_the_law(one_mode):
     assert ds.attrs["restitution_coefficient"] == 0.6
     assert (ds.response_class >= 0).all()
     run = sb.simulate(
-        sb.System(one_mode, sb.Restitution(0.6), sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.3)),
+        sb.System(
+            one_mode,
+            contacts=[
+                sb.Contact(sb.Restitution(0.6), sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.3))
+            ],
+        ),
         sb.Integration(cycles=10),
     )
     assert int(ds.zero_crossings[1, 1]) == run.summary.zero_crossings
@@ -178,7 +202,9 @@ def test_many_modes_are_refused_and_the_reason_is_true():
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=8)
     shaker = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1)
     with pytest.raises(sb.InputError, match=r"modes = 8.*one mode.*falls to zero"):
-        sb.simulate(sb.System(model, sb.Restitution(0.5), shaker), sb.Integration(cycles=1))
+        sb.simulate(
+            sb.System(model, contacts=[sb.Contact(sb.Restitution(0.5), shaker)]), sb.Integration(cycles=1)
+        )
     beam = default_values.BEAM
     total = beam.mass_per_length * beam.length
     masses = {

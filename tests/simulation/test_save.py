@@ -17,15 +17,19 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "conformance"))
 from start_up import start_up
 
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
-SYSTEM = sb.System(MODEL, default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))
+SYSTEM = sb.System(
+    MODEL,
+    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))],
+)
 RECORDED = sb.Striker(drive=start_up(MODEL, cycles=4), location=0.45)
 CASES = {
     "plain": (SYSTEM, sb.Integration(cycles=5)),
     "tolerance": (SYSTEM, sb.Integration(cycles=2, tolerance=1e-4)),
-    "recorded": (sb.System(MODEL, default_values.CONTACT, RECORDED), sb.Integration()),
+    "recorded": (sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, RECORDED)]), sb.Integration()),
     "restitution": (
         sb.System(
-            sb.ReducedModel.from_beam(default_values.BEAM, modes=1), sb.Restitution(0.6), SYSTEM.striker
+            sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
+            contacts=[sb.Contact(sb.Restitution(0.6), SYSTEM.striker)],
         ),
         sb.Integration(cycles=4),
     ),

@@ -28,7 +28,9 @@ def simulate(modes: int, ratio: float, velocity: float, cycles: int, **options: 
     drive = {name: options.pop(name) for name in ("location", "side") if name in options}
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, **drive)
     sample_times, start = options.pop("sample_times", None), options.pop("start", None)
-    system = sb.System(model_of(modes), default_values.CONTACT, shaker, start)
+    system = sb.System(
+        model_of(modes), contacts=[sb.Contact(default_values.CONTACT, shaker)], initial_state=start
+    )
     return sb.simulate(system, sb.Integration(cycles=cycles, **options), sample_times=sample_times)
 
 
@@ -337,7 +339,9 @@ def test_nothing_is_final_of_a_beam_that_is_still_struck() -> None:
         shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=float(velocity))
         short, long = (
             sb.simulate(
-                sb.System(model, default_values.CONTACT, shaker), sb.Integration(cycles=n), sample_times=[0.0]
+                sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)]),
+                sb.Integration(cycles=n),
+                sample_times=[0.0],
             )
             for n in (10, 200)
         )

@@ -25,24 +25,19 @@ SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
         ),
         ({"model": default_values.BEAM}, sb.InputTypeError, r"model = Beam\(.*: must be a ReducedModel"),
         (
-            {"striker": 1.21},
+            {"contacts": SHAKER},
             sb.InputTypeError,
-            "striker = 1.21: must be a Striker or a Shaker",
+            r"contacts = Shaker\(.*: must be a list or tuple",
         ),
         (
-            {"striker": None},
+            {"contacts": []},
             sb.InputError,
-            r"striker = None: .* needs an initial_state",
+            r"contacts = \[\]: .* needs an initial_state",
         ),
         (
-            {"contact": None},
-            sb.InputError,
-            "contact = None: a striker needs a law of contact, such as HertzContact",
-        ),
-        (
-            {"contact": 4e8},
+            {"contacts": [SHAKER]},
             sb.InputTypeError,
-            "contact = 400000000.0: must be a law of contact, such as HertzContact",
+            r"contacts\[0\] = Shaker\(.*: must be a Contact\(law, striker\)",
         ),
         ({"cycles": 0}, sb.InputError, r"cycles = 0: must be an integer in \[1, 10000000\]"),
         ({"cycles": -3}, sb.InputError, "cycles = -3: must be an integer"),
@@ -65,18 +60,17 @@ SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
 def test_refusals(changes: dict[str, Any], error: type[Exception], message: str) -> None:
     given: dict[str, Any] = {
         "model": BUCKLED,
-        "striker": SHAKER,
-        "contact": default_values.CONTACT,
+        "contacts": [sb.Contact(default_values.CONTACT, SHAKER)],
         "cycles": 1,
         **changes,
     }
-    system = {name: given.pop(name) for name in ("model", "striker", "contact")}
+    system = {name: given.pop(name) for name in ("model", "contacts")}
     times = given.pop("sample_times", None)
     with pytest.raises(error, match=message):
         sb.simulate(sb.System(**system), sb.Integration(**given), sample_times=times)
 
 
-SYSTEM = sb.System(BUCKLED, default_values.CONTACT, SHAKER)
+SYSTEM = sb.System(BUCKLED, contacts=[sb.Contact(default_values.CONTACT, SHAKER)])
 
 
 @pytest.mark.parametrize(
@@ -87,7 +81,7 @@ SYSTEM = sb.System(BUCKLED, default_values.CONTACT, SHAKER)
         (
             lambda: sb.simulate(sb.System(BUCKLED)),
             sb.InputError,
-            r"striker = None: without a striker the beam needs an initial_state",
+            r"contacts = \[\]: without a striker the beam needs an initial_state",
         ),
         (
             lambda: sb.simulate(SYSTEM, sb.Integration(cycles=10**6)),

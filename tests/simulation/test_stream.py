@@ -93,7 +93,7 @@ def test_memory_does_not_grow_with_what_a_sample_holds(tmp_path) -> None:
 import resource, snapbeam as sb
 from snapbeam.model import default_values
 model = sb.ReducedModel.from_beam(default_values.BEAM, modes=32)
-system = sb.System(model, default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))
+system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))])
 def peak():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 sb.simulate_to_file(system, sb.Integration(cycles=20), path={str(tmp_path / "short.nc")!r})

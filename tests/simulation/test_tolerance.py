@@ -42,7 +42,7 @@ def test_error_is_within_the_request(modes: int, omega: float, speed: float, tol
     model, shaker = model_of(modes), shaker_at(omega, speed)
     times = np.linspace(0.0, CYCLES / (omega * model.reference_frequency), 30 * CYCLES + 1)
     run = sb.simulate(
-        sb.System(model, CONTACT, shaker),
+        sb.System(model, contacts=[sb.Contact(CONTACT, shaker)]),
         sb.Integration(cycles=CYCLES, tolerance=tolerance),
         sample_times=times,
     )
@@ -51,13 +51,13 @@ def test_error_is_within_the_request(modes: int, omega: float, speed: float, tol
     assert run.accuracy.predictability_horizon == pytest.approx(times[-1])
     assert run.accuracy.estimated_error <= tolerance
     fine = sb.simulate(
-        sb.System(model, CONTACT, shaker),
+        sb.System(model, contacts=[sb.Contact(CONTACT, shaker)]),
         sb.Integration(cycles=CYCLES, accuracy="reference"),
         sample_times=times,
     )
     if run.accuracy.step / 3.0 < fine.dataset.attrs["step"]:
         fine = sb.simulate(
-            sb.System(model, CONTACT, shaker),
+            sb.System(model, contacts=[sb.Contact(CONTACT, shaker)]),
             sb.Integration(cycles=CYCLES, tolerance=1e-9),
             sample_times=times,
         )
@@ -70,14 +70,18 @@ def test_chaos_shortens_the_horizon() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         run = sb.simulate(
-            sb.System(model, CONTACT, shaker), sb.Integration(cycles=5, tolerance=1e-6), sample_times=[0.01]
+            sb.System(model, contacts=[sb.Contact(CONTACT, shaker)]),
+            sb.Integration(cycles=5, tolerance=1e-6),
+            sample_times=[0.01],
         )
     found = run.accuracy
     assert found is not None
     assert found.perturbation_growth > 1e-3
     assert 0.0 < found.predictability_horizon < 0.5 * 5 / (0.3 * model.reference_frequency)
     assert found.estimated_error <= 1e-6
-    separation = sb.perturbation_growth(sb.System(model, CONTACT, shaker), sb.Integration(cycles=5))
+    separation = sb.perturbation_growth(
+        sb.System(model, contacts=[sb.Contact(CONTACT, shaker)]), sb.Integration(cycles=5)
+    )
     late = separation.separation.sel(time=slice(2.0 * found.predictability_horizon, None))
     assert float(late.max()) > 1e-7
 
@@ -89,7 +93,9 @@ def test_a_request_beyond_reach_is_said(monkeypatch) -> None:
     model, shaker = model_of(8), shaker_at(0.7, 0.4)
     with pytest.warns(RuntimeWarning, match="met only up to"):
         run = sb.simulate(
-            sb.System(model, CONTACT, shaker), sb.Integration(cycles=5, tolerance=5e-5), sample_times=[0.01]
+            sb.System(model, contacts=[sb.Contact(CONTACT, shaker)]),
+            sb.Integration(cycles=5, tolerance=5e-5),
+            sample_times=[0.01],
         )
     assert run.accuracy is not None
     assert not run.accuracy.reached
@@ -101,7 +107,7 @@ def test_named_levels() -> None:
     """(1.21, 0.18), 32 modes, five cycles: standard within 1e-3, reference within 1e-8."""
     model, shaker = model_of(32), shaker_at(1.21, 0.18)
     times = np.linspace(0.0, 5 / (1.21 * model.reference_frequency), 101)
-    system = sb.System(model, CONTACT, shaker)
+    system = sb.System(model, contacts=[sb.Contact(CONTACT, shaker)])
     levels = {
         name: sb.simulate(system, sb.Integration(cycles=5, accuracy=name), sample_times=times)
         for name in ("standard", "reference")
@@ -121,7 +127,8 @@ def test_named_levels() -> None:
 def test_report_travels_with_the_run() -> None:
     model = model_of(2)
     run = sb.simulate(
-        sb.System(model, CONTACT, shaker_at(1.21, 0.18)), sb.Integration(cycles=2, tolerance=1e-4)
+        sb.System(model, contacts=[sb.Contact(CONTACT, shaker_at(1.21, 0.18))]),
+        sb.Integration(cycles=2, tolerance=1e-4),
     )
     assert run.accuracy is not None
     attrs = run.dataset.attrs
@@ -131,7 +138,9 @@ def test_report_travels_with_the_run() -> None:
     assert attrs["order"] == run.accuracy.order
     json.dumps(attrs)
     assert (
-        sb.simulate(sb.System(model, CONTACT, shaker_at(1.21, 0.18)), sb.Integration(cycles=2)).accuracy
+        sb.simulate(
+            sb.System(model, contacts=[sb.Contact(CONTACT, shaker_at(1.21, 0.18))]), sb.Integration(cycles=2)
+        ).accuracy
         is None
     )
 
@@ -139,12 +148,12 @@ def test_report_travels_with_the_run() -> None:
 def test_mirror_image_is_judged_alike() -> None:
     model = model_of(4)
     below = sb.simulate(
-        sb.System(model, CONTACT, shaker_at(1.625, 0.3)),
+        sb.System(model, contacts=[sb.Contact(CONTACT, shaker_at(1.625, 0.3))]),
         sb.Integration(cycles=2, tolerance=1e-5),
         sample_times=[0.01],
     )
     above = sb.simulate(
-        sb.System(model, CONTACT, shaker_at(1.625, 0.3, side="above")),
+        sb.System(model, contacts=[sb.Contact(CONTACT, shaker_at(1.625, 0.3, side="above"))]),
         sb.Integration(cycles=2, tolerance=1e-5),
         sample_times=[0.01],
     )
@@ -169,19 +178,19 @@ def test_conditioning_is_a_growing_response() -> None:
     """It grows in time, is linear in a small perturbation, and zero where nothing is driven."""
     model, shaker = model_of(2), shaker_at(1.21, 0.18)
     small = sb.perturbation_growth(
-        sb.System(model, CONTACT, shaker), sb.Integration(cycles=3), perturbation=1e-9
+        sb.System(model, contacts=[sb.Contact(CONTACT, shaker)]), sb.Integration(cycles=3), perturbation=1e-9
     )
     large = sb.perturbation_growth(
-        sb.System(model, CONTACT, shaker), sb.Integration(cycles=3), perturbation=1e-8
+        sb.System(model, contacts=[sb.Contact(CONTACT, shaker)]), sb.Integration(cycles=3), perturbation=1e-8
     )
     assert (np.diff(small.separation) >= 0.0).all()
     assert float(large.separation[-1]) == pytest.approx(10.0 * float(small.separation[-1]), rel=0.02)
     assert small.separation.attrs["units"] == "1"
     assert small.attrs["perturbation"] == 1e-9
     assert (
-        sb.perturbation_growth(sb.System(model, CONTACT, shaker), sb.Integration(cycles=1)).attrs[
-            "perturbation"
-        ]
+        sb.perturbation_growth(
+            sb.System(model, contacts=[sb.Contact(CONTACT, shaker)]), sb.Integration(cycles=1)
+        ).attrs["perturbation"]
         == PERTURBATION
     )
 
@@ -196,7 +205,7 @@ def test_tolerance_excludes_a_step(given: dict) -> None:
 def test_refuses_tolerances_out_of_range(tolerance) -> None:
     with pytest.raises(sb.InputError, match="tolerance"):
         sb.simulate(
-            sb.System(model_of(1), CONTACT, shaker_at(1.21, 0.18)),
+            sb.System(model_of(1), contacts=[sb.Contact(CONTACT, shaker_at(1.21, 0.18))]),
             sb.Integration(cycles=1, tolerance=tolerance),
         )
 
@@ -232,7 +241,9 @@ def test_every_motion_is_changed(name: str, beside: bool) -> None:
     """What a run makes of a change of its drive is asked of every drive, alone and beside others; some stood still."""
     base = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1))
     striker = sb.Striker(drive=MOTIONS[name], gap=0.0)
-    system = sb.System(model_of(1), CONTACT, striker, base_excitation=base if beside else None)
+    system = sb.System(
+        model_of(1), contacts=[sb.Contact(CONTACT, striker)], base_excitation=base if beside else None
+    )
     times = np.linspace(0.0, 0.012, 25)
     before, after = moved(system, None, times), moved(system, 0.5, times)
     assert np.ptp(before) > 0.0
@@ -248,7 +259,8 @@ def test_all_that_drives_is_changed() -> None:
     }
     second = sb.Striker(drive=MOTIONS["noise"], location=0.3, gap=1e-4)
     ensemble = make_ensemble(
-        sb.System(model_of(1), CONTACT, [stop, second], **around), sb.Integration(cycles=1)
+        sb.System(model_of(1), contacts=[sb.Contact(CONTACT, stop), sb.Contact(CONTACT, second)], **around),
+        sb.Integration(cycles=1),
     )
     names, changed = ensemble.drive.number_names, _perturbed(ensemble, 0.5)
     told = {
@@ -263,13 +275,18 @@ def test_all_that_drives_is_changed() -> None:
 def test_what_drives_nothing_changes_the_start() -> None:
     stop = sb.Striker(drive=sb.FixedStop(), gap=1e-4)
     start = sb.State(amplitude=[-1e-4])
-    ensemble = make_ensemble(sb.System(model_of(1), CONTACT, stop, start), sb.Integration(cycles=1))
+    ensemble = make_ensemble(
+        sb.System(model_of(1), contacts=[sb.Contact(CONTACT, stop)], initial_state=start),
+        sb.Integration(cycles=1),
+    )
     np.testing.assert_array_equal(_perturbed(ensemble, 0.5).starts, 1.5 * ensemble.starts)
 
 
 def test_a_drive_that_does_not_say_what_it_scales_with_is_refused(monkeypatch) -> None:
     """Nothing would be changed, and the response would be said to be 0."""
-    system = sb.System(model_of(1), CONTACT, sb.Striker(drive=MOTIONS["shock"], gap=0.0))
+    system = sb.System(
+        model_of(1), contacts=[sb.Contact(CONTACT, sb.Striker(drive=MOTIONS["shock"], gap=0.0))]
+    )
     ensemble = make_ensemble(system, sb.Integration(cycles=1))
     monkeypatch.setattr(sb.HalfSine, "amplitudes", ())
     with pytest.raises(sb.InputError, match="drive = 'half_sine': must name the numbers"):

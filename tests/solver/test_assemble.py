@@ -14,7 +14,10 @@ from snapbeam.solver.structure import structure_of
 from snapbeam.util.validation import InputError
 
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=5)
-SYSTEM = sb.System(MODEL, default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))
+SYSTEM = sb.System(
+    MODEL,
+    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))],
+)
 
 
 @pytest.mark.parametrize("side", ["below", "above"])
@@ -77,10 +80,10 @@ def test_the_tip_touches_unless_a_gap_is_given() -> None:
     assert offset() == 0.0
     stroke = 0.18 / 1.21 * default_values.BEAM.buckling_level
     assert offset(**{"drive.phase": 0.5}) == pytest.approx(-stroke * math.sin(0.5), rel=1e-12)
-    assert offset(**{"striker.gap": 1e-4}) == -1e-4
-    assert offset(**{"striker.gap": -1e-5}) == 1e-5
+    assert offset(**{"contact.gap": 1e-4}) == -1e-4
+    assert offset(**{"contact.gap": -1e-5}) == 1e-5
     for side, sign in (("below", 1.0), ("above", -1.0)):
-        given = {"striker.side": side}
+        given = {"contact.side": side}
         struck = SYSTEM.replace(**given)
         rest = sign * float(MODEL.shape_at(default_values.LOCATION) @ MODEL.well_amplitude)
         placed = struck.replace(**{"initial_state.striker_position": rest - sign * 2e-5})
@@ -91,7 +94,7 @@ def test_the_tip_touches_unless_a_gap_is_given() -> None:
 def test_a_column_that_is_the_systems_own_changes_nothing() -> None:
     integration = sb.Integration(cycles=2)
     alone = make_ensemble(SYSTEM, integration)
-    for name in ("drive.frequency_ratio", "striker.location", "contact.stiffness", "drive.phase"):
+    for name in ("drive.frequency_ratio", "contact.location", "contact.stiffness", "drive.phase"):
         same = make_ensemble(SYSTEM, integration, {name: np.full(2, SYSTEM.get(name))})
         assert same.size == 2
         for column in alone.runs.dtype.names:
@@ -102,7 +105,7 @@ def test_a_column_that_is_the_systems_own_changes_nothing() -> None:
 def test_an_ensemble_holds_no_layout() -> None:
     """Modes are counted as the model counts them; padding is an engine's own affair."""
     ensemble = make_ensemble(
-        SYSTEM, sb.Integration(cycles=1), {"striker.location": np.array([0.3, 0.4, 0.3])}
+        SYSTEM, sb.Integration(cycles=1), {"contact.location": np.array([0.3, 0.4, 0.3])}
     )
     assert ensemble.structure.omega.shape == (5,)
     assert ensemble.starts.shape == (1, 2, 5)

@@ -49,7 +49,10 @@ def assert_of_beam(run: sb.Run) -> None:
 
 @pytest.mark.parametrize("name", ["suspended", pytest.param("two strikers", marks=pytest.mark.slow)])
 def test_statistics_are_those_of_the_recorded_beam(name) -> None:
-    run = recorded(sb.System(MODEL, default_values.CONTACT, STRUCK[name]), sb.Integration(cycles=6))
+    run = recorded(
+        sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, STRUCK[name])]),
+        sb.Integration(cycles=6),
+    )
     assert run.summary.impacts > 1
     assert_of_beam(run)
 
@@ -64,7 +67,7 @@ def test_a_sphere_that_flies_away_leaves_no_trace_in_the_statistics() -> None:
     register_statistic(own)
     try:
         how = sb.Integration(cycles=6, high_frequency_ratio=2.0)
-        run = recorded(sb.System(MODEL, default_values.CONTACT, SPHERE), how)
+        run = recorded(sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, SPHERE)]), how)
     finally:
         unregister_statistic("own_peak")
     assert float(run.final_state.striker_rate) < -0.1, "it flies away"
@@ -90,7 +93,7 @@ def test_energy_in_a_circuit_is_not_in_the_modes() -> None:
     """All modes of the beam are high here, so that their share is 1, whatever energy the circuit stores."""
     coil = sb.ElectromagneticHarvester(force_factor=3.0, resistance=50.0, inductance=0.5)
     start = sb.State(amplitude=0.8 * MODEL.mirrored.well_amplitude)
-    system = sb.System(MODEL, initial_state=start, harvester=coil)
+    system = sb.System(MODEL, harvesters=[coil], initial_state=start)
     run = sb.simulate(system, sb.Integration(cycles=4, high_frequency_ratio=0.2))
     assert float(run.dataset.energy_circuit.max()) > 1e-3 * float(run.dataset.energy_beam.max())
     assert run.summary.high_frequency_energy_fraction == pytest.approx(1.0, rel=1e-12)
@@ -98,7 +101,7 @@ def test_energy_in_a_circuit_is_not_in_the_modes() -> None:
 
 def test_replicates_keep_the_state_of_the_striker() -> None:
     start = sb.State(amplitude=MODEL.well_amplitude, striker_shift=-1e-4, striker_rate=0.03)
-    system = sb.System(MODEL, default_values.CONTACT, SUSPENDED, start)
+    system = sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, SUSPENDED)], initial_state=start)
     begun = perturbed_start(system, Replicates(2), 1)
     assert float(begun.striker_shift) == -1e-4 and float(begun.striker_rate) == 0.03
     assert (begun.amplitude != start.amplitude).all()

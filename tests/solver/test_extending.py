@@ -70,8 +70,9 @@ def thrown(law: type[sb.ContactLaw], spring: float) -> sb.System:
         [[MASS]], [0.0], contact_shape=[1.0], length_scale=0.335e-3, reference_frequency=80.0
     )
     return sb.System(
-        model, law(spring), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0),
-        sb.State(amplitude=[0.0], velocity=[-SPEED]),
+        model,
+        contacts=[sb.Contact(law(spring), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0))],
+        initial_state=sb.State(amplitude=[0.0], velocity=[-SPEED]),
     )  # fmt: skip
 
 
@@ -120,8 +121,8 @@ def test_a_beam_struck_by_a_spring(own, tmp_path) -> None:
     """The energy balance closes, runs end early with the same class, and a system with the law is saved and read back."""
     law, *_ = own
     system = sb.System(
-        sb.ReducedModel.from_beam(default_values.BEAM, modes=4, damping_ratio=0.0), law(2e6),
-        sb.Shaker(frequency_ratio=1.4, velocity_amplitude=0.05),
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=4, damping_ratio=0.0),
+        contacts=[sb.Contact(law(2e6), sb.Shaker(frequency_ratio=1.4, velocity_amplitude=0.05))],
     )  # fmt: skip
     axes = {"contact.linear_stiffness": [5e5, 2e6], "velocity_amplitude": [0.02, 0.3, 0.5]}
     ds = sb.sweep(system, axes, sb.Integration(cycles=8))

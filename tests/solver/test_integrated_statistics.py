@@ -62,7 +62,10 @@ def test_random_runs_with_contact(modes: int, accuracy: str) -> None:
         ratio, ratio_of_high = rng.uniform(0.7, 1.8), rng.uniform(2.0, 6.0)
         drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=rng.uniform(0.05, 0.6))
         system = sb.System(
-            model, default_values.CONTACT, sb.Striker(drive=drive, location=rng.uniform(0.3, 0.5))
+            model,
+            contacts=[
+                sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=rng.uniform(0.3, 0.5)))
+            ],
         )
         how = sb.Integration(cycles=5, accuracy=accuracy, high_frequency_ratio=ratio_of_high)
         run = assert_integrated(system, how, 1.0 / (ratio * model.reference_frequency))
@@ -83,7 +86,9 @@ def test_unequal_wells(accuracy: str) -> None:
     reached = 0
     for ratio, velocity in ((1.1, 0.5), (1.4, 0.1)):
         drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity)
-        system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, location=0.45))
+        system = sb.System(
+            model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=0.45))]
+        )
         how = sb.Integration(cycles=5, accuracy=accuracy, high_frequency_ratio=2.0)
         run = assert_integrated(system, how, 1.0 / (ratio * model.reference_frequency))
         wanted = share(run, wells, model.dividing_height)
@@ -97,7 +102,10 @@ def test_a_statistic_that_is_registered_after_a_run_has_its_own_kernels() -> Non
     """No record is taken for one of another layout: Numba says nothing, and the results are the same."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
     striker = sb.Striker(drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.2))
-    system, how = sb.System(model, default_values.CONTACT, striker), sb.Integration(cycles=3)
+    system, how = (
+        sb.System(model, contacts=[sb.Contact(default_values.CONTACT, striker)]),
+        sb.Integration(cycles=3),
+    )
     before = sb.simulate(system, how).summary
     row = Statistic(
         "steps_counted", "float64", "1", "steps of the run", lambda reading, held: held, update=lambda held, _: held + 1.0
@@ -147,7 +155,9 @@ def test_the_layouts_of_the_processor_agree_on_integrated_statistics(monkeypatch
     striker = sb.Striker(drive=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.2), location=0.4)
     how = sb.Integration(cycles=8, high_frequency_ratio=1.5)
     points = {"drive.velocity_amplitude": np.linspace(0.05, 0.8, 9)}
-    ensemble = make_ensemble(sb.System(model, default_values.CONTACT, striker), how, points)
+    ensemble = make_ensemble(
+        sb.System(model, contacts=[sb.Contact(default_values.CONTACT, striker)]), how, points
+    )
     monkeypatch.setattr(driver, "FEWEST_STEPS", 0.0)
     found = []
     for most in (0, 12):

@@ -23,7 +23,7 @@ shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3)
 laws = {"hertz": default_values.CONTACT, "plastic": sb.Restitution(0.0), "elastic": sb.Restitution(0.9)}
 found = {}
 for name in sys.argv[1:]:
-    system, asked = sb.System(model, laws[name], shaker), sb.Integration(cycles=3)
+    system, asked = sb.System(model, contacts=[sb.Contact(laws[name], shaker)]), sb.Integration(cycles=3)
     run = sb.simulate(system, asked, sample_times=[0.0])
     ds = sb.sweep(system, {"velocity_amplitude": [0.3]}, asked)
     found[name] = [repr(dict(run.summary)), repr({str(k): v.item() for k, v in ds.data_vars.items()})]

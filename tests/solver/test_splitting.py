@@ -64,7 +64,7 @@ def test_measured_order_with_contact(modes: int, pair: tuple[float, float]) -> N
     shaker = sb.Shaker(frequency_ratio=pair[0], velocity_amplitude=pair[1])
     end = 2.0 / (pair[0] * model.reference_frequency)
     times = np.linspace(0.0, end, 401)[1:] * (1.0 - 1e-12)
-    system = sb.System(model, default_values.CONTACT, shaker)
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)])
 
     def run(**options: Any) -> Any:
         return sb.simulate(system, sb.Integration(cycles=2, **options), sample_times=times).dataset

@@ -26,7 +26,10 @@ MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=8)
 def run_of(pair: tuple[float, float], cycles: int, side: str = "below") -> tuple[sb.Run, sb.Run]:
     """A run, and the same one sampled densely and evenly."""
     shaker = sb.Shaker(frequency_ratio=pair[0], velocity_amplitude=pair[1], location=0.4, side=side)
-    system, integration = sb.System(MODEL, default_values.CONTACT, shaker), sb.Integration(cycles=cycles)
+    system, integration = (
+        sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, shaker)]),
+        sb.Integration(cycles=cycles),
+    )
     end = cycles / (pair[0] * MODEL.reference_frequency)
     return sb.simulate(system, integration), sb.simulate(
         system, integration, sample_times=np.linspace(0.0, end, 60_001)
@@ -122,7 +125,10 @@ def test_share_of_the_energy_in_high_modes() -> None:
 
 def test_a_map_has_the_statistics_of_its_runs() -> None:
     system = sb.System(
-        MODEL, default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
+        MODEL,
+        contacts=[
+            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))
+        ],
     )
     integration = sb.Integration(cycles=4)
     ds = sb.sweep(system, {"velocity_amplitude": [0.18, 0.3]}, integration)
@@ -163,7 +169,12 @@ def test_a_formula_of_what_is_kept_costs_no_compilation() -> None:
         "mean_force", "float64", "N", "mean contact force over the time of the run",
         lambda reading: reading.seen("total_impulse") / reading.duration,
     )  # fmt: skip
-    system = sb.System(MODEL, default_values.CONTACT, sb.Shaker(frequency_ratio=1.4, velocity_amplitude=0.02))
+    system = sb.System(
+        MODEL,
+        contacts=[
+            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.4, velocity_amplitude=0.02))
+        ],
+    )
     register_statistic(row)
     try:
         run = sb.simulate(system, sb.Integration(cycles=4))

@@ -39,7 +39,7 @@ def test_many_modes_are_as_good_as_few(modes: int) -> None:
     times = np.linspace(0.0, 5.0 / (1.21 * model.reference_frequency), 101)[1:] * (1.0 - 1e-12)
     fine, coarse = (
         sb.simulate(
-            sb.System(model, default_values.CONTACT, shaker),
+            sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)]),
             sb.Integration(cycles=5, accuracy=level),
             sample_times=times,
         ).dataset.displacement_at_striker

@@ -14,14 +14,14 @@ class Broken:
         raise RuntimeError("no array")
 
 
-@pytest.mark.parametrize("name", ["drive.velocity_amplitude", "striker.side"])
+@pytest.mark.parametrize("name", ["drive.velocity_amplitude", "contact.side"])
 @pytest.mark.parametrize(
     "values", [xr.Dataset({"a": ("x", [1.0, 2.0])}), Broken(), object(), {1.0, 2.0}, iter([1.0])], ids=type
 )
 def test_values_that_are_no_array(name, values):
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
     shaker = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1)
-    system = sb.System(model, default_values.CONTACT, shaker)
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)])
     with pytest.raises(sb.InputError, match=rf"^{name} = "):
         sb.sweep(system, {name: values}, sb.Integration(cycles=1))
 
@@ -40,7 +40,7 @@ def test_two_well_limits_of_a_model_without_an_imperfection():
 def test_frequencies_whose_periods_are_not_numbers(ratio):
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=0.1)
-    system = sb.System(model, default_values.CONTACT, shaker)
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)])
     with pytest.raises(sb.InputError, match=r"drive: a period of .* s: must be at least 1e-300 s and finite"):
         sb.simulate(system, sb.Integration(cycles=1))
     with pytest.raises(sb.InputError, match=r"a period of|must be a number"):

@@ -119,7 +119,9 @@ def test_values_that_rounding_alone_tells_apart_are_those_of_the_store(tmp_path,
 
 
 def test_axes_in_another_order_and_of_other_structures_grow_too(tmp_path, model, contact):
-    system = sb.System(model, contact=contact, striker=sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))
+    system = sb.System(
+        model, contacts=[sb.Contact(contact, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))]
+    )
     short = {"velocity_amplitude": [0.1, 0.4], "modes": [1, 3]}
     longer = {"modes": [1, 2, 3], "velocity_amplitude": [0.1, 0.25, 0.4]}
     how = sb.Integration(cycles=3)

@@ -82,7 +82,8 @@ def test_every_point_is_its_run(modes: int) -> None:
         for j in (0, 2):
             shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=VELOCITY[j])
             response = sb.simulate(
-                sb.System(model_of(modes), default_values.CONTACT, shaker), sb.Integration(cycles=4)
+                sb.System(model_of(modes), contacts=[sb.Contact(default_values.CONTACT, shaker)]),
+                sb.Integration(cycles=4),
             ).summary
             point = {name: ds[name].values[i, j].item() for name in STATISTICS}
             np.testing.assert_equal(point, dict(response))
@@ -213,9 +214,7 @@ def test_refuses_what_is_no_system() -> None:
     axes = {"frequency_ratio": 1.0, "velocity_amplitude": 0.1, "cycles": 1}
     with pytest.raises(sb.InputError, match="needs a buckled beam: axial_load = 0 N must exceed"):
         swept(sb.ReducedModel.from_beam(default_values.STRAIGHT_BEAM, 2), default_values.CONTACT, **axes)
-    with pytest.raises(
-        sb.InputError, match="contact = None: a striker needs a law of contact, such as HertzContact"
-    ):
+    with pytest.raises(sb.InputError, match="law = None: must be a law of contact, such as HertzContact"):
         swept(model_of(1), None, **axes)  # type: ignore[arg-type]
     with pytest.raises(sb.InputTypeError, match="model = 'beam': must be a ReducedModel"):
         swept("beam", default_values.CONTACT, **axes)  # type: ignore[arg-type]

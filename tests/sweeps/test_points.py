@@ -19,7 +19,7 @@ MIXED = {
     "beam.thickness": [3e-4, 4e-4],
     "drive.velocity_amplitude": np.linspace(0.1, 0.4, 4),
     "modes": [1, 3],
-    "striker.side": ["below", "above"],
+    "contact.side": ["below", "above"],
     "early_termination": [False, True],
 }
 
@@ -28,7 +28,7 @@ def test_a_mapping_makes_a_grid() -> None:
     grid = points_of(MIXED)
     assert isinstance(grid, Grid)
     assert list(grid.axes) == [
-        "drive.frequency_ratio", "beam.thickness", "drive.velocity_amplitude", "model.modes", "striker.side",
+        "drive.frequency_ratio", "beam.thickness", "drive.velocity_amplitude", "model.modes", "contact.side",
         "integration.early_termination",
     ]  # fmt: skip
     assert grid.dims == (
@@ -42,7 +42,7 @@ def test_counting_keeps_the_runs_of_a_structure_together() -> None:
     """Axes of the structure outermost, each group in the order it was given; every combination once."""
     grid = points_of(MIXED)
     assert grid.order == (
-        "beam.thickness", "model.modes", "striker.side", "integration.early_termination", "drive.frequency_ratio",
+        "beam.thickness", "model.modes", "contact.side", "integration.early_termination", "drive.frequency_ratio",
         "drive.velocity_amplitude",
     )  # fmt: skip
     assert grid.shape == (2, 2, 2, 2, 3, 4)
@@ -114,7 +114,7 @@ def test_a_list_needs_no_order_and_may_repeat() -> None:
 
 def test_one_value_of_a_dataset_holds_for_all() -> None:
     points = points_of(xr.Dataset({"frequency_ratio": ("p", [1.0, 2.0]), "location": 0.3}))
-    assert points.columns["striker.location"].tolist() == [0.3, 0.3]
+    assert points.columns["contact.location"].tolist() == [0.3, 0.3]
 
 
 def test_lists_are_told_apart() -> None:
@@ -159,8 +159,8 @@ def frame(**columns) -> pd.DataFrame:
             r"location of shape \(1, 2\): must be a number or a one-dimensional array",
         ),
         ({"modes": [1.5, 2.0]}, r"modes = 1.5: must be an integer in \[1, 256\]"),
-        ({"striker.side": ["below", "left"]}, "side = 'left': must be one of 'below', 'above'"),
-        ({"striker.side": ["below", "below"]}, "must differ from each other"),
+        ({"contact.side": ["below", "left"]}, "side = 'left': must be one of 'below', 'above'"),
+        ({"contact.side": ["below", "below"]}, "must differ from each other"),
         ({"frequency_ratio": ["a", "b"]}, "frequency_ratio = .*must be an array of numbers"),
         (
             frame(frequency_ratio=[1.0, -1.0]),
@@ -196,10 +196,10 @@ def test_axes_in_hz_keep_their_hz() -> None:
     """Axes in Hz and m are a grid of ratios; beside an axis that changes the frequency they stay in Hz."""
     system = Config().system.replace(**{"model.modes": 1})
     freq = system.model.reference_frequency
-    grid = physical_points(system, {"frequency_hz": [50.0, 100.0], "striker.location_m": [0.04, 0.06]})
+    grid = physical_points(system, {"frequency_hz": [50.0, 100.0], "contact.location_m": [0.04, 0.06]})
     assert isinstance(grid, Grid)
     np.testing.assert_allclose(grid.axes["drive.frequency_ratio"] * freq, [50.0, 100.0], rtol=1e-14)
-    np.testing.assert_allclose(grid.axes["striker.location"] * 0.161, [0.04, 0.06], rtol=1e-14)
+    np.testing.assert_allclose(grid.axes["contact.location"] * 0.161, [0.04, 0.06], rtol=1e-14)
     made = physical_points(system, {"beam.length": [0.1, 0.161], "drive.frequency_hz": [50.0, 100.0]})
     assert isinstance(made, Grid)
     assert made.axes["drive.frequency_hz"].tolist() == [50.0, 100.0]

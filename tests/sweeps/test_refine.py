@@ -120,7 +120,7 @@ def test_three_axes():
     def ball(frequency_ratio, velocity_amplitude, location):
         return np.where(frequency_ratio**2 + velocity_amplitude**2 + location**2 < 0.5, 1, 0)
 
-    names = ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location")
+    names = ("drive.frequency_ratio", "drive.velocity_amplitude", "contact.location")
     axes = {name: np.linspace(0.0, 1.0, 5) for name in names}
     grid, results = refine(DrawnRunner(Grid(axes), ball), 2)
     np.testing.assert_array_equal(results.columns.integers[:, 0].reshape(grid.shape), truth(grid, ball))
@@ -138,7 +138,7 @@ def test_whole_numbers_and_words_have_nothing_between_them():
         {
             "drive.velocity_amplitude": np.linspace(0.0, 1.0, 9),
             "model.modes": np.array([1, 8]),
-            "striker.side": np.array(["below", "above"]),
+            "contact.side": np.array(["below", "above"]),
             "beam.thickness": np.linspace(3e-4, 5e-4, 3),
         }
     )
@@ -146,7 +146,7 @@ def test_whole_numbers_and_words_have_nothing_between_them():
     book = DrawnRunner(coarse, by_structure)
     grid, results = refine(book, 3)
     assert {name: values.size for name, values in grid.axes.items()} == {
-        "drive.velocity_amplitude": 65, "model.modes": 2, "striker.side": 2, "beam.thickness": 17,
+        "drive.velocity_amplitude": 65, "model.modes": 2, "contact.side": 2, "beam.thickness": 17,
     }  # fmt: skip
     found = results.columns.integers[:, 0].reshape(grid.shape)
     np.testing.assert_array_equal(found, truth(grid, by_structure))
@@ -158,7 +158,7 @@ def test_whole_numbers_and_words_have_nothing_between_them():
 def test_a_list_cannot_be_refined(small):
     points = xr.Dataset({"frequency_ratio": ("point", [1.0, 1.5])})
     shaker = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3)
-    system = sb.System(small["model"], small["contact"], shaker)
+    system = sb.System(small["model"], contacts=[sb.Contact(small["contact"], shaker)])
     with pytest.raises(InputError, match="refine_levels: a list of points cannot be refined; give axes"):
         sb.sweep(system, points, sb.Integration(cycles=1), refine_levels=1)
 

@@ -22,7 +22,10 @@ def test_measuring_error_is_that_of_a_pixel():
 
 
 def starts_of(model, replicates, side="below"):
-    system = sb.System(model, CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, side=side))
+    system = sb.System(
+        model,
+        contacts=[sb.Contact(CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, side=side))],
+    )
     return [perturbed_start(system, replicates, repeat) for repeat in range(replicates.count)]
 
 
@@ -78,7 +81,9 @@ def test_shares(small):
 def test_repeats_of_starts_that_are_swept():
     """A change is added to where each point begins, not to the rest state."""
     model = sb.ReducedModel.from_beam(BEAM, modes=2)
-    system = sb.System(model, CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.02))
+    system = sb.System(
+        model, contacts=[sb.Contact(CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.02))]
+    )
     axes = {"initial_state.velocity[1]": [0.0, 1.0, 2.0], "velocity_amplitude": [0.02, 0.03]}
     asked = sb.Integration(cycles=3)
     ds = sb.sweep(system, axes, asked, replicates=Replicates(2, perturbation_rms=1e-15))

@@ -179,7 +179,7 @@ side, folder = int(sys.argv[1]), sys.argv[2]
 beam = sb.Beam(length=0.161, thickness=0.4e-3, width=15e-3, density=7800.0, young_modulus=200e9,
                buckling_level=0.335e-3)
 model = sb.ReducedModel.from_beam(beam, modes=1)
-system = sb.System(model, sb.HertzContact(stiffness=4e8), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0))
+system = sb.System(model, contacts=[sb.Contact(sb.HertzContact(stiffness=4e8), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0))])
 axes = {"frequency_ratio": np.linspace(2.0, 4.0, side), "velocity_amplitude": np.linspace(0.01, 0.6, 1000)}
 sb.sweep(system, axes, sb.Integration(cycles=1, step=7e-4), checkpoint=folder + "/store", output=folder + "/map.nc")
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)

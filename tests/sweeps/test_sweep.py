@@ -30,8 +30,9 @@ AXES = {
 def system() -> sb.System:
     return sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
-        default_values.CONTACT,
-        sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3),
+        contacts=[
+            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3))
+        ],
     )
 
 
@@ -124,7 +125,7 @@ def test_parts_stores_and_threads(whole, system, tmp_path) -> None:
 def test_the_file_is_the_map(whole, system, tmp_path) -> None:
     """Blocks of a map whose structure is counted outermost lie where xarray would write them."""
     names = ("frequency_ratio", "beam.buckling_level", "modes")
-    axes = {name: AXES[name] for name in names} | {"striker.side": ["below", "above"]}
+    axes = {name: AXES[name] for name in names} | {"contact.side": ["below", "above"]}
     memory = sb.sweep(system, axes, ASKED)
     file = sb.sweep(system, axes, ASKED, output=tmp_path / "a.nc").load()
     memory.to_netcdf(tmp_path / "b.nc", engine="h5netcdf")
@@ -163,7 +164,7 @@ def test_drawn_with_right_labels(system, tmp_path) -> None:
             "Number of modes $N$", r"Excitation frequency $\\Omega$",
         ),
         "contact": (
-            {"contact.stiffness": np.geomspace(1e7, 1e9, 4), "striker.side": ["below", "above"]},
+            {"contact.stiffness": np.geomspace(1e7, 1e9, 4), "contact.side": ["below", "above"]},
             "Contact stiffness $k_c$ (N/m$^{1.5}$)", "Side that the striker pushes from",
         ),
     }  # fmt: skip
@@ -188,9 +189,9 @@ SINGLE = {
     "beam.axial_load": [35.0, 40.0],
     "model.reference_frequency": [80.0, 90.0],
     "contact.stiffness": [1e7, 4e8],
-    "striker.location": [0.25, 0.45],
-    "striker.gap": [-1e-5, 0.0, 2e-5],
-    "striker.side": ["below", "above"],
+    "contact.location": [0.25, 0.45],
+    "contact.gap": [-1e-5, 0.0, 2e-5],
+    "contact.side": ["below", "above"],
     "drive.phase": [0.0, 1.5],
     "drive.velocity_amplitude": [0.0, 0.3],
     "initial_state.amplitude[1]": [-1.0, 0.5],
@@ -218,7 +219,7 @@ def test_an_axis_over(name: str, system) -> None:
 
 @pytest.mark.slow
 def test_restitution(system) -> None:
-    one = system.replace(**{"model.modes": 1}).replace(contact=sb.Restitution(0.5))
+    one = system.replace(**{"model.modes": 1}).replace(**{"contact.law": sb.Restitution(0.5)})
     ds = sb.sweep(one, {"restitution_coefficient": [0.0, 0.4, 0.9], "damping_ratio": [0.001, 0.01]}, ASKED)
     for i, j in itertools.product(range(3), range(2)):
         changed = one.replace(
@@ -241,12 +242,12 @@ def test_recorded_drives(system) -> None:
             frequency=95.0,
         ),
     )
-    shaken = system.replace(striker=record)
+    shaken = system.replace(**{"contact.striker": record})
     ds = sb.sweep(shaken, {"location": [0.3, 0.5], "modes": [1, 2]}, sb.Integration())
     assert ds.attrs["cycles"] == pytest.approx(record.drive.duration * 95.0)
     for i, j in itertools.product(range(2), range(2)):
         changed = shaken.replace(
-            **{"striker.location": ds.location[i].item(), "model.modes": ds.modes[j].item()}
+            **{"contact.location": ds.location[i].item(), "model.modes": ds.modes[j].item()}
         )
         assert_point_is_run(ds.isel(location=i, modes=j), changed, sb.Integration())
 
@@ -316,7 +317,7 @@ def test_a_list_point_for_point(table, system, tmp_path) -> None:
         changed = system.replace(
             **{
                 "drive.frequency_ratio": float(row.frequency_ratio), "model.modes": int(row.modes),
-                "beam.thickness": float(row["beam.thickness"]), "striker.location": float(row.location),
+                "beam.thickness": float(row["beam.thickness"]), "contact.location": float(row.location),
             }
         )  # fmt: skip
         assert_point_is_run(ds.isel(point=i), changed)
@@ -411,12 +412,12 @@ def test_parameters_that_are_only_in_order_together(system) -> None:
                 sb.System(s.model, initial_state=sb.State(amplitude=[0.0, 0.0])), {"location": [0.3]}
             ),
             InputError,
-            r"striker\.location: is not a parameter of this system",
+            r"contact\.location: is not a parameter of this system",
         ),
         (
             lambda s: sb.sweep(sb.System(s.model), {"modes": [1, 2]}),
             InputError,
-            "striker = None: .* needs an initial_state",
+            r"contacts = \[\]: .* needs an initial_state",
         ),
         (
             lambda s: sb.sweep(s, {"beam.buckling_level": [3e-4], "beam.axial_load": [30.0]}),

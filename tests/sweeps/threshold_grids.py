@@ -11,8 +11,7 @@ from snapbeam.util.status_codes import ResponseClass, RunStatus
 
 SYSTEM = sb.System(
     sb.ReducedModel.from_beam(BEAM, modes=1, damping_ratio=0.005),
-    contact=CONTACT,
-    striker=sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.2),
+    contacts=[sb.Contact(CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.2))],
 )
 AMPLITUDE = np.array([0.1, 0.2, 0.3, 0.4, 0.5])
 

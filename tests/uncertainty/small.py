@@ -12,4 +12,4 @@ def small_system(modes: int = 1, **shaker: float) -> sb.System:
     model = sb.ReducedModel.from_beam(
         default_values.BEAM, modes=modes, damping_ratio=default_values.DAMPING_RATIO
     )
-    return sb.System(model, default_values.CONTACT, sb.Shaker(**drive).striker())
+    return sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(**drive).striker())])

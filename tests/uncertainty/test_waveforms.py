@@ -18,7 +18,7 @@ CYCLES, ERROR = 4, 5e-6
 def nominal_system(modes: int = 1, velocity: float = 0.12) -> sb.System:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes, damping_ratio=0.005)
     shaker = sb.Shaker(frequency_ratio=1.4, velocity_amplitude=velocity, location=0.3)
-    return sb.System(model, default_values.CONTACT, shaker)
+    return sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)])
 
 
 def measured(nominal: sb.System, logs: np.ndarray, draw: np.random.Generator) -> sb.uncertainty.Waveform:
@@ -111,7 +111,7 @@ def test_refusals() -> None:
     nominal = nominal_system()
     given = {"system": nominal, "time": [0.0, 1e-3], "displacement": [0.0, 0.0], "standard_error": 1e-6}
     for change, words in (
-        ({"system": nominal.replace(striker=None)}, "must have a striker with a sine"),
+        ({"system": nominal.replace(contacts=[])}, "must have a striker with a sine"),
         ({"time": [1e-3, 0.0]}, "ascending"),
         ({"displacement": [0.0]}, "must hold a number, or NaN, for each time"),
         ({"standard_error": 0.0}, "standard_error"),

@@ -22,7 +22,10 @@ from snapbeam.util.work_rate import WorkRate, compile_seconds
 @pytest.fixture(scope="module")
 def system():
     striker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
-    return sb.System(sb.ReducedModel.from_beam(default_values.BEAM, modes=1), default_values.CONTACT, striker)
+    return sb.System(
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
+        contacts=[sb.Contact(default_values.CONTACT, striker)],
+    )
 
 
 def test_short_words_and_tables(system):

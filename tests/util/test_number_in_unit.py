@@ -77,14 +77,14 @@ def test_a_parameter_file_with_units_is_that_in_si():
                  "buckling_level": 3.35e-4},
         "contact": {"stiffness": 4e8},
         "drive": {"frequency_hz": 100.0},
-        "local_force": {"type": "local_spring", "stiffness": 2000.0, "location": 0.5},
+        "force": {"type": "local_spring", "stiffness": 2000.0, "location": 0.5},
     }  # fmt: skip
     texts = {
         "beam": {"length": "161 mm", "width": "0.5cm", "thickness": "400 um", "density": "7.8 g/cm^3",
                  "young_modulus": "210 GPa", "buckling_level": "335um"},
         "contact": {"stiffness": 4e8},
         "drive": {"frequency_hz": "0.1 kHz"},
-        "local_force": {"type": "local_spring", "stiffness": "2 mN/um", "location": "50 %"},
+        "force": {"type": "local_spring", "stiffness": "2 mN/um", "location": "50 %"},
     }  # fmt: skip
     one, other = (config_from_mapping({"extends": "paper"} | each, "x.toml") for each in (plain, texts))
     for section, values in one.given.items():

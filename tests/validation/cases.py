@@ -67,7 +67,7 @@ def impact_oscillator() -> list[Row]:
         stop = sb.Striker(
             drive=sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=force / damping), gap=1.0
         )
-        system = sb.System(model, sb.Restitution(e), stop)
+        system = sb.System(model, contacts=[sb.Contact(sb.Restitution(e), stop)])
         run = sb.simulate(system, sb.Integration(cycles=400, accuracy=REFERENCE))
         last = run.impacts.isel(impact=-1)
         at = float(last[IMPACT_TIME]) % (2.0 * math.pi)
@@ -85,7 +85,7 @@ def mass_on_a_stop() -> list[Row]:
     model = sb.ReducedModel.from_matrices([[100.0]], [1e4], contact_shape=[1.0])
     start = sb.State(amplitude=[0.0], velocity=[-1.0])
     stop = sb.Striker(drive=sb.FixedStop(), gap=0.0)
-    system = sb.System(model, sb.KelvinVoigt(1e6, 0.0), stop, start)
+    system = sb.System(model, contacts=[sb.Contact(sb.KelvinVoigt(1e6, 0.0), stop)], initial_state=start)
     run = sb.simulate(system, sb.Integration(cycles=1, accuracy=REFERENCE))
     first, second = (run.impacts.isel(impact=i) for i in (0, 1))
     source = "code_aster test SDND101"
@@ -164,7 +164,7 @@ def _flights(e: float, strength: float, holds: Callable[[NDArray[np.float64]], b
         velocity=[1.001 * math.pi],
         striker_position=0.0,
     )
-    system = sb.System(ball, law, table, start, external_force=weight)
+    system = sb.System(ball, contacts=[sb.Contact(law, table)], forces=[weight], initial_state=start)
     run = sb.simulate(system, sb.Integration(cycles=60))
     onset = run.impacts[IMPACT_TIME].values
     flights = onset[1:] - onset[:-1] - run.impacts["duration"].values[:-1]
@@ -193,7 +193,7 @@ def duffing(damping: float, force: float, phase: float) -> sb.System:
         damping_ratio=damping / (2.0 * math.sqrt(2.0)), reference_frequency=0.5 / math.pi,
     )  # fmt: skip
     history = sb.HarmonicForce(frequency_ratio=1.0, amplitude=force, phase=phase)
-    return sb.System(model, external_force=sb.ExternalForce(history=history))
+    return sb.System(model, forces=[sb.ExternalForce(history=history)])
 
 
 def basin_shares(points: int = 100) -> list[Row]:

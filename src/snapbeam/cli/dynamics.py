@@ -62,7 +62,7 @@ dynamics = typer.Typer(
     rich_markup_mode="markdown",
 )
 _ALL = (*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN)
-_AXES = ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location", "model.modes")
+_AXES = ("drive.frequency_ratio", "drive.velocity_amplitude", "contact.location", "model.modes")
 _OWN = "Analysis"
 _FEW = 4000
 """Maximum size of a variable in the JSON output."""

@@ -66,12 +66,21 @@ def equilibria(
             rich_help_panel="Force-displacement",
         ),
     ] = None,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--over",
+            help="Follow the equilibria over a parameter: force.voltage=0:40, beam.buckling_level=0.1mm:0.5mm.",
+            rich_help_panel="Branches over a parameter",
+            metavar="NAME=START:STOP",
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
             "--output",
             "-o",
-            help="NetCDF file of the curve to write.",
+            help="NetCDF file of the curve or the branches to write.",
             rich_help_panel="Output",
             metavar="FILE",
         ),
@@ -96,8 +105,7 @@ def equilibria(
         for name, value in (
             ("--location", location),
             ("--well", well),
-            ("--output", output),
-            ("--plot", plot),
+            *(() if over is not None else (("--output", output), ("--plot", plot))),
         )
         if value is not None
     ]
@@ -105,6 +113,8 @@ def equilibria(
         raise InputError(
             f"{', '.join(asked)}: belongs to the force-displacement curve; add --force-displacement"
         )
+    if with_force and over is not None:
+        raise InputError("--over, --force-displacement: give one of the two")
     check_pictures(("plot", plot))
     settings = configured(given)
     potential = settings.potential
@@ -122,7 +132,7 @@ def equilibria(
         model = identify_imperfection(
             model.beam, lower_frequency, upper_frequency, identify, model.modes, model.imperfection
         )
-        potential = Potential.of(model, None, None)
+        potential = Potential.of(model, ())
         assert model.beam is not None
         assert model.imperfection is not None
         unit = {"midspan_amplitude": "m", "point_load": "N", "uniform_load": "N/m"}[identify]
@@ -173,6 +183,43 @@ def equilibria(
     )  # fmt: skip
     if with_force:
         _force_displacement(potential, 0.5 if location is None else location, well, output, plot)
+    if over is not None:
+        _branches(settings, over, output, plot)
+
+
+def _branches(settings: Any, over: str, output: Path | None, plot: Path | None) -> None:
+    """Print the critical points over a parameter, and write the branches and their figure."""
+    from snapbeam.model.equilibrium_branches import equilibrium_branches
+    from snapbeam.model.parameter_axes import parse_axis
+    from snapbeam.model.parameters import lookup
+    from snapbeam.util.si_prefixes import prefixed
+    from snapbeam.util.validation import InputError
+
+    name, equals, text = over.partition("=")
+    name = settings.resolved(name.strip())
+    unit = lookup(name).quantity.unit
+    if not equals or text.count(":") != 1:
+        raise InputError(f"over = {over!r}: must be name=start:stop, such as force.voltage=0:40")
+    ends = [float(parse_axis(name, each, unit=unit)) for each in text.split(":")]
+    found = equilibrium_branches(settings.static_system, name, (ends[0], ends[1]))
+    console = out()
+    for kind, value, place in zip(
+        *(found[f"critical_{each}"].values for each in ("kind", "value", "displacement")), strict=True
+    ):
+        shown = f"{value:.6g}{'' if unit == '1' else ' ' + unit}"
+        console.print(f"{kind} point at {name} = {shown}, centre at {prefixed(float(place), 'm', 4)}")
+    if not found.sizes["critical_point"]:
+        console.print(f"no critical points over {name}")
+    add_json(
+        parameter=name,
+        critical_values=found["critical_value"].values,
+        critical_displacements=found["critical_displacement"].values,
+        critical_kinds=[str(each) for each in found["critical_kind"].values],
+    )
+    if output is not None:
+        console.print(f"Written: {file_line(write_map(found, output))}")
+    if plot is not None:
+        console.print(f"Written: {file_line(draw(found, plot))}")
 
 
 def _force_displacement(

@@ -26,7 +26,7 @@ __all__ = ["compute_map"]
 
 _AXES = (
     "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
-    "striker.location", "striker.location_m", "model.modes",
+    "contact.location", "contact.location_m", "model.modes",
 )  # fmt: skip
 
 
@@ -143,16 +143,17 @@ def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
     """
     from snapbeam.model.parameter_axes import PHYSICAL
     from snapbeam.model.parameter_file import DEFAULT_AXES
+    from snapbeam.model.quantity import split_name
 
     named: dict[str, Any] = settings.axes(keep_units=True)
-    order = ("model.modes", "drive.frequency_ratio", "drive.velocity_amplitude", "striker.location")
+    order = ("model.modes", "drive.frequency_ratio", "drive.velocity_amplitude", "contact.location")
     if any(text for text in given.get("sweep") or ()) or any(name not in order for name in named):
         return named
     drive = settings.section("drive")
     axes = dict(named)
     for name, text in DEFAULT_AXES.items():
-        field = name.partition(".")[2]
-        physical = {row.parameter: full.partition(".")[2] for full, row in PHYSICAL.items()}[name]
+        field = split_name(name)[1]
+        physical = {row.parameter: split_name(full)[1] for full, row in PHYSICAL.items()}[name]
         if name not in named and field not in drive and physical not in drive:
             axes |= settings.axes({name: text}) if not named else _default(name, text)
     axes = {name: axes[name] for name in sorted(axes, key=lambda each: order.index(each))}
@@ -160,7 +161,7 @@ def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
         import numpy as np
 
         striker = settings.system.striker
-        return {"striker.location": np.array([striker.location])}
+        return {"contact.location": np.array([striker.location])}
     return axes
 
 

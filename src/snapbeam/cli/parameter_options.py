@@ -63,8 +63,8 @@ IMPERFECTION = ("imperfection.midspan_amplitude", "imperfection.antisymmetric_am
 MODEL = ("model.modes", "model.damping_ratio", "model.reference_frequency")
 CONTACT = ("contact.stiffness", "contact.radius", "contact.young_modulus", "contact.poisson_ratio",
            "contact.coefficient", "contact.damping_factor", "contact.restitution", "contact.speed")  # fmt: skip
-STRIKER = ("striker.location", "striker.location_m", "striker.side", "striker.gap", "striker.mass", "striker.suspension_stiffness",
-           "striker.suspension_damping")  # fmt: skip
+STRIKER = ("contact.location", "contact.location_m", "contact.side", "contact.gap", "contact.mass", "contact.suspension_stiffness",
+           "contact.suspension_damping")  # fmt: skip
 DRIVE = (
     "drive.frequency_ratio",
     "drive.frequency_hz",
@@ -87,7 +87,6 @@ _PANELS = {
     "imperfection": "Imperfection (default: none)",
     "model": "Reduced model and contact",
     "contact": "Reduced model and contact",
-    "striker": "Striker and drive",
     "drive": "Striker and drive",
     "integration": "Integration",
 }
@@ -106,10 +105,10 @@ _OPTIONS = {
     "boundary.right_rotational_stiffness": "--right-rotational-stiffness",
     "boundary.axial_support_stiffness": "--axial-support-stiffness",
     "drive.velocity_m_s": "--velocity-m-s",
-    "striker.location_m": "--location-m",
-    "striker.mass": "--striker-mass",
-    "striker.suspension_stiffness": "--striker-suspension-stiffness",
-    "striker.suspension_damping": "--striker-suspension-damping",
+    "contact.location_m": "--location-m",
+    "contact.mass": "--striker-mass",
+    "contact.suspension_stiffness": "--striker-suspension-stiffness",
+    "contact.suspension_damping": "--striker-suspension-damping",
 }
 _WORDS = {
     "contact.radius": "radius of the sphere, m; with the next two options, instead of --contact-stiffness",
@@ -228,8 +227,9 @@ def _option(name: str, is_axis: bool) -> Any:
     """The type of an option, with its words."""
     from snapbeam.model.parameter_axes import PHYSICAL
     from snapbeam.model.parameters import parameters
+    from snapbeam.model.quantity import split_name
 
-    section, _, field = name.partition(".")
+    section, field = split_name(name)
     row, physical = parameters().get(name), PHYSICAL.get(name)
     flag = _OPTIONS.get(name, f"--{field.replace('_', '-')}")
     unit, words, symbol = "", _WORDS.get(name, ""), ""
@@ -240,7 +240,8 @@ def _option(name: str, is_axis: bool) -> Any:
     elif physical is not None:
         words = f"{physical.words}, {physical.unit}, instead of a ratio"
     text = f"{words[:1].upper()}{words[1:]}{_symbol(symbol)}."
-    options: dict[str, Any] = {"help": text, "rich_help_panel": "Axes" if is_axis else _PANELS[section]}
+    panel = "Striker and drive" if name in STRIKER else _PANELS[section]
+    options: dict[str, Any] = {"help": text, "rich_help_panel": "Axes" if is_axis else panel}
     if row is not None and row.quantity.kind is bool:
         return Annotated[bool | None, typer.Option(f"{flag}/--no-{flag[2:]}", **options)]
     if is_axis:
@@ -307,6 +308,7 @@ def configured(
     """
     from snapbeam.model.parameter_file import Config, load_config, override, same_axis
     from snapbeam.model.parameters import lookup
+    from snapbeam.model.quantity import split_name
     from snapbeam.util.validation import InputError
 
     file = given.get("config")
@@ -318,8 +320,8 @@ def configured(
     sections: dict[str, dict[str, Any]] = {}
     axes: dict[str, Any] = {}
     for name, value in given.items():
-        section, dot, field = name.partition(".")
-        if not dot or value is None:
+        section, field = split_name(name)
+        if not field or value is None:
             continue
         if isinstance(value, str) and _is_axis(name, value):
             axes[name] = value
@@ -327,11 +329,13 @@ def configured(
             sections.setdefault(section, {})[field] = _value(name, value)
     for text in given.get("set_") or ():
         name, value = _assignment(text, "set")
-        full = name if "." in name and name.partition(".")[2] == "type" else lookup(name).name
-        section, _, field = full.partition(".")
+        name = config.resolved(name)
+        full = name if split_name(name)[1] in ("type", "label") else lookup(name).name
+        section, field = split_name(full)
         sections.setdefault(section, {})[field] = _value(full, value)
     for text in given.get("sweep") or ():
         name, value = _assignment(text, "sweep")
+        name = config.resolved(name)
         if name in axes:
             raise InputError(f"sweep = {text!r}: {name} is given twice; give each axis once")
         axes[name] = value
@@ -352,7 +356,7 @@ def configured(
         raise typer.Exit
     if config.defaulted and (config.extends_paper or _needs_drive(given)):
         whole = config.whole().to_mapping()
-        taken = [name for name in config.defaulted if name.partition(".")[0] in whole]
+        taken = [name for name in config.defaulted if split_name(name)[0] in whole]
         values = ", ".join(f"{name} = {_shown(whole, name)}" for name in taken)
         source = "taken from the paper's beam" if config.extends_paper else "not in the file, by default"
         if taken:
@@ -369,25 +373,27 @@ def _require_striker(config: Config, sections: Mapping[str, Any], axes: Mapping[
     """Refuse the drive of a striker that neither the file nor an option gives, beside what the file does move."""
     from snapbeam.model.parameter_axes import physical_name
     from snapbeam.model.parameters import lookup
+    from snapbeam.model.quantity import split_name
     from snapbeam.util.validation import InputError
 
     moved = [name for name in ("base_excitation", "axial_load") if config.section(name) or sections.get(name)]
     given = [f"drive.{field}" for field in sections.get("drive", {})]
     swept = [physical_name(name) or lookup(name).name for name in axes]
     given += [name for name in swept if name.startswith("drive.")]
-    others = {*sections, *(name.partition(".")[0] for name in swept), *config.given}
-    if moved and given and not others & {"striker", "contact"} and not config.section("drive"):
+    others = {*sections, *(split_name(name)[0] for name in swept), *config.given}
+    if moved and given and "contact" not in others and not config.section("drive"):
         raise InputError(
             f"{', '.join(given)}: there is no striker to drive, {moved[0]} moves the beam; use --set or --sweep "
-            f"{moved[0]}.NAME=..., or add a [striker]"
+            f"{moved[0]}.NAME=..., or add a [contact]"
         )
 
 
 def _shown(sections: Mapping[str, Mapping[str, Any]], name: str) -> str:
     """A value with its unit."""
     from snapbeam.model.parameters import lookup
+    from snapbeam.model.quantity import split_name
 
-    section, _, field = name.partition(".")
+    section, field = split_name(name)
     value, unit = sections[section][field], lookup(name).quantity.unit
     return f"{value:.6g}{'' if unit == '1' else ' ' + unit}"
 
@@ -768,6 +774,7 @@ def config_of_file(path: Path, point: str | None) -> Config:
     from snapbeam.cli.console import open_result
     from snapbeam.model.parameter_axes import PHYSICAL
     from snapbeam.model.parameter_file import config_from_mapping
+    from snapbeam.model.quantity import split_name
     from snapbeam.util.validation import InputError, parsed_json
 
     dataset = open_result(path)
@@ -793,9 +800,9 @@ def config_of_file(path: Path, point: str | None) -> Config:
         raise InputError(f"from = {str(path)!r}: has its own initial state; use it from Python")
     sections["integration"] = run
     for name, value in _at_point(dataset, point, path).items():
-        section, _, field = name.partition(".")
+        section, field = split_name(name)
         if name in PHYSICAL:
-            sections[section].pop(PHYSICAL[name].parameter.partition(".")[2], None)
+            sections[section].pop(split_name(PHYSICAL[name].parameter)[1], None)
         sections.setdefault(section, {})[field] = value
     return config_from_mapping(sections, path.name)
 

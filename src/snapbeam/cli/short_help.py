@@ -15,7 +15,7 @@ LINES = 25
 _WIDTH = 80
 _ALL = "snapbeam.help_all"
 _USUAL = (
-    "config", "sweep", "drive__frequency_ratio", "drive__velocity_amplitude", "striker__location", "model__modes",
+    "config", "sweep", "drive__frequency_ratio", "drive__velocity_amplitude", "contact__location", "model__modes",
     "integration__cycles", "integration__tolerance", "parameter", "values", "initial_conditions", "output", "plot", "checkpoint",
     "beam__thickness", "beam__buckling_level", "frequency", "buckling_level", "pixel_size", "frame_rate", "location",
     "camera", "drive_output", "picture", "units", "map",

@@ -204,7 +204,7 @@ class _share_done:
 
 _OWN_RECORD = {
     "base_excitation": "recorded_acceleration, record (m/s^2)",
-    "external_force": "recorded_force, record (N)",
+    "force": "recorded_force, record (N)",
 }
 """Type and sampled quantity of a record that a section takes from a parameter file."""
 
@@ -218,7 +218,7 @@ def _require_striker(system: Any) -> None:
     moving = [section for section, _ in system.moving]
     instead = next((section for section in moving if section in _OWN_RECORD), None)
     way = (
-        "use a system with a [striker] and without a moving base, load or external force"
+        "use a system with a [contact] and without a moving base, load or external force"
         if instead is None
         else f"give the record in the file: [{instead}] with type = {_OWN_RECORD[instead]} and sampling_frequency (Hz)"
     )

@@ -17,7 +17,7 @@ from snapbeam.cli.console import duration, file_line
 from snapbeam.cli.parameter_options import point_text
 from snapbeam.model.parameter_axes import PHYSICAL
 from snapbeam.model.parameters import lookup, parameters
-from snapbeam.model.striker import numbered
+from snapbeam.model.quantity import numbered, split_name
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError
@@ -154,7 +154,7 @@ def _modes(dataset: xr.Dataset) -> str:
 
 _SNAPPED = ResponseClass.TRANSIENT_1
 """First class of an interwell response."""
-_DRIVING = ("drive", "base_excitation", "axial_load", "external_force")
+_DRIVING = ("drive", "base_excitation", "axial_load", "force")
 """Sections whose amplitudes drive the system; of strikers after the first with a number."""
 _STRENGTH = re.compile("amplitude|velocity|acceleration|displacement|force$|change")
 """Names of the parameters of an excitation that its strength follows from."""
@@ -165,7 +165,7 @@ _WITH_PREFIX = frozenset(("m", "m/s", "s", "N", "N/m", "Pa", "Hz", "ohm", "F", "
 
 def _drives(parameter: str) -> bool:
     """Return True for the dotted name of a parameter that the strength of an excitation follows from."""
-    section, _, field = parameter.partition(".")
+    section, field = split_name(parameter)
     return numbered(section)[0] in _DRIVING and _STRENGTH.search(field) is not None
 
 

@@ -33,7 +33,7 @@ __all__ = ["threshold"]
 
 _AXES = (
     "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
-    "striker.location", "striker.location_m", "model.modes",
+    "contact.location", "contact.location_m", "model.modes",
 )  # fmt: skip
 _VALUES = "0.005:0.64:128"
 

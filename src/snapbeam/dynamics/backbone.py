@@ -351,15 +351,13 @@ def _stop_of(system: System) -> tuple[Any, float, float, float] | None:
         If anything else acts on the beam.
     """
     acting = [
-        name
-        for name in ("base_excitation", "axial_load", "external_force", "local_force", "harvester")
-        if getattr(system, name) is not None
+        name for name in ("base_excitation", "axial_load", "forces", "harvesters") if getattr(system, name)
     ]
-    if acting or system.further_contacts:
+    if acting or system.contacts[1:]:
         raise InputError(
             f"system with {', '.join(acting) or 'several strikers'}: a backbone curve is of free motion; leave it out"
         )
-    striker, law = system.striker, system.contact
+    striker, law = system.striker, system.contact_law
     if striker is None or law is None:
         return None
     if not isinstance(striker.drive, FixedStop) or striker.mass is not None:

@@ -91,7 +91,7 @@ def bifurcation_diagram(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> diagram = sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", [0.02, 0.03, 0.04])
     >>> dict(diagram.sizes)
     {'sweep': 2, 'velocity_amplitude': 3, 'period': 32}
@@ -205,7 +205,7 @@ class _Diagram:
     ) -> None:
         """Every value from one start."""
         system = self.flow.system
-        location = self.values if self.name == "striker.location" else None
+        location = self.values if self.name == "contact.location" else None
         state = starts.state(system, number, system.start_state, location)
         rows = np.broadcast_to(self.flow.coordinates(state), (self.values.size, self.flow.dimension))
         kept, counts = self._go(rows, np.arange(self.values.size))

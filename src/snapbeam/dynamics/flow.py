@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.model.drive.base import HORIZON, Drive
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
+from snapbeam.model.quantity import split_name
 from snapbeam.model.state import State, amplitude_scale
 from snapbeam.model.system import System
 from snapbeam.simulation.request import cycle_of
@@ -184,9 +185,9 @@ def held_in_space(system: System) -> System:
         return system
     offset, without_gap = (
         float(make_ensemble(each, Integration()).runs["offset"][0])
-        for each in (system, system.replace(**{"striker.gap": 0.0, "initial_state": None}))
+        for each in (system, system.replace(**{"contact.gap": 0.0, "initial_state": None}))
     )
-    held = system.replace(**{"striker.gap": without_gap - offset})
+    held = system.replace(**{"contact.gap": without_gap - offset})
     start = system.initial_state
     if start is None or np.isnan(start.striker_position).all():
         return held
@@ -208,7 +209,7 @@ def require_map(system: System) -> None:
         )
     if system.striker is not None and system.striker.mass is not None:
         raise InputError(
-            f"striker.mass = {system.striker.mass:g}: a striker with a mass has a state of its own, which the dynamics "
+            f"contact.mass = {system.striker.mass:g}: a striker with a mass has a state of its own, which the dynamics "
             "tools do not include; integrate such a system by sb.advance(system, save_every_period=True)"
         )
 
@@ -226,9 +227,7 @@ def frequencies_of(
     runs, found = cycles_of(system, columns).size, []
     for section, drive in system.moving:
         own = {
-            name.partition(".")[2]: values
-            for name, values in columns.items()
-            if name.startswith(f"{section}.")
+            split_name(name)[1]: values for name, values in columns.items() if split_name(name)[0] == section
         }
         found.append((section, drive, drive.frequencies(own or {"": np.zeros(runs)}, system.scale)))
     return found
@@ -412,13 +411,8 @@ class Stroboscope:
     @property
     def smooth(self) -> bool:
         """Whether tangents exist: no local force, and contact forces without a jump that depend on the penetration only."""
-        contact = self.system.contact
-        if self.system.local_force is not None:
-            return False
-        if contact is None or self.system.striker is None:
-            return True
-        laws = [contact, *(each.contact for each in self.system.further_contacts)]
-        return all(law.properties.smooth and law.properties.tangent for law in laws)
+        laws = [each.law.properties for each in self.system.contacts]
+        return not self.system.local_forces and all(law.smooth and law.tangent for law in laws)
 
     @property
     def refined(self) -> Stroboscope:
@@ -497,7 +491,7 @@ class Stroboscope:
 
     def _require_free(self, name: str) -> None:
         """Refuse to change a phase that another value would override."""
-        section, _, field = lookup(name).name.partition(".")
+        section, field = split_name(lookup(name).name)
         leads = self.system.moving[:1]
         if field != "phase" or not leads or section != leads[0][0]:
             return

@@ -306,7 +306,7 @@ class LifetimeWork(PointWork):
         size = next(iter(points.values())).size
         for system, integration, which, own in setup.groups(points):
             begun = self.initial_conditions.state(
-                system, number, setup.start_of(system, own), own.get("striker.location")
+                system, number, setup.start_of(system, own), own.get("contact.location")
             )
             columns = {name: values for name, values in own.items() if not name.startswith("initial_state.")}
             ensemble = make_ensemble(system, integration, columns, start=begun)
@@ -416,7 +416,7 @@ def lifetime_map(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> ds = sb.dynamics.lifetime_map(
     ...     system,
     ...     {"drive.velocity_amplitude": [0.1, 0.2]},
@@ -456,7 +456,7 @@ def require_excitation(system: System) -> None:
     """
     if not system.moving:
         raise InputError(
-            "striker = None: a beam that nothing strikes or shakes does not go on snapping; give a striker, a "
+            "contacts = []: a beam that nothing strikes or shakes does not go on snapping; give a striker, a "
             "base_excitation, an axial_load or an external_force"
         )
 
@@ -483,7 +483,7 @@ def _setup(system: System, axes: Any, integration: Integration) -> SweepSetup:
 def _own_point(system: System) -> dict[str, NDArray[np.float64]]:
     """One parameter of the system with its own value: a sweep of one point."""
     if system.striker is not None:
-        return {"striker.location": np.array([system.striker.location])}
+        return {"contact.location": np.array([system.striker.location])}
     section, drive = system.moving[0]
     name, value = next(iter(drive.values().items()))
     return {f"{section}.{name}": np.array([value])}

@@ -106,7 +106,7 @@ def lyapunov_spectrum(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> result = sb.dynamics.lyapunov_spectrum(system, 2, periods=40, transient=20)
     >>> result.exponent.dims, result.exponent.attrs["units"]
     (('run', 'exponent_number'), '1/s')
@@ -333,7 +333,7 @@ def largest_lyapunov(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> result = sb.dynamics.largest_lyapunov(system, 40, transient=20)
     >>> bool(result.exponent < 0.0)
     True

@@ -83,7 +83,7 @@ class OrbitNotFoundError(RuntimeError):
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> try:
     ...     sb.dynamics.periodic_orbit(system, [5.0, 3.0], iterations=2)
     ... except sb.dynamics.OrbitNotFoundError as error:
@@ -339,7 +339,7 @@ def passage_of(flow: Stroboscope, coordinates: _Array, periods: int) -> Passage:
     depths = data["penetration_normalised"].values[:, None]
     onset, duration = run.impacts["onset"].values, run.impacts["duration"].values
     striker = np.zeros(onset.size, dtype=np.int64)
-    if system.further_contacts:
+    if system.contacts[1:]:
         depths, striker = data["striker_penetrations"].values, run.impacts["striker"].values.astype(int) - 1
     held, spacing = np.zeros(depths.shape, dtype=bool), 1.000001 * (time[1] - time[0])
     lightest = least = np.nan
@@ -404,7 +404,7 @@ class PeriodicOrbit:
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> orbit.is_stable, bool(abs(orbit.multipliers).max() < 1.0)
     (True, True)
@@ -620,7 +620,7 @@ def periodic_orbit(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> orbit.period, orbit.residual < 1e-10
     (1, True)
@@ -628,7 +628,7 @@ def periodic_orbit(
     flow = flow_of(system, integration, "reference")
     if isinstance(flow, Stroboscope):
         if flow.system.primary_excitation is None:
-            raise InputError("striker = None: a beam without excitation has no orbit except its equilibrium")
+            raise InputError("contacts = []: a beam without excitation has no orbit except its equilibrium")
         if phase is not None:
             flow = Stroboscope(flow.system, flow.integration, phase)
     elif phase is not None:

@@ -87,7 +87,7 @@ def poincare_section(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> section = sb.dynamics.poincare_section(system, "impact", 20, transient=20)
     >>> sorted(section.data_vars)[:3]
     ['displacement_at_striker', 'drive_phase', 'midspan_displacement']
@@ -95,7 +95,7 @@ def poincare_section(
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if system.primary_excitation is None:
-        raise InputError("striker = None: a section needs a drive, a base excitation or an axial load")
+        raise InputError("contacts = []: a section needs a drive, a base excitation or an axial load")
     total = integer("periods", periods, 1, 10**6)
     flow = Stroboscope(system, Integration() if integration is None else integration, phase)
     level = _level(section)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from snapbeam.dynamics.flow import frequencies_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
-from snapbeam.model.striker import numbered
+from snapbeam.model.quantity import numbered
 from snapbeam.model.system import System
 from snapbeam.simulation.simulate import simulate
 from snapbeam.solver.assemble import make_ensemble, run_columns
@@ -81,7 +81,7 @@ def hysteresis(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> found = sb.dynamics.hysteresis(system, "velocity_amplitude", [0.02, 0.03], sb.Integration(cycles=20))
     >>> found["peak_force"].dims
     ('sweep', 'velocity_amplitude')
@@ -107,7 +107,7 @@ def hysteresis(
     for value in points:
         make_ensemble(system.replace(**{row.name: float(value)}), settings)
     told = counting(progress, "hysteresis", "values")
-    rows = rows_for(len(system.further_contacts) + (system.striker is not None))
+    rows = rows_for(len(system.contacts))
     tables: dict[str, Any] = {
         key: np.full((len(kinds), points.size), _missing(key, each.dtype), each.dtype)
         for key, each in rows.items()

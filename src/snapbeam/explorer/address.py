@@ -16,13 +16,14 @@ from urllib.parse import urlencode
 from snapbeam import InputError
 from snapbeam.explorer.jobs import ADDRESS
 from snapbeam.model.parameter_axes import parameter_of_axis
+from snapbeam.model.quantity import split_name
 
 __all__ = ["Address", "number"]
 
 
 _KEYS = ("x", "y", "show", "cut", "at", "b", "view", "set", "theme", "type", "tab", "card")
 _MOST = 64
-_NAME = r"[a-z]\w*(\.\w+)?"
+_NAME = r"[a-z]\w*(\.[1-9]\d*)?(\.\w+)?"
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,7 @@ def _changes(text: str) -> dict[str, Any]:
     parts = [part.partition(":") for part in text.split(",")]
     changes = {name: _value(value) for name, _, value in parts}
     for name, colon, value in parts:
-        if not colon or not re.fullmatch(_NAME, name) or ("." not in name and value):
+        if not colon or not re.fullmatch(_NAME, name) or (value and not split_name(name)[1]):
             raise InputError("must be section.name:value,section.name:value")
     return changes
 

@@ -748,7 +748,7 @@ _PRESETS: dict[str, dict[str, dict[str, Any]]] = {
     "the paper's, 1000 cycles": {"integration": {"cycles": 1000}},
     "Newton's impact, one mode": {"model": {"modes": 1}, "contact": {"coefficient": 0.6}},
     "twice the buckling level": {"beam": {"buckling_level": 0.67e-3}},
-    "struck a quarter along": {"striker": {"location": 0.25}},
+    "struck a quarter along": {"contact": {"location": 0.25}},
 }
 
 
@@ -805,7 +805,7 @@ class SystemCard:
             if (not row.kinds or kinds.get(row.section) in row.kinds)
             and row.quantity.kind in (float, int, str, bool)
             and (row.section != "integration" or row.name in _INTEGRATION)
-            and row.section in _SECTIONS
+            and _group(row) in _SECTIONS
         ]
 
     def fill(self, keep: bool = False) -> None:
@@ -834,7 +834,7 @@ class SystemCard:
             self.fields = {row.name: self._field(row) for row in rows}
             parts: list[Any] = []
             for section, title in _SECTIONS.items():
-                fields = [self.fields[row.name] for row in rows if row.section == section]
+                fields = [self.fields[row.name] for row in rows if _group(row) == section]
                 if section == "contact":
                     fields = [self.law, *fields]
                 if fields:
@@ -880,8 +880,9 @@ class SystemCard:
         """
         found = {name: self._typed(name) for name in self._edited()}
         if self.law.value != self._law:
-            found |= {name: None for name in self.system.parameters if name.startswith("contact.")}
-            found |= {name: self._typed(name) for name in self.fields if name.startswith("contact.")}
+            law = [row.name for row in parameters().values() if _group(row) == "contact"]
+            found |= {name: None for name in law if name in self.system.parameters}
+            found |= {name: self._typed(name) for name in law if name in self.fields}
             found["contact.type"] = self.law.value
         return found
 
@@ -964,6 +965,11 @@ class SystemCard:
         found = [each.message for each in self.system.diagnostics()]
         doubts = Markup("").join(_BAD.format(each) for each in found)
         self.facts.object = Markup('<table class="facts"><tr>{}</tr></table>{}').format(cells, doubts)
+
+
+def _group(row: Parameter) -> str:
+    """The heading that the field of a parameter stands under: of a contact, that of its law or that of its striker."""
+    return "striker" if row.section == "contact" and not row.kinds else row.section
 
 
 def _kinds(section: str) -> list[str]:

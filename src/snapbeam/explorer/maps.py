@@ -31,6 +31,7 @@ from snapbeam import (
 from snapbeam.explorer.jobs import WINDOW_POINTS, Jobs, Token, check_run
 from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, to_physical
 from snapbeam.model.parameter_file import config_from_mapping, config_text
+from snapbeam.model.quantity import split_name
 from snapbeam.plot.axes import edges_of, is_geometric, positions
 from snapbeam.sweeps.points import ratios_of
 from snapbeam.util.netcdf import read_result, split_group
@@ -157,7 +158,7 @@ def layers_of(skeleton: xr.Dataset) -> dict[str, MapLayer]:
 
     def place(name: str) -> tuple[bool, int, str]:
         # those of one of several strikers after those of all
-        whole = name.partition("_striker_")[0] if name in STATISTICS else name
+        whole = name.partition("_contact_")[0] if name in STATISTICS else name
         return (
             name != "response_class",
             order.index(whole) if whole in order else -1,
@@ -359,14 +360,14 @@ class SystemSource(Source):
     def __init__(self, system: System, axes: Mapping[str, Any], integration: Integration, name: str) -> None:
         self.skeleton = axes_dataset(system, axes, integration)
         self.name = name
-        self.strikers = 1 + len(system.further_contacts)
+        self.strikers = len(system.contacts)
 
     def variables(self) -> list[str]:
         """All that a sweep gives."""
         names = [name for name in STATISTICS if name != "status"]
         if self.strikers == 1:
             return names
-        each = [f"{name}_striker_{number}" for number in range(1, self.strikers + 1) for name in names]
+        each = [f"{name}_contact_{number}" for number in range(1, self.strikers + 1) for name in names]
         return names + [name for name in each if name in STATISTICS]
 
 
@@ -480,7 +481,7 @@ def axes_dataset(system: System, axes: Mapping[str, Any], integration: Integrati
         row = parameter_of_axis(name)
         labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
         coords[row.short] = ((row.short,), np.asarray(values), labels)
-    for name in ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location"):
+    for name in ("drive.frequency_ratio", "drive.velocity_amplitude", "contact.location"):
         row = parameter_of_axis(name)
         if row.short not in coords and name in system.parameters:
             labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
@@ -577,7 +578,7 @@ class Point:
     def system(self, base: System, integration: Integration) -> tuple[System, Integration]:
         """What is run at this point."""
         of_run = {
-            name.partition(".")[2]: value
+            split_name(name)[1]: value
             for name, value in self.values.items()
             if name.startswith("integration.")
         }
@@ -1589,8 +1590,8 @@ def patched(sections: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str
     """Sections with a :func:`difference`: ``patched(before, difference(before, after)) == after``."""
     found = {section: dict(values) for section, values in sections.items()}
     for name, value in changes.items():
-        section, dot, key = name.partition(".")
-        if not dot:
+        section, key = split_name(name)
+        if not key:
             found.pop(section, None)
         elif value is None:
             found.get(section, {}).pop(key, None)

@@ -574,7 +574,7 @@ class Numbers(RunPanel):
         circuit = system.harvester is not None
         parts = {
             "base_": system.base_excitation is not None, "load_work": system.axial_load is not None,
-            "local_force_": system.local_force is not None, "energy_harvested": circuit, "harvested_": circuit,
+            "local_force_": bool(system.local_forces), "energy_harvested": circuit, "harvested_": circuit,
             "rms_voltage": circuit, "peak_voltage": circuit,
         }  # fmt: skip
         for name, value in run.summary.items():

@@ -44,7 +44,7 @@ class MapComparison:
     >>> from snapbeam import lab, paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> axes = {"frequency_ratio": [1.0, 1.2], "velocity_amplitude": [0.02, 0.1, 0.2]}
     >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
     >>> measured = sb.MeasuredPoints(
@@ -138,7 +138,7 @@ def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -
     >>> from snapbeam import lab, paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> axes = {"frequency_ratio": [1.0, 1.2], "velocity_amplitude": [0.02, 0.1, 0.2]}
     >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
     >>> measured = sb.MeasuredPoints(

@@ -948,7 +948,7 @@ def render_run(
     >>> from snapbeam import lab, paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> synthetic = lab.render_run(run, camera=lab.SyntheticCamera(shape=(192, 64)))
     """

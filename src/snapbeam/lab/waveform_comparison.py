@@ -189,7 +189,7 @@ def compare_waveforms(
     >>> from snapbeam import lab, paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> frequency = 1.2 * model.reference_frequency  # Hz
     >>> comparison = lab.compare_waveforms(run.dataset, run.dataset, frequency, cycles=(2, 18))
@@ -425,7 +425,7 @@ class MeasuredResponse:
     >>> from snapbeam import lab, paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> lab.measure_response(run.dataset, cycles=20).response_class.label
     'continuous interwell'
@@ -492,7 +492,7 @@ def measure_response(
     >>> from snapbeam import lab, paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> lab.measure_response(run.dataset, cycles=20).zero_crossings
     16

@@ -182,6 +182,13 @@ class AxialLoadModulation:
 
     motion: Drive
 
+    noun: ClassVar[str] = "a changing axial load"
+    """In messages."""
+    has_excitation_row: ClassVar[bool] = False
+    """Whether it pushes along a row as time goes."""
+    rate_dependent: ClassVar[bool] = False
+    """Whether its force depends on the velocity of the structure."""
+
     def __post_init__(self) -> None:
         if not isinstance(self.motion, LoadMotion):
             raise InputTypeError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,13 @@ class BaseExcitation:
     striker_on_base: bool = quantity(
         "1", "whether the striker is mounted on the base", default=True, kind=bool, scope=STRUCTURE
     )
+
+    noun: ClassVar[str] = "a moving base"
+    """In messages."""
+    has_excitation_row: ClassVar[bool] = True
+    """Whether it pushes along a row as time goes."""
+    rate_dependent: ClassVar[bool] = False
+    """Whether its force depends on the velocity of the structure."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.motion, Drive):

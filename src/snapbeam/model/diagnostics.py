@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from snapbeam.model.beam import Beam
-from snapbeam.model.drive.base import Drive
-from snapbeam.model.drive.recorded_acceleration import RecordedAcceleration
-from snapbeam.model.drive.shock import GRAVITY
-from snapbeam.model.drive.sine import Sine
-from snapbeam.model.harvester import Harvester, PiezoelectricHarvester
 from snapbeam.model.potential import Potential
 from snapbeam.model.quantity import quantities
 from snapbeam.model.reduced_model import ReducedModel
@@ -27,32 +23,18 @@ _STOCKY = 0.1
 """Thickness over length up to which shear and rotary inertia may be left out."""
 _CENTRAL = 0.05
 """Distance of a striker from the centre, over the length, below which it hardly excites antisymmetric modes."""
-_LONGEST_DRIFT = 1.0
-"""Displacement by an offset of a recorded acceleration, over the length scale, up to which it is plausible."""
-_LARGEST_RATIO = 20.0
-_LARGEST_AMPLITUDE = 20.0
-
-
-_STRONGEST_COUPLING = 1.0
-"""Theta^2 (x_2 - x_1) L/(C E I) that no layers reach: e^2/(eps c) of the material, which stiffens the beam too."""
 
 
 def doubts_of(
     potential: Potential,
     striker: Striker | None,
-    harvester: Harvester | None = None,
-    moving: Sequence[tuple[str, Drive]] = (),
+    parts: Sequence[tuple[str, Any]] = (),
 ) -> tuple[Diagnostic, ...]:
-    """Diagnostics about a structure, the forces on it, what strikes it, its harvester and prescribed motions, by section."""
+    """Diagnostics about a structure, the forces on it, what strikes it, and its other parts, by section."""
     model = potential.model
     found = [] if model.beam is None else _of_beam(model.beam) + _of_modes(model, model.beam, striker)
-    if striker is not None and isinstance(striker.drive, Sine):
-        found += _of_sine(striker.drive, model)
-    if isinstance(harvester, PiezoelectricHarvester) and model.beam is not None:
-        found += _of_layers(harvester, model.beam)
-    for section, drive in moving:
-        if isinstance(drive, RecordedAcceleration):
-            found += _of_record(section, drive, model)
+    for section, part in parts:
+        found += part.diagnostics(section, model)
     if model.imperfection is not None and not model.is_bistable:
         found.append(
             Diagnostic(
@@ -76,23 +58,6 @@ def _of_wells(potential: Potential) -> list[Diagnostic]:
         f"{potential.dividing_height:.4g} m, which divides the two wells of the structure without it"
     )
     return [Diagnostic("other-wells", message, {"wells": float(count)})]
-
-
-def _of_record(section: str, drive: RecordedAcceleration, model: ReducedModel) -> list[Diagnostic]:
-    drift = drive.drift
-    if model.length_scale is None or drift <= _LONGEST_DRIFT * model.length_scale:
-        return []
-    offset = float(np.median(drive.record))
-    return [
-        Diagnostic(
-            "drifting-record",
-            f"{section}.record: its acceleration has an offset of {offset:.3g} m/s^2 ({offset / GRAVITY:.2g} g), by which "
-            f"its displacement drifts by {drift:.3g} m ({drift / model.length_scale:.3g} times the length scale) within "
-            f"{drive.duration:.4g} s; subtract the offset, record - numpy.median(record), or filter the record by a "
-            "high-pass below the lowest frequency that matters",
-            {"drift": drift, "drift_over_length_scale": drift / model.length_scale, "offset": offset},
-        )
-    ]
 
 
 def _of_beam(beam: Beam) -> list[Diagnostic]:
@@ -165,43 +130,3 @@ def _of_modes(model: ReducedModel, beam: Beam, striker: Striker | None) -> list[
             {"buckling_level_over_radius": level, "symmetric_frequencies": float(symmetric[0])},
         )
     ]
-
-
-def _of_layers(harvester: PiezoelectricHarvester, beam: Beam) -> list[Diagnostic]:
-    covered = (harvester.patch_end - harvester.patch_start) * beam.length
-    stiffness = harvester.capacitance * beam.bending_stiffness
-    coupling = harvester.moment_per_volt**2 * covered / stiffness
-    if coupling < _STRONGEST_COUPLING:
-        return []
-    most = (_STRONGEST_COUPLING * stiffness / covered) ** 0.5
-    return [
-        Diagnostic(
-            "unphysical-coupling",
-            f"harvester.moment_per_volt = {harvester.moment_per_volt:g} N m/V with capacitance = "
-            f"{harvester.capacitance:g} F: must be below {most:.3g} N m/V; Theta^2 (x_2 - x_1) L/(C E I) is "
-            f"{coupling:.3g}, and no material reaches 1; use PiezoelectricHarvester.from_material",
-            {"coupling": coupling, "greatest_moment_per_volt": most},
-        )
-    ]
-
-
-def _of_sine(drive: Sine, model: ReducedModel) -> list[Diagnostic]:
-    found = []
-    if drive.frequency_ratio >= _LARGEST_RATIO:
-        found.append(
-            Diagnostic(
-                "ratio-like-hertz",
-                f"drive.frequency_ratio = {drive.frequency_ratio:g}: a ratio to the first natural frequency "
-                f"({model.reference_frequency:.4g} Hz); is it given in Hz?",
-                {"frequency_ratio": drive.frequency_ratio},
-            )
-        )
-    if drive.velocity_amplitude >= _LARGEST_AMPLITUDE:
-        found.append(
-            Diagnostic(
-                "amplitude-like-speed",
-                f"drive.velocity_amplitude = {drive.velocity_amplitude:g}: a ratio to b omega_1; is it given in mm/s?",
-                {"velocity_amplitude": drive.velocity_amplitude},
-            )
-        )
-    return found

@@ -1,7 +1,7 @@
-"""Equilibrium paths of any potential under a point force, by continuation in arc length.
+"""Equilibrium paths of any potential over a point force or another parameter, by continuation in arc length.
 
-The equilibria of a system under the force F on the row c solve dU/dalpha = F c.  Every path through an equilibrium
-without the force is followed to both sides by steps along its tangent and Newton's method on the plane across it
+The equilibria of a system under the force F on the row c solve dU/dalpha = F c, those over a parameter p of the system
+dU(alpha; p)/dalpha = 0.  Every path through an equilibrium without the force, or at one of some values of p, is followed to both sides by steps along its tangent and Newton's method on the plane across it
 (Keller 1977), and so is every path that branches off.  Where a law of a local force has no closed form, nothing else is
 possible; a closed path that has no equilibrium without the force, and meets no other path, is not found then.  Of a
 structure without local forces, whose equilibria are known in closed form, it is, by its equilibria under many forces.
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from snapbeam.model.potential import Potential
 from snapbeam.util.validation import InputError
 
-__all__ = ["EquilibriumPath", "Singular", "equilibrium_paths"]
+__all__ = ["EquilibriumPath", "Singular", "equilibrium_paths", "paths_over_parameter"]
 
 
 _Array = NDArray[np.float64]
@@ -46,6 +46,12 @@ _ASIDE = 4e-3
 """First step on a path that branches off."""
 _FORCES = 40
 """Forces, between the largest ones of singular points, under which closed paths are looked for."""
+_VALUES = 5
+"""Values of a parameter, over its range, whose equilibria are starting points."""
+_DIFFERENCE = 1e-5
+"""Half the distance of the values of a derivative by the parameter, over the range."""
+_KNOWN = 256
+"""Potentials that are held, by the value of the parameter."""
 _BESIDE = 0.02
 """Distance from the end of the range of a law, over that of the end from the straight beam."""
 _SAME = 1e-3
@@ -62,9 +68,9 @@ class Singular(NamedTuple):
 
 @dataclass
 class EquilibriumPath:
-    """A path: its points in order, force (N) and amplitudes, and the number of unstable directions under the force."""
+    """A path: its points in order, force (N) or parameter, amplitudes, and the number of unstable directions."""
 
-    force: _Array
+    value: _Array
     amplitude: _Array
     unstable: NDArray[np.int_]
     singular: tuple[Singular, ...]
@@ -88,11 +94,121 @@ class _Point(NamedTuple):
 
 
 @dataclass
-class _Tracer:
-    """Continuation of the equilibria of a potential under a force on a row, between two displacements of its point."""
+class _UnderForce:
+    """The equilibria of a potential under a force on a row: the parameter is the force."""
 
     potential: Potential
     row: _Array
+    asked: int = 0
+    name, unit, ends_at_range = "location", "N", False
+
+    @property
+    def first(self) -> tuple[float, _Array]:
+        """An equilibrium, by the force."""
+        return 0.0, self.potential.equilibria[0].amplitude
+
+    def at(self, value: float) -> Potential:
+        """The force does not change the stiffness."""
+        return self.potential
+
+    def loaded(self, value: float) -> Potential:
+        """The potential with the force."""
+        return dataclasses.replace(self.potential, constant=self.potential.constant + value * self.row)
+
+    def residual(self, alpha: _Array, value: float) -> _Array:
+        return self.potential.gradient(alpha) - value * self.row
+
+    def push(self, alpha: _Array, value: float) -> _Array:
+        """Minus the derivative of the residual by the force."""
+        return self.row
+
+    def scale(self, stiffness: _Array, length: float) -> tuple[float, float]:
+        """Origin and unit: the force that moves a well as far as the displacement of the wells."""
+        reach = length * float(np.abs(self.row).max())
+        return 0.0, reach / max(abs(float(self.row @ np.linalg.solve(stiffness, self.row))), 1e-300)
+
+    def place(self, alpha: _Array, value: float) -> float:
+        """Displacement of the point of the force."""
+        return float(self.row @ alpha)
+
+    def along(self, size: int) -> _Array:
+        return np.append(self.row, 0.0)
+
+    def values(self, singular: list[float]) -> list[float]:
+        """Forces whose equilibria are starting points: none, and then many between those of the singular points."""
+        self.asked += 1
+        if self.asked == 1:
+            return [0.0]
+        if self.asked == 2 and not self.potential.local_forces:
+            return list((np.linspace(-1.0, 1.0, _FORCES) * max(map(abs, singular), default=0.0)).tolist())
+        return []
+
+
+@dataclass
+class _OverParameter:
+    """The equilibria of a system over one of its parameters."""
+
+    name: str
+    unit: str
+    of: Callable[[float], Potential]
+    low: float
+    high: float
+    known: dict[float, Potential] = field(default_factory=dict)
+    asked: int = 0
+    ends_at_range = True
+
+    @property
+    def first(self) -> tuple[float, _Array]:
+        """An equilibrium, by the parameter."""
+        for value in np.linspace(self.low, self.high, _VALUES).tolist():
+            if self.at(value).equilibria:
+                return value, self.at(value).equilibria[0].amplitude
+        raise InputError(
+            f"{self.name}: there is no equilibrium at any of {_VALUES} values from {self.low:g} to {self.high:g} "
+            f"{self.unit}; use another range"
+        )
+
+    def at(self, value: float) -> Potential:
+        """The potential at a value."""
+        if value not in self.known:
+            if len(self.known) > _KNOWN:
+                self.known.clear()
+            self.known[value] = self.of(value)
+        return self.known[value]
+
+    loaded = at
+
+    def residual(self, alpha: _Array, value: float) -> _Array:
+        return self.at(value).gradient(alpha)
+
+    def push(self, alpha: _Array, value: float) -> _Array:
+        """Minus the derivative of the gradient by the parameter, by differences within the range."""
+        h = _DIFFERENCE * (self.high - self.low)
+        ends = [min(max(end, self.low), self.high) for end in (value - h, value + h)]
+        one, other = (self.at(end).gradient(alpha) for end in ends)
+        return (one - other) / (ends[1] - ends[0]) if ends[0] < ends[1] else np.zeros_like(alpha)
+
+    def scale(self, stiffness: _Array, length: float) -> tuple[float, float]:
+        """Origin and unit: the range."""
+        return self.low, self.high - self.low
+
+    def place(self, alpha: _Array, value: float) -> float:
+        return value
+
+    def along(self, size: int) -> _Array:
+        return np.append(np.zeros(size - 1), 1.0)
+
+    def values(self, singular: list[float]) -> list[float]:
+        """Values whose equilibria are starting points: some over the range, once."""
+        self.asked += 1
+        return list(np.linspace(self.low, self.high, _VALUES).tolist()) if self.asked == 1 else []
+
+
+@dataclass
+class _Tracer:
+    """Continuation of the equilibria of a family of potentials, between two places."""
+
+    family: _UnderForce | _OverParameter
     low: float
     high: float
     paths: list[EquilibriumPath] = field(default_factory=list)
@@ -100,24 +216,35 @@ class _Tracer:
     """Whether the path that is being followed ended for want of steps."""
 
     def __post_init__(self) -> None:
-        self.length = float(np.abs(self.potential.size).max())
-        reach = self.length * float(np.abs(self.row).max())
-        stiffness = self.potential.tangent(self.potential.equilibria[0].amplitude)
-        self.unit = reach / max(abs(float(self.row @ np.linalg.solve(stiffness, self.row))), 1e-300)
+        value, first = self.family.first
+        potential = self.family.at(value)
+        self.length = float(np.abs(potential.size).max())
+        stiffness = potential.tangent(first)
+        self.origin, self.unit = self.family.scale(stiffness, self.length)
         self.balance = 1.0 / np.maximum(np.abs(stiffness).max(axis=1) * self.length, 1e-300)
 
     def amplitude(self, y: _Array) -> _Array:
         return self.length * y[:-1]
 
+    def value(self, y: _Array) -> float:
+        """The force or the parameter."""
+        return self.origin + self.unit * float(y[-1])
+
+    def potential(self, y: _Array) -> Potential:
+        """The potential that gives the stiffness at a point."""
+        return self.family.at(self.value(y))
+
     def _jacobian(self, y: _Array) -> _Array:
         """Derivatives of the scaled residual, shape (N, N + 1)."""
-        stiffness = self.length * self.potential.tangent(self.amplitude(y))
-        return np.column_stack((stiffness, -self.unit * self.row)) * self.balance[:, None]
+        stiffness = self.length * self.potential(y).tangent(self.amplitude(y))
+        push = self.family.push(self.amplitude(y), self.value(y))
+        return np.column_stack((stiffness, -self.unit * push)) * self.balance[:, None]
 
     def point(self, y: _Array, along: _Array) -> _Point:
         """The point with the tangent on the side of *along*."""
         tangent = np.linalg.svd(self._jacobian(y))[2][-1]
-        stiffness = self.potential.in_modes(self.potential.tangent(self.amplitude(y)))
+        potential = self.potential(y)
+        stiffness = potential.in_modes(potential.tangent(self.amplitude(y)))
         tangent = math.copysign(1.0, float(tangent @ along)) * tangent
         return _Point(y, np.asarray(tangent), np.asarray(np.linalg.eigvalsh(stiffness)))
 
@@ -128,21 +255,20 @@ class _Tracer:
         """
         y = guess
         for _ in range(_NEWTON if normal is not None else _LEAST_NORM):
-            if not self.potential.holds(self.amplitude(y)):
-                return None
-            residual = self.potential.gradient(self.amplitude(y)) - self.unit * y[-1] * self.row
-            residual = residual * self.balance
             try:
+                if not self.potential(y).holds(self.amplitude(y)):
+                    return None
+                residual = self.family.residual(self.amplitude(y), self.value(y)) * self.balance
                 if normal is None:
                     step = np.linalg.lstsq(self._jacobian(y), residual, rcond=1e-9)[0]
                 else:
                     system = np.vstack((self._jacobian(y), normal))
                     step = np.linalg.solve(system, np.append(residual, normal @ (y - guess)))
-            except np.linalg.LinAlgError:
+            except (np.linalg.LinAlgError, InputError):
                 return None
             y = y - step
             if np.abs(step).max() <= _CONVERGED * max(1.0, float(np.abs(y).max())):
-                return y if self.potential.holds(self.amplitude(y)) else None
+                return y if self.potential(y).holds(self.amplitude(y)) else None
         return y if normal is None else None
 
     def between(self, a: _Point, b: _Point, value: Callable[[_Point], float]) -> _Point:
@@ -162,6 +288,10 @@ class _Tracer:
         at(share)
         return found[share]
 
+    def _at_value(self, value: float, a: _Point, b: _Point) -> _Point:
+        """The point between two points at a force or value of the parameter."""
+        return self.between(a, b, lambda point: self.value(point.y) - value)
+
     def singular_between(self, a: _Point, b: _Point) -> tuple[_Point, str] | None:
         """The singular point between two neighbours, and its kind; None without one.
 
@@ -169,8 +299,8 @@ class _Tracer:
         """
         if abs(a.unstable - b.unstable) > 1:
             raise InputError(
-                f"location: {abs(a.unstable - b.unstable)} directions lose their stiffness at the same force, "
-                f"{self.unit * a.y[-1]:.6g} N, whose branches cannot be told apart; change the structure a little"
+                f"{self.family.name}: {abs(a.unstable - b.unstable)} directions lose their stiffness at the same value, "
+                f"{self.value(a.y):.6g} {self.family.unit}, whose branches cannot be told apart; change the structure a little"
             )
         if a.unstable == b.unstable:
             if a.tangent[-1] * b.tangent[-1] >= 0.0:
@@ -179,19 +309,21 @@ class _Tracer:
         lost = min(a.unstable, b.unstable)
         found = self.between(a, b, lambda point: float(point.eigenvalues[lost]))
         direction = self.null_direction(found)
-        part = abs(float(self.row @ direction)) / float(np.linalg.norm(self.row) * np.linalg.norm(direction))
+        push = self.family.push(self.amplitude(found.y), self.value(found.y))
+        size = float(np.linalg.norm(push) * np.linalg.norm(direction))
+        part = abs(float(push @ direction)) / size if size > 0.0 else 0.0
         return found, "limit" if part > _UNCOUPLED else "bifurcation"
 
     def null_direction(self, point: _Point) -> _Array:
         """Amplitudes of the direction without stiffness."""
-        stiffness = self.potential.in_modes(self.potential.tangent(self.amplitude(point.y)))
-        values, axes = np.linalg.eigh(stiffness)
-        return np.asarray(self.potential.model.linear_modes @ axes[:, int(np.abs(values).argmin())])
+        potential = self.potential(point.y)
+        values, axes = np.linalg.eigh(potential.in_modes(potential.tangent(self.amplitude(point.y))))
+        return np.asarray(potential.model.linear_modes @ axes[:, int(np.abs(values).argmin())])
 
     def is_known(self, y: _Array) -> bool:
         """Whether a point lies on a path that was followed."""
         for path in self.paths:
-            points = np.column_stack((path.amplitude / self.length, path.force / self.unit))
+            points = np.column_stack((path.amplitude / self.length, (path.value - self.origin) / self.unit))
             begin, away = points[:-1], np.diff(points, axis=0)
             along = np.clip(((y - begin) * away).sum(1) / np.maximum((away * away).sum(1), 1e-300), 0.0, 1.0)
             if np.sqrt((((begin + along[:, None] * away) - y) ** 2).sum(1).min()) < _SAME:
@@ -234,12 +366,17 @@ class _Tracer:
             if len(points) > 8 and closes:
                 return [*points, start], singular, True
             points.append(new)
-            displacement = float(self.row @ self.amplitude(new.y))
-            outward = float(self.row @ (new.y - here.y)[:-1])
-            beyond = (displacement > self.high and outward > 0.0) or (
-                displacement < self.low and outward < 0.0
+            place, before = (
+                self.family.place(self.amplitude(each), self.value(each)) for each in (new.y, here.y)
             )
-            if beyond or (self.potential.local_forces and abs(new.y[-1]) > _LARGEST):
+            end = self.high if place > self.high and place > before else self.low
+            if (place > self.high and place > before) or (place < self.low and place < before):
+                if self.family.ends_at_range:
+                    points.pop()
+                    if before != end:
+                        points.append(self._at_value(end, here, new))
+                return points, singular, False
+            if self.potential(new.y).local_forces and abs(new.y[-1]) > _LARGEST:
                 return points, singular, False
             step = min(_STEP * max(1.0, abs(float(new.y[-1]))), 1.5 * step)
         self.lost = True
@@ -247,7 +384,8 @@ class _Tracer:
 
     def _is_at_end_of_a_law(self, y: _Array) -> bool:
         """Whether a local force acts beside the end of the range of its law, which the path cannot pass."""
-        for row, law in zip(self.potential.rows, self.potential.local_forces, strict=True):
+        potential = self.potential(y)
+        for row, law in zip(potential.rows, potential.local_forces, strict=True):
             u = float(row @ self.amplitude(y))
             if any(abs(end - u) <= _BESIDE * abs(end) for end in law.displacement_range(law.numbers)):
                 return True
@@ -279,7 +417,7 @@ class _Tracer:
             unstable[[0, -1]] = unstable[[1, -2]]  # a singular point, where the path meets another one
         self.paths.append(
             EquilibriumPath(
-                force=self.unit * np.array([point.y[-1] for point in points]),
+                value=np.array([self.value(point.y) for point in points]),
                 amplitude=np.array([self.amplitude(point.y) for point in points]),
                 unstable=unstable,
                 singular=tuple(Singular(at, kinds[at]) for at in sorted(kinds)),
@@ -289,11 +427,15 @@ class _Tracer:
             )
         )
         forks = [points[at] for at, kind in kinds.items() if kind == "bifurcation"]
-        modes = self.potential.model.linear_modes
-        forks.sort(key=lambda fork: int(np.abs(np.linalg.solve(modes, self.null_direction(fork))).argmax()))
+        forks.sort(key=self._mode_of)
         for fork in forks:
             direction = np.append(self.null_direction(fork), 0.0)
             self._add_beside(fork, direction[None] / np.linalg.norm(direction), True)
+
+    def _mode_of(self, fork: _Point) -> int:
+        """The number of the mode in which a path branches off."""
+        modes = self.potential(fork.y).model.linear_modes
+        return int(np.abs(np.linalg.solve(modes, self.null_direction(fork))).argmax())
 
     def _add_beside(self, fork: _Point, space: _Array, secondary: bool) -> None:
         """Follow the paths through a bifurcation in the direction of a line, or of the part of a plane across its tangent."""
@@ -308,34 +450,37 @@ class _Tracer:
                 self.add(self.point(y, sign * away), secondary)
 
     def run(self) -> list[EquilibriumPath]:
-        """All paths: through equilibria without the force, those that branch off, and closed ones under some force."""
-        along = np.append(self.row, 0.0)
-        forces = [0.0]
-        for _ in range(1 if self.potential.local_forces else 2):
-            for force, alpha in self._seeds(forces):
-                y = np.append(alpha / self.length, force / self.unit)
-                if self.low < float(self.row @ alpha) < self.high and not self.is_known(y):
-                    self.add(self.point(y, along), False)
-            limits = [abs(float(path.force[at])) for path in self.paths for at, _ in path.singular]
-            forces = (np.linspace(-1.0, 1.0, _FORCES) * max(limits, default=0.0)).tolist()
+        """All paths: through the equilibria at the family's values, those that branch off, and closed ones between."""
+        values = self.family.values([])
+        while len(values):
+            for value in values:
+                for each in self.family.loaded(value).equilibria:
+                    y = np.append(each.amplitude / self.length, (value - self.origin) / self.unit)
+                    if self.low <= self.family.place(
+                        each.amplitude, value
+                    ) <= self.high and not self.is_known(y):
+                        self.add(self.point(y, self.family.along(len(y))), False)
+            values = self.family.values(
+                [float(path.value[at]) for path in self.paths for at, _ in path.singular]
+            )
         return self.paths
-
-    def _seeds(self, forces: Iterable[float]) -> Iterator[tuple[float, _Array]]:
-        """Equilibria under given forces on the row."""
-        for force in forces:
-            loaded = dataclasses.replace(self.potential, constant=self.potential.constant + force * self.row)
-            for each in loaded.equilibria:
-                yield float(force), each.amplitude
 
 
 def equilibrium_paths(
     potential: Potential, row: _Array, between: tuple[float, float]
 ) -> list[EquilibriumPath]:
     """Paths of the equilibria of a potential under a force on *row*, a little beyond two displacements of its point."""
-    return _Tracer(potential, row, *between).run()
+    return _Tracer(_UnderForce(potential, row), *between).run()
+
+
+def paths_over_parameter(
+    name: str, unit: str, of: Callable[[float], Potential], between: tuple[float, float]
+) -> list[EquilibriumPath]:
+    """Paths of the equilibria of the potentials *of* the values of a parameter, between two values."""
+    return _Tracer(_OverParameter(name, unit, of, *between), *between).run()
 
 
 def stable_parts(path: EquilibriumPath) -> list[tuple[int, int]]:
     """First and last points of the stable parts of a path, singular points at their ends included."""
-    ends = [0, *(each.place for each in path.singular), len(path.force) - 1]
+    ends = [0, *(each.place for each in path.singular), len(path.value) - 1]
     return [(a, b) for a, b in pairwise(ends) if b > a + 1 and not path.unstable[(a + b) // 2]]

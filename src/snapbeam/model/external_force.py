@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Drive, Scale, Timed
-from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
+from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, check_label, quantity
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.validation import InputError, InputTypeError, finite_array, shown
 
@@ -285,6 +285,8 @@ class ExternalForce:
         Of a beam: where the force acts, over the length.
     shape : array_like of shape (N,), optional
         Of a structure given by matrices: h, the force on each coordinate per unit of F; its contact point by default.
+    label : str, optional
+        Name in parameter names, in place of the number of the force.
 
     Examples
     --------
@@ -294,18 +296,31 @@ class ExternalForce:
     ... )
     >>> system = sb.System(
     ...     oscillator,
-    ...     external_force=sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=1.0, amplitude=0.2)),
+    ...     forces=[sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=1.0, amplitude=0.2))],
     ... )
     """
 
     history: ForceHistory
     location: float | None = quantity(
-        "1", "location of the external force over the length", default=None, optional=True, low=0.0, high=1.0,
+        "1", "location of the force over the length", default=None, optional=True, low=0.0, high=1.0,
         scope=STRUCTURE,
     )  # fmt: skip
     shape: Any = quantity(
-        "1", "external force on each coordinate", default=None, optional=True, kind=object, scope=STRUCTURE
+        "1",
+        "force on each coordinate per unit of the force",
+        default=None,
+        optional=True,
+        kind=object,
+        scope=STRUCTURE,
     )
+    label: str = field(default="", repr=False)
+
+    noun: ClassVar[str] = "an external force"
+    """In messages."""
+    has_excitation_row: ClassVar[bool] = True
+    """Whether it pushes along a row as time goes."""
+    rate_dependent: ClassVar[bool] = False
+    """Whether its force depends on the velocity of the structure."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.history, ForceHistory):
@@ -314,10 +329,16 @@ class ExternalForce:
                 "RecordedForce"
             )
         check_fields(self)
+        check_label(self.label)
         if self.shape is not None:
             shape = finite_array("shape", self.shape, 1).copy()
             shape.setflags(write=False)
             object.__setattr__(self, "shape", shape)
+
+    @property
+    def constant_part(self) -> float:
+        """Part of the force that does not change in time, N."""
+        return self.history.constant_part
 
     def row(self, model: ReducedModel) -> _Array:
         """Return h of a model, shape (N,).
@@ -330,20 +351,20 @@ class ExternalForce:
         if model.beam is not None:
             if self.shape is not None or self.location is None:
                 raise InputError(
-                    f"external_force.location = {self.location}: a force on a beam acts at a location; give location "
+                    f"force.location = {self.location}: a force on a beam acts at a location; give location "
                     "in (0, 1) and leave shape out"
                 )
             return np.asarray(model.shape_at(self.location))
         if self.location is not None:
             raise InputError(
-                f"external_force.location = {self.location:g}: a structure given by matrices has no length; give shape"
+                f"force.location = {self.location:g}: a structure given by matrices has no length; give shape"
             )
         if self.shape is None:
             assert model.contact_shape is not None
             return model.contact_shape
         if self.shape.shape != (model.modes,):
             raise InputError(
-                f"external_force.shape of shape {self.shape.shape}: must be ({model.modes},); give one number for each "
+                f"force.shape of shape {self.shape.shape}: must be ({model.modes},); give one number for each "
                 "coordinate"
             )
         found: _Array = self.shape

@@ -101,7 +101,7 @@ def force_displacement(
     if isinstance(system, System):
         potential = system.potential
     elif isinstance(system, ReducedModel):
-        potential = Potential.of(system, None, None)
+        potential = Potential.of(system, ())
     elif isinstance(system, Potential):
         potential = system
     else:
@@ -140,7 +140,7 @@ def force_displacement(
         message = f"{lost} of {len(branches)} branches end for want of steps, and those beyond are missing"
         tell([Diagnostic("incomplete-curve", message, {"incomplete_branches": float(lost)})])
     kept = [(low <= each.amplitude @ row) & (each.amplitude @ row <= high) for each in branches]
-    force = np.concatenate([each.force[inside] for each, inside in zip(branches, kept, strict=True)])
+    force = np.concatenate([each.value[inside] for each, inside in zip(branches, kept, strict=True)])
     alpha = np.concatenate([each.amplitude[inside] for each, inside in zip(branches, kept, strict=True)])
     unstable = np.concatenate([each.unstable[inside] for each, inside in zip(branches, kept, strict=True)])
     numbers = np.repeat(np.arange(len(branches)), [inside.sum() for inside in kept])
@@ -200,7 +200,7 @@ def force_displacement(
         ),
         "critical_force": (
             "critical_point",
-            np.array([branches[number].force[at] for number, at, _ in special]),
+            np.array([branches[number].value[at] for number, at, _ in special]),
             _attributes("N", "force at the critical point"),
         ),
     }
@@ -241,7 +241,7 @@ def _well(potential: Potential, given: str | None) -> tuple[str, str]:
     wells = potential.wells
     if not wells:
         raise InputError(
-            f"local_force = {', '.join(map(shown, potential.local_forces))}: leaves no well, such as beyond pull-in; give a "
+            f"forces = {', '.join(map(shown, potential.local_forces))}: leave no well, such as beyond pull-in; give a "
             "weaker force"
         )
     only = "upper" if potential.center(wells[0]) > 0.0 else "lower"
@@ -275,14 +275,14 @@ def _snaps(
 
     def distance(part: tuple[EquilibriumPath, int, int], well: _Array) -> float:
         path, first, last = part
-        force = path.force[first : last + 1]
+        force = path.value[first : last + 1]
         near = np.flatnonzero(force[:-1] * force[1:] <= 0.0) + first
         points = path.amplitude[np.concatenate((near, near + 1))]
         return float(np.abs(points - well).max(axis=1).min()) if near.size else math.inf
 
     def ends(path: EquilibriumPath, first: int, last: int) -> list[tuple[float, float, str]]:
         return [
-            (float(path.force[at]), float(row @ path.amplitude[at]), kind)
+            (float(path.value[at]), float(row @ path.amplitude[at]), kind)
             for at, kind in path.singular
             if at in (first, last)
         ]
@@ -294,7 +294,7 @@ def _snaps(
         away = min(stable, key=lambda part: distance(part, wells[-1]))
     else:
         # the stable part that goes on to any force in the direction of the push
-        away = max(stable, key=lambda part: float((push * part[0].force[part[1] : part[2] + 1]).max()))
+        away = max(stable, key=lambda part: float((push * part[0].value[part[1] : part[2] + 1]).max()))
     if home is away or not wells[0].any():
         return {"snap_through": none, "snap_back": none}
     return {

@@ -13,6 +13,7 @@ from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import modes_between
 from snapbeam.model.quantity import RUN, check_fields, quantity
 from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.validation import InputError, choice, finite, instance, positive, within
 
 __all__ = ["HARVESTERS", "ElectromagneticHarvester", "Harvester", "PiezoelectricHarvester"]
@@ -23,6 +24,8 @@ _Array = NDArray[np.float64]
 HARVESTERS: dict[str, type[Harvester]] = {}
 """Every harvester by the name it has in parameter files."""
 WIRINGS = ("parallel", "series")
+_STRONGEST_COUPLING = 1.0
+"""Theta^2 (x_2 - x_1) L/(C E I) that no layers reach: e^2/(eps c) of the material, which stiffens the beam too."""
 
 
 class Harvester:
@@ -38,6 +41,12 @@ class Harvester:
     """
 
     name: ClassVar[str] = ""
+    noun: ClassVar[str] = "a harvester"
+    """In messages."""
+    has_excitation_row: ClassVar[bool] = False
+    """Whether it pushes along a row as time goes."""
+    rate_dependent: ClassVar[bool] = True
+    """Whether its force depends on the velocity of the structure."""
     resistance: float
     """Of the load, ohm."""
 
@@ -71,6 +80,10 @@ class Harvester:
     def volts(self, resistance: _Array) -> _Array:
         """Voltage across the load per z."""
         raise NotImplementedError
+
+    def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:
+        """Diagnostics of values that are implausible for a model; none by default."""
+        return []
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,6 +230,27 @@ class PiezoelectricHarvester(Harvester):
     def volts(self, resistance: _Array) -> _Array:
         """It is the voltage."""
         return np.ones_like(resistance)
+
+    def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:
+        """A coupling that no material has."""
+        if model.beam is None:
+            return []
+        beam = model.beam
+        covered = (self.patch_end - self.patch_start) * beam.length
+        stiffness = self.capacitance * beam.bending_stiffness
+        coupling = self.moment_per_volt**2 * covered / stiffness
+        if coupling < _STRONGEST_COUPLING:
+            return []
+        most = (_STRONGEST_COUPLING * stiffness / covered) ** 0.5
+        return [
+            Diagnostic(
+                "unphysical-coupling",
+                f"{section}.moment_per_volt = {self.moment_per_volt:g} N m/V with capacitance = "
+                f"{self.capacitance:g} F: must be below {most:.3g} N m/V; Theta^2 (x_2 - x_1) L/(C E I) is "
+                f"{coupling:.3g}, and no material reaches 1; use PiezoelectricHarvester.from_material",
+                {"coupling": coupling, "greatest_moment_per_volt": most},
+            )
+        ]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.quantity import STRUCTURE, check_fields, numbers_type, quantity
+from snapbeam.model.quantity import STRUCTURE, check_fields, check_label, numbers_type, quantity
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.validation import InputError, finite_array
 
@@ -28,7 +29,7 @@ _Array = NDArray[np.float64]
 
 LOCAL_FORCES: dict[str, type[LocalForce]] = {}
 """Every law of a local force, by the name it has in parameter files."""
-_PLACES = ("location", "coordinate", "shape")
+_PLACES = ("location", "coordinate", "shape", "label")
 _PERMITTIVITY = 8.8541878188e-12
 """Of vacuum, F/m (CODATA 2022)."""
 _NEAREST = 0.1
@@ -62,6 +63,8 @@ class LocalForce:
         Of a beam: what u is, in m or rad.
     shape : array_like of shape (N,), optional
         Of a structure given by matrices: u = shape . alpha; its contact point by default.
+    label : str, optional
+        Name in parameter names, in place of the number of the force: ``"magnet"`` in ``force.magnet.gap``.
 
     Notes
     -----
@@ -75,14 +78,14 @@ class LocalForce:
     >>> from snapbeam import paper
     >>> system = sb.System(
     ...     sb.ReducedModel.from_beam(paper.BEAM, modes=2),
-    ...     local_force=sb.LocalSpring(stiffness=20.0, location=0.4),
+    ...     forces=[sb.LocalSpring(stiffness=20.0, location=0.4)],
     ... )
-    >>> system.get("local_force.stiffness")
+    >>> system.get("force.stiffness")
     20.0
     """
 
     location: float | None = quantity(
-        "1", "location of the local force over the length", default=None, optional=True, low=0.0, high=1.0,
+        "1", "location of the force over the length", default=None, optional=True, low=0.0, high=1.0,
         closed="both", scope=STRUCTURE,
     )  # fmt: skip
     coordinate: str = quantity(
@@ -94,12 +97,19 @@ class LocalForce:
         scope=STRUCTURE,
     )
     shape: Any = quantity(
-        "1", "coordinate of the local force, per modal amplitude", default=None, optional=True, kind=object,
+        "1", "force on each coordinate per unit of the force", default=None, optional=True, kind=object,
         scope=STRUCTURE,
     )  # fmt: skip
+    label: str = dataclasses.field(default="", repr=False)
 
     name: ClassVar[str] = ""
     """In parameter files and attributes."""
+    noun: ClassVar[str] = "a local force"
+    """In messages."""
+    has_excitation_row: ClassVar[bool] = False
+    """Whether it pushes along a row as time goes."""
+    constant_part: ClassVar[float] = 0.0
+    """Part of the force that does not depend on the motion, N."""
     dissipative: ClassVar[bool] = False
     """Whether the force depends on the velocity too."""
 
@@ -115,6 +125,7 @@ class LocalForce:
 
     def __post_init__(self) -> None:
         check_fields(self)
+        check_label(self.label)
         if self.shape is not None:
             shape = finite_array("shape", self.shape, 1).copy()
             shape.setflags(write=False)
@@ -168,6 +179,11 @@ class LocalForce:
         return cls.displacement_range is not LocalForce.displacement_range
 
     @property
+    def rate_dependent(self) -> bool:
+        """Whether the force depends on the velocity of the structure."""
+        return self.dissipative
+
+    @property
     def is_conservative(self) -> bool:
         """Whether the law has a conservative part."""
         return type(self).force is not LocalForce.force
@@ -177,7 +193,7 @@ class LocalForce:
         """The named tuple of the law's constants, as kernels see them; an attribute of the class, ``Numbers``."""
         return numbers_type(cls, (item.name for item in dataclasses.fields(cls) if item.name not in _PLACES))
 
-    @property
+    @cached_property
     def numbers(self) -> Any:
         """The law's constants."""
         kind = self.numbers_type()
@@ -194,7 +210,7 @@ class LocalForce:
         if model.beam is not None:
             if self.shape is not None or self.location is None:
                 raise InputError(
-                    f"local_force.location = {self.location}: a force on a beam acts at a location; give location in "
+                    f"force.location = {self.location}: a force on a beam acts at a location; give location in "
                     "[0, 1] and leave shape out"
                 )
             at = self.location * model.beam.length
@@ -202,7 +218,7 @@ class LocalForce:
             return np.asarray(modes.slope(at) if self.coordinate == "rotation" else modes.shape(at))
         if self.location is not None or self.coordinate != "displacement":
             raise InputError(
-                f"local_force.location = {self.location}, coordinate = {self.coordinate!r}: a structure given by matrices has "
+                f"force.location = {self.location}, coordinate = {self.coordinate!r}: a structure given by matrices has "
                 "no length; give shape"
             )
         if self.shape is None:
@@ -210,7 +226,7 @@ class LocalForce:
             return model.contact_shape
         if self.shape.shape != (model.modes,):
             raise InputError(
-                f"local_force.shape of shape {self.shape.shape}: must be ({model.modes},); give one number for each coordinate"
+                f"force.shape of shape {self.shape.shape}: must be ({model.modes},); give one number for each coordinate"
             )
         found: _Array = self.shape
         return found
@@ -277,7 +293,7 @@ class _TowardsGap(LocalForce):
         super().__post_init__()
         if self.gap == 0.0:
             raise InputError(
-                "local_force.gap = 0: must differ from 0; give the distance from the straight beam, with its sign"
+                "force.gap = 0: must differ from 0; give the distance from the straight beam, with its sign"
             )
 
     @staticmethod

@@ -8,41 +8,29 @@ from typing import Any
 
 import numpy as np
 
-from snapbeam.model.axial_load import LOADS, AxialLoadModulation
+from snapbeam.model.axial_load import AxialLoadModulation
 from snapbeam.model.base_excitation import BaseExcitation
 from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import CLAMPED, BoundaryConditions
-from snapbeam.model.contact.base import LAWS, ContactLaw
-from snapbeam.model.drive.base import DRIVES, Drive
 from snapbeam.model.external_force import FORCES, ExternalForce
-from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.imperfection import Imperfection
-from snapbeam.model.local_force import LOCAL_FORCES
-from snapbeam.model.quantity import quantities
+from snapbeam.model.parameters import SECTIONS, kinds_of
+from snapbeam.model.quantity import NUMBERED, numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
-from snapbeam.model.striker import OF_FIRST_STRIKER, ContactPair, Striker, numbered
-from snapbeam.util.validation import InputError, mapping, shown
+from snapbeam.model.striker import Contact, Striker
+from snapbeam.util.validation import InputError, InputTypeError, mapping, shown
 
-__all__ = ["SECTIONS", "parts_from_mapping", "parts_to_mapping", "replaced"]
+__all__ = [
+    "flattened",
+    "nested",
+    "parts_from_mapping",
+    "parts_to_mapping",
+    "replaced",
+    "resolved",
+    "sequence_of",
+]
 
-
-SECTIONS = (
-    "beam",
-    "model",
-    "boundary",
-    "imperfection",
-    "contact",
-    "striker",
-    "drive",
-    "base_excitation",
-    "axial_load",
-    "external_force",
-    "local_force",
-    "harvester",
-    "initial_state",
-)
-"""Sections of a system, in their order."""
 
 _MATRICES = (
     "mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "well_amplitude", "length_scale",
@@ -63,8 +51,6 @@ _START = (
 def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
     """The parts of a :class:`~snapbeam.System` as sections; what is None is left out."""
     model: ReducedModel = system.model
-    contact: ContactLaw | None = system.contact
-    striker: Striker | None = system.striker
     start: State | None = system.initial_state
     sections: dict[str, dict[str, Any]] = {}
     section: dict[str, Any] = {}
@@ -91,37 +77,20 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
     if model.given_reference_frequency is not None:
         section["reference_frequency"] = model.given_reference_frequency
     sections["model"] = section
-    if contact is not None:
-        sections["contact"] = {"type": contact.name} | _fields(contact)
-    if striker is not None:
-        # without a mass there is no suspension
-        left_out = ("suspension_stiffness", "suspension_damping") if striker.mass is None else ()
-        own = {name: getattr(striker, name) for name in quantities(Striker) if name not in left_out}
-        sections["striker"] = {name: value for name, value in own.items() if value is not None}
-        sections["drive"] = {"type": striker.drive.name} | _fields(striker.drive)
-    for number, each in enumerate(system.further_contacts, 2):
-        sections[f"contact_{number}"] = {"type": each.contact.name} | _fields(each.contact)
-        own = {
-            name: getattr(each.striker, name) for name in quantities(Striker) if name not in OF_FIRST_STRIKER
-        }
-        sections[f"striker_{number}"] = {name: value for name, value in own.items() if value is not None}
-        sections[f"drive_{number}"] = {"type": each.striker.drive.name} | _fields(each.striker.drive)
-    if system.base_excitation is not None:
-        own = {name: getattr(system.base_excitation, name) for name in quantities(BaseExcitation)}
-        sections["base_excitation"] = (
-            {"type": system.base_excitation.motion.name} | own | _fields(system.base_excitation.motion)
-        )
-    if system.axial_load is not None:
-        sections["axial_load"] = {"type": system.axial_load.motion.name} | _fields(system.axial_load.motion)
-    if system.external_force is not None:
-        own = {name: getattr(system.external_force, name) for name in quantities(ExternalForce)}
-        own = {name: value for name, value in own.items() if value is not None}
-        history = system.external_force.history
-        sections["external_force"] = {"type": history.name} | own | _fields(history)
-    if system.local_force is not None:
-        sections["local_force"] = {"type": system.local_force.name} | _fields(system.local_force)
-    if system.harvester is not None:
-        sections["harvester"] = {"type": system.harvester.name} | _fields(system.harvester)
+    for number, each in enumerate(system.contacts, 1):
+        striker = _fields(each.striker)
+        drive = striker.pop("drive")
+        if each.striker.mass is None:  # without a mass there is no suspension
+            del striker["suspension_stiffness"], striker["suspension_damping"]
+        labelled = {"label": each.label} if each.label else {}
+        sections[section_of("contact", number)] = _described(each.law) | striker | labelled
+        sections[section_of("drive", number)] = _described(drive)
+    for name in _MOVED:
+        if getattr(system, name) is not None:
+            sections[name] = _described(getattr(system, name))
+    for kind in ("force", "harvester"):
+        for number, each in enumerate(getattr(system, _TUPLES[kind]), 1):
+            sections[section_of(kind, number)] = _described(each)
     if start is not None:
         values = {name: getattr(start, name) for name in _START}
         if start.contact_time.size == 1:
@@ -134,48 +103,50 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
     return sections
 
 
+def _described(part: Any) -> dict[str, Any]:
+    """The section of a part: its type, or that of its motion, and the fields of both."""
+    values = _fields(part)
+    motion = values.pop("history", values.pop("motion", None))
+    if motion is None:
+        return {"type": part.name} | values
+    return {"type": motion.name} | values | _fields(motion)
+
+
 def _fields(part: Any) -> dict[str, Any]:
     found = {item.name: getattr(part, item.name) for item in dataclasses.fields(part)}
-    return {name: value for name, value in found.items() if value is not None}
+    return {
+        name: value for name, value in found.items() if value is not None and (name, value) != ("label", "")
+    }
 
 
-def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+def parts_from_mapping(sections: Mapping[str, Any]) -> dict[str, Any]:
     """The parts that sections describe."""
-    mapping("sections", sections)
+    sections = flattened(mapping("sections", sections))
     for name, values in sections.items():
         if numbered(name)[0] not in SECTIONS:
             raise InputError(f"[{name}]: unknown section; must be one of {', '.join(SECTIONS)}")
         if not isinstance(values, Mapping):
             raise InputError(f"{name} = {shown(values)}: must be a section [{name}]")
-    parts: dict[str, Any] = {"model": _model(sections)}
-    if "contact" in sections:
-        parts["contact"] = _chosen(sections["contact"], "contact", "type", LAWS)
-    if "striker" in sections or "drive" in sections:
-        drive: Drive = _chosen(sections.get("drive", {}), "drive", "type", DRIVES)
-        own = dict(sections.get("striker", {}))
-        _only(own, "striker", list(quantities(Striker)))
-        parts["striker"] = Striker(drive=drive, **own)
-    parts["further_contacts"] = _others(sections, parts.get("contact"))
-    if "base_excitation" in sections:
-        own = dict(sections["base_excitation"])
-        around = {name: own.pop(name) for name in quantities(BaseExcitation) if name in own}
-        parts["base_excitation"] = BaseExcitation(
-            motion=_chosen(own, "base_excitation", "type", DRIVES), **around
-        )
-    if "axial_load" in sections:
-        parts["axial_load"] = AxialLoadModulation(
-            motion=_chosen(sections["axial_load"], "axial_load", "type", LOADS)
-        )
-    if "external_force" in sections:
-        own = dict(sections["external_force"])
-        of_force = {name: own.pop(name) for name in quantities(ExternalForce) if name in own}
-        parts["external_force"] = ExternalForce(
-            history=_chosen(own, "external_force", "type", FORCES), **of_force
-        )
-    if "local_force" in sections:
-        parts["local_force"] = _chosen(sections["local_force"], "local_force", "type", LOCAL_FORCES)
-    if "harvester" in sections:
-        parts["harvester"] = _chosen(sections["harvester"], "harvester", "type", HARVESTERS)
+    contacts: list[Contact] = []
+    for section, values in _numbered_sections(sections, "contact", "drive"):
+        moving = section.replace("contact", "drive")
+        drive = _chosen(sections.get(moving, {"type": "fixed"}), moving)
+        own = dict(values)
+        striker = Striker(drive=drive, **_taken(own, quantities(Striker)))
+        label = own.pop("label", "")
+        # a further contact of which no law is given has that of the first
+        law = contacts[0].law if contacts and not own else _chosen(own, section)
+        contacts.append(Contact(law, striker, label))
+    parts: dict[str, Any] = {"model": _model(sections), "contacts": tuple(contacts)}
+    for name, kind in _MOVED.items():
+        if name in sections:
+            parts[name] = _moved(kind, "motion", sections[name], name)
+    parts["forces"] = tuple(
+        _force(section, values) for section, values in _numbered_sections(sections, "force")
+    )
+    parts["harvesters"] = tuple(
+        _chosen(values, section) for section, values in _numbered_sections(sections, "harvester")
+    )
     if "initial_state" in sections:
         values = dict(sections["initial_state"])
         _only(values, "initial_state", list(_START))
@@ -184,22 +155,71 @@ def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, A
     return parts
 
 
-def _others(sections: Mapping[str, Mapping[str, Any]], contact: Any) -> tuple[ContactPair, ...]:
-    """The strikers beside the first: sections striker_2, drive_2 and contact_2 (without it the first one's law)."""
-    numbers = sorted({numbered(name)[1] for name in sections} - {1})
-    if numbers != list(range(2, 2 + len(numbers))):
-        raise InputError(f"[striker_{numbers[-1]}]: there is no striker before it; number them 2, 3, ...")
-    found = []
-    for number in numbers:
-        names = {kind: f"{kind}_{number}" for kind in ("striker", "drive", "contact")}
-        own = dict(sections.get(names["striker"], {}))
-        _only(own, names["striker"], list(quantities(Striker)))
-        drive = _chosen(sections.get(names["drive"], {"type": "fixed"}), names["drive"], "type", DRIVES)
-        law = contact
-        if names["contact"] in sections:
-            law = _chosen(sections[names["contact"]], names["contact"], "type", LAWS)
-        found.append(ContactPair(Striker(drive=drive, **own), law))
-    return tuple(found)
+def _force(section: str, values: Mapping[str, Any]) -> Any:
+    if values.get("type") not in FORCES:
+        return _chosen(values, section)
+    return _moved(ExternalForce, "history", values, section)
+
+
+def _moved(kind: Any, motion: str, values: Mapping[str, Any], section: str) -> Any:
+    """A part with a motion, whose section names the type of that."""
+    own = dict(values)
+    rest = _taken(own, [item.name for item in dataclasses.fields(kind)])
+    return kind(**{motion: _chosen(own, section)}, **rest)
+
+
+def _taken(values: dict[str, Any], names: Any) -> dict[str, Any]:
+    """Those of *values* that have one of the names, taken out of them."""
+    return {name: values.pop(name) for name in names if name in values}
+
+
+def _numbered_sections(sections: Mapping[str, Any], *kinds: str) -> list[tuple[str, Mapping[str, Any]]]:
+    """The sections of the first of some kinds, in order; of the others there may be none."""
+    numbers = sorted({numbered(name)[1] for name in sections if numbered(name)[0] in kinds})
+    if numbers != list(range(1, 1 + len(numbers))):
+        raise InputError(
+            f"[{section_of(kinds[0], numbers[-1])}]: there is none before it; number them 1, 2, 3, ..."
+        )
+    return [(name := section_of(kinds[0], number), sections.get(name, {})) for number in numbers]
+
+
+def flattened(sections: Mapping[str, Any]) -> dict[str, Any]:
+    """Sections by name, ``contact``, ``contact.2``, ..., of those in which arrays of tables stand, as in a TOML file.
+
+    The drive of a contact may stand in its table.
+    """
+    found: dict[str, Any] = {}
+    for kind, given in sections.items():
+        tables = given if kind in NUMBERED and isinstance(given, (list, tuple)) else [given]
+        if not tables:
+            raise InputError(f"{kind} = []: must be a table, or an array of at least one table [[{kind}]]")
+        for number, values in enumerate(tables, 1):
+            section = section_of(kind, number)
+            if kind == "contact" and isinstance(values, Mapping) and isinstance(values.get("drive"), Mapping):
+                moving = section_of("drive", number)
+                if moving in found or moving in sections:
+                    raise InputError(f"[{section}] drive: is also given in [{moving}]; leave one out")
+                found[moving] = values["drive"]
+                values = {name: value for name, value in values.items() if name != "drive"}
+            found[section] = values
+    return found
+
+
+def nested(sections: Mapping[str, Any]) -> dict[str, Any]:
+    """Sections with arrays of tables for what there is several of, the drive of each contact in its table."""
+    found: dict[str, Any] = {}
+    for section, values in sections.items():
+        kind, _ = numbered(section)
+        several = section_of(kind, 2) in sections or (kind == "drive" and "contact.2" in sections)
+        if not several:
+            found[section] = values
+        elif kind != "drive":
+            table = dict(values)
+            moving = section.replace("contact", "drive")
+            if kind == "contact" and moving in sections:
+                table["drive"] = sections[moving]
+            found.setdefault(kind, []).append(table)
+    return found
 
 
 def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
@@ -231,14 +251,15 @@ def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
     return ReducedModel.from_matrices(**own)
 
 
-def _chosen(values: Mapping[str, Any], section: str, key: str, known: Mapping[str, Any]) -> Any:
-    own = dict(values)
-    name = own.pop(key, None)
+def _chosen(values: Mapping[str, Any], section: str) -> Any:
+    """The part whose kind the key ``type`` of its section names."""
+    own, known = dict(values), kinds_of(numbered(section)[0])
+    name = own.pop("type", None)
     if not isinstance(name, str) or name not in known:
-        raise InputError(f"[{section}] {key} = {shown(name)}: must be one of {', '.join(map(repr, known))}")
+        raise InputError(f"[{section}] type = {shown(name)}: must be one of {', '.join(map(repr, known))}")
     kind = known[name]
     _only(own, section, [item.name for item in dataclasses.fields(kind)])
-    _needed(own, section, kind, f" for {key} = {shown(name)}")
+    _needed(own, section, kind, f" for type = {shown(name)}")
     return kind(**own)
 
 
@@ -266,34 +287,51 @@ def _only(values: Mapping[str, Any], section: str, known: list[str]) -> None:
 _OF_MODEL = ("modes", "damping_ratio", "reference_frequency")
 
 
+_MOVED = {"base_excitation": BaseExcitation, "axial_load": AxialLoadModulation}
+"""Parts with a motion, by the section of a system."""
+_TUPLES = {"contact": "contacts", "force": "forces", "harvester": "harvesters"}
+"""Parts of a system that are tuples, by the section of one of them."""
+_PARTS = ("model", "base_excitation", "axial_load", "initial_state", *_TUPLES.values())
+
+
+def resolved(system: Any, name: str) -> str:
+    """The dotted name by number of a parameter that is given by number 1 or by the label of a contact or force."""
+    kind, _, rest = name.partition(".")
+    given, dot, field = rest.partition(".")
+    if kind not in NUMBERED or not given or (not dot and given != "1" and given.isdigit()):
+        return name
+    parts = getattr(system, _TUPLES[kind if kind != "drive" else "contact"])
+    labels = [getattr(each, "label", "") for each in parts]
+    if given == "1" or given in labels:
+        number = 1 if given == "1" else 1 + labels.index(given)
+        return section_of(kind, number) + dot + field
+    if dot and not given.isdigit():
+        known = ", ".join([*map(str, range(1, 1 + len(parts))), *filter(None, labels)])
+        raise InputError(f"{name}: this system has no {kind} {given!r}; must be one of {known or 'none'}")
+    return name
+
+
 def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """The parts of a system (model, contact, striker, start) with *changes*, by dotted name or whole part."""
+    """The parts of a system (model, contacts, forces, ...) with *changes*, by dotted name or whole part."""
     whole: dict[str, Any] = {}
     inside: dict[str, dict[str, Any]] = {}
     for name, value in changes.items():
-        section, dot, field = name.partition(".")
-        if numbered(section)[0] not in SECTIONS:
+        section, field = split_name(name)
+        if numbered(section)[0] not in (*SECTIONS, *_PARTS):
             raise InputError(
                 f"{name}: is not a parameter of a system; its sections are {', '.join(SECTIONS)}"
             )
-        if dot:
+        if field:
             inside.setdefault(section, {})[field] = value
         else:
             whole[section] = value
-    found = dict(parts)
-    for name in (
-        "model",
-        "contact",
-        "striker",
-        "base_excitation",
-        "axial_load",
-        "external_force",
-        "local_force",
-        "harvester",
-        "initial_state",
-    ):
-        if name in whole:
-            found[name] = whole[name]
+    found = dict(parts) | {name: whole[name] for name in _PARTS if name in whole}
+    for kind, name in _TUPLES.items():
+        count = len(sequence_of(name, found[name]))
+        for section in (*whole, *inside):
+            of, number = numbered(section)
+            if of in (kind, "drive" if kind == "contact" else kind) and number > count:
+                raise InputError(f"{section}: this system has {count or 'no'} {name if count != 1 else kind}")
     of_beam = inside.get("beam", {})
     if "boundary" in whole or "boundary" in inside:
         of_beam = of_beam | {"boundary": _ends(found["model"], whole, inside.get("boundary", {}))}
@@ -301,65 +339,62 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
     if "imperfection" in whole or "imperfection" in inside:
         given = whole.get("imperfection", found["model"].imperfection)
         found["model"] = _with_imperfection(found["model"], given, inside.get("imperfection", {}))
-    if "contact" in inside:
-        found["contact"] = _changed(found["contact"], "contact", inside["contact"])
-    if "drive" in whole:
-        found["striker"] = dataclasses.replace(_there(found["striker"], "striker"), drive=whole["drive"])
-    if "drive" in inside:
-        striker = _there(found["striker"], "drive")
-        drive = _changed(striker.drive, "drive", inside["drive"])
-        found["striker"] = dataclasses.replace(striker, drive=drive)
-    if "striker" in inside:
-        found["striker"] = _changed(found["striker"], "striker", inside["striker"])
-    found["further_contacts"] = _others_replacing(found.get("further_contacts", ()), whole, inside)
-    for name in ("base_excitation", "axial_load", "external_force"):
+    found["contacts"] = tuple(
+        _contact_replacing(each, number, whole, inside)
+        for number, each in enumerate(sequence_of("contacts", found["contacts"]), 1)
+    )
+    for name in ("base_excitation", "axial_load"):
         if name in inside:
             found[name] = _around(found.get(name), name, inside[name])
-    for name in ("local_force", "harvester"):
-        if name in inside:
-            found[name] = _changed(found.get(name), name, inside[name])
+    for kind in ("force", "harvester"):
+        made = []
+        for number, each in enumerate(sequence_of(_TUPLES[kind], found[_TUPLES[kind]]), 1):
+            section = section_of(kind, number)
+            made.append(_around(whole.get(section, each), section, inside.get(section, {})))
+        found[_TUPLES[kind]] = tuple(made)
     start, model = found["initial_state"], found["model"]
     if isinstance(start, State) and "initial_state" not in whole and start.modes != model.modes:
         found["initial_state"] = start.with_modes(model.modes)
     return found
 
 
-def _others_replacing(
-    others: tuple[ContactPair, ...], whole: Mapping[str, Any], inside: Mapping[str, Mapping[str, Any]]
-) -> tuple[ContactPair, ...]:
-    """The strikers beside the first one, changed by dotted name or whole part."""
-    for name in (*whole, *inside):
-        if numbered(name)[1] > 1 + len(others):
-            raise InputError(f"{name}: this system has {1 + len(others)} strikers")
-    made = []
-    for number, each in enumerate(others, 2):
-        striker, contact = (
-            whole.get(f"striker_{number}", each.striker),
-            whole.get(f"contact_{number}", each.contact),
-        )
-        drive = whole.get(f"drive_{number}", striker.drive)
-        if f"drive_{number}" in inside:
-            drive = _changed(drive, f"drive_{number}", inside[f"drive_{number}"])
-        own = {"drive": drive} if drive is not striker.drive else {}
-        if own:
-            striker = dataclasses.replace(striker, **own)
-        if f"striker_{number}" in inside:
-            striker = _changed(striker, f"striker_{number}", inside[f"striker_{number}"])
-        if f"contact_{number}" in inside:
-            contact = _changed(contact, f"contact_{number}", inside[f"contact_{number}"])
-        made.append(ContactPair(striker, contact))
-    return tuple(made)
+def sequence_of(name: str, value: Any) -> tuple[Any, ...]:
+    """A list or tuple, as a tuple."""
+    if not isinstance(value, (list, tuple)):
+        raise InputTypeError(f"{name} = {shown(value)}: must be a list or tuple, such as [{name[:-1]}]")
+    return tuple(value)
 
 
-def _there(part: Any, section: str) -> Any:
+def _contact_replacing(
+    contact: Any, number: int, whole: Mapping[str, Any], inside: Mapping[str, Mapping[str, Any]]
+) -> Any:
+    """A contact with its law, striker or drive changed, by dotted name or whole part."""
+    section, moving = section_of("contact", number), section_of("drive", number)
+    contact = whole.get(section, contact)
+    if moving not in whole and moving not in inside and section not in inside:
+        return contact
+    values = dict(inside.get(section, {}))
+    whole_parts = {name: values.pop(name, getattr(contact, name)) for name in ("law", "striker", "label")}
+    contact = Contact(**whole_parts)
+    law, striker = contact.law, contact.striker
+    drive = whole.get(moving, striker.drive)
+    if moving in inside:
+        drive = _changed(drive, moving, inside[moving])
+    if drive is not striker.drive:
+        striker = dataclasses.replace(striker, drive=drive)
+    of_striker = _taken(values, quantities(Striker))
+    if of_striker:
+        striker = dataclasses.replace(striker, **of_striker)
+    if values:
+        law = _changed(law, section, values, list(quantities(Striker)))
+    return Contact(law, striker, contact.label)
+
+
+def _changed(part: Any, section: str, values: Mapping[str, Any], others: list[str] | None = None) -> Any:
+    """A frozen part with some of its quantities changed."""
     if part is None:
         raise InputError(f"{section}: this system has none")
-    return part
-
-
-def _changed(part: Any, section: str, values: Mapping[str, Any]) -> Any:
-    """A frozen part with some of its quantities changed."""
-    known = quantities(type(_there(part, section)))
+    known = [*quantities(type(part)), *(others or [])]
     for name in values:
         if name not in known:
             raise InputError(
@@ -369,13 +404,14 @@ def _changed(part: Any, section: str, values: Mapping[str, Any]) -> Any:
 
 
 def _around(part: Any, section: str, values: Mapping[str, Any]) -> Any:
-    """A base, a load or a force with some of its own quantities changed, or of its motion's."""
-    own = quantities(type(_there(part, section)))
-    of_motion = {name: value for name, value in values.items() if name not in own}
+    """A base, a load, a force or a harvester with some of its own quantities changed, or of its motion's."""
+    own = {} if part is None else quantities(type(part))
+    moves = next((name for name in ("history", "motion") if hasattr(part, name)), "")
+    of_motion = {name: value for name, value in values.items() if name not in own} if moves else {}
     if of_motion:
-        moves = "history" if section == "external_force" else "motion"
         part = dataclasses.replace(part, **{moves: _changed(getattr(part, moves), section, of_motion)})
-    return dataclasses.replace(part, **{name: value for name, value in values.items() if name in own})
+    rest = {name: value for name, value in values.items() if name not in of_motion}
+    return _changed(part, section, rest) if rest else part
 
 
 def _ends(model: ReducedModel, whole: Mapping[str, Any], values: Mapping[str, Any]) -> Any:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.drive.shock import GRAVITY
 from snapbeam.model.parameters import Parameter, lookup
+from snapbeam.model.quantity import split_name
 from snapbeam.model.system import System
 from snapbeam.util.units import number_in_unit
 from snapbeam.util.validation import (
@@ -146,7 +147,7 @@ class Physical:
             "velocity_amplitude": length * omega,
             "displacement_amplitude": 1e6 * length,
             "acceleration_amplitude": length * omega**2 / GRAVITY,
-        }[self.parameter.partition(".")[2]]
+        }[split_name(self.parameter)[1]]
 
 
 PHYSICAL: dict[str, Physical] = {
@@ -155,7 +156,7 @@ PHYSICAL: dict[str, Physical] = {
     "drive.displacement_um": Physical(
         "drive.displacement_amplitude", "um", "displacement amplitude of the striker"
     ),
-    "striker.location_m": Physical("striker.location", "m", "distance of the striker from the left clamp"),
+    "contact.location_m": Physical("contact.location", "m", "distance of the striker from the left clamp"),
     "base_excitation.frequency_hz": Physical(
         "base_excitation.frequency_ratio", "Hz", "frequency of the base"
     ),
@@ -172,7 +173,7 @@ PHYSICAL: dict[str, Physical] = {
 def physical_name(name: str) -> str | None:
     """The dotted name of a parameter in its physical unit, by itself or by its last part; None if it is none."""
     instance("name", name, str, "text")
-    found = [full for full in PHYSICAL if name in (full, full.partition(".")[2])]
+    found = [full for full in PHYSICAL if name in (full, split_name(full)[1])]
     return found[0] if found else None
 
 
@@ -195,17 +196,17 @@ def parameter_of_axis(name: str) -> Parameter:
     own = dataclasses.replace(
         ratio.quantity, unit=row.unit, long_name=row.words, symbol="", high=math.inf, plausible=None
     )
-    short = name.removeprefix("drive.").removeprefix("striker.").replace(".", "_")
+    short = name.removeprefix("drive.").removeprefix("contact.").replace(".", "_")
     return dataclasses.replace(ratio, name=name, short=short, quantity=own)
 
 
 def unit_of(system: System, name: str) -> float:
     """What a ratio of 1 is in the physical unit of *name*."""
     scale, row = system.scale, PHYSICAL[name]
-    if row.parameter != "striker.location":
+    if row.parameter != "contact.location":
         return row.unit_of(scale.length, scale.omega)
     if system.model.beam is None:
-        raise InputError("striker.location_m: a structure given by matrices has no length; give location")
+        raise InputError("contact.location_m: a structure given by matrices has no length; give location")
     return system.model.beam.length
 
 
@@ -245,7 +246,7 @@ def checked_physical(system: System, name: str, value: float, shown: str) -> flo
         If the ratio is out of its range; the message says both.
     """
     ratio, row = float(from_physical(system, name, value)), lookup(PHYSICAL[name].parameter)
-    short = row.name.partition(".")[2]
+    short = split_name(row.name)[1]
     try:
         row.quantity.check(short, ratio)
     except InputError as error:

@@ -14,18 +14,13 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
-from snapbeam.model.axial_load import LOADS
-from snapbeam.model.contact.base import LAWS
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
 from snapbeam.model.drive.base import DRIVES
 from snapbeam.model.external_force import FORCES
-from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.integration import CYCLES, Integration
-from snapbeam.model.local_force import LOCAL_FORCES
-from snapbeam.model.mapping import SECTIONS as SYSTEM_SECTIONS
-from snapbeam.model.mapping import parts_from_mapping
+from snapbeam.model.mapping import flattened, parts_from_mapping
 from snapbeam.model.parameter_axes import (
     PHYSICAL,
     axis_that_changes_unit,
@@ -34,11 +29,12 @@ from snapbeam.model.parameter_axes import (
     parse_axis,
     physical_name,
 )
-from snapbeam.model.parameters import Parameter, lookup, parameters, row_of
+from snapbeam.model.parameters import SECTIONS as SYSTEM_SECTIONS
+from snapbeam.model.parameters import Parameter, kinds_of, lookup, parameters, row_of
 from snapbeam.model.potential import Potential
-from snapbeam.model.quantity import quantities
+from snapbeam.model.quantity import check_label, numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import ReducedModel
-from snapbeam.model.striker import numbered
+from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.input_files import read_toml
@@ -145,23 +141,11 @@ def contact_rivals() -> list[tuple[set[str], set[str]]]:
 # Parameters that were given, checked one by one: names, kinds, sizes and units.
 
 
-SECTIONS = (
-    "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "external_force", "local_force", "harvester", "initial_state",
-    "sweep", "integration",
-)  # fmt: skip
+SECTIONS = (*SYSTEM_SECTIONS, "sweep", "integration")
 _OF_OTHER_COMMANDS = ("uncertainty", "probability", "design")
 """Sections that a file may contain for other commands, which check them."""
 _OF_RUNS = ("sweep", "integration")
 """Sections that describe no system."""
-_KINDS: dict[str, Mapping[str, type]] = {
-    "drive": DRIVES,
-    "base_excitation": {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()},
-    "axial_load": LOADS,
-    "external_force": FORCES,
-    "local_force": LOCAL_FORCES,
-    "harvester": HARVESTERS,
-}
-"""What a section may be of, where its ``type`` says so."""
 _SYMBOLS = {
     "E": "young_modulus", "L": "length", "N": "modes", "Omega": "frequency_ratio", "P": "axial_load",
     "V": "velocity_amplitude", "b": "buckling_level", "e": "coefficient", "f1": "reference_frequency", "h": "thickness",
@@ -174,7 +158,7 @@ def checked_sections(sections: Mapping[str, Any]) -> tuple[dict[str, dict[str, A
     """Return the checked values by section and name, and one message for each fault."""
     lines: list[str] = []
     found: dict[str, dict[str, Any]] = {}
-    for section, values in mapping("sections", sections).items():
+    for section, values in flattened(mapping("sections", sections)).items():
         if section == "extends":
             if values != "paper":
                 lines.append(
@@ -195,14 +179,12 @@ def checked_sections(sections: Mapping[str, Any]) -> tuple[dict[str, dict[str, A
 
 def _known(section: str, found: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Names that a section may hold."""
-    kind, number = numbered(section)
-    names = [row.name.partition(".")[2] for row in parameters().values() if row.section == kind]
-    if number > 1:
-        names = [name for name in names if row_of(f"{section}.{name}") is not None]
-        return names + {"drive": ["type"], "contact": ["type"]}.get(kind, [])
-    names += [name.partition(".")[2] for name in PHYSICAL if name.startswith(f"{section}.")]
-    names += ["type"] if section in _KINDS else []
-    return names + (["type", *MATERIALS, *WANTED] if section == "contact" else [])
+    kind = numbered(section)[0]
+    names = [split_name(row.name)[1] for row in parameters().values() if row.section == kind]
+    names += ["type"] if kinds_of(kind) else []
+    names += ["label"] if kind in ("contact", "force") else []
+    names += [*MATERIALS, *WANTED] if kind == "contact" else []
+    return names + [field for of, field in map(split_name, PHYSICAL) if of == section]
 
 
 def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any]]) -> str:
@@ -297,9 +279,15 @@ def _is_sum(section: str, value: Any) -> bool:
 def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
     """What is in no row: the law, the drive's kind, materials, and physical units."""
     if name == "type":
-        known = LAWS if numbered(section)[0] == "contact" else _KINDS[numbered(section)[0]]
+        known = kinds_of(numbered(section)[0])
         if not isinstance(value, str) or (value not in known and not _is_sum(section, value)):
             return f"{name} = {shown(value)}: must be one of {', '.join(map(repr, known))}", None
+        return "", value
+    if name == "label":
+        try:
+            check_label(value)
+        except InputError as error:
+            return str(error), None
         return "", value
     full = f"{section}.{name}"
     if full in PHYSICAL or name == "radius" or name in WANTED:
@@ -335,7 +323,7 @@ def _checked_axis(name: str, value: Any, own: dict[str, Any]) -> str:
             return f"{name}: the same axis is given as {twice[0]}"
         parsed = parsed_axis(full, value)
         if full not in PHYSICAL:
-            row, short = lookup(full), full.partition(".")[2]
+            row, short = lookup(full), split_name(full)[1]
             for point in (parsed[0], parsed[-1]) if row.quantity.kind is float else parsed:
                 plain = point if isinstance(point, str) else point.item()
                 row.quantity.check(short, plain)
@@ -351,7 +339,7 @@ def _checked_axis(name: str, value: Any, own: dict[str, Any]) -> str:
 def parsed_axis(name: str, value: Any) -> Any:
     """The values of an axis: numbers, or words."""
     row = None if name in PHYSICAL else lookup(name)
-    short = name.partition(".")[2] or name
+    short = split_name(name)[1] or name
     if row is not None and row.quantity.kind in (str, bool):
         words = value.split(",") if isinstance(value, str) else value
         return np.array([row.quantity.check(short, word) for word in words])
@@ -413,10 +401,10 @@ DEFAULT_DRIVE = {"frequency_ratio": 1.21, "velocity_amplitude": 0.18}
 DEFAULT_AXES = {"drive.frequency_ratio": "0.1:4:64", "drive.velocity_amplitude": "0.01:0.65:40"}
 """Of a map for which no axis is named."""
 _AROUND, _STRIKING = (
-    ("base_excitation", "axial_load", "external_force", "local_force", "harvester"),
-    ("contact", "striker", "drive"),
+    ("base_excitation", "axial_load", "force", "harvester"),
+    ("contact", "drive"),
 )
-_CONVERTED = {"radius", *WANTED, *(name.partition(".")[2] for name in PHYSICAL)}
+_CONVERTED = {"radius", *WANTED, *(field for _, field in map(split_name, PHYSICAL))}
 """Names of a parameter file that a system does not have."""
 # What stands for the same thing in a section: giving one set takes the other away.
 _RIVALS: dict[str, list[tuple[set[str], set[str]]]] = {
@@ -452,17 +440,28 @@ class Config:
         """What was given of a section."""
         return dict(self.given.get(name, {}))
 
+    def resolved(self, name: str) -> str:
+        """The dotted name by number of a parameter that is given by the label of a contact or force."""
+        kind, _, rest = name.partition(".")
+        label, dot, field = rest.partition(".")
+        labelled = "contact" if kind == "drive" else kind
+        for section, values in self.given.items():
+            own, number = numbered(section)
+            if dot and own == labelled and values.get("label") == label:
+                return f"{section_of(kind, number)}.{field}"
+        return name
+
     def _with_axes(self, name: str) -> dict[str, Any]:
         """What was given of a section; a key that has an axis only takes the first value of the axis."""
         found, known = self.section(name), parameters()
         kind = law_of(found) if numbered(name)[0] == "contact" else found.get("type", "sine")
         for axis, values in self.section("sweep").items():
             ratio = PHYSICAL[axis].parameter if axis in PHYSICAL else lookup(axis).name
-            section, _, key = ratio.partition(".")
+            section, key = split_name(ratio)
             if section != name or key in found:
                 continue
             if axis in PHYSICAL:
-                own = axis.partition(".")[2] in found or (self.extends_paper and name in _STRIKING)
+                own = split_name(axis)[1] in found or (self.extends_paper and name in _STRIKING)
                 if not own:
                     found[key] = _stand_in(key, 0.0)
                 continue
@@ -482,7 +481,7 @@ class Config:
             f"{section}.{name}"
             for section in sections
             for name in found[section]
-            if name not in self.section(section) and name != "modes" and f"{section}.{name}" not in swept
+            if name not in {*self.section(section), "modes", "location"} and f"{section}.{name}" not in swept
         )
 
     def whole(self, axes: Mapping[str, Any] | None = None) -> Config:
@@ -567,6 +566,8 @@ class Config:
             and not {"stiffness", *MATERIALS} & of_contact.keys()
         ):
             contact = {"stiffness": CONTACT.stiffness}
+        if "location_m" not in of_contact:
+            contact["location"] = LOCATION
         drive = dict(DEFAULT_DRIVE)
         given = self.section("drive")
         if given.get("type", "sine") != "sine":
@@ -578,20 +579,19 @@ class Config:
             "beam": beam,
             "model": {"modes": MODES, "damping_ratio": DAMPING_RATIO},
             "contact": contact,
-            "striker": {} if "location_m" in self.section("striker") else {"location": LOCATION},
             "drive": drive,
         }
 
     @cached_property
     def system(self) -> System:
         """The system; what is not given is the paper's.  Refused (InputError) if values do not go together."""
-        self._require("beam", "model", *(() if self._is_unstruck else ("contact", "striker")))
+        self._require("beam", "model", *(() if self._is_unstruck else ("contact",)))
         sections: dict[str, Any] = {
             name: values | (self._with_axes(name) if self._may_be_axis(name) else self.section(name))
             for name, values in self._defaults().items()
         }
         sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
-        sections |= {name: self._with_axes(name) for name in _AROUND if self.section(name)}
+        sections |= {name: self._with_axes(name) for name in self._around}
         sections |= self._further
         if self._is_unstruck:
             for name in _STRIKING:
@@ -603,16 +603,16 @@ class Config:
             sections["drive"].setdefault("type", "sine")
         later = {
             f"{section}.{name}": sections[section].pop(name)
-            for section in ("drive", "striker", "base_excitation")
+            for section in ("drive", "contact", "base_excitation")
             for name in [key for key in sections.get(section, {}) if f"{section}.{key}" in PHYSICAL]
         }
         for physical, value in later.items():
-            own = PHYSICAL[physical].parameter.partition(".")[2]
-            sections[physical.partition(".")[0]].setdefault(own, _stand_in(own, value))
+            section, own = split_name(PHYSICAL[physical].parameter)
+            sections[section].setdefault(own, _stand_in(own, value))
         system = System.from_mapping(sections)
         if later:
             system = system.replace(**{
-                PHYSICAL[name].parameter: checked_physical(system, name, value, name.partition(".")[2])
+                PHYSICAL[name].parameter: checked_physical(system, name, value, split_name(name)[1])
                 for name, value in later.items()
             })  # fmt: skip
         return self._started(system)
@@ -623,16 +623,22 @@ class Config:
 
     @property
     def _further(self) -> dict[str, dict[str, Any]]:
-        """The sections of strikers beside the first, complete."""
+        """The sections of further contacts and their drives, complete."""
         found = {}
         for name in self.given:
             kind, number = numbered(name)
-            if number > 1:
+            if number > 1 and kind in _STRIKING:
                 own = self._with_axes(name)
-                found[name] = contact_of(own) if kind == "contact" else own
+                has_law = own.keys() - {*quantities(Striker), "label"}
+                found[name] = contact_of(own) if kind == "contact" and has_law else own
                 if kind == "drive":
                     found[name].setdefault("type", "sine")
         return found
+
+    @property
+    def _around(self) -> list[str]:
+        """The sections of what acts on the structure beside strikers."""
+        return [name for name, values in self.given.items() if numbered(name)[0] in _AROUND and values]
 
     @property
     def _is_unstruck(self) -> bool:
@@ -647,7 +653,10 @@ class Config:
 
     @property
     def _is_moved(self) -> bool:
-        return any(self.section(name) for name in ("base_excitation", "axial_load", "external_force"))
+        return any(
+            name in ("base_excitation", "axial_load") or self.section(name).get("type") in FORCES
+            for name in self._around
+        )
 
     @property
     def is_complete(self) -> bool:
@@ -660,9 +669,13 @@ class Config:
     @property
     def is_static(self) -> bool:
         """Whether only a beam is described, with the forces on it, and no damping that a motion needs."""
-        parts = {"beam", "model", "boundary", "imperfection", "external_force", "local_force"}
-        damped = "damping_ratio" in self.section("model") and set(self.given) & set(_AROUND)
-        return not self.extends_paper and not damped and not set(self.given) - parts
+        kinds = {numbered(name)[0] for name in self.given}
+        damped = "damping_ratio" in self.section("model") and self._around
+        return (
+            not self.extends_paper
+            and not damped
+            and not kinds - {"beam", "model", "boundary", "imperfection", "force"}
+        )
 
     def _started(self, system: System) -> System:
         """The system with the start that was given."""
@@ -682,13 +695,18 @@ class Config:
     @property
     def potential(self) -> Potential:
         """Potential energy of the model with the forces that were given, of a beam that need not be buckled."""
-        parts = self._parts("external_force", "local_force")
-        return Potential.of(parts["model"], parts.get("external_force"), parts.get("local_force"))
+        parts = self._parts(*(name for name in self._around if numbered(name)[0] == "force"))
+        return Potential.of(parts["model"], parts["forces"])
+
+    @property
+    def static_system(self) -> System:
+        """The model with the forces that were given, for questions about its equilibria."""
+        return System(**self._parts(*(name for name in self._around if numbered(name)[0] == "force")))
 
     @property
     def free_structure(self) -> ReducedModel:
         """The model, for questions about its free motion; refused (InputError) if anything else acts on it."""
-        acting = [name for name in (*_AROUND, "contact", "striker", "drive") if self.section(name)]
+        acting = [*self._around, *(name for name in _STRIKING if self.section(name))]
         if acting:
             raise InputError(
                 f"{', '.join(acting)}: free motion of the structure alone is computed; leave out {acting[0]}"
@@ -735,7 +753,7 @@ class Config:
                 found[PHYSICAL[name].parameter] = np.array(ratios)
             else:
                 found[lookup(name).name] = parsed
-        own = [name for name in PHYSICAL if name.partition(".")[2] in self.section(name.partition(".")[0])]
+        own = [name for name in PHYSICAL for of, field in [split_name(name)] if field in self.section(of)]
         for name in [*own, *(name for name in given if name in PHYSICAL)]:
             axis = axis_that_changes_unit(self.system, name, found)
             if axis is None:
@@ -747,7 +765,7 @@ class Config:
                     f"with an axis {name}"
                 )
             found.pop(ratio, None)
-            section, _, key = name.partition(".")
+            section, key = split_name(name)
             found[name] = (
                 parsed_axis(name, given[name]) if name in given else np.array([self.section(section)[key]])
             )
@@ -815,7 +833,9 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]], source: 
             for name in own:
                 for same in same_axis(name):
                     target.pop(same, None)
-        for one, other in [pair for both in _RIVALS.get(section, []) for pair in (both, both[::-1])]:
+        for one, other in [
+            pair for both in _RIVALS.get(numbered(section)[0], []) for pair in (both, both[::-1])
+        ]:
             if one & own.keys() and not other & own.keys():
                 for name in other:
                     target.pop(name, None)
@@ -869,6 +889,7 @@ def system_of_file(path: str | os.PathLike[str]) -> System:
 
 def _is_saved_system(sections: Mapping[str, Any]) -> bool:
     """Whether these are the sections of a system alone, with the names that :meth:`~snapbeam.System.save` writes."""
+    sections = flattened(sections)
     contacts = [name for name in sections if numbered(name)[0] == "contact"]
     return all(
         numbered(section)[0] in SYSTEM_SECTIONS and isinstance(values, Mapping) and not values.keys() & _CONVERTED
@@ -899,11 +920,21 @@ def config_text(config: Config, comment: str = "") -> str:
     lines = [f"# {line}" for line in comment.splitlines()]
     if config.extends_paper and config.given and not config.is_complete:
         lines += ["# what this file leaves out is as in the paper", 'extends = "paper"']
-    for section, values in config.to_mapping().items():
+    sections = config.to_mapping()
+    if "contact.2" in sections:  # each drive in the table of its contact
+        striking = {name: sections.pop(name) for name in list(sections) if numbered(name)[0] in _STRIKING}
+        for name in sorted(striking, key=lambda name: (numbered(name)[1], name)):
+            sections.setdefault(name.replace("drive", "contact"), {})
+            sections[name] = striking[name]
+    for section, values in sections.items():
         lines += [""] if lines else []
-        lines.append(f"[{section}]")
+        kind = numbered(section)[0]
+        if kind == "drive" and "contact.2" in sections:
+            lines.append("[contact.drive]")
+        else:
+            lines.append(f"[[{kind}]]" if f"{kind}.2" in sections else f"[{kind}]")
         for name, value in values.items():
-            row = row_of(f"{section}.{name}")
+            row = row_of(f"{numbered(section)[0]}.{name}")
             physical = PHYSICAL.get(f"{section}.{name}")
             if row is not None:
                 unit = "" if row.quantity.unit == "1" else f", {row.quantity.unit}"

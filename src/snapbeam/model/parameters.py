@@ -26,13 +26,20 @@ from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.integration import Integration
 from snapbeam.model.local_force import LOCAL_FORCES
-from snapbeam.model.quantity import RUN, ParameterField, quantities
+from snapbeam.model.quantity import RUN, ParameterField, numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import MODEL_QUANTITIES
 from snapbeam.model.state import START_NAME
-from snapbeam.model.striker import OF_FIRST_STRIKER, Striker, numbered
+from snapbeam.model.striker import Striker
 from snapbeam.util.validation import InputError, shown
 
-__all__ = ["Parameter", "lookup", "parameters", "row_of", "short_names"]
+__all__ = ["SECTIONS", "Parameter", "kinds_of", "lookup", "parameters", "row_of", "short_names"]
+
+
+SECTIONS = (
+    "beam", "model", "boundary", "imperfection", "contact", "drive", "base_excitation", "axial_load", "force",
+    "harvester", "initial_state",
+)  # fmt: skip
+"""Sections of a system, in their order."""
 
 
 _NONE = dataclasses.MISSING
@@ -66,7 +73,7 @@ class Parameter:
     @property
     def section(self) -> str:
         """What it is a parameter of."""
-        return self.name.partition(".")[0]
+        return numbered(split_name(self.name)[0])[0]
 
     @property
     def is_run(self) -> bool:
@@ -106,39 +113,42 @@ def _rows() -> Iterable[Parameter]:
         ("beam", Beam),
         ("boundary", BoundaryConditions),
         ("imperfection", Imperfection),
-        ("striker", Striker),
+        ("contact", Striker),
         ("integration", Integration),
     )
     for section, part in own:
         yield from _of_class(section, part)
     for row in _of_class("base_excitation", BaseExcitation):
         yield dataclasses.replace(row, short=f"base_excitation_{row.short}")
-    for row in _of_class("external_force", ExternalForce):
-        yield dataclasses.replace(row, short=f"external_force_{row.short}")
+    for row in _of_class("force", ExternalForce):
+        yield dataclasses.replace(row, short=f"force_{row.short}", kinds=tuple(FORCES))
     for name, (item, default) in MODEL_QUANTITIES.items():
         yield Parameter(f"model.{name}", item.short or name, item, default)
-    shaking = {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()}
-    several: tuple[tuple[str, Mapping[str, type]], ...] = (
-        ("contact", LAWS),
-        ("drive", DRIVES),
-        ("base_excitation", shaking),
-        ("axial_load", LOADS),
-        ("external_force", FORCES),
-        ("local_force", LOCAL_FORCES),
-        ("harvester", HARVESTERS),
-    )
-    for section, known in several:
-        for kind_name, kind in known.items():
+    for section in ("contact", "drive", *_AROUND):
+        for kind_name, kind in kinds_of(section).items():
             for row in _of_class(section, kind):
                 row = _around(row) if section in _AROUND else row
                 yield dataclasses.replace(row, kinds=(kind_name,))
 
 
+def kinds_of(section: str) -> Mapping[str, Any]:
+    """The classes that a section can describe, by the word that its key ``type`` has; none of a section without it."""
+    if section == "base_excitation":
+        return {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()}
+    known: dict[str, Mapping[str, Any]] = {
+        "contact": LAWS,
+        "drive": DRIVES,
+        "axial_load": LOADS,
+        "force": {**FORCES, **LOCAL_FORCES},
+        "harvester": HARVESTERS,
+    }
+    return known.get(section, {})
+
+
 _AROUND = {
     "base_excitation": "the base",
     "axial_load": "",
-    "external_force": "",
-    "local_force": "",
+    "force": "",
     "harvester": "",
 }
 """Sections of what surrounds a beam, whose names in datasets say so, and what words of a drive are said of."""
@@ -146,7 +156,7 @@ _AROUND = {
 
 def _around(row: Parameter) -> Parameter:
     """A parameter of what surrounds the beam, told from the striker's of the same name."""
-    section, _, name = row.name.partition(".")
+    section, name = split_name(row.name)
     of = _AROUND[section]
     words = f"{row.quantity.long_name}, of {of}" if of else row.quantity.long_name
     plain = name if row.short == name or section == "base_excitation" else row.short
@@ -180,20 +190,17 @@ def _table(registered: tuple[tuple[tuple[str, type], ...], ...]) -> dict[str, Pa
         if row.name in table:
             row = dataclasses.replace(row, kinds=(*table[row.name].kinds, *row.kinds))
         table[row.name] = row
-    order = (
-        "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "external_force", "local_force", "harvester", "initial_state",
-        "integration",
-    )  # fmt: skip
+    order = (*SECTIONS, "integration")
     return dict(sorted(table.items(), key=lambda item: order.index(item[1].section)))
 
 
-_OF_STRIKER = re.compile(r"(.+)_striker_([2-9])")
+_OF_NUMBER = re.compile(r"(.+)_(contact|force|harvester)_([1-9][0-9]*)")
 _OF_TERM = re.compile(r"(.+)_([1-4])")
 
 
 def row_of(name: str) -> Parameter | None:
-    """The row of a dotted name, of a striker beside the first too (``striker_2.location``); None if there is none."""
-    table, (section, _, field) = parameters(), name.partition(".")
+    """The row of a dotted name, of a second contact or force too (``contact.2.gap``); None if there is none."""
+    table, (section, field) = parameters(), split_name(name)
     kind, number = numbered(section)
     row = table.get(f"{kind}.{field}")
     found = _OF_TERM.fullmatch(field)
@@ -205,27 +212,25 @@ def row_of(name: str) -> Parameter | None:
             row = dataclasses.replace(row, name=name, short=f"{row.short}_{found[2]}", quantity=own)
     if number == 1 or row is None:
         return row
-    if row.section == "striker" and row.name.partition(".")[2] in OF_FIRST_STRIKER:
-        return None
-    words = f"{row.quantity.long_name}, of striker {number}"
+    of = "contact" if kind == "drive" else kind
+    words = f"{row.quantity.long_name}, of {of} {number}"
     quantity = dataclasses.replace(row.quantity, long_name=words)
-    return dataclasses.replace(row, name=name, short=f"{row.short}_striker_{number}", quantity=quantity)
+    return dataclasses.replace(row, name=name, short=f"{row.short}_{of}_{number}", quantity=quantity)
 
 
 def _by_short(name: str, shorts: Mapping[str, str]) -> Parameter | None:
-    """The row of a striker beside the first, or of a term of a sum, by the name that datasets use."""
-    found = _OF_STRIKER.fullmatch(name)
-    striker = f"_{found[2]}" if found is not None else ""
+    """The row of a further contact or force, or of a term of a sum, by the name that datasets use."""
+    found = _OF_NUMBER.fullmatch(name)
     plain = name if found is None else found[1]
     term = _OF_TERM.fullmatch(plain)
     if plain in shorts:
-        section, _, field = shorts[plain].partition(".")
+        section, field = split_name(shorts[plain])
     elif term is not None and term[1] in shorts:
-        section, _, field = shorts[term[1]].partition(".")
+        section, field = split_name(shorts[term[1]])
         field = f"{field}_{term[2]}"
     else:
         return None
-    return row_of(f"{section}{striker}.{field}")
+    return row_of(f"{section_of(section, 1 if found is None else int(found[3]))}.{field}")
 
 
 def short_names() -> dict[str, str]:
@@ -271,8 +276,8 @@ def lookup(name: str) -> Parameter:
     if row is not None:
         return row
     tails: dict[str, list[str]] = {}
-    for full in (each for each in table if each.partition(".")[0] not in _AROUND):
-        tails.setdefault(full.partition(".")[2], []).append(full)
+    for full in (each for each in table if split_name(each)[0] not in _AROUND):
+        tails.setdefault(split_name(full)[1], []).append(full)
     if len(tails.get(name, [])) == 1:
         return table[tails[name][0]]
     close = difflib.get_close_matches(name, [*table, *shorts], 3)

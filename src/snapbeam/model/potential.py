@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from itertools import combinations
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -71,12 +73,14 @@ class Potential:
     local_forces: tuple[LocalForce, ...]
 
     @classmethod
-    def of(cls, model: ReducedModel, external: ExternalForce | None, local: LocalForce | None) -> Potential:
-        """The potential energy of a structure, the constant part of an external force and a local force."""
+    def of(cls, model: ReducedModel, forces: Sequence[LocalForce | ExternalForce]) -> Potential:
+        """The potential energy of a structure, of the local forces and of the constant parts of external forces."""
         constant = np.zeros(model.modes)
-        if external is not None and external.history.constant_part != 0.0:
-            constant = external.history.constant_part * external.row(model)
-        return cls(model, constant, () if local is None or not local.is_conservative else (local,))
+        for each in forces:
+            if each.constant_part != 0.0:
+                constant = constant + each.constant_part * each.row(model)
+        local: list[Any] = [each for each in forces if not each.has_excitation_row]
+        return cls(model, constant, tuple(each for each in local if each.is_conservative))
 
     @cached_property
     def structure(self) -> ReducedModel:
@@ -178,22 +182,51 @@ class Potential:
             if self._adds_up(listed):
                 return tuple(sorted(listed, key=lambda each: each.energy))
         raise InputError(
-            f"local_force: {len(found)} equilibria were found, whose numbers of unstable directions "
+            f"forces: {len(found)} equilibria were found, whose numbers of unstable directions "
             f"{[each.unstable_directions for each in listed]} do not add up; check displacement_range of the law"
         )
 
     def _adds_up(self, found: list[Equilibrium]) -> bool:
-        """Check the equilibria by their index: the sum of (-1)^(unstable directions) over all of them is 1 (Morse).
+        """Check the equilibria by their indices: sum of (-1)^(unstable directions) = 1 - chi (Morse).
 
-        It is one less for every end of the range of a law at which the force pulls beyond that end.
+        chi is the Euler characteristic of the part of the boundary beyond which laws pull, a union of faces of the convex
+        set in which all laws are valid: over every group of faces that have a point in common, the sum of
+        (-1)^(1 + faces).
         """
-        pulls = 0
-        for law in self.local_forces:
-            for end, sign in zip(law.displacement_range(law.numbers), (-1.0, 1.0), strict=True):
+        from scipy.optimize import linprog
+
+        ranges = np.array([law.displacement_range(law.numbers) for law in self.local_forces])
+        faces = []
+        for j, law in enumerate(self.local_forces):
+            for end, sign in zip(ranges[j], (-1.0, 1.0), strict=True):
                 if math.isfinite(end):
                     beside = end - sign * 1e-9 * max(abs(end), self._length)
-                    pulls += sign * law.force_at(beside) > 0.0
-        return sum((-1) ** each.unstable_directions for each in found) == 1 - pulls
+                    if sign * law.force_at(beside) > 0.0:
+                        faces.append((j, end / self._length))
+        above = np.concatenate((self.rows, -self.rows))
+        bounds = np.concatenate((ranges[:, 1], -ranges[:, 0]))
+        limited = np.isfinite(bounds)
+        scale = float(np.abs(self.size).max()) / self._length
+
+        def meet(group: tuple[tuple[int, float], ...]) -> bool:
+            rows = np.array([self.rows[j] for j, _ in group])
+            ends = np.array([end for _, end in group])
+            solution = linprog(
+                np.zeros(self.model.modes),
+                A_ub=scale * above[limited],
+                b_ub=bounds[limited] / self._length,
+                A_eq=scale * rows,
+                b_eq=ends,
+                bounds=(None, None),
+            )
+            return solution.status == 0
+
+        chi = sum(
+            (-1) ** (1 + count) * meet(group)
+            for count in range(1, 1 + len(faces))
+            for group in combinations(faces, count)
+        )
+        return sum((-1) ** each.unstable_directions for each in found) == 1 - chi
 
     def _is_same(self, one: _Array, other: _Array) -> bool:
         return bool(np.abs(one - other).max() <= _SAME * np.abs(self.size).max())

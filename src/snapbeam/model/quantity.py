@@ -14,17 +14,32 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.util.validation import choice, finite, flag, integer, nonnegative, positive, within
+from snapbeam.util.validation import (
+    InputError,
+    choice,
+    finite,
+    flag,
+    integer,
+    nonnegative,
+    positive,
+    shown,
+    within,
+)
 
 __all__ = [
+    "NUMBERED",
     "RUN",
     "STRUCTURE",
     "ParameterField",
     "check_fields",
+    "check_label",
+    "numbered",
     "numbers_type",
     "own_name",
     "quantities",
     "quantity",
+    "section_of",
+    "split_name",
 ]
 
 
@@ -121,6 +136,39 @@ def check_fields(value: Any) -> None:
     """Check every quantity of a frozen dataclass, and keep it as a plain number, in its ``__post_init__``."""
     for name, item in quantities(type(value)).items():
         object.__setattr__(value, name, item.check(name, getattr(value, name)))
+
+
+# ----------------------------------------------------------------------------------------------------
+# Names of parameters: section.field, section.number.field for the second and later contacts, drives, forces, harvesters.
+
+
+NUMBERED = ("contact", "drive", "force", "harvester")
+"""Sections of which a system can have several."""
+
+
+def section_of(kind: str, number: int) -> str:
+    """The section of one of several parts, the first being 1, whose number is left out: ``force``, ``force.2``."""
+    return kind if number == 1 else f"{kind}.{number}"
+
+
+def numbered(section: str) -> tuple[str, int]:
+    """The kind and the number of a section: ``contact.2`` is that of the second contact; 1 of any other."""
+    kind, _, number = section.partition(".")
+    return (kind, int(number)) if kind in NUMBERED and number.isdigit() else (section, 1)
+
+
+def split_name(name: str) -> tuple[str, str]:
+    """The section and the field of a dotted name; no field of a section's own name, such as ``force.2``."""
+    section, dot, field = name.rpartition(".")
+    return (section, field) if dot and not field.isdigit() else (name, "")
+
+
+def check_label(label: Any) -> None:
+    """Refuse a label that cannot stand in a dotted name in place of a number."""
+    if not isinstance(label, str) or (label and not label.isidentifier()):
+        raise InputError(
+            f"label = {shown(label)}: must be a name of letters, digits and underscores that begins with a letter"
+        )
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from snapbeam.util.validation import InputError, checked, finite_array
 __all__ = ["quasi_static_objection", "quasi_static_threshold"]
 
 
-_OTHER = ("local_force", "external_force", "base_excitation", "axial_load", "harvester")
+_OTHER = ("force", "base_excitation", "axial_load", "harvester")
 
 
 def quasi_static_objection(attributes: Mapping[Hashable, Any]) -> str | None:

@@ -3,33 +3,23 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.drive.base import Drive
-from snapbeam.model.drive.combined import MOST_STRIKERS
 from snapbeam.model.drive.sine import Sine
-from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
+from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, check_label, quantity
 from snapbeam.util.validation import InputError, InputTypeError, shown
 
 __all__ = [
-    "OF_FIRST_STRIKER",
     "SIDES",
-    "ContactPair",
+    "Contact",
     "Shaker",
     "Striker",
-    "check_others",
-    "numbered",
-    "parted",
 ]
 
 
 SIDES = ("below", "above")
-OF_FIRST_STRIKER = ("mass", "suspension_stiffness", "suspension_damping")
-"""Fields that only the first of several strikers may set."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,111 +164,46 @@ class Shaker:
 
 
 # ----------------------------------------------------------------------------------------------------
-# Strikers beside the first one: several strike one beam, each with its own place, side, law and drive.
-
-
-_NUMBERED = re.compile(r"(striker|drive|contact)_([2-9])")
+# A contact: a striker and the law by which it touches.
 
 
 @dataclass(frozen=True)
-class ContactPair:
-    """A striker beside the first one, and the law by which it touches.
+class Contact:
+    """A striker and the law of its contact with the structure.
 
     Parameters
     ----------
-    striker : Striker
-        Without a gap its tip touches the beam at rest in the well that the first striker pushes away from.
-    contact : ContactLaw
-
-    Examples
-    --------
-    >>> import snapbeam as sb
-    >>> stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5)
-    >>> pair = sb.ContactPair(stop, sb.HertzContact(1e9))
-    """
-
-    striker: Striker
-    contact: ContactLaw
-
-
-def numbered(section: str) -> tuple[str, int]:
-    """The kind of a section and the number of its striker: ``drive_2`` is the drive of the second; 1 of any other."""
-    found = _NUMBERED.fullmatch(section)
-    return (section, 1) if found is None else (found[1], int(found[2]))
-
-
-def parted(striker: Any, contact: Any, others: tuple[ContactPair, ...]) -> dict[str, Any]:
-    """The first striker and its law, and the others with theirs, of a sequence of strikers.
+    law : ContactLaw
+    striker : Striker or Shaker
+        Of several, each has its own location, side, gap and drive.  Without a gap its tip touches the beam at rest in the
+        well that the first striker pushes away from.
+    label : str, optional
+        Name in parameter names, in place of the number of the contact: ``"stop"`` in ``contact.stop.gap``.
 
     Raises
     ------
     InputError
-        For laws that are neither one for all nor one each, and for a sequence beside *others*.
+        For a law or a striker that is none, and for a label that is no identifier.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> stop = sb.Contact(
+    ...     sb.HertzContact(1e9), sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5), label="stop"
+    ... )
     """
-    if not isinstance(striker, (list, tuple)) or not striker:
-        raise InputError(
-            f"contact = {shown(contact)}: laws in a sequence belong to strikers in a sequence, one each"
-        )
-    if others:
-        raise InputError(
-            "further_contacts: striker = [...] already lists every striker; leave further_contacts out"
-        )
-    laws: Sequence[Any] = contact if isinstance(contact, (list, tuple)) else [contact] * len(striker)
-    if len(laws) != len(striker):
-        raise InputError(
-            f"contact: {len(laws)} laws for {len(striker)} strikers; give one law for all, or one each"
-        )
-    made = [each.striker() if isinstance(each, Shaker) else each for each in striker]
-    rest = tuple(ContactPair(*pair) for pair in zip(made[1:], laws[1:], strict=True))
-    return {"striker": made[0], "contact": laws[0], "further_contacts": rest}
 
+    law: ContactLaw
+    striker: Striker
+    label: str = ""
 
-def check_others(system: Any) -> None:
-    """Refuse strikers beside the first that are none, or that do not go with the rest of a system."""
-    others = system.further_contacts
-    if not isinstance(others, tuple) or not all(isinstance(each, ContactPair) for each in others):
-        raise InputTypeError(
-            f"further_contacts = {shown(others)}: must be a tuple of ContactPair; or give striker = [...]"
-        )
-    if not others:
-        return
-    if system.striker is None:
-        raise InputError("further_contacts: need a first striker; give striker = [...]")
-    if len(others) >= MOST_STRIKERS:
-        raise InputError(f"striker: {len(others) + 1} strikers; must be at most {MOST_STRIKERS}")
-    if system.contact is not None and system.contact.impulsive:
-        raise InputError(
-            f"contact = {system.contact!r} with several strikers: Newton's law allows one striker, since a jump of the "
-            "velocity cannot act against another contact that is closed; use a HertzContact, or "
-            "a HuntCrossley of the same restitution for the first striker"
-        )
-    if system.striker.drive.samples().size:
-        raise InputError(
-            f"drive = {system.striker.drive.name!r} with several strikers: a recording has its own time axis; use drives given by formulas"
-        )
-    for number, each in enumerate(others, 2):
-        _check_one(number, each)
-
-
-def _check_one(number: int, another: ContactPair) -> None:
-    striker, contact = another.striker, another.contact
-    if not isinstance(striker, Striker):
-        raise InputTypeError(f"striker {number} = {shown(striker)}: must be a Striker or a Shaker")
-    if not isinstance(contact, ContactLaw):
-        raise InputTypeError(
-            f"contact {number} = {shown(contact)}: must be a law of contact, such as HertzContact(stiffness)"
-        )
-    if contact.impulsive or contact.rate_dependent:
-        raise InputError(
-            f"contact_{number} = {contact!r}: two forces that depend on the velocity have no exact kick together; of "
-            "several strikers the first alone may lose energy, the others take a HertzContact or a PowerLaw"
-        )
-    if striker.mass is not None:
-        raise InputError(
-            f"striker_{number}.mass = {striker.mass:g}: of several strikers the first alone may be a body, since the "
-            "reduced structure contains one body; leave the mass out, or make this one the first"
-        )
-    if striker.drive.samples().size:
-        raise InputError(
-            f"drive_{number} = {striker.drive.name!r}: a recording has its own time axis; use a drive given by a formula, or a FixedStop"
-        )
+    def __post_init__(self) -> None:
+        if isinstance(self.striker, Shaker):
+            object.__setattr__(self, "striker", self.striker.striker())
+        if not isinstance(self.striker, Striker):
+            raise InputTypeError(f"striker = {shown(self.striker)}: must be a Striker or a Shaker")
+        if not isinstance(self.law, ContactLaw):
+            raise InputTypeError(
+                f"law = {shown(self.law)}: must be a law of contact, such as HertzContact(stiffness)"
+            )
+        check_label(self.label)

@@ -6,12 +6,13 @@ import dataclasses
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from snapbeam.model.axial_load import AxialLoadModulation
 from snapbeam.model.base_excitation import BaseExcitation, rigid_mass
@@ -19,112 +20,42 @@ from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.diagnostics import doubts_of
 from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.drive.fixed_stop import FixedStop
+from snapbeam.model.equilibria import Equilibrium
 from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.harvester import Harvester
 from snapbeam.model.local_force import LocalForce
-from snapbeam.model.mapping import parts_from_mapping, parts_to_mapping, replaced
+from snapbeam.model.mapping import (
+    nested,
+    parts_from_mapping,
+    parts_to_mapping,
+    replaced,
+    resolved,
+    sequence_of,
+)
 from snapbeam.model.potential import Potential
+from snapbeam.model.quantity import section_of
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State, rest_state, started
-from snapbeam.model.striker import ContactPair, Shaker, Striker, check_others, parted
+from snapbeam.model.striker import Contact, Striker
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.validation import InputError, InputTypeError, instance, shown
 
-__all__ = ["System", "check_environment"]
+__all__ = ["System"]
 
 
-# ----------------------------------------------------------------------------------------------------
-# What surrounds a beam, held against the rest of a system: mixtures that are refused, with the way out.
-
-
-_A = {
-    "base_excitation": "a BaseExcitation(motion=AccelerationSine(...))",
-    "axial_load": "an AxialLoadModulation(motion=HarmonicLoad(...))",
-    "external_force": "an ExternalForce(history=HarmonicForce(...))",
-    "local_force": "a LocalSpring(...), or a law that is derived from LocalForce",
-    "harvester": "a PiezoelectricHarvester(...) or an ElectromagneticHarvester(...)",
+_A: dict[str, tuple[Any, str]] = {
+    "contacts": (Contact, "a Contact(law, striker)"),
+    "forces": (
+        (ExternalForce, LocalForce),
+        "an ExternalForce(history=HarmonicForce(...)), a LocalSpring(...), or a law that is derived from LocalForce",
+    ),
+    "harvesters": (Harvester, "a PiezoelectricHarvester(...) or an ElectromagneticHarvester(...)"),
+    "base_excitation": (BaseExcitation, "a BaseExcitation(motion=AccelerationSine(...))"),
+    "axial_load": (AxialLoadModulation, "an AxialLoadModulation(motion=HarmonicLoad(...))"),
 }
-
-
-def check_environment(system: Any) -> None:
-    """Refuse surroundings that are none, or that do not go with the rest of a :class:`~snapbeam.System`."""
-    base, load, harvester = system.base_excitation, system.axial_load, system.harvester
-    force = system.external_force
-    for name, part, kind in (
-        ("base_excitation", base, BaseExcitation),
-        ("axial_load", load, AxialLoadModulation),
-        ("external_force", force, ExternalForce),
-        ("local_force", system.local_force, LocalForce),
-        ("harvester", harvester, Harvester),
-    ):
-        if part is not None and not isinstance(part, kind):
-            raise InputTypeError(f"{name} = {shown(part)}: must be {_A[name]}")
-    if base is not None:
-        rigid_mass(system.model)
-    if force is not None:
-        force.row(system.model)
-        if base is not None:
-            raise InputError(
-                "external_force with base_excitation: the solver has one excitation row; add the inertial force of the "
-                "base to the external force, or leave one out"
-            )
-    if harvester is not None:
-        harvester.row(system.model)
-    _check_local_force(system)
-    if base is None and load is None and harvester is None and force is None:
-        return
-    words = "a harvester" if harvester is not None else "a changing axial load"
-    words = "a moving base" if base is not None else words
-    words = "an external force" if force is not None else words
-    contact, striker = system.contact, system.striker
-    if contact is not None and contact.impulsive:
-        raise InputError(
-            f"contact = {contact!r} with {words}: sticking under Newton's law includes the tip's force only; use a "
-            "HertzContact, or a HuntCrossley with the same restitution"
-        )
-    if contact is not None and contact.rate_dependent and harvester is not None:
-        raise InputError(
-            f"contact = {shown(contact)} with a harvester: two things that depend on the velocity at once; use a "
-            "HertzContact or a PowerLaw, and let damping_ratio stand for the loss"
-        )
-    if (
-        striker is not None
-        and striker.drive.samples().size
-        and (base is not None or load is not None or force is not None)
-    ):
-        raise InputError(
-            f"drive = {striker.drive.name!r} with {words}: a recording has its own time axis; use a drive given by a formula, "
-            "or a FixedStop"
-        )
-    if load is not None and system.model.beam is None:
-        raise InputError(
-            "axial_load: changes the axial load of a beam; a structure given by matrices has its load in its stiffness"
-        )
-
-
-def _check_local_force(system: Any) -> None:
-    """Refuse a local force beside what is not integrated with it."""
-    local, contact = system.local_force, system.contact
-    if local is None:
-        return
-    local.row(system.model)
-    if contact is not None and contact.impulsive:
-        raise InputError(
-            f"contact = {contact!r} with a local force: sticking under Newton's law includes the tip's force only; use a "
-            "HertzContact, or a HuntCrossley with the same restitution"
-        )
-    if local.dissipative and (
-        system.harvester is not None or (contact is not None and contact.rate_dependent)
-    ):
-        raise InputError(
-            f"local_force = {shown(local)} with a harvester or a contact law that depends on the velocity: the solver "
-            "has one velocity-dependent force; leave one of them out"
-        )
-
-
-# ----------------------------------------------------------------------------------------------------
+"""Parts of a system beside its model: their classes, and words for them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,34 +65,30 @@ class System:
     Parameters
     ----------
     model : ReducedModel
-    contact : ContactLaw, or a sequence of them, optional
-        Needed with a striker.  Of several strikers, one law each or one for all.
-    striker : Striker or Shaker, or a sequence of them, optional
-        Without one the structure vibrates freely from *initial_state*.  Several strike at once, each with its own place, side,
-        law and drive; runs begin in the well that the first one pushes away from.
+    contacts : sequence of Contact, optional
+        Strikers, each with the law of its contact.  Without any the structure vibrates freely from *initial_state*.  Runs begin
+        in the well that the first one pushes away from.
+    forces : sequence of LocalForce or ExternalForce, optional
+        A :class:`~snapbeam.LocalForce` depends on the displacement and velocity of one point, an
+        :class:`~snapbeam.ExternalForce` on time.
     base_excitation : BaseExcitation, optional
         The motion of what both ends of the beam are mounted on.
     axial_load : AxialLoadModulation, optional
         How the axial load changes in time.
-    external_force : ExternalForce, optional
-        A force on the structure; not beside a base excitation.
-    local_force : LocalForce, optional
-        A force that depends on the displacement and velocity of one point, such as a :class:`~snapbeam.LocalSpring` or a law of
-        one's own.
-    harvester : PiezoelectricHarvester or ElectromagneticHarvester, optional
-        A circuit that turns motion into power in a resistor.
+    harvesters : sequence of PiezoelectricHarvester or ElectromagneticHarvester, optional
+        Circuits that turn motion into power in a resistor.
     initial_state : State, optional
         Where runs begin, one state; by default at rest in the well that the striker pushes away from, touched by it.
-
-    Attributes
-    ----------
-    further_contacts : tuple of ContactPair
-        The strikers beside the first one, with their laws.
 
     Raises
     ------
     InputError
-        For parts that are none, or that do not go together.
+        For parts that are none, that do not fit the model, or two with the same label.
+
+    Notes
+    -----
+    A system may have more than the solver can integrate, which a run then refuses; its potential energy and what follows
+    from that are found nevertheless.
 
     Examples
     --------
@@ -169,55 +96,57 @@ class System:
     >>> from snapbeam.model import default_values
     >>> system = sb.System(
     ...     sb.ReducedModel.from_beam(default_values.BEAM, modes=8),
-    ...     contact=default_values.CONTACT,
-    ...     striker=sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
+    ...     contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))],
     ... )
-    >>> thicker = system.replace(**{"beam.thickness": 5e-4, "striker.location": 0.3})
+    >>> thicker = system.replace(**{"beam.thickness": 5e-4, "contact.location": 0.3})
     """
 
     model: ReducedModel
-    contact: ContactLaw | None = None
-    striker: Striker | None = None
-    initial_state: State | None = None
+    contacts: Sequence[Contact] = ()
+    forces: Sequence[LocalForce | ExternalForce] = ()
     base_excitation: BaseExcitation | None = None
     axial_load: AxialLoadModulation | None = None
-    harvester: Harvester | None = None
-    further_contacts: tuple[ContactPair, ...] = ()
-    external_force: ExternalForce | None = None
-    local_force: LocalForce | None = None
+    harvesters: Sequence[Harvester] = ()
+    initial_state: State | None = None
 
     def __post_init__(self) -> None:
-        if isinstance(self.striker, (list, tuple)) or isinstance(self.contact, (list, tuple)):
-            for name, value in parted(self.striker, self.contact, self.further_contacts).items():
-                object.__setattr__(self, name, value)
-        model, contact, striker, start = self.model, self.contact, self.striker, self.initial_state
+        model, start = self.model, self.initial_state
         if not isinstance(model, ReducedModel):
             raise InputTypeError(f"model = {shown(model)}: must be a ReducedModel")
-        if isinstance(striker, Shaker):
-            striker = striker.striker()
-            object.__setattr__(self, "striker", striker)
-        if striker is not None and not isinstance(striker, Striker):
-            raise InputTypeError(f"striker = {shown(striker)}: must be a Striker or a Shaker")
-        if contact is not None and not isinstance(contact, ContactLaw):
-            raise InputTypeError(
-                f"contact = {shown(contact)}: must be a law of contact, such as HertzContact(stiffness)"
-            )
-        if contact is not None and contact.max_modes is not None and model.modes > contact.max_modes:
+        for name, (kind, words) in _A.items():
+            given = getattr(self, name)
+            if name.endswith("s"):
+                object.__setattr__(self, name, given := sequence_of(name, given))
+                for i, each in enumerate(given):
+                    if not isinstance(each, kind):
+                        raise InputTypeError(f"{name}[{i}] = {shown(each)}: must be {words}")
+                labels = [label for each in given if (label := getattr(each, "label", ""))]
+                for label in labels:
+                    if labels.count(label) > 1:
+                        raise InputError(f"{name}: two have the label {label!r}; give each its own")
+            elif given is not None and not isinstance(given, kind):
+                raise InputTypeError(f"{name} = {shown(given)}: must be {words}")
+        for number, contact in enumerate(self.contacts, 1):
+            law, striker = contact.law, contact.striker
+            section = section_of("contact", number)
+            if law.max_modes is not None and model.modes > law.max_modes:
+                raise InputError(
+                    f"{section} = {shown(law)} with modes = {model.modes}: Newton's law needs one mode, since the "
+                    "mass met by an impulse at a point falls to zero as modes are added; use a HertzContact"
+                )
+            if striker.mass is not None and law.impulsive:
+                raise InputError(
+                    f"{section} = {law!r} with mass = {striker.mass:g} kg: under Newton's law the striker moves "
+                    "as prescribed; leave the mass out, or use a HertzContact or a HuntCrossley"
+                )
+        if self.base_excitation is not None:
+            rigid_mass(model)
+        for each in (*self.forces, *self.harvesters):
+            each.row(model)
+        if self.axial_load is not None and model.beam is None:
             raise InputError(
-                f"contact = {shown(contact)} with modes = {model.modes}: Newton's law needs one mode, since the "
-                "mass met by an impulse at a point falls to zero as modes are added; use a HertzContact"
+                "axial_load: changes the axial load of a beam; a structure given by matrices has its load in its stiffness"
             )
-        if striker is not None and striker.mass is not None and contact is not None and contact.impulsive:
-            raise InputError(
-                f"contact = {contact!r} with striker mass = {striker.mass:g} kg: under Newton's law the striker moves "
-                "as prescribed; leave the mass out, or use a HertzContact or a HuntCrossley"
-            )
-        if striker is not None and contact is None:
-            raise InputError(
-                "contact = None: a striker needs a law of contact, such as HertzContact(stiffness)"
-            )
-        check_environment(self)
-        check_others(self)
         if model.length_scale is None:
             model.require_bistable("a run")
         if start is not None:
@@ -240,10 +169,11 @@ class System:
         """A neighbour: the same system with parameters changed by dotted name.
 
         Names are those of the table of parameters (:func:`snapbeam.model.parameters.parameters`), such as
-        ``beam.thickness``, ``model.modes``, ``contact.stiffness``, ``striker.location`` and
-        ``drive.frequency_ratio`` (of the second striker ``striker_2.location``, ``drive_2.frequency_ratio``,
-        ``contact_2.stiffness``), or whole parts: ``beam``, ``model``, ``contact``, ``striker``, ``drive``, ``initial_state``,
-        ``base_excitation``, ``axial_load``, ``external_force``, ``local_force``, ``harvester``.
+        ``beam.thickness``, ``model.modes``, ``contact.stiffness``, ``contact.location`` and ``drive.frequency_ratio``.
+        Those of the second contact, its drive or the second force have its number, ``contact.2.gap``,
+        ``drive.2.frequency_ratio``, or its label, ``contact.stop.gap``.  Whole parts are ``beam``, ``model``, ``contacts``,
+        ``forces``, ``base_excitation``, ``axial_load``, ``harvesters`` and ``initial_state``; one of several is ``contact``,
+        ``contact.law``, ``contact.striker``, ``drive``, ``force`` or ``harvester``, with its number after the first word.
 
         Raises
         ------
@@ -252,6 +182,7 @@ class System:
         """
         prefix = "initial_state."
         parts = {item.name: getattr(self, item.name) for item in fields(self)}
+        changes = {resolved(self, name): value for name, value in changes.items()}
         other = {name: value for name, value in changes.items() if not name.startswith(prefix)}
         found = System(**replaced(parts, other))
         start = {name.removeprefix(prefix): changes[name] for name in changes if name not in other}
@@ -267,8 +198,8 @@ class System:
         InputError
             For a name that the system does not have.
         """
-        found = self.parameters
-        if instance("name", name, str, "text") not in found:
+        found, name = self.parameters, resolved(self, instance("name", name, str, "text"))
+        if name not in found:
             raise InputError(f"{name}: is not a parameter of this system; it has {', '.join(found)}")
         return found[name]
 
@@ -293,30 +224,55 @@ class System:
 
         A striker that stands still moves nothing where a base or an axial load does.
         """
-        found: list[tuple[str, Drive]] = []
-        more = [
-            (f"drive_{number}", each.striker.drive)
-            for number, each in enumerate(self.further_contacts, 2)
-            if not isinstance(each.striker.drive, FixedStop)
+        around = (self.base_excitation, self.axial_load, self.external_force)
+        drives = [
+            (section_of("drive", number), each.striker.drive) for number, each in enumerate(self.contacts, 1)
         ]
-        around = self.base_excitation, self.axial_load, self.external_force
-        alone = all(each is None for each in around) and not more
-        if self.striker is not None and (alone or not isinstance(self.striker.drive, FixedStop)):
-            found.append(("drive", self.striker.drive))
-        found += more
+        found: list[tuple[str, Drive]] = [each for each in drives if not isinstance(each[1], FixedStop)]
+        if not found and all(each is None for each in around):
+            found = drives[:1]
         if self.base_excitation is not None:
             found.append(("base_excitation", self.base_excitation.motion))
         if self.axial_load is not None:
             found.append(("axial_load", self.axial_load.motion))
-        if self.external_force is not None:
-            found.append(("external_force", self.external_force.history))
+        for number, each in enumerate(self.forces, 1):
+            history = getattr(each, "history", None)
+            if history is not None:
+                found.append((section_of("force", number), history))
         return tuple(found)
 
     @property
-    def has_environment(self) -> bool:
-        """Whether a base moves, the axial load changes, an external or local force acts, or there is a harvester."""
-        around = self.base_excitation, self.axial_load, self.external_force, self.local_force, self.harvester
-        return any(each is not None for each in around)
+    def striker(self) -> Striker | None:
+        """The first striker: runs begin in the well that it pushes away from."""
+        return self.contacts[0].striker if self.contacts else None
+
+    @property
+    def contact_law(self) -> ContactLaw | None:
+        """The law of the first contact."""
+        return self.contacts[0].law if self.contacts else None
+
+    @property
+    def local_forces(self) -> tuple[LocalForce, ...]:
+        """The forces that depend on the displacement or velocity of a point."""
+        found: tuple[Any, ...] = tuple(each for each in self.forces if not each.has_excitation_row)
+        return found
+
+    @property
+    def external_force(self) -> ExternalForce | None:
+        """The first force that depends on time."""
+        found: list[Any] = [each for each in self.forces if each.has_excitation_row]
+        return found[0] if found else None
+
+    @property
+    def harvester(self) -> Harvester | None:
+        """The first harvester."""
+        return self.harvesters[0] if self.harvesters else None
+
+    @property
+    def surroundings(self) -> tuple[Any, ...]:
+        """What acts on the structure beside strikers: forces, a moving base, a changing axial load, harvesters."""
+        parts = (*self.forces, self.base_excitation, self.axial_load, *self.harvesters)
+        return tuple(each for each in parts if each is not None)
 
     @property
     def primary_excitation(self) -> tuple[str, Drive] | None:
@@ -326,26 +282,26 @@ class System:
     @cached_property
     def potential(self) -> Potential:
         """Potential energy of the structure, the local forces and the constant part of the external force, with its wells."""
-        return Potential.of(self.model, self.external_force, self.local_force)
+        return Potential.of(self.model, self.forces)
 
     @cached_property
     def unloaded_potential(self) -> Potential:
         """The potential energy before a run, when no external force acts yet: its wells are those that a run begins in."""
         if not self.potential.constant.any():
             return self.potential
-        return Potential.of(self.model, None, self.local_force)
+        return Potential.of(self.model, self.local_forces)
 
     @cached_property
     def rest_state(self) -> State:
         """At rest in the well that the first striker pushes away from, touched by it; without one, in the well of the start.
 
-        With a local force it is the well of the system that a beam comes to, without inertia, from that well of the
+        With local forces it is the well of the system that a beam comes to, without inertia, from that well of the
         structure.  An external force begins with the run, its constant part too.
 
         Raises
         ------
         InputError
-            If the local force leaves no well there.
+            If the local forces leave no well there.
         """
         state, local = rest_state(self.model, self.striker), self.unloaded_potential
         if local.is_of_the_structure_alone:
@@ -353,10 +309,63 @@ class System:
         well = local.descent(state.amplitude)
         if well is None:
             raise InputError(
-                f"local_force = {shown(self.local_force)}: leaves no well where a run begins, such as beyond pull-in; give "
+                f"forces = {shown(self.local_forces)}: leave no well where a run begins, such as beyond pull-in; give "
                 "an initial_state, or a weaker force"
             )
         return State(amplitude=local.wells[well].amplitude)
+
+    def poles(self, equilibrium: Equilibrium | None = None) -> NDArray[np.complex128]:
+        """Poles of small oscillations about an equilibrium, with damping, local forces and circuits.
+
+        Of m a'' + C a' + K a = sum_j theta_j z_j and M_j z_j' = -theta_j . a' - rho_j z_j, with the tangent stiffness K of the
+        potential energy and the damping C of the modes and, at rest, of the local forces.  Contacts are open.
+
+        Parameters
+        ----------
+        equilibrium : Equilibrium, optional
+            One of ``potential.equilibria``; by default that of the rest state.
+
+        Returns
+        -------
+        array of shape (2 N + circuits with inertia,)
+            s, rad/s, by abs(s) and Im(s): frequencies abs(s)/(2 pi) Hz, damping ratios -Re(s)/abs(s).
+
+        Examples
+        --------
+        A piezoelectric layer with an open circuit stiffens a mass on a spring, omega^2 = k/m + theta^2/(m C):
+
+        >>> import snapbeam as sb
+        >>> model = sb.ReducedModel.from_matrices(
+        ...     [[1.0]], [1.0], contact_shape=[1.0], patch_shape=[1.0], reference_frequency=1.0
+        ... )
+        >>> layer = sb.PiezoelectricHarvester(moment_per_volt=0.5, capacitance=1.0, resistance=1e12)
+        >>> print(abs(sb.System(model, harvesters=[layer]).poles())[-1].round(6))
+        1.118034
+        """
+        model, potential = self.model, self.potential
+        alpha = self.rest_state.amplitude if equilibrium is None else equilibrium.amplitude
+        n, modes = model.modes, model.linear_modes
+        damping = modes.T @ model.damping_matrix @ modes
+        for force in self.local_forces:
+            row = force.row(model)
+            if force.dissipative:
+                coefficient = force.damping_coefficient(force.numbers, float(row @ alpha), 0.0)
+                damping = damping + coefficient * np.outer(modes.T @ row, modes.T @ row)
+        circuits = []
+        for each in self.harvesters:
+            theta, loss = modes.T @ each.row(model), float(each.loss(np.array([each.resistance]))[0])
+            if each.inertia > 0.0:
+                circuits.append((theta / np.sqrt(each.inertia), loss / each.inertia))
+            else:
+                damping = damping + np.outer(theta, theta) / loss
+        matrix = np.zeros((2 * n + len(circuits),) * 2)
+        matrix[:n, n : 2 * n] = np.eye(n)
+        matrix[n : 2 * n, :n] = -potential.in_modes(potential.tangent(alpha))
+        matrix[n : 2 * n, n : 2 * n] = -damping
+        for i, (theta, rate) in enumerate(circuits, 2 * n):
+            matrix[n : 2 * n, i], matrix[i, n : 2 * n], matrix[i, i] = theta, -theta, -rate
+        found = np.linalg.eigvals(matrix)
+        return np.asarray(found[np.lexsort((found.imag, np.abs(found)))])
 
     @property
     def start_state(self) -> State:
@@ -365,7 +374,8 @@ class System:
 
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Diagnostics: values that look like another unit, and assumptions of the model that do not hold."""
-        return doubts_of(self.unloaded_potential, self.striker, self.harvester, self.moving)
+        parts = [(section_of("harvester", number), each) for number, each in enumerate(self.harvesters, 1)]
+        return doubts_of(self.unloaded_potential, self.striker, [*parts, *self.moving])
 
     # ------------------------------------------------------------------ identity and files
 
@@ -402,7 +412,7 @@ class System:
 
         target = check_writable(path, "path", (".toml",))
         with atomic_path(target) as temporary:
-            temporary.write_text(tomli_w.dumps(_without_none(self.to_mapping())), encoding="utf-8")
+            temporary.write_text(tomli_w.dumps(nested(_without_none(self.to_mapping()))), encoding="utf-8")
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> System:
@@ -442,15 +452,10 @@ class System:
         return html_table(f"System, hash {self.hash[:12]}", rows)
 
     def __repr__(self) -> str:
-        parts = [f"modes={self.model.modes}", f"contact={self.contact!r}"]
-        if self.striker is not None:
-            parts.append(
-                f"striker={self.striker!r}"
-                if self.striker.drive.harmonic
-                else f"striker={self.striker.drive.name}"
-            )
-        if self.further_contacts:
-            parts.append(f"strikers={1 + len(self.further_contacts)}")
+        parts = [f"modes={self.model.modes}"]
+        for each in self.contacts:
+            drive = each.striker.drive
+            parts.append(f"contact={each.law!r}, striker={each.striker if drive.harmonic else drive.name}")
         return f"<System {', '.join(parts)}, hash {self.hash[:12]}>"
 
 

@@ -58,7 +58,11 @@ def paper_run(
         frequency_ratio=frequency_ratio, velocity_amplitude=velocity_amplitude, location=location
     )
     integration = sb.Integration(cycles=cycles, **more)
-    return sb.simulate(sb.System(model, CONTACT, shaker.striker()), integration, sample_times=sample_times)
+    return sb.simulate(
+        sb.System(model, contacts=[sb.Contact(CONTACT, shaker.striker())]),
+        integration,
+        sample_times=sample_times,
+    )
 
 
 def paper_map(
@@ -81,12 +85,12 @@ def paper_map(
     given = {
         "drive.frequency_ratio": frequency_ratio,
         "drive.velocity_amplitude": velocity_amplitude,
-        "striker.location": location,
+        "contact.location": location,
     }
     axes = {name: value for name, value in given.items() if np.ndim(value)}
     ratio, amplitude, place = (float(np.ravel(value)[0]) for value in given.values())
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=amplitude, location=place)
-    system = sb.System(model, contact, shaker.striker())
+    system = sb.System(model, contacts=[sb.Contact(contact, shaker.striker())])
     return sb.sweep(system, axes, sb.Integration(**options), progress=progress)
 
 

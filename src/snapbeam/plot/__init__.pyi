@@ -11,6 +11,7 @@ from .dynamics import plot_lifetimes as plot_lifetimes
 from .dynamics import plot_multipliers as plot_multipliers
 from .dynamics import plot_section as plot_section
 from .dynamics import plot_survival as plot_survival
+from .force_displacement import plot_equilibrium_branches as plot_equilibrium_branches
 from .force_displacement import plot_force_displacement as plot_force_displacement
 from .map import class_handles as class_handles
 from .map import plot_points as plot_points

@@ -19,7 +19,7 @@ from snapbeam.plot.dynamics import (
     plot_section,
     plot_survival,
 )
-from snapbeam.plot.force_displacement import plot_force_displacement
+from snapbeam.plot.force_displacement import plot_equilibrium_branches, plot_force_displacement
 from snapbeam.plot.map import plot_response_map, plot_statistic
 from snapbeam.plot.run import (
     plot_energies,
@@ -155,6 +155,10 @@ _KINDS = (
         "force-displacement curve", {"snap_through_force"}, {"branch_number"},
         lambda _: {"force": plot_force_displacement},
     ),
+    _Kind(
+        "equilibrium branches", {"critical_value", "natural_frequency"}, {"critical_point"},
+        lambda _: {"midspan_displacement": plot_equilibrium_branches},
+    ),
     _Kind("map", {"response_class"}, set(), _map),
 )  # fmt: skip
 
@@ -211,7 +215,7 @@ def plot_dataset(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> run = sb.simulate(system, sb.Integration(cycles=10))
     >>> ax = sb.plot.plot_dataset(run.dataset, "phase_portrait")
     >>> ax = run.dataset.snapbeam.plot()

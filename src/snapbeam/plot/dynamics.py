@@ -72,7 +72,7 @@ def plot_diagram(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> diagram = sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", [0.02, 0.03, 0.04])
     >>> ax = sb.plot.plot_diagram(diagram)
     """
@@ -203,7 +203,7 @@ def plot_lifetimes(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> axes = {"drive.velocity_amplitude": [0.1, 0.2]}
     >>> settings = sb.dynamics.LifetimeSettings(settling_cycles=5)
     >>> lifetimes = sb.dynamics.lifetime_map(
@@ -277,7 +277,7 @@ def plot_survival(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> axes = {"drive.velocity_amplitude": [0.1, 0.2]}
     >>> settings = sb.dynamics.LifetimeSettings(settling_cycles=5)
     >>> lifetimes = sb.dynamics.lifetime_map(
@@ -383,7 +383,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> ax = sb.plot.plot_exponents(sb.dynamics.lyapunov_spectrum(system, periods=40, transient=20))
     """
     if "exponent" not in dataset:
@@ -503,7 +503,7 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=200)
     >>> ax = sb.plot.plot_multipliers(orbit.to_dataset())
     """
@@ -635,7 +635,7 @@ def plot_bifurcation_curve(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12)
     >>> names, bounds = ("frequency_ratio", "velocity_amplitude"), ((1.5, 1.7), (0.02, 0.1))
@@ -730,7 +730,7 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> attractors = sb.dynamics.find_attractors(system, 12)
     >>> ax = sb.plot.plot_attractors(attractors.to_dataset())
     """
@@ -772,7 +772,7 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> ax = sb.plot.plot_section(sb.dynamics.poincare_section(system, "impact", 20, transient=20))
     """
     y = x.replace("displacement", "velocity")
@@ -815,7 +815,7 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> found = sb.dynamics.find_attractors(system, 12)
     >>> grid = {"amplitude[1]": [-1.2, 0.0, 1.2], "velocity[1]": [-0.5, 0.5]}
     >>> ax = sb.plot.plot_basins(sb.dynamics.basins_of_attraction(found, grid))

@@ -1,4 +1,4 @@
-"""Figure of a static force-displacement curve: branches, stability, critical points, snap-through and snap-back."""
+"""Figures of static equilibria: force-displacement curves, and branches over a parameter."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from snapbeam.model.parameters import lookup
 from snapbeam.plot.style import axes_or_new, figure_style, fix_ticks
 from snapbeam.util.si_prefixes import prefixed, scale_of
 from snapbeam.util.validation import InputError, checked
@@ -15,7 +16,7 @@ from snapbeam.util.validation import InputError, checked
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["plot_force_displacement"]
+__all__ = ["plot_equilibrium_branches", "plot_force_displacement"]
 
 
 _STABLE, _HELD, _UNSTABLE = "#16245E", "#B03A27", "#9A9A9A"
@@ -178,3 +179,67 @@ def _critical(dataset: xr.Dataset, ax: Axes, prefix_w: float, prefix_f: float) -
                 )
             )  # fmt: skip
     return handles
+
+
+@checked
+def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the equilibria of a system over a parameter: displacement of the centre, stability, critical points.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`snapbeam.model.equilibrium_branches`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure one column wide by default.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If the dataset is not of that function.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> plate = sb.ReducedModel.from_matrices([[1e-9]], [[2.0]], contact_shape=[1.0], length_scale=3e-6)
+    >>> electrode = sb.ElectrostaticForce(voltage=1.0, area=4e-8, gap=3e-6)
+    >>> found = sb.model.equilibrium_branches(sb.System(plate, forces=[electrode]), "force.voltage", (0.0, 8.0))
+    >>> ax = sb.plot.plot_equilibrium_branches(found)
+    """
+    if not {"midspan_displacement", "unstable_directions", "critical_value"} <= set(dataset.variables):
+        raise InputError(
+            f"dataset with {', '.join(map(str, dataset.variables))}: must be a result of equilibrium_branches"
+        )
+    row = lookup(dataset.attrs["parameter"])
+    value, place = dataset[row.short].values, dataset["midspan_displacement"].values
+    stable = dataset["unstable_directions"].values == 0
+    prefix, unit = scale_of(place, "m")
+    with figure_style():
+        ax = axes_or_new(ax, height=70.0)
+        for number in np.unique(dataset["branch"].values):
+            index = np.flatnonzero(dataset["branch"].values == number)
+            for part in np.split(np.arange(index.size), np.flatnonzero(np.diff(stable[index])) + 1):
+                # a line of one kind ends where the next one begins
+                points = index[part[0] : min(part[-1] + 2, index.size)]
+                color, line, width = _STYLES["stable" if stable[points[0]] else "unstable"]
+                ax.plot(value[points], place[points] / prefix, line, color=color, linewidth=width)
+        handles = [
+            Line2D([], [], color=_STYLES[name][0], linestyle=_STYLES[name][1], label=name)
+            for name in ("stable", "unstable")
+            if (stable if name == "stable" else ~stable).any()
+        ]
+        for kind, (marker, words) in _MARKERS.items():
+            at = dataset["critical_kind"].values == kind
+            if at.any():
+                handles += ax.plot(
+                    dataset["critical_value"].values[at], dataset["critical_displacement"].values[at] / prefix,
+                    marker, markerfacecolor="white", markeredgecolor="#000000", markersize=4.5, linestyle="", label=words,
+                )  # fmt: skip
+        ax.set_xlabel(row.label)
+        ax.set_ylabel(f"Displacement of the centre ({unit})")
+        ax.legend(handles=handles, loc="best")
+        fix_ticks(ax)
+    return ax

@@ -111,7 +111,7 @@ def plot_response_map(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> axes = {"drive.frequency_ratio": [0.7, 0.8], "drive.velocity_amplitude": [0.1, 0.2]}
     >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_response_map(dataset)
@@ -397,7 +397,7 @@ def plot_statistic(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> axes = {"drive.frequency_ratio": [0.7, 0.8], "drive.velocity_amplitude": [0.1, 0.2]}
     >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_statistic(dataset, "peak_force")
@@ -557,7 +557,7 @@ def plot_points(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> points = xr.Dataset(
     ...     {
     ...         "drive.frequency_ratio": ("point", [0.7, 0.75, 0.8]),

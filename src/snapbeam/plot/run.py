@@ -93,7 +93,7 @@ def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, mode
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_modal_amplitudes(run, modes=2)
     """
@@ -155,7 +155,7 @@ def plot_energies(run: Run | xr.Dataset, ax: Axes | None = None) -> Axes:
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_energies(run)
     """
@@ -205,7 +205,7 @@ def plot_spectrum(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_spectrum(run)
     """
@@ -264,7 +264,7 @@ def plot_phase_portrait(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_phase_portrait(run)
     """
@@ -346,7 +346,7 @@ def plot_run(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_run(run, window=(10.0, 15.0))
     """

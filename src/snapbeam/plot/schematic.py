@@ -15,6 +15,7 @@ from snapbeam.model.drive.constant_velocity import ConstantVelocity
 from snapbeam.model.drive.fixed_stop import FixedStop
 from snapbeam.model.harvester import ElectromagneticHarvester, PiezoelectricHarvester
 from snapbeam.model.imperfection import Imperfection
+from snapbeam.model.quantity import numbered
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
 from snapbeam.plot.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, figure_style, new_figure
@@ -201,7 +202,7 @@ def plot_system(system: System, title: str = "") -> Figure:
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> figure = sb.plot.plot_system(system, title="Beam of the paper")
     """
     instance("system", system, System, "a System")
@@ -214,21 +215,16 @@ def plot_system(system: System, title: str = "") -> Figure:
         widths = [2.4, 1.0] if striker is not None or system.primary_excitation is not None else [1.0]
         axes = figure.subplots(1, len(widths), squeeze=False, width_ratios=widths)[0]
         _draw_beam(axes[0], system)
-        if striker is not None:
-            assert system.contact is not None
-            _draw_striker(axes[0], system, striker, system.contact, 1 if system.further_contacts else 0)
-        for number, each in enumerate(system.further_contacts, 2):
-            _draw_striker(axes[0], system, each.striker, each.contact, number)
-        tips = [(int(name[6:] or 1), drive) for name, drive in system.moving if name.startswith("drive")]
+        for number, each in enumerate(system.contacts, 1 if system.contacts[1:] else 0):
+            _draw_striker(axes[0], system, each.striker, each.law, number)
+        tips = [(numbered(name)[1], drive) for name, drive in system.moving if numbered(name)[0] == "drive"]
         if len(tips) > 1:
             draw_tips(axes[1], system, tips)
         elif system.primary_excitation is not None:
             _draw_drive(axes[1], system, *system.primary_excitation)
         if title:
             axes[0].set_title(title, loc="left")
-        both = any(
-            each.striker.side != striker.side for each in system.further_contacts if striker is not None
-        )
+        both = len({each.striker.side for each in system.contacts}) > 1
         outward, inward = (2.0, 1.7) if both else (2.55, 1.25)
         axes[0].set_xlim(-0.85, _WIDE + 0.85)
         axes[0].set_ylim(*((-outward, inward) if _sign(striker) > 0.0 else (-inward, outward)))
@@ -435,7 +431,8 @@ def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
     cycles = np.linspace(0.0, 2.0 if isinstance(drive, ConstantVelocity) else _CYCLES, 1601)
     phase = float(columns.get("phase", np.zeros(1))[0])
     moved = motion_of(drive, columns, scale, cycles * period, phase)
-    per = 1.0 if section in ("axial_load", "external_force") else scale.length
+    section = numbered(section)[0]
+    per = 1.0 if section in ("axial_load", "force") else scale.length
     down = (
         section == "base_excitation"
         and system.base_excitation is not None
@@ -449,7 +446,7 @@ def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
             "drive": "Tip / $b$",
             "base_excitation": "Base $y/b$",
             "axial_load": r"$P(t) - P$ (N)",
-            "external_force": "$F(t)$ (N)",
+            "force": "$F(t)$ (N)",
         }[section]
     )
     ax.set_xlim(0.0, cycles[-1])

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter
 
 from snapbeam.model.parameters import lookup
+from snapbeam.model.quantity import split_name
 from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
 from snapbeam.plot.axes import dress, edges_of, is_geometric, positions, symbol_of
 from snapbeam.plot.style import CLASS_COLORS, figure_style, fix_ticks, new_figure, set_title
@@ -420,9 +421,9 @@ def _name(data: xr.Dataset, at: int, local: bool) -> str:
     """What stands beside a bar: the parameter and, locally, how much it is moved by, in its own unit."""
     name = str(data["parameter"].values[at])
     row = lookup(name)
-    section, _, text = name.partition(".")
+    section, text = split_name(name)
     text = text.replace("_", " ")
-    if section == "contact":
+    if section == "contact" and row.kinds:
         text = f"contact {text}"
     if not local:
         return text

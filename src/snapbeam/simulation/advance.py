@@ -88,8 +88,7 @@ def advance(
     >>> from snapbeam import paper
     >>> system = sb.System(
     ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05),
-    ...     paper.CONTACT,
-    ...     sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03),
+    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03))],
     ... )
     >>> state = sb.advance(system, periods=20)
     >>> state = sb.advance(system, state, periods=1)
@@ -145,16 +144,16 @@ def require_tangent(system: System) -> None:
     ------
     InputError
     """
-    if system.contact is not None and not system.contact.properties.smooth:
+    if system.contact_law is not None and not system.contact_law.properties.smooth:
         raise InputError(
-            f"tangent with contact = {shown(system.contact)}: its force jumps, and so does the tangent flow; give no tangent"
+            f"tangent with contact = {shown(system.contact_law)}: its force jumps, and so does the tangent flow; give no tangent"
         )
     if system.striker is not None and system.striker.mass is not None:
         raise InputError(
-            f"tangent with striker mass = {system.striker.mass:g} kg: the tangent flow does not contain the body "
+            f"tangent with contact.mass = {system.striker.mass:g} kg: the tangent flow does not contain the body "
             "of the striker; give no tangent, or no mass"
         )
-    if system.local_force is not None:
+    if system.local_forces:
         raise InputError(
             "tangent with a local force: the tangent flow does not contain it; give no tangent, or no local force"
         )
@@ -162,9 +161,9 @@ def require_tangent(system: System) -> None:
         raise InputError(
             "tangent with a harvester: the tangent flow does not contain its circuit; give no tangent, or no harvester"
         )
-    if system.contact is not None and not system.contact.properties.tangent:
+    if system.contact_law is not None and not system.contact_law.properties.tangent:
         raise InputError(
-            f"tangent with contact = {system.contact!r}: the tangent flow exists for laws whose force depends on the "
+            f"tangent with contact = {system.contact_law!r}: the tangent flow exists for laws whose force depends on the "
             "penetration only, such as HertzContact(stiffness); give no tangent"
         )
 

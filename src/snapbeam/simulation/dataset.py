@@ -225,7 +225,7 @@ def strikers_of(
     """
     others, length = ensemble.others, system.scale.length
     assert others is not None and system.striker is not None
-    count, samples = 1 + len(system.further_contacts), recorded.times.size
+    count, samples = len(system.contacts), recorded.times.size
     force, depth, tip = (np.zeros((samples, count)) for _ in range(3))
     energy = values[:, _COLUMN["contact"]].copy()
     sign = ensemble.structure.sign
@@ -234,13 +234,13 @@ def strikers_of(
         values[:, _COLUMN["penetration"]] / length,
         first,
     )
-    for j, each in enumerate(system.further_contacts):
+    for j, each in enumerate(system.contacts[1:]):
         numbers, row = others.numbers[0, j], others.rows[others.places[0, j]]
         reached = recorded.q @ row
         motion, _ = tip_of(ensemble, system, j + 2, recorded.times)
         motion = motion + numbers[SIGN] * _follows(ensemble, system, recorded)
         pressed = numbers[OFFSET] + motion - reached
-        contact: Any = each.contact
+        contact: Any = each.law
         kind = contact.numbers_type()
         law = kind(*(getattr(contact, name) for name in kind._fields))
         touching = np.maximum(pressed, 0.0)
@@ -340,7 +340,7 @@ def run_dataset(
         "velocity_at_striker": rate @ shape / speed,
         "midspan_velocity": rate @ model.midspan_shape / speed,
     }
-    struck = system.striker is not None
+    struck = bool(system.contacts)
     if struck:
         penetration = values[:, _COLUMN["penetration"]] / scale
         variables |= {
@@ -368,7 +368,7 @@ def run_dataset(
         variables |= of_each
     if ensemble.circuit_coupling is not None:
         variables |= _harvested(ensemble, ensemble.circuit_coupling, recorded, values)
-    if struck and system.contact is not None and system.contact.is_dissipative:
+    if struck and system.contact_law is not None and system.contact_law.is_dissipative:
         variables["energy_lost_contact"] = values[:, _COLUMN["lost"]]
     at = recorded.times
     valid = np.asarray(np.isfinite(values[:, 2:]).all(axis=1) & np.isfinite(alpha).all(axis=1))
@@ -412,7 +412,7 @@ def _harvested(
 def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Array) -> dict[str, _Array]:
     """Return the variables of a base excitation, of a changing axial load and of an external force."""
     found: dict[str, _Array] = {}
-    if system.local_force is not None and system.local_force.dissipative:
+    if any(each.dissipative for each in system.local_forces):
         found["local_force_work"] = values[:, _COLUMN["local_force_work"]]
     if system.base_excitation is None and system.axial_load is None and system.external_force is None:
         return found
@@ -425,7 +425,7 @@ def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Arr
         found["load_change"] = motions["axial_load"][0]
         found["load_work"] = values[:, _COLUMN["load_work"]]
     if system.external_force is not None:
-        found["external_force"] = motions["external_force"][0]
+        found["external_force"] = motions["force"][0]
         found["force_work"] = values[:, _COLUMN["base_work"]]
     return found
 

@@ -41,7 +41,7 @@ def require_motion(system: System) -> None:
     """Refuse a system without excitation and initial state."""
     if system.striker is None and system.initial_state is None and not system.moving:
         raise InputError(
-            "striker = None: without a striker the beam needs an initial_state; give one, or a striker"
+            "contacts = []: without a striker the beam needs an initial_state; give one, or a contact"
         )
 
 

@@ -78,8 +78,7 @@ def load(path: str | os.PathLike[str]) -> Run:
     >>> from snapbeam import paper
     >>> system = sb.System(
     ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     paper.CONTACT,
-    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18),
+    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
     ... )
     >>> sb.simulate(system, sb.Integration(cycles=2)).save("run.nc")
     >>> run = sb.load("run.nc")

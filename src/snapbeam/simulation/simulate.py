@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
-from snapbeam.model.quantity import quantities
+from snapbeam.model.quantity import numbered, quantities
 from snapbeam.model.state import State
-from snapbeam.model.striker import numbered
 from snapbeam.model.system import System
 from snapbeam.simulation.dataset import impact_table, joined, run_dataset
 from snapbeam.simulation.request import checked_request, cycle_of
@@ -76,9 +75,9 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
         "longest_contact_step": plan.step / 2**plan.min_contact_halvings,
         "shortest_contact_step": plan.step / 2**plan.max_halvings,
     }
-    if system.contact is not None:
-        attrs["contact_type"] = system.contact.name
-        attrs |= _short(system.contact)
+    if system.contacts:
+        attrs["contact_type"] = system.contacts[0].law.name
+        attrs |= _short(system.contacts[0].law)
     if model.beam is not None:
         attrs |= {name: float(value) for name, value in _short(model.beam).items()}
         attrs |= _short(model.beam.boundary)
@@ -89,26 +88,19 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
             "reference_well": model.reference_well,
             "initial_well": model.side_of(system.start_state.amplitude),
         }
-    sections = system.to_mapping() if system.has_environment else {}
-    for section in ("base_excitation", "axial_load", "external_force", "local_force", "harvester"):
-        for name, value in sections.get(section, {}).items():
-            short = f"{section}_type" if name == "type" else lookup(f"{section}.{name}").short
+    if system.contacts[1:]:
+        attrs["strikers"] = len(system.contacts)
+    around = ("base_excitation", "axial_load", "force", "harvester")
+    for section, values in system.to_mapping().items():
+        kind, number = numbered(section)
+        if kind not in around and number == 1:
+            continue
+        of = "contact" if kind == "drive" else kind
+        suffix = "" if number == 1 else f"_{of}_{number}"
+        for name, value in values.items():
+            plain = name in ("type", "label")
+            short = f"{kind}_{name}{suffix}" if plain else lookup(f"{section}.{name}").short
             attrs[short] = int(value) if isinstance(value, bool) else value
-    return attrs | _of_others(system)
-
-
-def _of_others(system: System) -> dict[str, Any]:
-    """Return the attributes of the strikers after the first."""
-    attrs: dict[str, Any] = {"strikers": 1 + len(system.further_contacts)} if system.further_contacts else {}
-    for section, values in system.to_mapping().items() if system.further_contacts else ():
-        part, number = numbered(section)
-        if number > 1:
-            attrs |= {
-                f"{part}_type_striker_{number}"
-                if name == "type"
-                else lookup(f"{section}.{name}").short: value
-                for name, value in values.items()
-            }
     return attrs
 
 
@@ -426,8 +418,7 @@ def simulate(
     >>> from snapbeam import paper
     >>> system = sb.System(
     ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     paper.CONTACT,
-    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18),
+    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
     ... )
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> run.summary.response_class.label

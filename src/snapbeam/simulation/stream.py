@@ -81,8 +81,7 @@ def simulate_to_file(
     >>> from snapbeam import paper
     >>> system = sb.System(
     ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     paper.CONTACT,
-    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18),
+    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
     ... )
     >>> summary = sb.simulate_to_file(system, sb.Integration(cycles=2), path="run.nc")
     """

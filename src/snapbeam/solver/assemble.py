@@ -19,16 +19,15 @@ from snapbeam.model.drive.sine import Sine
 from snapbeam.model.early_termination import decidable_energy, passed_heights
 from snapbeam.model.external_force import RecordedForce
 from snapbeam.model.integration import Integration
-from snapbeam.model.local_force import LocalForce
 from snapbeam.model.quantity import RUN as RUN_SCOPE
-from snapbeam.model.quantity import quantities
+from snapbeam.model.quantity import numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
-from snapbeam.model.striker import numbered
 from snapbeam.model.system import System
 from snapbeam.solver.ensemble import FAR_AWAY, RUN, CircuitCoupling, Ensemble, FurtherContactTable
 from snapbeam.solver.excitation import tip_motion
 from snapbeam.solver.further_contacts import LAW, NUMBERS, OFFSET, REST, SIGN, SINCE, SPEED
+from snapbeam.solver.restrictions import check_integrable
 from snapbeam.solver.step_size import Clocked, Plan, choose_base_step, clocked, most_steps
 from snapbeam.solver.structure import Structure, structure_of
 from snapbeam.util.validation import InputError, shown
@@ -61,39 +60,33 @@ def others_of(
     A striker stands where its tip touches the beam at rest in the first well, or its gap away from that.  *since* holds
     the contact time of every striker, shape (runs or 1, strikers).
     """
-    if not system.further_contacts:
+    further = system.contacts[1:]
+    if not further:
         return None
-    count = len(system.further_contacts)
+    count = len(further)
     numbers, places = np.zeros((runs, count, NUMBERS)), np.zeros((runs, count), dtype=np.int64)
     rows: list[_Array] = []
-    for j, each in enumerate(system.further_contacts):
+    for j, each in enumerate(further):
         number, striker = j + 2, each.striker
         assert system.striker is not None
         sign = 1.0 if striker.side == system.striker.side else -1.0
-        location = columns[f"striker_{number}.location"]
+        section, moving = section_of("contact", number), section_of("drive", number)
+        location = columns[f"{section}.location"]
         different, which = np.unique(location, return_inverse=True)
         shapes = np.array([structure.model.shape_at(float(x)) for x in different])
         places[:, j] = len(rows) + which
         rows += [sign * structure.row_of_beam(structure.row(shape)) for shape in shapes]
         numbers[:, j, REST] = sign * structure.sign * structure.rests(shapes)[which]
-        begun = _begun(striker.drive, columns, f"drive_{number}", system, runs)
-        gap = columns.get(f"striker_{number}.gap", np.full(runs, np.nan))
+        begun = _begun(striker.drive, columns, moving, system, runs)
+        gap = columns.get(f"{section}.gap", np.full(runs, np.nan))
         numbers[:, j, OFFSET] = np.where(np.isnan(gap), -begun, -gap)
         numbers[:, j, SIGN] = sign
-        numbers[:, j, SPEED] = _speed(striker.drive, columns, f"drive_{number}", system, runs)
+        numbers[:, j, SPEED] = _speed(striker.drive, columns, moving, system, runs)
         numbers[:, j, SINCE] = since[:, number - 1]
-        names = type(each.contact).numbers_type()._fields
+        names = type(each.law).numbers_type()._fields
         for k, name in enumerate(names):
-            numbers[:, j, LAW + k] = columns[f"contact_{number}.{name}"]
-    return FurtherContactTable(
-        tuple(type(each.contact) for each in system.further_contacts), numbers, places, np.array(rows)
-    )
-
-
-def _own(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:
-    names = len(section) + 1
-    own = {name[names:]: values for name, values in columns.items() if name.startswith(f"{section}.")}
-    return own or {"": np.zeros(runs)}
+            numbers[:, j, LAW + k] = columns[f"{section}.{name}"]
+    return FurtherContactTable(tuple(type(each.law) for each in further), numbers, places, np.array(rows))
 
 
 def _begun(drive: Drive, columns: Mapping[str, _Array], section: str, system: System, runs: int) -> _Array:
@@ -148,7 +141,7 @@ def cycles_of(system: System, columns: Mapping[str, _Array]) -> _Array:
         return 2.0 * math.pi / (np.ones(runs) * system.scale.omega)
     section, drive = leads
     with np.errstate(all="ignore"):
-        periods = drive.cycle(_own_driven(columns, section, runs), system.scale)
+        periods = drive.cycle(_own(columns, section, runs), system.scale)
     bad = np.flatnonzero(~((periods >= _SHORTEST_PERIOD) & np.isfinite(periods)))
     if bad.size:
         raise InputError(
@@ -166,10 +159,10 @@ def phases_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arra
     return columns.get(name, np.zeros(runs))
 
 
-def _own_driven(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:
-    """Parameters of a drive in a section, of which there may be none."""
-    names = len(section) + 1
-    own = {name[names:]: values for name, values in columns.items() if name.startswith(f"{section}.")}
+def _own(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:
+    """Parameters of a section, of which there may be none."""
+    names = {name: split_name(name) for name in columns}
+    own = {field: columns[name] for name, (of, field) in names.items() if of == section}
     return own or {"": np.zeros(runs)}
 
 
@@ -184,7 +177,7 @@ def driven_of(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
             Sine, numbers, cycles_of(system, columns), np.full(runs, -np.inf), np.zeros(runs), np.empty(0)
         )
     drive = striker.drive
-    own = _own_driven(columns, "drive", runs)
+    own = _own(columns, "drive", runs)
     found = drive.numbers(own, scale)
     highest, speed = drive.bounds(own, scale)
     samples = drive.samples() * (1.0 if striker.side == "below" else -1.0)
@@ -203,14 +196,15 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
     """
     scale, names = (
         system.scale,
-        {"drive": "tip", "base_excitation": "base", "axial_load": "load", "external_force": "base"},
+        {"drive": "tip", "base_excitation": "base", "axial_load": "load"},
     )
-    names |= {f"drive_{number}": f"tip{number - 1}" for number in range(2, 2 + len(system.further_contacts))}
+    names |= {section_of("drive", i + 1): f"tip{i}" for i in range(1, len(system.contacts))}
+    names |= {section: "base" for section in _forces(system)}
     kinds: dict[str, type[Drive]] = {}
     found: dict[str, _Array] = {}
     speed, fastest, samples = np.zeros(runs), np.zeros(runs), np.empty(0)
     for section, drive in system.moving:
-        part, own = names[section], _own_driven(columns, section, runs)
+        part, own = names[section], _own(columns, section, runs)
         numbers = drive.numbers(own, scale)
         kinds[part] = drive.integrated_as or type(drive)
         found |= {f"{part}_{name}": numbers[name] for name in drive.number_names}
@@ -219,7 +213,7 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
         if section == "drive":
             speed = speed + drive.bounds(own, scale)[1]
     if system.base_excitation is not None:
-        own, base = _own_driven(columns, "base_excitation", runs), system.base_excitation
+        own, base = _own(columns, "base_excitation", runs), system.base_excitation
         sign = 1.0 if base.direction == "up" else -1.0
         side = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
         follow = 0.0 if base.striker_on_base or system.striker is None else -side * sign
@@ -229,7 +223,7 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
         samples = base.motion.samples()
     if system.external_force is not None:
         history = system.external_force.history
-        own = _own_driven(columns, "external_force", runs)
+        own = _own(columns, _forces(system)[0], runs)
         found["base_hardest"] = history.peak_acceleration(own, scale)
         found["base_sign"], found["base_follow"] = np.ones(runs), np.zeros(runs)
         samples = history.samples()
@@ -245,8 +239,8 @@ def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
     """Greatest angular frequency of the base, the axial load and the external force, rad/s; 0 without them."""
     found = np.zeros(runs)
     for section, drive in system.moving:
-        if section in _AROUND:
-            numbers = drive.numbers(_own_driven(columns, section, runs), system.scale)
+        if _is_around(section):
+            numbers = drive.numbers(_own(columns, section, runs), system.scale)
             found = np.maximum(found, numbers["fastest" if "fastest" in numbers else "omega"])
     return found
 
@@ -258,7 +252,7 @@ def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, t
     """
     found = {}
     for section, drive in system.moving:
-        if section not in _AROUND:
+        if not _is_around(section):
             continue
         pairs = _motion_at(ensemble, system, drive, times)
         sign = (
@@ -268,7 +262,7 @@ def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, t
             and system.base_excitation.direction == "down"
             else 1.0
         )
-        found[section] = sign * pairs[:, 0], sign * pairs[:, 1]
+        found[numbered(section)[0]] = sign * pairs[:, 0], sign * pairs[:, 1]
     return found
 
 
@@ -278,8 +272,7 @@ def tip_of(ensemble: Ensemble, system: System, number: int, times: _Array) -> tu
     Seen from its own side, in the frame of the ends but without what a base does to it.  *ensemble* is that of the one
     run, which may begin in the middle of its drives.
     """
-    striker = system.further_contacts[number - 2].striker if number > 1 else system.striker
-    assert striker is not None
+    striker = system.contacts[number - 1].striker
     pairs = _motion_at(ensemble, system, striker.drive, times)
     return pairs[:, 0], pairs[:, 1]
 
@@ -316,8 +309,17 @@ def begun_at(driven: Driven, phase: _Array) -> _Array:
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
 
-_AROUND = ("base_excitation", "axial_load", "external_force")
-"""Sections of what acts on the structure as a whole."""
+
+def _is_around(section: str) -> bool:
+    """Whether a section is of what acts on the structure itself."""
+    return section in ("base_excitation", "axial_load") or numbered(section)[0] == "force"
+
+
+def _forces(system: System) -> list[str]:
+    """Sections of the external forces."""
+    return [section for section, _ in system.moving if numbered(section)[0] == "force"]
+
+
 _LOWEST = {"standard": 1e-9, "reference": 1e-13}
 """Height of a flight after an impact that lasts no time, over b, below which chatter ends in sticking."""
 _RESOLVED = 24.0
@@ -359,6 +361,7 @@ def make_ensemble(
     InputError
         For parameters that cannot differ between the runs of an ensemble, and for more steps than can be counted.
     """
+    check_integrable(system)
     columns = run_columns(system, points or {})
     state = system.start_state if start is None else start
     runs = next(iter(columns.values())).size if columns else 1
@@ -368,7 +371,7 @@ def make_ensemble(
     side = _side(system, state, goes_on=periods is not None)
     structure = structure_of(
         system.model, side, system.striker, system.base_excitation, system.harvester, system.external_force,
-        system.local_force, system.unloaded_potential.dividing_height,
+        system.local_forces, system.unloaded_potential.dividing_height,
     )  # fmt: skip
     plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
     if step_factor != 1.0:
@@ -376,8 +379,8 @@ def make_ensemble(
     _require_clock(system, state)
     driven = driven_of(system, columns, runs)
     table = np.zeros(runs, dtype=RUN)
-    places = _places(structure, table, columns.get("striker.location", np.full(runs, 0.5)))
-    since = state.flat().contact_times(1 + len(system.further_contacts))
+    places = _places(structure, table, columns.get("contact.location", np.full(runs, 0.5)))
+    since = state.flat().contact_times(max(1, len(system.contacts)))
     unit = 1.0 if system.harvester is None else system.harvester.unit
     starts = _starts(structure, table, state, since, unit)
     table["phase"] = np.where(np.isnan(state.phase), phases_of(system, columns, runs), state.phase)
@@ -387,13 +390,18 @@ def make_ensemble(
     if coupling is not None:
         table["circuit_rate"] = coupling.rate
     highest = table["rest_contact"] + table["offset"] + driven.highest
-    if structure.body_mass is not None or driven.kind.parts or system.further_contacts or system.local_force:
+    if (
+        structure.body_mass is not None
+        or driven.kind.parts
+        or len(system.contacts) > 1
+        or system.local_forces
+    ):
         highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown, and a shaken beam too
     time = clocked(table, system, integration, driven.period, plans, periods)
     _require_record(system, table, driven)
     _decisions(table, system, structure, integration, time, places.location, highest)
     table["lowest"] = system.scale.length * _LOWEST[integration.accuracy]
-    law: type[ContactLaw] = HertzContact if system.contact is None else type(system.contact)
+    law: type[ContactLaw] = HertzContact if system.contact_law is None else type(system.contact_law)
     return Ensemble(
         structure=structure,
         scale=system.scale,
@@ -457,29 +465,25 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
     """
     size = next(iter(points.values())).size if points else 1
     own: dict[str, float] = {}
-    parts: list[tuple[str, Any]] = [("contact", system.contact), ("striker", system.striker)]
-    for number, each in enumerate(system.further_contacts, 2):
-        parts += [(f"contact_{number}", each.contact), (f"striker_{number}", each.striker)]
-        own |= {f"drive_{number}.{name}": value for name, value in each.striker.drive.values().items()}
-    for section, part in parts:
-        if part is not None:
+    for number, each in enumerate(system.contacts, 1):
+        for part in (each.law, each.striker):
             own |= {
-                f"{section}.{name}": value
+                f"{section_of('contact', number)}.{name}": value
                 for name, value in vars(part).items()
                 if isinstance(value, float) and quantities(type(part))[name].scope == RUN_SCOPE
             }
-    if system.striker is not None:
-        own |= {f"drive.{name}": value for name, value in system.striker.drive.values().items()}
+        moving = section_of("drive", number)
+        own |= {f"{moving}.{name}": value for name, value in each.striker.drive.values().items()}
     if system.harvester is not None:
         own["harvester.resistance"] = float(system.harvester.resistance)
     for section, motion in system.moving:
-        if section in _AROUND:
+        if _is_around(section):
             own |= {f"{section}.{name}": value for name, value in motion.values().items()}
     columns = {name: np.full(size, value) for name, value in own.items()}
     for name, values in points.items():
-        section, _, field = name.partition(".")
-        strikers = 0 if system.striker is None else 1 + len(system.further_contacts)
-        may_gap = field == "gap" and numbered(section)[0] == "striker" and numbered(section)[1] <= strikers
+        section, field = split_name(name)
+        kind, number = numbered(section)
+        may_gap = field == "gap" and kind == "contact" and number <= len(system.contacts)
         if name not in columns and not may_gap:
             raise InputError(f"{name}: no parameter that may differ between the runs of one ensemble")
         columns[name] = np.asarray(values, dtype=np.float64)
@@ -493,12 +497,12 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     """
     plans, striker = _plans_of(system, integration, columns), system.striker
     further = [
-        _plans_of(system, integration, columns, f"contact_{number}", each.contact)
-        for number, each in enumerate(system.further_contacts, 2)
+        _plans_of(system, integration, columns, section_of("contact", number), each.law)
+        for number, each in enumerate(system.contacts[1:], 2)
     ]
     if further:
         plans = [_serving(each) for each in zip(plans, *further, strict=True)]
-    if integration.step is None and any(section in _AROUND for section, _ in system.moving):
+    if integration.step is None and any(_is_around(section) for section, _ in system.moving):
         fastest = fastest_of(system, columns, len(plans))
         plans = [
             each._replace(step=min(each.step, 2.0 * math.pi / (_RESOLVED * rate))) if rate > 0.0 else each
@@ -514,8 +518,8 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
             each._replace(step=min(each.step, longest, 1.0 / rate if rate > 0.0 else math.inf))
             for each, rate in zip(plans, rates.tolist(), strict=True)
         ]
-    if integration.step is None and system.local_force is not None:
-        longest = _longest_with_local_force(system, system.local_force, integration.accuracy)
+    if integration.step is None and system.local_forces:
+        longest = _longest_with_local_forces(system, integration.accuracy)
         plans = [each._replace(step=min(each.step, longest)) for each in plans]
     if striker is None or striker.mass is None:
         return plans
@@ -529,21 +533,23 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     ]
 
 
-def _longest_with_local_force(system: System, force: LocalForce, accuracy: str) -> float:
-    """Longest step with a local force, s: its stiffness and damping are in the kicks."""
+def _longest_with_local_forces(system: System, accuracy: str) -> float:
+    """Longest step with local forces, s: their stiffness and damping are in the kicks."""
     model, scale = _struck(system), system.scale
-    shape = force.row(model)
-    mobility = float(np.sum((model.linear_modes.T @ shape) ** 2))
-    well = abs(float(shape @ model.well_amplitude))
-    # u and v of an interwell motion
     at_center = abs(float(model.midspan_shape @ model.well_amplitude)) or scale.length
-    largest = 2.0 * max(
-        well, scale.length * float(np.abs(shape).max() / max(np.abs(model.midspan_shape).max(), 1e-300))
-    )
-    fastest = largest * scale.omega * max(1.0, scale.length / at_center)
-    stiff = math.sqrt(mobility * force.greatest_stiffness(largest))
-    decay = mobility * force.greatest_damping(largest, fastest) if force.dissipative else 0.0
-    return _TAPPED[accuracy] / max(stiff, decay, 1e-300)
+    squared, decay = 0.0, 0.0
+    for force in system.local_forces:
+        shape = force.row(model)
+        mobility = float(np.sum((model.linear_modes.T @ shape) ** 2))
+        well = abs(float(shape @ model.well_amplitude))
+        # u and v of an interwell motion
+        largest = 2.0 * max(
+            well, scale.length * float(np.abs(shape).max() / max(np.abs(model.midspan_shape).max(), 1e-300))
+        )
+        fastest = largest * scale.omega * max(1.0, scale.length / at_center)
+        squared += mobility * force.greatest_stiffness(largest)
+        decay += mobility * force.greatest_damping(largest, fastest) if force.dissipative else 0.0
+    return _TAPPED[accuracy] / max(math.sqrt(squared), decay, 1e-300)
 
 
 def _fastest_open(system: System) -> float:
@@ -586,12 +592,11 @@ def _plans_of(
     contact: ContactLaw | None = None,
 ) -> list[Plan]:
     """The steps that a contact asks for: that of the first striker, or another one's."""
-    of_contact = {
-        name.partition(".")[2]: values for name, values in columns.items() if name.startswith(f"{section}.")
-    }
+    contact = contact or system.contact_law
+    known = () if contact is None else quantities(type(contact))
+    of_contact = {name: columns[at] for name in known if (at := f"{section}.{name}") in columns}
     step, accuracy = integration.step, integration.accuracy
     runs = next(iter(columns.values())).size if columns else 1
-    contact = contact or (system.contact if system.striker is not None else None)
     if contact is None or not of_contact:
         return [choose_base_step(_struck(system), contact, step=step, accuracy=accuracy)] * runs
     table = np.stack(list(of_contact.values()), axis=1)
@@ -671,14 +676,14 @@ def _offsets(
     touching = np.array([reach[int(run["contact_row"]), int(run["start_row"])] for run in table])
     begun = begun_at(driven, table["phase"])
     offset = touching - begun
-    if "striker.gap" in columns:
+    if "contact.gap" in columns:
         # the gap is that to the beam at rest, which a local force moves out of the well of the structure
         rest = (
             0.0
             if system.potential.is_of_the_structure_alone
             else _reach_at_rest(system, structure, table, rows)
         )
-        offset = np.where(np.isnan(columns["striker.gap"]), offset, rest - columns["striker.gap"])
+        offset = np.where(np.isnan(columns["contact.gap"]), offset, rest - columns["contact.gap"])
     return np.asarray(np.where(np.isnan(flat.striker_position), offset, position))
 
 
@@ -703,7 +708,7 @@ def _circuit_coupling(system: System, columns: Mapping[str, _Array], runs: int) 
 
 def _law_numbers(law: type[ContactLaw], system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
     names = law.numbers_type()._fields
-    if system.contact is None or system.striker is None:
+    if system.contact_law is None:
         return np.zeros((runs, len(names)))
     return np.stack([columns[f"contact.{name}"] for name in names], axis=1)
 
@@ -719,8 +724,8 @@ def _decisions(
 ) -> None:
     """When a run may end early."""
     table["decide_crossings"], table["decide_energy"] = -1, -math.inf
-    properties = system.contact is None or system.contact.properties.energy_bound
-    if not integration.early_termination or not properties or system.further_contacts or system.local_force:
+    properties = system.contact_law is None or system.contact_law.properties.energy_bound
+    if not integration.early_termination or not properties or len(system.contacts) > 1 or system.local_forces:
         return
     if system.striker is not None and structure.wells_are_mirror_images:
         # elsewhere the class also depends on whether the other well is reached

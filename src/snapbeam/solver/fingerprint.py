@@ -16,7 +16,7 @@ from snapbeam.model.default_values import BEAM, CONTACT
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.integration import ACCURACIES, Integration
 from snapbeam.model.reduced_model import ReducedModel
-from snapbeam.model.striker import Striker
+from snapbeam.model.striker import Contact, Striker
 from snapbeam.model.system import System
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.cpu import driver
@@ -38,8 +38,9 @@ def solver_fingerprint() -> str:
     for modes, ratio, velocity in _CASES:
         system = System(
             ReducedModel.from_beam(BEAM, modes=modes, damping_ratio=0.005),
-            CONTACT,
-            Striker(drive=Sine(frequency_ratio=ratio, velocity_amplitude=velocity)),
+            contacts=[
+                Contact(CONTACT, Striker(drive=Sine(frequency_ratio=ratio, velocity_amplitude=velocity)))
+            ],
         )
         for accuracy in ACCURACIES:
             accumulators = driver.run_ensemble(

@@ -394,7 +394,7 @@ def _of_one_striker(name: str) -> Statistic | None:
 
 
 STATISTICS: dict[str, Statistic] = NamedTable(_of_one_striker, ((row.name, row) for row in _ROWS))
-"""Variables of a map and attributes of an outcome, by name; ``peak_force_striker_2`` is found too, not listed."""
+"""Variables of a map and attributes of an outcome, by name; ``peak_force_contact_2`` is found too, not listed."""
 
 
 def updated() -> tuple[Statistic, ...]:
@@ -496,7 +496,7 @@ def rows_for(strikers: int) -> dict[str, Statistic]:
 
 def of_one_named(name: str) -> Statistic | None:
     """The row of one of several strikers by its name; None if there is no such row."""
-    whole, _, number = name.rpartition("_striker_")
+    whole, _, number = name.rpartition("_contact_")
     if whole not in _EACH or number not in _NUMBERS:
         return None
     return _of_one(whole, int(number))
@@ -505,9 +505,9 @@ def of_one_named(name: str) -> Statistic | None:
 def _of_one(name: str, number: int) -> Statistic:
     """Of one striker, the first being 1."""
     whole, (column, words) = STATISTICS[name], _EACH[name]
-    words = f"{words}, striker {number}"
+    words = f"{words}, contact {number}"
     return Statistic(
-        f"{name}_striker_{number}",
+        f"{name}_contact_{number}",
         whole.dtype,
         whole.unit,
         words,

@@ -93,7 +93,7 @@ class Structure:
     base_load: _Array | None = None
     """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi).  Of an external force
     F(t) along a row h: V^T h, where F stands for the acceleration."""
-    local_force: LocalForceRow | None = None
+    local_forces: tuple[LocalForceRow, ...] = ()
     circuit_row: _Array | None = None
     """Of a harvester: its coupling, scaled so that half the square of the circuit's coordinate is its energy."""
     circuit: bool = False
@@ -199,11 +199,11 @@ class Structure:
             digest.update(np.ascontiguousarray(self.base_load).tobytes())
         if self.body_mass is not None:
             digest.update(np.array([self.body_mass]).tobytes())
-        if self.local_force is not None:
-            kind = type(self.local_force.law).owner
+        for force in self.local_forces:
+            kind = type(force.law).owner
             digest.update(f"{kind.__module__}.{kind.__qualname__}".encode())
-            digest.update(np.ascontiguousarray(self.local_force.row).tobytes())
-            digest.update(np.array([*self.local_force.law]).tobytes())
+            digest.update(np.ascontiguousarray(force.row).tobytes())
+            digest.update(np.array([*force.law]).tobytes())
         return digest.hexdigest()
 
 
@@ -214,14 +214,14 @@ def structure_of(
     base: BaseExcitation | None = None,
     harvester: Harvester | None = None,
     force: ExternalForce | None = None,
-    local_force: LocalForce | None = None,
+    local_forces: tuple[LocalForce, ...] = (),
     dividing_height: float | None = None,
 ) -> Structure:
     """The structure of a reduced model, about the well that a striker from *side* pushes away from.
 
     A striker that is a body of mass m_s on a spring k_s is one more linear mode, q_s = sqrt(m_s) times its displacement
     beyond the motion that its drive gives it: no tension, contact row -1/sqrt(m_s).  The *dividing_height*, in space, is
-    that of the model by default; where a local force moves it, the wells count as unequal.
+    that of the model by default; where local forces move it, the wells count as unequal.
     """
     sign = 1.0 if side == "below" else -1.0
     model = model if sign > 0.0 else model.mirrored
@@ -242,7 +242,7 @@ def structure_of(
         model=model,
         unequal_wells=_uneven(model, sign, dividing_height),
         base_load=_base_load(model, base, force),
-        local_force=None if local_force is None else _local_force(model, equilibrium, local_force),
+        local_forces=tuple(_local_force(model, equilibrium, each) for each in local_forces),
     )
     if striker is not None and striker.mass is not None:
         structure = _with_body(structure, striker, carried_by_base=base is not None and base.striker_on_base)
@@ -303,7 +303,7 @@ def _with_body(structure: Structure, striker: Striker, carried_by_base: bool = F
         shift=np.append(structure.shift, 0.0),
         unequal_wells=None if structure.unequal_wells is None else _with_rest(structure.unequal_wells),
         base_load=None if structure.base_load is None else np.append(structure.base_load, own),
-        local_force=_longer(structure.local_force),
+        local_forces=_longer(structure.local_forces),
         body_mass=striker.mass,
     )
 
@@ -329,7 +329,7 @@ def _with_circuit(structure: Structure, harvester: Harvester) -> Structure:
         coupling=tension,
         unequal_wells=None if structure.unequal_wells is None else _with_rest(structure.unequal_wells),
         base_load=None if structure.base_load is None else np.append(structure.base_load, 0.0),
-        local_force=_longer(structure.local_force),
+        local_forces=_longer(structure.local_forces),
         circuit_row=np.append(coupling, 0.0),
         circuit=True,
     )
@@ -338,8 +338,8 @@ def _with_circuit(structure: Structure, harvester: Harvester) -> Structure:
 _ROWS = ("omega", "damping_ratio", "well", "center", "shift")
 
 
-def _longer(force: LocalForceRow | None) -> LocalForceRow | None:
-    return None if force is None else dataclasses.replace(force, row=np.append(force.row, 0.0))
+def _longer(forces: tuple[LocalForceRow, ...]) -> tuple[LocalForceRow, ...]:
+    return tuple(dataclasses.replace(each, row=np.append(each.row, 0.0)) for each in forces)
 
 
 def _with_rest(unequal_wells: UnequalWells) -> UnequalWells:

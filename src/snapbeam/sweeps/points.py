@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.model.mapping import resolved
 from snapbeam.model.parameter_axes import (
     PHYSICAL,
     axis_that_changes_unit,
@@ -22,6 +23,7 @@ from snapbeam.model.parameter_axes import (
     unit_of,
 )
 from snapbeam.model.parameters import Parameter, lookup, parameters, short_names
+from snapbeam.model.quantity import split_name
 from snapbeam.util.provenance import array_hash
 from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, shown
 
@@ -229,6 +231,7 @@ def physical_points(system: System, axes: Mapping[str, Any]) -> Points:
     These become ratios.  Where another axis changes the structure, and with it the unit of a ratio, they stay as they are
     given; :meth:`~snapbeam.sweeps.setup.SweepSetup.groups` makes the ratios of each structure.
     """
+    axes = {resolved(system, str(name)): values for name, values in axes.items()}
     given = {PHYSICAL[own].parameter: own for name in axes if (own := physical_name(str(name))) is not None}
     if not given:
         return points_of(axes)
@@ -350,7 +353,7 @@ def _is_label(name: str) -> bool:
         For a name that is almost the name of a parameter.
     """
     table = parameters()
-    known = [*table, *short_names(), *(full.partition(".")[2] for full in table)]
+    known = [*table, *short_names(), *(split_name(full)[1] for full in table)]
     if name in known:
         return False
     try:

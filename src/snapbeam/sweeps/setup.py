@@ -14,13 +14,14 @@ from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, unit_of
 from snapbeam.model.parameters import lookup
-from snapbeam.model.quantity import quantities
+from snapbeam.model.quantity import quantities, split_name
 from snapbeam.model.state import State, started
 from snapbeam.model.system import System
 from snapbeam.simulation.save import code_flags
 from snapbeam.simulation.simulate import attributes_of
 from snapbeam.solver.assemble import cycles_of, make_ensemble, plans_of, run_columns
 from snapbeam.solver.registry import resolve
+from snapbeam.solver.restrictions import check_integrable
 from snapbeam.solver.statistics import STATISTICS, statistics_of
 from snapbeam.solver.step_size import Plan, require_resolved
 from snapbeam.sweeps.points import (
@@ -64,8 +65,8 @@ def require_parameters(system: System, points: Points) -> None:
             or _ratio(name) in system.parameters
         ):
             continue
-        section, _, field = name.partition(".")
-        if field != "gap" or section not in {each.partition(".")[0] for each in system.parameters}:
+        section, field = split_name(name)
+        if field != "gap" or section not in {split_name(each)[0] for each in system.parameters}:
             raise InputError(
                 f"{name}: is not a parameter of this system; its parameters are {', '.join(system.parameters)}"
             )
@@ -76,7 +77,7 @@ def require_parameters(system: System, points: Points) -> None:
         and not any(name.startswith("initial_state.") for name in first)
     ):
         raise InputError(
-            "striker = None: without a striker the beam needs an initial_state; give one, or a striker"
+            "contacts = []: without a striker the beam needs an initial_state; give one, or a contact"
         )
     _at(system, first)
 
@@ -142,7 +143,7 @@ def require_every_structure(setup: SweepSetup) -> None:
 Progress = Callable[[int, int], object]
 
 TITLE = "map of the response of a struck bistable beam"
-_ALWAYS = ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location")
+_ALWAYS = ("drive.frequency_ratio", "drive.velocity_amplitude", "contact.location")
 """Parameters that every dataset contains, swept or not."""
 
 
@@ -210,8 +211,8 @@ class SweepSetup:
                     drive=ensemble.drive,
                     striker_with_mass=ensemble.structure.body_mass is not None,
                     unequal_wells=ensemble.structure.model.transverse_force is not None,
-                    environment=system.has_environment,
-                    several_strikers=bool(system.further_contacts),
+                    environment=bool(system.surroundings),
+                    several_strikers=len(system.contacts) > 1,
                 )[1]
                 books = engine.run_ensemble(ensemble, threads, report)
                 for name, values in statistics_of(ensemble, books).items():
@@ -328,7 +329,7 @@ class SweepSetup:
                 "reference_well",
                 "initial_well",
             }
-        if any(name == "striker.side" or name.startswith("initial_state.") for name in self.points.names):
+        if any(name == "contact.side" or name.startswith("initial_state.") for name in self.points.names):
             varied.add("initial_well")
         beam = self.system.model.beam
         if beam is not None and any(name.startswith(("beam.", "boundary.")) for name in self.points.names):
@@ -426,7 +427,8 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
     if isinstance(points, PointList):
         points = list_in_ratios(system, points)
     require_parameters(system, points)
-    law = type(system.contact) if system.contact is not None else None
+    check_integrable(system)
+    law = type(system.contact_law) if system.contact_law is not None else None
     resolved = resolve(
         integration.engine,
         runs=points.size,
@@ -435,8 +437,8 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         law=law,
         striker_with_mass=system.striker is not None and system.striker.mass is not None,
         unequal_wells=system.model.transverse_force is not None,
-        environment=system.has_environment,
-        several_strikers=bool(system.further_contacts),
+        environment=bool(system.surroundings),
+        several_strikers=len(system.contacts) > 1,
         **({} if system.striker is None else {"drive": type(system.striker.drive)}),
     )[0]
     setup = SweepSetup(system, integration.replace(engine=resolved), points)

@@ -79,7 +79,7 @@ class PointWork:
     @cached_property
     def statistics(self) -> dict[str, Statistic]:
         """Statistics of the sweep, with those of each of several strikers."""
-        return rows_for(1 + len(self.setup.system.further_contacts))
+        return rows_for(len(self.setup.system.contacts))
 
     @cached_property
     def integers(self) -> tuple[str, ...]:
@@ -322,10 +322,9 @@ def provenance_of(system: System) -> Provenance:
 
 def _code(system: System) -> str:
     """Return the hash of the code of the package, and of a contact law or drive that is defined outside it."""
-    parts = [system.contact, system.striker and system.striker.drive]
-    foreign = tuple(
-        type(part) for part in parts if part and not type(part).__module__.startswith("snapbeam.")
-    )
+    parts: list[object] = [part for each in system.contacts for part in (each.law, each.striker.drive)]
+    parts += [*system.forces, *system.harvesters]
+    foreign = tuple(type(part) for part in parts if not type(part).__module__.startswith("snapbeam."))
     mark = fingerprint(foreign) if foreign else ""
     if not mark:
         return code_hash() if not foreign else f"{code_hash()}+?"

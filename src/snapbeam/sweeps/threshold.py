@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.integration import Integration
+from snapbeam.model.mapping import resolved
 from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, physical_name
 from snapbeam.model.parameters import lookup
 from snapbeam.model.system import System
@@ -108,8 +109,7 @@ def threshold(
     >>> from snapbeam import paper
     >>> system = sb.System(
     ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     paper.CONTACT,
-    ...     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18),
+    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
     ... )
     >>> found = sb.threshold(
     ...     system, "drive.velocity_amplitude", [0.02, 0.08, 0.14, 0.2],
@@ -118,6 +118,8 @@ def threshold(
     >>> found["lower_threshold"].dims
     ('frequency_ratio',)
     """
+    if isinstance(system, System) and isinstance(parameter, str):
+        parameter = resolved(system, parameter)
     row = parameter_of_axis(physical_name(str(parameter)) or lookup(parameter).name)
     if not row.is_run or row.quantity.kind is not float:
         raise InputError(

@@ -137,7 +137,7 @@ class Trials:
         return self.of_columns(columns, progress)
 
     def _any_parameter(self) -> tuple[str, ...]:
-        return ("striker.location",)
+        return ("contact.location",)
 
     def of_columns(self, columns: Columns, progress: Progress | None = None) -> dict[str, NDArray[Any]]:
         """Run points as they are, without sampling."""
@@ -182,7 +182,7 @@ class Trials:
             _require_allowed(ratio, found[ratio])
 
     def _is_held(self, ratio: str) -> bool:
-        if ratio == "striker.location":
+        if ratio == "contact.location":
             return "beam.length" in self.uncertainty.of and self.system.striker is not None
         return ratio in self.system.parameters
 
@@ -233,7 +233,7 @@ class Trials:
         striker, size = self.system.striker, numbers.size
         assert striker is not None
         modes = self.system.model.modes
-        location = columns.get("striker.location", np.full(size, striker.location))
+        location = columns.get("contact.location", np.full(size, striker.location))
         table = np.empty((size, 2, modes))
         starts = InitialConditions(
             count=1, displacement=self.uncertainty.displacement, seed=self.uncertainty.seed
@@ -318,7 +318,7 @@ def trials_of(
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if system.striker is None:
-        raise InputError("striker = None: must be a Striker; the outcomes are those of a struck beam")
+        raise InputError("contacts = []: must hold a Contact; the outcomes are those of a struck beam")
     uncertainty = ParameterUncertainty() if uncertainty is None else uncertainty
     if not isinstance(uncertainty, ParameterUncertainty):
         raise InputTypeError(f"uncertainty = {shown(uncertainty)}: must be a ParameterUncertainty")
@@ -335,8 +335,8 @@ def trials_of(
             "and m/s; give hold_fixed = 'normalised'"
         )
     keeping = checkpoint if isinstance(checkpoint, CheckpointOptions) else CheckpointOptions(checkpoint)
-    if uncertainty.moves_start and "striker.gap" not in uncertainty.of:
-        if system.parameters.get("striker.gap") is None:
+    if uncertainty.moves_start and "contact.gap" not in uncertainty.of:
+        if system.parameters.get("contact.gap") is None:
             system = held_in_space(system)
     return Trials(system, integration.replace(early_termination=early), uncertainty, keeping, cluster)
 
@@ -389,7 +389,7 @@ def require_held(names: Iterable[str], system: System) -> None:
     ------
     InputError
     """
-    strikers = 0 if system.striker is None else 1 + len(system.further_contacts)
+    strikers = len(system.contacts)
     held = rows_for(strikers)
     for name in names:
         if name in STATISTICS and name not in held:

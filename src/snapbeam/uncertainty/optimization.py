@@ -165,7 +165,7 @@ class Objective:
     ----------
     quantity : str
         An outcome (its probability), a statistic of the runs, of one of several strikers too, as
-        ``"peak_force_striker_2"``, a parameter, ``"speed"``, ``"stroke"``, ``"acceleration"`` or
+        ``"peak_force_contact_2"``, a parameter, ``"speed"``, ``"stroke"``, ``"acceleration"`` or
         ``"cycles_to_settle"``.
     quantile : float, optional
         Of a statistic, in (0, 1): what is exceeded by no more than the rest of the runs; its mean by default.
@@ -719,7 +719,7 @@ def design_problem(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
@@ -802,7 +802,7 @@ def optimize_design(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )

@@ -166,7 +166,7 @@ class Waveform:
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> run = sb.simulate(system, sb.Integration(cycles=5))
     >>> displacement = run.dataset.displacement_at_striker.values * system.scale.length  # m, here of a simulation
     >>> waveform = sb.uncertainty.Waveform(
@@ -556,7 +556,7 @@ def _nominal(name: str, beam: Beam, tracked: Sequence[Waveform]) -> float:
     system = tracked[0].system
     if name == "damping_ratio":
         return float(np.mean(system.model.damping_ratio))
-    return float(getattr(system.contact, "stiffness"))  # noqa: B009
+    return float(getattr(system.contact_law, "stiffness"))  # noqa: B009
 
 
 def _checked_waveforms(given: Sequence[Waveform] | Waveform) -> tuple[Waveform, ...]:
@@ -582,7 +582,7 @@ def _checked_prior(
         if name in prior and alone.get(dotted):
             raise InputError(f"prior: {name} is measured by itself; leave out one of the two")
         if name == "contact_stiffness" and name in prior:
-            if not all(hasattr(each.system.contact, "stiffness") for each in tracked):
+            if not all(hasattr(each.system.contact_law, "stiffness") for each in tracked):
                 raise InputError("prior: contact_stiffness, of a contact that has none")
     return list(prior)
 
@@ -712,7 +712,7 @@ def class_likelihood(
     ...     measured, paper.BEAM, {"buckling_level": 0.05}, modes=2, samples=200
     ... )
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> measurements = sb.MeasuredPoints(
     ...     frequency_ratio=[1.2], velocity_amplitude=[0.2], location=[0.4762], response_class=[3]
     ... )
@@ -744,7 +744,7 @@ def class_likelihood(
     }
     place = measurements.location[known]
     if np.isfinite(place).all():
-        points["striker.location"] = place[dot]
+        points["contact.location"] = place[dot]
     found = trials.statistics(trials.in_hz(points), number)
     mine = (found["response_class"] == measurements.response_class[known][dot]) & reached(found)
     hits = mine.reshape(samples, count, runs).sum(axis=-1)

@@ -301,7 +301,7 @@ class StatisticQoI:
     Parameters
     ----------
     name : str
-        Of :data:`snapbeam.STATISTICS`, of one of several strikers, such as ``"peak_force_striker_2"``, or an outcome
+        Of :data:`snapbeam.STATISTICS`, of one of several strikers, such as ``"peak_force_contact_2"``, or an outcome
         such as ``"snap"``: 1 where it happens, else 0.
 
     Examples
@@ -310,7 +310,7 @@ class StatisticQoI:
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
@@ -631,7 +631,7 @@ def sensitivity(
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contact=paper.CONTACT, striker=shaker)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )

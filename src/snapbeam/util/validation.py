@@ -460,7 +460,7 @@ Kind = TypeVar("Kind")
 
 
 class NamedTable(dict[str, Kind]):
-    """A list of things by name that knows more names than it lists, as ``sine+burst`` or ``impacts_striker_2``.
+    """A list of things by name that knows more names than it lists, as ``sine+burst`` or ``impacts_contact_2``.
 
     Parameters
     ----------

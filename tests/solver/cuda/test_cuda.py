@@ -32,7 +32,10 @@ def ensemble_of(modes, ratio, velocity, cycles, accuracy="standard", location=1 
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, damping_ratio=0.005)
     ratio, velocity = np.atleast_1d(ratio).astype(float), np.atleast_1d(velocity).astype(float)
     system = sb.System(
-        model, CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0, location=location)
+        model,
+        contacts=[
+            sb.Contact(CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0, location=location))
+        ],
     )
     ensemble = make_ensemble(
         system,

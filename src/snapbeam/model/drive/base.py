@@ -5,13 +5,17 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.quantity import check_fields, numbers_type
+from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.validation import NamedTable
+
+if TYPE_CHECKING:
+    from snapbeam.model.reduced_model import ReducedModel
 
 __all__ = ["DRIVES", "HORIZON", "Drive", "Scale", "Timed"]
 
@@ -130,6 +134,10 @@ class Drive:
     def samples(self) -> _Array:
         """What kernels look up, as one row; empty for a formula."""
         return np.empty(0)
+
+    def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:
+        """Diagnostics of values that are implausible for a model; none by default."""
+        return []
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.model.drive.base import Scale, Timed
 from snapbeam.model.drive.shock import GRAVITY
 from snapbeam.model.quantity import check_fields, quantity
+from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.validation import InputError, finite_array
+
+if TYPE_CHECKING:
+    from snapbeam.model.reduced_model import ReducedModel
 
 __all__ = ["RecordedAcceleration"]
 
@@ -23,6 +27,8 @@ _Array = NDArray[np.float64]
 
 _KNOTS = 8.0
 """Samples in the shortest period that the steps resolve."""
+_LONGEST_DRIFT = 1.0
+"""Displacement by an offset of the record, over the length scale, up to which it is plausible."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -189,3 +195,20 @@ class RecordedAcceleration(Timed):
         a0, rise = memory[row], memory[row + 4] - memory[row]
         a, b = memory[row + 1] * interval, memory[row + 5] * interval
         return a0 + s * (a + s * (3.0 * rise - 2.0 * a - b + s * (a + b - 2.0 * rise)))
+
+    def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:
+        """A drift of the displacement by an offset of the record."""
+        drift = self.drift
+        if model.length_scale is None or drift <= _LONGEST_DRIFT * model.length_scale:
+            return []
+        offset = float(np.median(self.record))
+        return [
+            Diagnostic(
+                "drifting-record",
+                f"{section}.record: its acceleration has an offset of {offset:.3g} m/s^2 ({offset / GRAVITY:.2g} g), by which "
+                f"its displacement drifts by {drift:.3g} m ({drift / model.length_scale:.3g} times the length scale) within "
+                f"{self.duration:.4g} s; subtract the offset, record - numpy.median(record), or filter the record by a "
+                "high-pass below the lowest frequency that matters",
+                {"drift": drift, "drift_over_length_scale": drift / model.length_scale, "offset": offset},
+            )
+        ]

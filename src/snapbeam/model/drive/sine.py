@@ -5,18 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.quantity import RUN, quantity
+from snapbeam.util.diagnostics import Diagnostic
+
+if TYPE_CHECKING:
+    from snapbeam.model.reduced_model import ReducedModel
 
 __all__ = ["AccelerationSine", "DisplacementSine", "Sine"]
 
 
 _Array = NDArray[np.float64]
+_LARGEST_RATIO = 20.0
+"""Ratios from which on a number is probably given in Hz or mm/s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +87,28 @@ class Sine(Drive):
         """A omega^2."""
         numbers = self.numbers(columns, scale)
         return np.asarray(numbers["amplitude"] * numbers["omega"] ** 2)
+
+    def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:
+        """Values that look like another unit."""
+        found = []
+        if self.frequency_ratio >= _LARGEST_RATIO:
+            found.append(
+                Diagnostic(
+                    "ratio-like-hertz",
+                    f"{section}.frequency_ratio = {self.frequency_ratio:g}: a ratio to the first natural frequency "
+                    f"({model.reference_frequency:.4g} Hz); is it given in Hz?",
+                    {"frequency_ratio": self.frequency_ratio},
+                )
+            )
+        if self.velocity_amplitude >= _LARGEST_RATIO:
+            found.append(
+                Diagnostic(
+                    "amplitude-like-speed",
+                    f"{section}.velocity_amplitude = {self.velocity_amplitude:g}: a ratio to b omega_1; is it given in mm/s?",
+                    {"velocity_amplitude": self.velocity_amplitude},
+                )
+            )
+        return found
 
 
 @dataclass(frozen=True, kw_only=True)

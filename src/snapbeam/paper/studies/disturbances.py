@@ -55,7 +55,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     for at, (omega, drive) in enumerate(points):
         for name, given in _variants(model, float(omega), float(drive), cycles).items():
             run = sb.simulate(
-                sb.System(model, CONTACT, **given),
+                sb.System(model, **given),
                 sb.Integration(cycles=cycles, early_termination=True),
                 sample_times=[0.0],
             )
@@ -73,16 +73,16 @@ def _variants(model: sb.ReducedModel, omega: float, drive: float, cycles: int) -
     rest = model.well_amplitude
     steady = _record(model, omega, drive, cycles)
     return {
-        "base": {"striker": steady},
-        "perturbed": {"striker": _record(model, omega, drive * (1.0 + 1e-9), cycles)},
-        "offset": {"striker": steady, "initial_state": sb.State(amplitude=rest * (1.0 - OFFSET))},
-        "startup": {"striker": _record(model, omega, drive, cycles, EXCESS)},
+        "base": {"contacts": [steady]},
+        "perturbed": {"contacts": [_record(model, omega, drive * (1.0 + 1e-9), cycles)]},
+        "offset": {"contacts": [steady], "initial_state": sb.State(amplitude=rest * (1.0 - OFFSET))},
+        "startup": {"contacts": [_record(model, omega, drive, cycles, EXCESS)]},
     }
 
 
 def _record(
     model: sb.ReducedModel, omega: float, drive: float, cycles: int, excess: float = 0.0, phase: float = 0.0
-) -> sb.Striker:
+) -> sb.Contact:
     """w_s' = V b omega_1 cos(omega t + phase), its displacement first (1 + *excess*) times as large, as samples."""
     angular = 2.0 * math.pi * omega * model.reference_frequency
     height = drive * float(model.length_scale or 0.0) / omega
@@ -91,7 +91,7 @@ def _record(
     size = 1.0 + excess * np.exp(-cycle)
     slope = -excess * np.exp(-cycle) / (2.0 * math.pi)  # by the angle
     offset = math.sin(phase) * size[0]
-    return sb.Striker(
+    striker = sb.Striker(
         drive=sb.RecordedMotion(
             displacement=height * (size * np.sin(angle) - offset),
             velocity=height * angular * (size * np.cos(angle) + slope * np.sin(angle)),
@@ -100,6 +100,7 @@ def _record(
         ),
         location=LOCATION,
     )
+    return sb.Contact(CONTACT, striker)
 
 
 def _at_border(model: sb.ReducedModel, omega: float, drive: float, cycles: int) -> bool:
@@ -132,7 +133,7 @@ def _repeat(model: sb.ReducedModel, omega: float, drive: float) -> list[float] |
     shaker = sb.Shaker(frequency_ratio=omega, velocity_amplitude=drive, location=LOCATION)
     cycles = max(math.ceil(8.0 * omega), 2)
     run = sb.simulate(
-        sb.System(model, CONTACT, shaker.striker()),
+        sb.System(model, contacts=[sb.Contact(CONTACT, shaker.striker())]),
         sb.Integration(cycles=cycles, accuracy="reference"),
         sample_times=[0.0],
     )
@@ -143,7 +144,7 @@ def _repeat(model: sb.ReducedModel, omega: float, drive: float) -> list[float] |
         return None
     at = float(onset[late[np.argmax(impulse[late])]])
     around = sb.simulate(
-        sb.System(model, CONTACT, shaker.striker()),
+        sb.System(model, contacts=[sb.Contact(CONTACT, shaker.striker())]),
         sb.Integration(cycles=cycles, accuracy="reference"),
         sample_times=[at - near, at, at + near],
     ).dataset.modal_amplitude.values
@@ -155,7 +156,7 @@ def _repeat(model: sb.ReducedModel, omega: float, drive: float) -> list[float] |
     for kept in (np.ones_like(alone), alone):
         start = sb.State(amplitude=alpha * kept, velocity=velocity * kept)
         again = sb.simulate(
-            sb.System(model, CONTACT, record, start),
+            sb.System(model, contacts=[record], initial_state=start),
             sb.Integration(cycles=cycles, accuracy="reference"),
             sample_times=[0.25 * first],
         )

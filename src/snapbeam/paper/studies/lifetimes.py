@@ -41,7 +41,10 @@ _APART = 1.0
 
 def _system(modes: int, ratio: float, velocity: float) -> sb.System:
     return sb.System(
-        paper_model(modes), CONTACT, sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity).striker()
+        paper_model(modes),
+        contacts=[
+            sb.Contact(CONTACT, sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity).striker())
+        ],
     )
 
 

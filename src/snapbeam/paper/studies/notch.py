@@ -49,7 +49,7 @@ def _system(modes: int, beam: sb.Beam = BEAM, **parts: Any) -> sb.System:
     )
     drive = parts.pop("drive", sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.1))
     contact = parts.pop("contact", CONTACT)
-    return sb.System(model, contact, sb.Striker(drive=drive, **parts))
+    return sb.System(model, contacts=[sb.Contact(contact, sb.Striker(drive=drive, **parts))])
 
 
 def _supported(**stiffness: float) -> sb.Beam:

@@ -64,7 +64,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
         "drive.velocity_amplitude": drives[:, None]
         * (1.0 + _OFF["velocity_amplitude"] * draws["velocity_amplitude"]),
         "drive.frequency_ratio": OMEGA * (1.0 + _OFF["frequency_ratio"] * draws["frequency_ratio"]),
-        "striker.location": LOCATION + _OFF["location"] * draws["location"],
+        "contact.location": LOCATION + _OFF["location"] * draws["location"],
     }
     points = xr.Dataset({name: ("point", np.asarray(values).ravel()) for name, values in columns.items()})
     found, barriers, freq = [], [], []
@@ -78,7 +78,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
             ramp_down_cycles=0.25,
             retraction=1.0,
         )
-        system = sb.System(model, CONTACT, sb.Striker(drive=burst))
+        system = sb.System(model, contacts=[sb.Contact(CONTACT, sb.Striker(drive=burst))])
         ds = sb.sweep(system, points, sb.Integration(cycles=results.pick(30, 40)))
         over = (ds.final_well.values > 0) & ds.final_well_proven.values
         open_ = ~ds.final_well_proven.values

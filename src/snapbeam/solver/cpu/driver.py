@@ -96,8 +96,7 @@ def _kernel(march: Callable[..., Any], ensemble: Ensemble) -> Any:
     moving = [kind for _, kind in ensemble.drive.parts]
     parts = [*moving, *(term for kind in (ensemble.drive, *moving) for term in kind.terms)]
     others = () if ensemble.others is None else (several(ensemble.others.laws), *ensemble.others.laws)
-    local = ensemble.structure.local_force
-    forces = () if local is None else (type(local.law).owner,)
+    forces = tuple(type(each.law).owner for each in ensemble.structure.local_forces)
     kinds = (ensemble.law, ensemble.drive, *parts, *others, *forces, type(extras_of_table()).owner)
     return kernel(march.py_func, kinds)  # type: ignore[attr-defined]
 

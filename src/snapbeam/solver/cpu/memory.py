@@ -121,14 +121,14 @@ def pack(
         "tension": np.concatenate(strips),
     }
     kinds = (*TERMS_BEFORE_CONTACTS, FurtherContacts, *TERMS_AFTER_CONTACTS)
-    built: dict[type, TermMemory] = {}
+    built: list[tuple[type, str, TermMemory]] = []
     for kind in kinds:
-        found = None if kind is FurtherContacts else kind.build(structure, drive, size, padded)
-        if found is not None:
-            built[kind] = found
-            arrays |= {
-                f"{kind.__name__}.{name}": values for name, values in (found.shared | found.own).items()
-            }
+        for i, found in enumerate(
+            [] if kind is FurtherContacts else kind.build(structure, drive, size, padded)
+        ):
+            prefix = f"{kind.__name__}.{i}."
+            built.append((kind, prefix, found))
+            arrays |= {f"{prefix}{name}": values for name, values in (found.shared | found.own).items()}
     if structure.circuit_row is not None:
         arrays |= {"circuit_row": padded(structure.circuit_row), "rate": np.zeros(WIDTH)}
     if several is not None:
@@ -148,9 +148,8 @@ def pack(
         if kind is FurtherContacts and others is not None:
             terms.append(others)
             own.append({})
-        elif kind in built:
-            shared, single, numbers = built[kind]
-            places = {name: placed.pop(f"{kind.__name__}.{name}") for name in (*shared, *single)}
+        for _, prefix, (shared, single, numbers) in [each for each in built if each[0] is kind]:
+            places = {name: placed.pop(f"{prefix}{name}") for name in (*shared, *single)}
             terms.append(kind(**places, **numbers))
             own.append({name: values.size for name, values in single.items()})
     moving = bool(np.all(omega * np.sqrt(1.0 - zeta * zeta) > 0.0))

@@ -37,11 +37,11 @@ class AxialLoad(NamedTuple):
     """P at the kick, N."""
 
     @staticmethod
-    def build(structure: Any, drive: Any, size: int, padded: Any) -> TermMemory | None:
+    def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
         """Of a drive whose motions include the load's."""
         if not any(part == "load" for part, _ in drive.parts):
-            return None
-        return TermMemory({}, {"change": np.zeros(WIDTH)}, {})
+            return []
+        return [TermMemory({}, {"change": np.zeros(WIDTH)}, {})]
 
     @staticmethod
     @inlined

@@ -40,11 +40,11 @@ class BaseExcitation(NamedTuple):
     """a at the kick, m/s^2."""
 
     @staticmethod
-    def build(structure: Any, drive: Any, size: int, padded: Any) -> TermMemory | None:
+    def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
         """Of a drive whose motions include the base's."""
         if not any(part == "base" for part, _ in drive.parts):
-            return None
-        return TermMemory({"row": padded(structure.base_load)}, {"acceleration": np.zeros(WIDTH)}, {})
+            return []
+        return [TermMemory({"row": padded(structure.base_load)}, {"acceleration": np.zeros(WIDTH)}, {})]
 
     @staticmethod
     @inlined

@@ -11,7 +11,7 @@ method, and a structure without terms, leave no code.
 Beside operations, a class has
 
 ``build(structure, drive, size, padded)``
-    Python: a :class:`TermMemory`, or None if the structure and the drive have no such term.
+    Python: a :class:`TermMemory` for each term of the class that the structure and the drive have.
 ``kick_work(memory, size, term, weight, g, r, kick, p)``, ``accumulator`` and ``work_description``
     Its work in a kick of *weight* seconds, J, exact: the row *kick* is the whole acceleration of the kick, contact
     included, and p the row of the velocities before it.  With it, the name and long name of the statistic of the work.

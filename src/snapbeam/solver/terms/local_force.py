@@ -136,8 +136,8 @@ class LocalForce(NamedTuple):
     """Constants of the law; their type names its functions."""
 
     @staticmethod
-    def build(structure: Any, drive: Any, size: int, padded: Any) -> TermMemory | None:
-        """Of a structure with a local force whose law depends on the displacement alone."""
+    def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
+        """Of the local forces whose laws depend on the displacement alone."""
         return _built(structure, padded, dissipative=False)
 
     @staticmethod
@@ -181,8 +181,8 @@ class DampedLocalForce(LocalForce):
     __slots__ = ()
 
     @staticmethod
-    def build(structure: Any, drive: Any, size: int, padded: Any) -> TermMemory | None:
-        """Of a structure with a local force whose law has a damping part."""
+    def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
+        """Of the local forces whose laws have a damping part."""
         return _built(structure, padded, dissipative=True)
 
     @staticmethod
@@ -238,10 +238,11 @@ class DampedLocalForce(LocalForce):
         return memory[term.state + _WORK]
 
 
-def _built(structure: Any, padded: Any, dissipative: bool) -> TermMemory | None:
-    force = structure.local_force
-    if force is None or type(force.law).owner.dissipative != dissipative:
-        return None
-    return TermMemory(
-        {"row": padded(force.row)}, {"state": np.zeros(WIDTH)}, {"rest": force.rest, "law": force.law}
-    )
+def _built(structure: Any, padded: Any, dissipative: bool) -> list[TermMemory]:
+    return [
+        TermMemory(
+            {"row": padded(each.row)}, {"state": np.zeros(WIDTH)}, {"rest": each.rest, "law": each.law}
+        )
+        for each in structure.local_forces
+        if type(each.law).owner.dissipative == dissipative
+    ]

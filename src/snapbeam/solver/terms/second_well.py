@@ -35,16 +35,18 @@ class SecondWell(NamedTuple):
     """Displacement of the centre that divides the wells, m."""
 
     @staticmethod
-    def build(structure: Any, drive: Any, size: int, padded: Any) -> TermMemory | None:
+    def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
         """Of a structure whose wells are no mirror images."""
         wells = structure.unequal_wells
         if wells is None:
-            return None
-        return TermMemory(
-            {"force": padded(wells.force), "second": padded(wells.second)},
-            {"present": np.zeros(size + WIDTH)},
-            {"lift": wells.lift, "depth": wells.depth, "level": wells.level},
-        )
+            return []
+        return [
+            TermMemory(
+                {"force": padded(wells.force), "second": padded(wells.second)},
+                {"present": np.zeros(size + WIDTH)},
+                {"lift": wells.lift, "depth": wells.depth, "level": wells.level},
+            )
+        ]
 
     @staticmethod
     @inlined

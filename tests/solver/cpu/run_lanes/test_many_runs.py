@@ -31,7 +31,9 @@ def many(runs, cycles=10):
     """Runs of one mode over the plane of Fig. 6."""
     generator = np.random.default_rng(0)
     striker = sb.Striker(drive=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.2))
-    system = sb.System(sb.ReducedModel.from_beam(BEAM, modes=1, damping_ratio=0.005), CONTACT, striker)
+    system = sb.System(
+        sb.ReducedModel.from_beam(BEAM, modes=1, damping_ratio=0.005), contacts=[sb.Contact(CONTACT, striker)]
+    )
     points = {
         "drive.frequency_ratio": generator.uniform(0.1, 4.0, runs),
         "drive.velocity_amplitude": generator.uniform(0.02, 0.65, runs),

@@ -22,18 +22,24 @@ def ensemble(modes, runs=40, cycles=12, seed=0, contact=CONTACT, drive=None, str
     generator = np.random.default_rng(seed)
     system = sb.System(
         sb.ReducedModel.from_beam(BEAM, modes=modes, damping_ratio=0.005),
-        contact,
-        sb.Striker(drive=drive or sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.2), **(striker or {})),
+        contacts=[
+            sb.Contact(
+                contact,
+                sb.Striker(
+                    drive=drive or sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.2), **(striker or {})
+                ),
+            )
+        ],
     )
     points = {}
     if drive is None:
         points = {
             "drive.frequency_ratio": generator.uniform(0.1, 4.0, runs),
             "drive.velocity_amplitude": generator.uniform(0.02, 1.0, runs),
-            "striker.location": generator.choice([0.3, 0.42, 1.0 / 2.1], runs),
+            "contact.location": generator.choice([0.3, 0.42, 1.0 / 2.1], runs),
         }
     else:
-        points = {"striker.location": np.full(runs, 0.4)}
+        points = {"contact.location": np.full(runs, 0.4)}
     return make_ensemble(system, sb.Integration(cycles=cycles, **how), points)
 
 
@@ -96,7 +102,7 @@ def test_a_striker_with_mass(monkeypatch):
         how = sb.Integration(cycles=8)
         times = np.linspace(0.0, 8 * 2.0 * np.pi / numbers["omega"] * (1.0 - 1e-12), 20001)
         w = sb.simulate(
-            sb.System(model, CONTACT, striker), how, sample_times=times
+            sb.System(model, contacts=[sb.Contact(CONTACT, striker)]), how, sample_times=times
         ).dataset.displacement_at_striker
         assert found["min_displacement"][i] == pytest.approx(float(w.min()), abs=1e-3)
         assert found["max_displacement"][i] == pytest.approx(float(w.max()), abs=1e-3)

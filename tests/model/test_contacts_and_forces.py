@@ -1,0 +1,182 @@
+"""Any number of contacts and forces: names by number and by label, files, and what a run refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam.cli.parameter_options import configured
+from snapbeam.model import default_values
+from snapbeam.model.parameter_file import config_from_mapping, config_text, load_config
+from snapbeam.util.validation import InputError, InputTypeError
+
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
+HERTZ = default_values.CONTACT
+SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1)
+STOP = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5)
+SYSTEM = sb.System(
+    MODEL,
+    contacts=[
+        sb.Contact(HERTZ, SHAKER),
+        sb.Contact(sb.PowerLaw.from_stiffness(4e11, 2.0), STOP, label="stop"),
+        sb.Contact(HERTZ, STOP),
+    ],
+    forces=[
+        sb.LocalSpring(stiffness=20.0, location=0.4),
+        sb.MagneticForce(strength=1e-9, gap=1e-3, location=0.5, label="magnet"),
+        sb.ExternalForce(history=sb.ConstantForce(force=1e-3), location=0.6),
+    ],
+)
+
+
+def test_names_by_number_and_by_label():
+    changed = SYSTEM.replace(**{
+        "contact.stop.gap": 6e-5, "contact.3.gap": 7e-5, "contact.1.location": 0.45, "drive.1.phase": 0.2,
+        "force.stiffness": 30.0, "force.magnet.strength": 2e-9, "force.3.force": 2e-3,
+    })  # fmt: skip
+    assert [each.striker.gap for each in changed.contacts] == [None, 6e-5, 7e-5]
+    assert (changed.striker.location, changed.striker.drive.phase) == (0.45, 0.2)
+    assert (changed.forces[0].stiffness, changed.forces[1].strength) == (30.0, 2e-9)
+    assert changed.forces[2].history.force == 2e-3
+    for names in (
+        ("contact.stop.gap", "contact.2.gap"),
+        ("force.magnet.gap", "force.2.gap"),
+        ("contact.1.side", "contact.side"),
+    ):
+        assert changed.get(names[0]) == changed.get(names[1])
+    assert changed.contacts[1].label == "stop" and changed.contacts[0].law is SYSTEM.contacts[0].law
+    wall = SYSTEM.replace(
+        **{"contact.stop.law": HERTZ, "drive.3": SHAKER.striker().drive, "force.magnet": SYSTEM.forces[0]}
+    )
+    assert wall.contacts[1].law == HERTZ and wall.contacts[1].striker == STOP
+    assert wall.contacts[2].striker.drive == SHAKER.striker().drive
+    assert wall.forces[1] == SYSTEM.forces[0]
+    assert SYSTEM.replace(contacts=SYSTEM.contacts[:1], forces=[]).surroundings == ()
+
+
+def test_files(tmp_path):
+    """Arrays of tables, the drive of a contact in its table; what is written is read again."""
+    SYSTEM.save(tmp_path / "system.toml")
+    text = (tmp_path / "system.toml").read_text()
+    assert text.count("[[contact]]") == 3 and text.count("[[force]]") == 3 and "[striker" not in text
+    assert sb.System.load(tmp_path / "system.toml") == SYSTEM
+    assert sb.System.from_mapping(SYSTEM.to_mapping()) == SYSTEM
+    mine = """
+extends = "paper"
+[[contact]]
+location = 0.4
+[contact.drive]
+frequency_hz = 100
+velocity_amplitude = 0.1
+[[contact]]
+label = "stop"
+gap = "50 um"
+side = "above"
+[[force]]
+type = "local_spring"
+stiffness = "2 mN/um"
+location = 0.5
+[[force]]
+type = "constant_force"
+label = "weight"
+force = 1e-3
+location = 0.5
+"""
+    (tmp_path / "mine.toml").write_text(mine)
+    config = load_config(tmp_path / "mine.toml")
+    system = config.system
+    assert [each.label for each in system.contacts] == ["", "stop"]
+    assert system.contacts[1].law == system.contacts[0].law and system.get(
+        "contact.stop.gap"
+    ) == pytest.approx(5e-5)
+    assert system.get("force.stiffness") == 2000.0 and system.get("force.weight.force") == 1e-3
+    for written in (config_text(config), config_text(config.whole())):
+        (tmp_path / "again.toml").write_text(written)
+        assert load_config(tmp_path / "again.toml").system == system
+    given = {"config": tmp_path / "mine.toml", "set_": ["contact.stop.gap=60um", "force.weight.force=2e-3"]}
+    changed = configured(given).system
+    assert changed.get("contact.2.gap") == pytest.approx(6e-5) and changed.get("force.2.force") == 2e-3
+    for section in ("contact", "force"):
+        with pytest.raises(
+            InputError, match=rf"{section} = \[\]: must be a table, or an array of at least one"
+        ):
+            config_from_mapping({"extends": "paper", section: []})
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        (
+            {"contacts": [sb.Contact(HERTZ, STOP, "a"), sb.Contact(HERTZ, STOP, "a")]},
+            "contacts: two have the label 'a'",
+        ),
+        ({"forces": [SYSTEM.forces[1]] * 2}, "forces: two have the label 'magnet'"),
+        ({"forces": SYSTEM.forces[0]}, r"forces = LocalSpring\(.*: must be a list or tuple"),
+        ({"forces": [HERTZ]}, r"forces\[0\] = HertzContact\(.*: must be an ExternalForce"),
+        (
+            {"forces": [sb.LocalSpring(stiffness=1.0)]},
+            "force.location = None: a force on a beam acts at a location",
+        ),
+        ({"harvesters": [None]}, r"harvesters\[0\] = None: must be a PiezoelectricHarvester"),
+        ({"base_excitation": 1.0}, "base_excitation = 1.0: must be a BaseExcitation"),
+    ],
+)
+def test_refused_parts(parts, message):
+    with pytest.raises((InputError, InputTypeError), match=message):
+        sb.System(MODEL, **parts)
+
+
+@pytest.mark.parametrize("label", ["2", "a b", "a.b", 3])
+def test_refused_labels(label):
+    for make in (
+        lambda: sb.Contact(HERTZ, STOP, label),
+        lambda: sb.LocalSpring(stiffness=1.0, location=0.5, label=label),
+    ):
+        with pytest.raises(InputError, match=r"label = .*: must be a name of letters"):
+            make()
+
+
+def test_questions_of_more_than_a_run_can_have():
+    """Six stops, two harvesters and two external forces: equilibria are found, a run is refused with the reason."""
+    coil = sb.ElectromagneticHarvester(force_factor=1.0, resistance=10.0)
+    weight = sb.ExternalForce(history=sb.ConstantForce(force=-2e-3), location=0.5)
+    system = sb.System(
+        MODEL, contacts=[sb.Contact(HERTZ, STOP)] * 6, forces=[weight, weight], harvesters=[coil, coil]
+    )
+    one = sb.System(MODEL, forces=[sb.ExternalForce(history=sb.ConstantForce(force=-4e-3), location=0.5)])
+    for each, same in zip(system.potential.equilibria, one.potential.equilibria, strict=True):
+        np.testing.assert_allclose(each.amplitude, same.amplitude, rtol=1e-9, atol=1e-12)
+    for message, parts in (
+        ("forces: the solver has one row of excitation", {}),
+        ("harvesters: 2 circuits; must be at most 1", {"forces": []}),
+        ("contacts: 6; must be at most 4", {"forces": [], "harvesters": []}),
+    ):
+        for run in (sb.simulate, lambda system: sb.sweep(system, {"contact.2.gap": [1e-5]})):
+            with pytest.raises(InputError, match=message):
+                run(system.replace(**parts))
+
+
+@pytest.mark.slow
+def test_springs_at_one_place_are_one_spring():
+    """Two springs side by side are one of the summed stiffness: potential, and a run to rounding."""
+    start = sb.State(amplitude=0.9 * MODEL.well_amplitude)
+    one, other = sb.LocalSpring(stiffness=12.0, location=0.4), sb.LocalSpring(stiffness=8.0, location=0.4)
+    two = sb.System(MODEL, forces=[one, other], initial_state=start)
+    whole = two.replace(forces=[sb.LocalSpring(stiffness=20.0, location=0.4)])
+    assert [each.energy for each in two.potential.wells] == pytest.approx(
+        [each.energy for each in whole.potential.wells], rel=1e-12
+    )
+    how = sb.Integration(cycles=3, step=2e-5)
+    ends = [sb.simulate(each, how).final_state for each in (two, whole)]
+    np.testing.assert_allclose(ends[0].amplitude, ends[1].amplitude, rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_sweep_over_labels():
+    system = sb.System(MODEL, contacts=[sb.Contact(HERTZ, SHAKER), sb.Contact(HERTZ, STOP, label="stop")])
+    how = sb.Integration(cycles=2)
+    found = sb.sweep(system, {"contact.stop.gap": [2e-5, 5e-5]}, how)
+    same = sb.sweep(system, {"contact.2.gap": [2e-5, 5e-5]}, how)
+    np.testing.assert_array_equal(found.peak_force, same.peak_force)
+    assert found.peak_force.dims == ("striker_gap_contact_2",)

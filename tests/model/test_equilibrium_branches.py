@@ -1,0 +1,127 @@
+"""Equilibria over a parameter: pull-in, buckling, and a snap-through that another method finds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam.cli.app import app
+from snapbeam.model import default_values
+from snapbeam.model.equilibrium_paths import paths_over_parameter
+from snapbeam.model.potential import Potential
+from snapbeam.util.validation import InputError
+
+BEAM = default_values.BEAM
+
+
+@pytest.mark.parametrize("side", [1.0, pytest.param(-1.0, marks=pytest.mark.slow)])
+def test_pull_in_voltage(side: float) -> None:
+    """V^2 = 8 k g^3/(27 eps_0 A) at a third of the gap; the frequency goes to zero there."""
+    k, gap, area, mass = 2.0, 3e-6, 4e-8, 1e-9
+    plate = sb.ReducedModel.from_matrices([[mass]], [[k]], contact_shape=[1.0], length_scale=gap)
+    electrode = sb.ElectrostaticForce(voltage=1.0, area=area, gap=side * gap, label="electrode")
+    system = sb.System(plate, forces=[electrode])
+    found = sb.model.equilibrium_branches(system, "force.electrode.voltage", (0.0, 8.0))
+    exact = math.sqrt(8.0 * k * gap**3 / (27.0 * 8.8541878188e-12 * area))
+    assert found.critical_kind.values.tolist() == ["limit"]
+    assert float(found.critical_value[0]) == pytest.approx(exact, rel=1e-9)
+    assert float(found.critical_displacement[0]) == pytest.approx(side * gap / 3.0, rel=1e-5)
+    voltage, place = found.force_voltage.values, found.midspan_displacement.values
+    pull = 8.8541878188e-12 * area * voltage**2 / 2.0
+    np.testing.assert_allclose(k * np.abs(place) * (gap - np.abs(place)) ** 2, pull, atol=1e-9 * k * gap**3)
+    stable = found.unstable_directions.values == 0
+    assert (np.abs(place[stable]) <= gap / 3.0 * (1.0 + 1e-6)).all() and (~stable).any()
+    soft = k - 2.0 * pull / (gap - np.abs(place)) ** 3
+    expected = np.sqrt(np.maximum(soft, 0.0) / mass) / (2.0 * math.pi)
+    np.testing.assert_allclose(
+        found.natural_frequency.values[stable, 0], expected[stable], atol=1e-3 * expected.max()
+    )
+    assert np.isnan(found.natural_frequency.values[~stable]).all()
+    assert found.attrs["incomplete_branches"] == 0
+
+
+def test_buckling_is_a_bifurcation() -> None:
+    """The straight beam branches at E I (2 pi/L)^2; the mode's amplitude follows from the tension beyond it."""
+    critical = BEAM.critical_load
+
+    def potential(load: float) -> Potential:
+        beam = BEAM.replace(axial_load=load)
+        return Potential.of(sb.ReducedModel.from_beam(beam, modes=3), ())
+
+    paths = paths_over_parameter("beam.axial_load", "N", potential, (0.5 * critical, 1.9 * critical))
+    kinds = [(path.value[at], kind) for path in paths for at, kind in path.singular]
+    assert len(kinds) == 1 and kinds[0][1] == "bifurcation"
+    assert kinds[0][0] == pytest.approx(critical, rel=1e-9)
+    assert all(path.complete for path in paths) and sum(path.secondary for path in paths) == 2
+    for path in paths:
+        for load, alpha in zip(path.value[::7], path.amplitude[::7], strict=True):
+            if path.secondary and load > 1.01 * critical:
+                level = BEAM.replace(axial_load=load).buckling_level
+                model = sb.ReducedModel.from_beam(BEAM.replace(axial_load=load), modes=3)
+                assert abs(float(model.midspan_shape @ alpha)) == pytest.approx(level, rel=1e-8)
+
+
+@pytest.mark.slow
+def test_a_limit_point_is_the_snap_through_force() -> None:
+    """Over a constant force at the centre, as force_displacement finds it."""
+    model = sb.ReducedModel.from_beam(BEAM, modes=3, imperfection=sb.Imperfection(midspan_amplitude=4e-6))
+    spring = sb.LocalSpring(stiffness=20.0, location=0.3)
+    push = sb.ExternalForce(history=sb.ConstantForce(force=0.0), location=0.45, label="push")
+    system = sb.System(model, forces=[spring, push])
+    curve = sb.force_displacement(system, 0.45)
+    limits = curve.critical_force.values[curve.critical_kind.values == "limit"]
+    end = 1.2 * float(np.abs(limits).max())
+    found = sb.model.equilibrium_branches(system, "force.push.force", (-end, end))
+    own = found.critical_value.values[found.critical_kind.values == "limit"]
+    np.testing.assert_allclose(np.sort(own), np.sort(limits), rtol=1e-6)
+
+
+def test_refusals() -> None:
+    system = sb.System(sb.ReducedModel.from_beam(BEAM, modes=1))
+    for parameter, values, message in (
+        ("force.voltage", (0.0, 1.0), "parameter = 'force.voltage': must be a number that the system has"),
+        ("model.modes", (1.0, 2.0), "parameter = 'model.modes': must be a number"),
+        ("beam.buckling_level", (1e-4, 1e-5), "values"),
+        ("beam.buckling_level", (-1e-4, 1e-4), "buckling_level = -0.0001"),
+    ):
+        with pytest.raises(InputError, match=message):
+            sb.model.equilibrium_branches(system, parameter, values)
+
+
+@pytest.mark.slow
+def test_the_command(tmp_path, monkeypatch) -> None:
+    from typer.testing import CliRunner
+
+    monkeypatch.chdir(tmp_path)
+    text = """
+extends = "paper"
+[model]
+modes = 2
+[[force]]
+type = "magnetic_force"
+strength = 1e-9
+gap = 1e-3
+location = 0.5
+label = "magnet"
+"""
+    (tmp_path / "own.toml").write_text(text)
+    command = [
+        "equilibria",
+        "--config",
+        "own.toml",
+        "--over",
+        "force.magnet.strength=0:9e-8",
+        "-o",
+        "b.nc",
+        "--plot",
+        "b.png",
+    ]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0, done.output
+    assert "limit point at force.strength = " in done.output
+    assert (tmp_path / "b.png").stat().st_size > 5_000
+    refused = CliRunner().invoke(app, [*command, "--force-displacement"])
+    assert refused.exit_code == 2
