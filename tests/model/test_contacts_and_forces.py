@@ -46,6 +46,9 @@ def test_names_by_number_and_by_label():
     ):
         assert changed.get(names[0]) == changed.get(names[1])
     assert changed.contacts[1].label == "stop" and changed.contacts[0].law is SYSTEM.contacts[0].law
+    named = SYSTEM.replace(**{"contact.2.label": "gap"})  # a label that is the name of a field, too
+    assert named.replace(**{"contact.gap": 1e-5}).contacts[0].striker.gap == 1e-5
+    assert named.get("contact.gap.side") == "above"
     wall = SYSTEM.replace(
         **{"contact.stop.law": HERTZ, "drive.3": SHAKER.striker().drive, "force.magnet": SYSTEM.forces[0]}
     )

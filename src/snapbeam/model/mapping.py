@@ -14,7 +14,7 @@ from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import CLAMPED, BoundaryConditions
 from snapbeam.model.external_force import FORCES, ExternalForce
 from snapbeam.model.imperfection import Imperfection
-from snapbeam.model.parameters import SECTIONS, kinds_of
+from snapbeam.model.parameters import SECTIONS, kinds_of, row_of
 from snapbeam.model.quantity import NUMBERED, numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
@@ -300,6 +300,8 @@ def resolved(system: Any, name: str) -> str:
     given, dot, field = rest.partition(".")
     if kind not in NUMBERED or not given or (not dot and given != "1" and given.isdigit()):
         return name
+    if not dot and (given in ("law", "striker", "label") or row_of(name) is not None):
+        return name  # a field of the first, whatever the labels are
     parts = getattr(system, _TUPLES[kind if kind != "drive" else "contact"])
     labels = [getattr(each, "label", "") for each in parts]
     if given == "1" or given in labels:
