@@ -125,7 +125,7 @@ def test_determinant_of_a_bouncing_ball(restitution: float, stroke: float) -> No
     assert determinant == pytest.approx(math.exp(-law.linear_damping * pressed), rel=1e-5)
 
 
-@pytest.mark.parametrize("with_striker", [True, False])
+@pytest.mark.parametrize("with_striker", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_a_constant_force_repeats_after_any_time(with_striker: bool) -> None:
     """The orbit under a constant load closes, and runs from it return to it; a load alone leaves the equilibrium."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, 1, damping_ratio=0.02)
