@@ -100,6 +100,10 @@ location = 0.5
     given = {"config": tmp_path / "mine.toml", "set_": ["contact.stop.gap=60um", "force.weight.force=2e-3"]}
     changed = configured(given).system
     assert changed.get("contact.2.gap") == pytest.approx(6e-5) and changed.get("force.2.force") == 2e-3
+    with pytest.raises(
+        InputError, match=r"contact\.wall\.gap: no contact has this label; the labels are stop, weight"
+    ):
+        configured(given | {"set_": ["contact.wall.gap=1um"]})
     for section in ("contact", "force"):
         with pytest.raises(
             InputError, match=rf"{section} = \[\]: must be a table, or an array of at least one"

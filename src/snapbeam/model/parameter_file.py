@@ -32,7 +32,7 @@ from snapbeam.model.parameter_axes import (
 from snapbeam.model.parameters import SECTIONS as SYSTEM_SECTIONS
 from snapbeam.model.parameters import Parameter, kinds_of, lookup, parameters, row_of
 from snapbeam.model.potential import Potential
-from snapbeam.model.quantity import check_label, numbered, quantities, section_of, split_name
+from snapbeam.model.quantity import NUMBERED, check_label, numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
@@ -449,6 +449,11 @@ class Config:
             own, number = numbered(section)
             if dot and own == labelled and values.get("label") == label:
                 return f"{section_of(kind, number)}.{field}"
+        if dot and kind in NUMBERED and not label.isdigit():
+            known = [str(each["label"]) for each in self.given.values() if "label" in each]
+            raise InputError(
+                f"{name}: no {labelled} has this label; the labels are {', '.join(known) or 'none'}"
+            )
         return name
 
     def _with_axes(self, name: str) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from snapbeam.model.integration import Integration
+from snapbeam.model.quantity import numbered
 from snapbeam.model.system import System
 from snapbeam.solver.statistics import rows_for
 from snapbeam.sweeps.checkpoint.records import Record, TaskLog, refuse_links
@@ -103,7 +104,7 @@ class _Table:
 def _work(described: dict[str, Any], name: str, done: dict[int, Record]) -> PointWork:
     """Return the work that a description determines; a finished task must have the same hash."""
     held, chunk = described["parameters"], int(described["points_per_task"])
-    strikers = sum(section.split("_")[0] == "striker" for section in held["system"])
+    strikers = sum(numbered(section)[0] == "contact" for section in held["system"])
     if held.get("statistics") != list(rows_for(strikers)):
         raise InputError(f"checkpoint = {shown(name)}: contains other statistics than this version has")
     axes = {axis: values for axis, values in held["points"].items() if isinstance(values, list)}
