@@ -259,16 +259,25 @@ class Potential:
 
     def _towards_ends(self, known: list[_Array]) -> list[_Array]:
         """Starting points ever nearer to the ends of the ranges of laws, where a force that grows has its equilibria."""
+        stiffness = self.model.stiffness
+        compliance = 1.0 / np.abs(stiffness) if stiffness.ndim == 1 and stiffness.all() else 1.0
+        ends = [
+            (j, end)
+            for j, law in enumerate(self.local_forces)
+            for end in law.displacement_range(law.numbers)
+            if math.isfinite(end)
+        ]
         found = []
-        for row, law in zip(self.rows, self.local_forces, strict=True):
-            stiffness = self.model.stiffness
-            response = row / np.abs(stiffness) if stiffness.ndim == 1 and stiffness.all() else row
-            ends = [each for each in law.displacement_range(law.numbers) if math.isfinite(each)]
-            for end in ends:
-                for alpha in known:
-                    away = end - float(row @ alpha)
-                    shares = 1.0 - np.geomspace(1.0, 1e-6, _TOWARDS)
-                    found += [alpha + share * away / float(row @ response) * response for share in shares]
+        shares = 1.0 - np.geomspace(1.0, 1e-6, _TOWARDS)
+        # towards one end, and towards two at once, where an equilibrium with two unstable directions can be
+        for group in [*combinations(ends, 1), *combinations(ends, 2)]:
+            rows = self.rows[[j for j, _ in group]]
+            product = rows @ (compliance * rows).T
+            if np.linalg.matrix_rank(product) < len(group):
+                continue
+            for alpha in known:
+                away = np.linalg.solve(product, np.array([end for _, end in group]) - rows @ alpha)
+                found += [alpha + share * (away @ (compliance * rows)) for share in shares]
         return found
 
     def holds(self, alpha: _Array) -> bool:
