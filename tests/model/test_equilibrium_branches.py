@@ -79,6 +79,20 @@ def test_a_limit_point_is_the_snap_through_force() -> None:
     np.testing.assert_allclose(np.sort(own), np.sort(limits), rtol=1e-6)
 
 
+def test_a_parameter_that_changes_the_modes() -> None:
+    """The centre of a longer beam is at its own buckling level, though its modes have another norm."""
+    system = sb.System(sb.ReducedModel.from_beam(BEAM, modes=2))
+    found = sb.model.equilibrium_branches(system, "beam.length", (0.1, 0.3))
+    stable = found.unstable_directions.values == 0
+    place = np.abs(found.midspan_displacement.values)
+    np.testing.assert_allclose(place[stable], BEAM.buckling_level, rtol=1e-9)
+    assert place[~stable].max() < 1e-9 * BEAM.buckling_level
+    first = found.natural_frequency.values[stable, 0]
+    for length, frequency in zip(found.beam_length.values[stable][::9], first[::9], strict=True):
+        model = sb.ReducedModel.from_beam(BEAM.replace(length=length), modes=2)
+        assert frequency == pytest.approx(model.reference_frequency, rel=1e-7)
+
+
 def test_refusals() -> None:
     system = sb.System(sb.ReducedModel.from_beam(BEAM, modes=1))
     for parameter, values, message in (

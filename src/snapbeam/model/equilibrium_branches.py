@@ -90,10 +90,13 @@ def equilibrium_branches(system: System, parameter: str, values: tuple[float, fl
     potentials = [potential_of(each) for each in value.tolist()]
     special = [(number, *each) for number, branch in enumerate(branches) for each in branch.singular]
     at = [(branches[number].value[place], branches[number].amplitude[place]) for number, place, _ in special]
-    center = system.model.midspan_shape
     places: dict[str, Any] = {
         row.short: ("point", value, _attributes(row.quantity.unit, row.quantity.long_name)),
-        "midspan_displacement": ("point", alpha @ center, _attributes("m", "displacement of the centre")),
+        "midspan_displacement": (
+            "point",
+            np.array([each.model.midspan_shape @ a for each, a in zip(potentials, alpha, strict=True)]),
+            _attributes("m", "displacement of the centre"),
+        ),
         "energy": (
             "point",
             np.array([float(each.energy(a)) for each, a in zip(potentials, alpha, strict=True)]),
@@ -105,7 +108,11 @@ def equilibrium_branches(system: System, parameter: str, values: tuple[float, fl
             np.repeat(np.arange(len(branches)), [each.value.size for each in branches]),
             _attributes("1", "number of the branch"),
         ),
-        "amplitude": (("point", "mode"), alpha, _attributes("m^0.5", "amplitudes of the modes")),
+        "amplitude": (
+            ("point", "mode"),
+            alpha,
+            _attributes("m^0.5" if system.model.beam is not None else "1", "amplitudes of the modes"),
+        ),
         "natural_frequency": (
             ("point", "mode"),
             np.array([_frequencies(*each) for each in zip(potentials, alpha, unstable, strict=True)]),
@@ -133,7 +140,7 @@ def equilibrium_branches(system: System, parameter: str, values: tuple[float, fl
         ),
         "critical_displacement": (
             "critical_point",
-            np.array([float(center @ each) for _, each in at], dtype=np.float64),
+            np.array([potential_of(each).model.midspan_shape @ a for each, a in at], dtype=np.float64),
             _attributes("m", "displacement of the centre at the critical point"),
         ),
     }
