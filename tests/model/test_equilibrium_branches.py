@@ -79,6 +79,16 @@ def test_a_limit_point_is_the_snap_through_force() -> None:
     np.testing.assert_allclose(np.sort(own), np.sort(limits), rtol=1e-6)
 
 
+def test_no_equilibrium_in_the_range() -> None:
+    """Beyond pull-in over the whole range."""
+    plate = sb.ReducedModel.from_matrices([[1e-9]], [[2.0]], contact_shape=[1.0], length_scale=3e-6)
+    system = sb.System(plate, forces=[sb.ElectrostaticForce(voltage=1.0, area=4e-8, gap=3e-6)])
+    with pytest.raises(
+        InputError, match=r"force\.voltage: there is no equilibrium at any of 5 values from 8 to 9 V"
+    ):
+        sb.model.equilibrium_branches(system, "force.voltage", (8.0, 9.0))
+
+
 def test_a_parameter_that_changes_the_modes() -> None:
     """The centre of a longer beam is at its own buckling level, though its modes have another norm."""
     system = sb.System(sb.ReducedModel.from_beam(BEAM, modes=2))
@@ -139,3 +149,7 @@ label = "magnet"
     assert (tmp_path / "b.png").stat().st_size > 5_000
     refused = CliRunner().invoke(app, [*command, "--force-displacement"])
     assert refused.exit_code == 2
+    refused = CliRunner().invoke(
+        app, ["equilibria", "--config", "own.toml", "--over", "force.strength=1:2:3"]
+    )
+    assert refused.exit_code == 2 and "must be name=start:stop" in refused.output

@@ -216,10 +216,7 @@ def _branches(settings: Any, over: str, output: Path | None, plot: Path | None) 
         critical_displacements=found["critical_displacement"].values,
         critical_kinds=[str(each) for each in found["critical_kind"].values],
     )
-    if output is not None:
-        console.print(f"Written: {file_line(write_map(found, output))}")
-    if plot is not None:
-        console.print(f"Written: {file_line(draw(found, plot))}")
+    _write(found, output, plot)
 
 
 def _force_displacement(
@@ -253,7 +250,12 @@ def _force_displacement(
         critical_displacements=curve["critical_displacement"].values,
         critical_kinds=[str(each) for each in curve["critical_kind"].values],
     )
+    _write(curve, output, plot)
+
+
+def _write(dataset: Any, output: Path | None, plot: Path | None) -> None:
+    """Write a result and its figure."""
     if output is not None:
-        console.print(f"Written: {file_line(write_map(curve, output))}")
+        out().print(f"Written: {file_line(write_map(dataset, output))}")
     if plot is not None:
-        console.print(f"Written: {file_line(draw(curve, plot))}")
+        out().print(f"Written: {file_line(draw(dataset, plot))}")

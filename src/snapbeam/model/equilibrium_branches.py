@@ -7,12 +7,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.equilibrium_paths import paths_over_parameter
+from snapbeam.model.equilibrium_paths import (
+    attributes,
+    count_incomplete,
+    critical_points,
+    paths_over_parameter,
+)
 from snapbeam.model.mapping import resolved
 from snapbeam.model.parameters import lookup
 from snapbeam.model.potential import Potential
 from snapbeam.model.system import System
-from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.validation import InputError, checked, instance, interval, shown
 
 if TYPE_CHECKING:
@@ -65,7 +69,7 @@ def equilibrium_branches(system: System, parameter: str, values: tuple[float, fl
     from snapbeam.util.datasets import xr
 
     instance("system", system, System, "a System")
-    name = lookup(resolved(system, instance("parameter", parameter, str, "text"))).name
+    name = lookup(resolved(instance("parameter", parameter, str, "text"), system.labels)).name
     row = lookup(name)
     if row.quantity.kind is not float or not isinstance(system.parameters.get(name), float):
         raise InputError(
@@ -80,68 +84,54 @@ def equilibrium_branches(system: System, parameter: str, values: tuple[float, fl
         return system.replace(**{name: value}).potential
 
     branches = paths_over_parameter(name, row.quantity.unit, potential_of, (low, high))
-    lost = sum(not each.complete for each in branches)
-    if lost:
-        message = f"{lost} of {len(branches)} branches end for want of steps, and those beyond are missing"
-        tell([Diagnostic("incomplete-curve", message, {"incomplete_branches": float(lost)})])
     value = np.concatenate([each.value for each in branches])
     alpha = np.concatenate([each.amplitude for each in branches])
     unstable = np.concatenate([each.unstable for each in branches])
     potentials = [potential_of(each) for each in value.tolist()]
-    special = [(number, *each) for number, branch in enumerate(branches) for each in branch.singular]
-    at = [(branches[number].value[place], branches[number].amplitude[place]) for number, place, _ in special]
+    points, critical = critical_points(branches)
     places: dict[str, Any] = {
-        row.short: ("point", value, _attributes(row.quantity.unit, row.quantity.long_name)),
+        row.short: ("point", value, attributes(row.quantity.unit, row.quantity.long_name)),
         "midspan_displacement": (
             "point",
             np.array([each.model.midspan_shape @ a for each, a in zip(potentials, alpha, strict=True)]),
-            _attributes("m", "displacement of the centre"),
+            attributes("m", "displacement of the centre"),
         ),
         "energy": (
             "point",
             np.array([float(each.energy(a)) for each, a in zip(potentials, alpha, strict=True)]),
-            _attributes("J", "potential energy"),
+            attributes("J", "potential energy"),
         ),
-        "unstable_directions": ("point", unstable, _attributes("1", "unstable directions; 0 is stable")),
+        "unstable_directions": ("point", unstable, attributes("1", "unstable directions; 0 is stable")),
         "branch": (
             "point",
             np.repeat(np.arange(len(branches)), [each.value.size for each in branches]),
-            _attributes("1", "number of the branch"),
+            attributes("1", "number of the branch"),
         ),
         "amplitude": (
             ("point", "mode"),
             alpha,
-            _attributes("m^0.5" if system.model.beam is not None else "1", "amplitudes of the modes"),
+            attributes("m^0.5" if system.model.beam is not None else "1", "amplitudes of the modes"),
         ),
         "natural_frequency": (
             ("point", "mode"),
             np.array([_frequencies(*each) for each in zip(potentials, alpha, unstable, strict=True)]),
-            _attributes("Hz", "natural frequencies about the equilibrium"),
+            attributes("Hz", "natural frequencies about the equilibrium"),
         ),
-        "critical_kind": (
-            "critical_point",
-            np.array([kind for _, _, kind in special], dtype="<U11"),
-            {"long_name": "kind of the critical point"},
-        ),
-        "critical_branch": (
-            "critical_point",
-            np.array([number for number, _, _ in special], dtype=np.int64),
-            _attributes("1", "branch of the critical point"),
-        ),
+        **critical,
         "critical_unstable_directions": (
             "critical_point",
-            np.array([branches[number].unstable[place] for number, place, _ in special], dtype=np.int64),
-            _attributes("1", "unstable directions beside the critical point; 0 where a stable part ends"),
+            np.array([each for _, _, each in points], dtype=np.int64),
+            attributes("1", "unstable directions beside the critical point; 0 where a stable part ends"),
         ),
         "critical_value": (
             "critical_point",
-            np.array([each for each, _ in at], dtype=np.float64),
-            _attributes(row.quantity.unit, f"{row.quantity.long_name}, at the critical point"),
+            np.array([each for each, _, _ in points], dtype=np.float64),
+            attributes(row.quantity.unit, f"{row.quantity.long_name}, at the critical point"),
         ),
         "critical_displacement": (
             "critical_point",
-            np.array([potential_of(each).model.midspan_shape @ a for each, a in at], dtype=np.float64),
-            _attributes("m", "displacement of the centre at the critical point"),
+            np.array([potential_of(each).model.midspan_shape @ a for each, a, _ in points], dtype=np.float64),
+            attributes("m", "displacement of the centre at the critical point"),
         ),
     }
     return xr.Dataset(
@@ -151,7 +141,7 @@ def equilibrium_branches(system: System, parameter: str, values: tuple[float, fl
             "description": f"equilibria over {row.quantity.long_name}",
             "parameter": name,
             "modes": system.model.modes,
-            "incomplete_branches": lost,
+            "incomplete_branches": count_incomplete(branches),
         },
     )
 
@@ -162,7 +152,3 @@ def _frequencies(potential: Potential, alpha: NDArray[np.float64], unstable: int
         return np.full(alpha.size, np.nan)
     squared = np.linalg.eigvalsh(potential.in_modes(potential.tangent(alpha)))
     return np.asarray(np.sqrt(np.maximum(squared, 0.0)) / (2.0 * np.pi))
-
-
-def _attributes(unit: str, words: str) -> dict[str, str]:
-    return {"units": unit, "long_name": words}

@@ -14,15 +14,25 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.potential import Potential
+from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.validation import InputError
 
-__all__ = ["EquilibriumPath", "Singular", "equilibrium_paths", "paths_over_parameter"]
+__all__ = [
+    "EquilibriumPath",
+    "Singular",
+    "attributes",
+    "count_incomplete",
+    "critical_points",
+    "equilibrium_paths",
+    "paths_over_parameter",
+    "stable_parts",
+]
 
 
 _Array = NDArray[np.float64]
@@ -478,6 +488,37 @@ def paths_over_parameter(
 ) -> list[EquilibriumPath]:
     """Paths of the equilibria of the potentials *of* the values of a parameter, between two values."""
     return _Tracer(_OverParameter(name, unit, of, *between), *between).run()
+
+
+def attributes(unit: str, words: str) -> dict[str, str]:
+    """Attributes of a variable."""
+    return {"units": unit, "long_name": words}
+
+
+def critical_points(
+    paths: list[EquilibriumPath],
+) -> tuple[list[tuple[float, _Array, int]], dict[str, Any]]:
+    """Value, amplitudes and unstable directions at each singular point, and the variables of their kinds and branches."""
+    special = [(number, *each) for number, path in enumerate(paths) for each in path.singular]
+    points = [
+        (float(paths[number].value[at]), paths[number].amplitude[at], int(paths[number].unstable[at]))
+        for number, at, _ in special
+    ]
+    kinds = np.array([kind for _, _, kind in special], dtype="<U11")
+    numbers = np.array([number for number, _, _ in special], dtype=np.int64)
+    return points, {
+        "critical_kind": ("critical_point", kinds, {"long_name": "kind of the critical point"}),
+        "critical_branch": ("critical_point", numbers, attributes("1", "branch of the critical point")),
+    }
+
+
+def count_incomplete(paths: list[EquilibriumPath]) -> int:
+    """Number of paths that end for want of steps, about which a diagnostic is given."""
+    lost = sum(not each.complete for each in paths)
+    if lost:
+        message = f"{lost} of {len(paths)} branches end for want of steps, and those beyond are missing"
+        tell([Diagnostic("incomplete-curve", message, {"incomplete_branches": float(lost)})])
+    return lost
 
 
 def stable_parts(path: EquilibriumPath) -> list[tuple[int, int]]:

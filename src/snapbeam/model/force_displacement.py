@@ -8,11 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.equilibrium_paths import EquilibriumPath, equilibrium_paths, stable_parts
+from snapbeam.model.equilibrium_paths import (
+    EquilibriumPath,
+    attributes,
+    count_incomplete,
+    critical_points,
+    equilibrium_paths,
+    stable_parts,
+)
 from snapbeam.model.potential import Potential
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
-from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.validation import InputError, InputTypeError, checked, choice, interval, shown, within
 
 if TYPE_CHECKING:
@@ -130,15 +136,12 @@ def force_displacement(
     if given is not None:
         between = min(between[0], given[0]), max(between[1], given[1])
     branches = equilibrium_paths(potential, row, between)
-    special = [(number, *each) for number, branch in enumerate(branches) for each in branch.singular]
-    places += [float(row @ branches[number].amplitude[at]) for number, at, _ in special]
+    points, critical = critical_points(branches)
+    places += [float(row @ each) for _, each, _ in points]
     margin = _MARGIN * np.ptp(places) or size
     low, high = (min(places) - margin, max(places) + margin) if given is None else given
 
-    lost = sum(not each.complete for each in branches)
-    if lost:
-        message = f"{lost} of {len(branches)} branches end for want of steps, and those beyond are missing"
-        tell([Diagnostic("incomplete-curve", message, {"incomplete_branches": float(lost)})])
+    lost = count_incomplete(branches)
     kept = [(low <= each.amplitude @ row) & (each.amplitude @ row <= high) for each in branches]
     force = np.concatenate([each.value[inside] for each, inside in zip(branches, kept, strict=True)])
     alpha = np.concatenate([each.amplitude[inside] for each, inside in zip(branches, kept, strict=True)])
@@ -155,66 +158,57 @@ def force_displacement(
         ends = [potential.barrier(0), potential.barrier(len(potential.wells) - 1)]
         barriers = dict(zip(barriers, ends if side == "lower" else ends[::-1], strict=True))
     variables: dict[str, Any] = {
-        "displacement": ("point", alpha @ row, _attributes("m", "displacement at the force's location")),
-        "force": ("point", force, _attributes("N", "force")),
+        "displacement": ("point", alpha @ row, attributes("m", "displacement at the force's location")),
+        "force": ("point", force, attributes("N", "force")),
         "energy": (
             "point",
             potential.energy(alpha),
-            _attributes("J", "potential energy without the force"),
+            attributes("J", "potential energy without the force"),
         ),
         "unstable_directions": (
             "point",
             unstable,
-            _attributes("1", "unstable directions under the force; 0 is stable"),
+            attributes("1", "unstable directions under the force; 0 is stable"),
         ),
         "unstable_directions_at_fixed_displacement": (
             "point",
             _unstable_at_fixed_displacement(potential, row, alpha),
-            _attributes("1", "unstable directions if the displacement at the force is held"),
+            attributes("1", "unstable directions if the displacement at the force is held"),
         ),
-        "branch": ("point", numbers, _attributes("1", "number of the branch")),
+        "branch": ("point", numbers, attributes("1", "number of the branch")),
         "amplitude": (
             ("point", "mode"),
             alpha,
-            _attributes("m^0.5" if model.beam is not None else "1", "amplitudes of the modes"),
+            attributes("m^0.5" if model.beam is not None else "1", "amplitudes of the modes"),
         ),
         "branch_kind": (
             "branch_number",
             np.array(["secondary" if each.secondary else "primary" for each in branches]),
             {"long_name": "kind of the branch"},
         ),
-        "critical_kind": (
-            "critical_point",
-            np.array([kind for _, _, kind in special], dtype="<U11"),
-            {"long_name": "kind of the critical point"},
-        ),
-        "critical_branch": (
-            "critical_point",
-            np.array([number for number, _, _ in special], dtype=np.int64),
-            _attributes("1", "branch of the critical point"),
-        ),
+        **critical,
         "critical_displacement": (
             "critical_point",
-            np.array([row @ branches[number].amplitude[at] for number, at, _ in special]),
-            _attributes("m", "displacement at the force's location, at the critical point"),
+            np.array([row @ each for _, each, _ in points]),
+            attributes("m", "displacement at the force's location, at the critical point"),
         ),
         "critical_force": (
             "critical_point",
-            np.array([branches[number].value[at] for number, at, _ in special]),
-            _attributes("N", "force at the critical point"),
+            np.array([each for each, _, _ in points]),
+            attributes("N", "force at the critical point"),
         ),
     }
     for name in ("snap_through", "snap_back"):
         words = name.replace("_", "-")
-        variables[f"{name}_force"] = ((), snaps[name][0], _attributes("N", f"{words} force"))
+        variables[f"{name}_force"] = ((), snaps[name][0], attributes("N", f"{words} force"))
         variables[f"{name}_displacement"] = (
             (),
             snaps[name][1],
-            _attributes("m", f"displacement at the force's location, at {words}"),
+            attributes("m", f"displacement at the force's location, at {words}"),
         )
     origins = {"energy_barrier": "from the well", "energy_barrier_back": "from the other well"}
     for name, value in barriers.items():
-        variables[name] = ((), value, _attributes("J", f"energy barrier {origins[name]}, without a force"))
+        variables[name] = ((), value, attributes("J", f"energy barrier {origins[name]}, without a force"))
     return xr.Dataset(
         variables,
         coords={"branch_number": np.arange(len(branches)), "mode": np.arange(1, model.modes + 1)},
@@ -230,10 +224,6 @@ def force_displacement(
             "modes": model.modes,
         },
     )
-
-
-def _attributes(unit: str, words: str) -> dict[str, str]:
-    return {"units": unit, "long_name": words}
 
 
 def _well(potential: Potential, given: str | None) -> tuple[str, str]:
