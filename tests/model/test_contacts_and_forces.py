@@ -101,9 +101,17 @@ location = 0.5
     changed = configured(given).system
     assert changed.get("contact.2.gap") == pytest.approx(6e-5) and changed.get("force.2.force") == 2e-3
     with pytest.raises(
-        InputError, match=r"contact\.wall\.gap: no contact has this label; the labels are stop, weight"
+        InputError, match=r"contact\.wall\.gap: this system has no contact 'wall'; must be one of 1, 2, stop"
     ):
         configured(given | {"set_": ["contact.wall.gap=1um"]})
+    (tmp_path / "swept.toml").write_text(mine + '[sweep]\n"contact.stop.gap" = "20um:60um:3"\n')
+    axes = load_config(tmp_path / "swept.toml").axes()
+    np.testing.assert_allclose(axes["contact.2.gap"], [2e-5, 4e-5, 6e-5])
+    twice = {"extends": "paper", "contact": {"drive": {"type": "fixed"}}, "drive": {"type": "fixed"}}
+    with pytest.raises(InputError, match=r"\[contact\] drive: is also given in \[drive\]; leave one out"):
+        config_from_mapping(twice)
+    with pytest.raises(InputError, match=r"\[contact\.3\]: there is none before it; number them 1, 2, 3"):
+        sb.System.from_mapping(sb.System(MODEL).to_mapping() | {"contact": {}, "contact.3": {}})
     for section in ("contact", "force"):
         with pytest.raises(
             InputError, match=rf"{section} = \[\]: must be a table, or an array of at least one"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from snapbeam.util.validation import InputError, InputTypeError, mapping, shown
 
 __all__ = [
     "flattened",
+    "labels_of",
     "nested",
     "parts_from_mapping",
     "parts_to_mapping",
@@ -294,23 +295,35 @@ _TUPLES = {"contact": "contacts", "force": "forces", "harvester": "harvesters"}
 _PARTS = ("model", "base_excitation", "axial_load", "initial_state", *_TUPLES.values())
 
 
-def resolved(system: Any, name: str) -> str:
-    """The dotted name by number of a parameter that is given by number 1 or by the label of a contact or force."""
+def resolved(name: str, labels: Mapping[str, Sequence[str]]) -> str:
+    """The dotted name by number of a parameter that is given by number 1 or by the label of a contact or force.
+
+    *labels* are those of the parts in their order, by the section of the first.
+    """
     kind, _, rest = name.partition(".")
     given, dot, field = rest.partition(".")
     if kind not in NUMBERED or not given or (not dot and given != "1" and given.isdigit()):
         return name
     if not dot and (given in ("law", "striker", "label") or row_of(name) is not None):
         return name  # a field of the first, whatever the labels are
-    parts = getattr(system, _TUPLES[kind if kind != "drive" else "contact"])
-    labels = [getattr(each, "label", "") for each in parts]
-    if given == "1" or given in labels:
-        number = 1 if given == "1" else 1 + labels.index(given)
+    own = list(labels["contact" if kind == "drive" else kind])
+    if given == "1" or given in own:
+        number = 1 if given == "1" else 1 + own.index(given)
         return section_of(kind, number) + dot + field
     if dot and not given.isdigit():
-        known = ", ".join([*map(str, range(1, 1 + len(parts))), *filter(None, labels)])
+        known = ", ".join([*map(str, range(1, 1 + len(own))), *filter(None, own)])
         raise InputError(f"{name}: this system has no {kind} {given!r}; must be one of {known or 'none'}")
     return name
+
+
+def labels_of(sections: Mapping[str, Any]) -> dict[str, list[str]]:
+    """The labels of the parts in flat sections, as :func:`resolved` takes them."""
+    found: dict[str, list[str]] = {}
+    for kind in _TUPLES:
+        numbers = [numbered(name)[1] for name in sections if numbered(name)[0] == kind]
+        own = [sections.get(section_of(kind, number), {}) for number in range(1, 1 + max(numbers, default=0))]
+        found[kind] = [str(each.get("label", "")) if isinstance(each, Mapping) else "" for each in own]
+    return found
 
 
 def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

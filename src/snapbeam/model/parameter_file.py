@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -20,7 +20,7 @@ from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION
 from snapbeam.model.drive.base import DRIVES
 from snapbeam.model.external_force import FORCES
 from snapbeam.model.integration import CYCLES, Integration
-from snapbeam.model.mapping import flattened, parts_from_mapping
+from snapbeam.model.mapping import flattened, labels_of, parts_from_mapping, resolved
 from snapbeam.model.parameter_axes import (
     PHYSICAL,
     axis_that_changes_unit,
@@ -32,7 +32,7 @@ from snapbeam.model.parameter_axes import (
 from snapbeam.model.parameters import SECTIONS as SYSTEM_SECTIONS
 from snapbeam.model.parameters import Parameter, kinds_of, lookup, parameters, row_of
 from snapbeam.model.potential import Potential
-from snapbeam.model.quantity import NUMBERED, check_label, numbered, quantities, section_of, split_name
+from snapbeam.model.quantity import check_label, numbered, quantities, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
@@ -158,7 +158,9 @@ def checked_sections(sections: Mapping[str, Any]) -> tuple[dict[str, dict[str, A
     """Return the checked values by section and name, and one message for each fault."""
     lines: list[str] = []
     found: dict[str, dict[str, Any]] = {}
-    for section, values in flattened(mapping("sections", sections)).items():
+    flat = flattened(mapping("sections", sections))
+    labels = labels_of(flat)
+    for section, values in flat.items():
         if section == "extends":
             if values != "paper":
                 lines.append(
@@ -172,7 +174,7 @@ def checked_sections(sections: Mapping[str, Any]) -> tuple[dict[str, dict[str, A
         elif not isinstance(values, Mapping):
             lines.append(f"{section} = {shown(values)}: must be a section [{section}]")
         else:
-            faults = [_checked(section, str(name), value, found) for name, value in values.items()]
+            faults = [_checked(section, str(name), value, found, labels) for name, value in values.items()]
             lines += [f"[{section}] {message}" for message in faults if message]
     return found, lines
 
@@ -187,11 +189,17 @@ def _known(section: str, found: Mapping[str, Mapping[str, Any]]) -> list[str]:
     return names + [field for of, field in map(split_name, PHYSICAL) if of == section]
 
 
-def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any]]) -> str:
+def _checked(
+    section: str,
+    name: str,
+    value: Any,
+    found: dict[str, dict[str, Any]],
+    labels: Mapping[str, Sequence[str]],
+) -> str:
     """Enter a value in *found*, or return what is wrong with it."""
     own = found.setdefault(section, {})
     if section == "sweep":
-        return _checked_axis(name, value, own)
+        return _checked_axis(name, value, own, labels)
     if section == "initial_state":
         try:
             row: Parameter | None = lookup(f"initial_state.{name}")
@@ -313,8 +321,9 @@ def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
     return "", [float(each) for each in pair]
 
 
-def _checked_axis(name: str, value: Any, own: dict[str, Any]) -> str:
+def _checked_axis(name: str, value: Any, own: dict[str, Any], labels: Mapping[str, Sequence[str]]) -> str:
     try:
+        name = resolved(name, labels)
         full = physical_name(name) or lookup(name).name
         rivals = {full, *(key for key, row in PHYSICAL.items() if row.parameter == full)}
         rivals |= {PHYSICAL[full].parameter} if full in PHYSICAL else set()
@@ -442,19 +451,7 @@ class Config:
 
     def resolved(self, name: str) -> str:
         """The dotted name by number of a parameter that is given by the label of a contact or force."""
-        kind, _, rest = name.partition(".")
-        label, dot, field = rest.partition(".")
-        labelled = "contact" if kind == "drive" else kind
-        for section, values in self.given.items():
-            own, number = numbered(section)
-            if dot and own == labelled and values.get("label") == label:
-                return f"{section_of(kind, number)}.{field}"
-        if dot and kind in NUMBERED and not label.isdigit():
-            known = [str(each["label"]) for each in self.given.values() if "label" in each]
-            raise InputError(
-                f"{name}: no {labelled} has this label; the labels are {', '.join(known) or 'none'}"
-            )
-        return name
+        return resolved(name, labels_of(self.given))
 
     def _with_axes(self, name: str) -> dict[str, Any]:
         """What was given of a section; a key that has an axis only takes the first value of the axis."""

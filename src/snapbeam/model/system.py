@@ -182,7 +182,7 @@ class System:
         """
         prefix = "initial_state."
         parts = {item.name: getattr(self, item.name) for item in fields(self)}
-        changes = {resolved(self, name): value for name, value in changes.items()}
+        changes = {resolved(name, self.labels): value for name, value in changes.items()}
         other = {name: value for name, value in changes.items() if not name.startswith(prefix)}
         found = System(**replaced(parts, other))
         start = {name.removeprefix(prefix): changes[name] for name in changes if name not in other}
@@ -198,7 +198,7 @@ class System:
         InputError
             For a name that the system does not have.
         """
-        found, name = self.parameters, resolved(self, instance("name", name, str, "text"))
+        found, name = self.parameters, resolved(instance("name", name, str, "text"), self.labels)
         if name not in found:
             raise InputError(f"{name}: is not a parameter of this system; it has {', '.join(found)}")
         return found[name]
@@ -211,6 +211,12 @@ class System:
             for section, values in self.to_mapping().items()
             for name, value in values.items()
         }
+
+    @property
+    def labels(self) -> dict[str, list[str]]:
+        """Labels of the contacts and forces in their order, empty where none was given, by the section of the first."""
+        parts = {"contact": self.contacts, "force": self.forces, "harvester": self.harvesters}
+        return {kind: [getattr(each, "label", "") for each in own] for kind, own in parts.items()}
 
     @property
     def scale(self) -> Scale:
@@ -270,7 +276,7 @@ class System:
 
     @property
     def surroundings(self) -> tuple[Any, ...]:
-        """What acts on the structure beside strikers: forces, a moving base, a changing axial load, harvesters."""
+        """Parts that act on the structure beside strikers: forces, a moving base, a changing axial load, harvesters."""
         parts = (*self.forces, self.base_excitation, self.axial_load, *self.harvesters)
         return tuple(each for each in parts if each is not None)
 

@@ -231,7 +231,7 @@ def physical_points(system: System, axes: Mapping[str, Any]) -> Points:
     These become ratios.  Where another axis changes the structure, and with it the unit of a ratio, they stay as they are
     given; :meth:`~snapbeam.sweeps.setup.SweepSetup.groups` makes the ratios of each structure.
     """
-    axes = {resolved(system, str(name)): values for name, values in axes.items()}
+    axes = {resolved(str(name), system.labels): values for name, values in axes.items()}
     given = {PHYSICAL[own].parameter: own for name in axes if (own := physical_name(str(name))) is not None}
     if not given:
         return points_of(axes)

@@ -119,7 +119,7 @@ def threshold(
     ('frequency_ratio',)
     """
     if isinstance(system, System) and isinstance(parameter, str):
-        parameter = resolved(system, parameter)
+        parameter = resolved(parameter, system.labels)
     row = parameter_of_axis(physical_name(str(parameter)) or lookup(parameter).name)
     if not row.is_run or row.quantity.kind is not float:
         raise InputError(
