@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
@@ -34,8 +36,30 @@ def test_piezo_circuit_of_one_mode(resistance: float) -> None:
         assert np.abs(found - root).min() < 1e-9 * abs(root)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Damper(sb.LocalForce):
+    """A linear damper, F = -c v."""
+
+    coefficient: float = sb.quantity("N s/m", "coefficient of the damper", low=0.0)
+    dissipative = True
+
+    @staticmethod
+    def damping_force(law, displacement: float, velocity: float) -> float:
+        return -law.coefficient * velocity
+
+    @staticmethod
+    def damping_coefficient(law, displacement: float, velocity: float) -> float:
+        return law.coefficient
+
+
+def test_dampers_at_points() -> None:
+    """Two local dampers at rest add their coefficients: 2 s^2 + (0.3 + 0.5) s + 8 = 0."""
+    found = sb.System(oscillator(), forces=[Damper(coefficient=0.3), Damper(coefficient=0.5)]).poles()
+    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(np.roots([2.0, 0.8, 8.0])), rtol=1e-10)
+
+
 def test_coils_damp() -> None:
-    """Each coil without inductance adds K^2/R, and a damper at rest its coefficient; two at once add up."""
+    """Each coil without inductance adds K^2/R; two at once add up."""
     coil = sb.ElectromagneticHarvester(force_factor=0.5, resistance=3.0, coil_resistance=2.0)
     found = sb.System(oscillator(), harvesters=[coil, coil]).poles()
     exact = np.roots([2.0, 2.0 * 0.25 / 5.0, 8.0])
