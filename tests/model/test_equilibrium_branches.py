@@ -41,6 +41,13 @@ def test_pull_in_voltage(side: float) -> None:
     )
     assert np.isnan(found.natural_frequency.values[~stable]).all()
     assert found.attrs["incomplete_branches"] == 0
+    ax = found.snapbeam.plot()
+    assert ax.get_xlabel() == "Voltage of the electrode $V$ (V)"
+    small = found.assign(force_voltage=1e-6 * found.force_voltage, critical_value=1e-6 * found.critical_value)
+    ax = small.snapbeam.plot()
+    assert ax.get_xlabel() == "Voltage of the electrode $V$ (µV)"
+    (point,) = [line for line in ax.lines if line.get_label() == "limit point"]
+    assert point.get_xdata()[0] == pytest.approx(exact, rel=1e-9)
 
 
 def test_buckling_is_a_bifurcation() -> None:

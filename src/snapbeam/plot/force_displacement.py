@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -217,6 +218,8 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
     value, place = dataset[row.short].values, dataset["midspan_displacement"].values
     stable = dataset["unstable_directions"].values == 0
     prefix, unit = scale_of(place, "m")
+    size, axis = _short_axis(value, row.quantity.unit)
+    label = dataclasses.replace(row, quantity=dataclasses.replace(row.quantity, unit=axis)).label
     with figure_style():
         ax = axes_or_new(ax, height=70.0)
         for number in np.unique(dataset["branch"].values):
@@ -225,7 +228,7 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
                 # a line of one kind ends where the next one begins
                 points = index[part[0] : min(part[-1] + 2, index.size)]
                 color, line, width = _STYLES["stable" if stable[points[0]] else "unstable"]
-                ax.plot(value[points], place[points] / prefix, line, color=color, linewidth=width)
+                ax.plot(value[points] / size, place[points] / prefix, line, color=color, linewidth=width)
         handles = [
             Line2D([], [], color=_STYLES[name][0], linestyle=_STYLES[name][1], label=name)
             for name in ("stable", "unstable")
@@ -235,11 +238,21 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
             at = dataset["critical_kind"].values == kind
             if at.any():
                 handles += ax.plot(
-                    dataset["critical_value"].values[at], dataset["critical_displacement"].values[at] / prefix,
+                    dataset["critical_value"].values[at] / size, dataset["critical_displacement"].values[at] / prefix,
                     marker, markerfacecolor="white", markeredgecolor="#000000", markersize=4.5, linestyle="", label=words,
                 )  # fmt: skip
-        ax.set_xlabel(row.label)
+        ax.set_xlabel(label)
         ax.set_ylabel(f"Displacement of the centre ({unit})")
         ax.legend(handles=handles, loc="best")
         fix_ticks(ax)
     return ax
+
+
+def _short_axis(values: np.ndarray, unit: str) -> tuple[float, str]:
+    """Factor and unit of an axis with short numbers: a prefix, or a power of ten where the unit takes none."""
+    if unit.isalpha():
+        return scale_of(values, unit)
+    power = int(np.floor(np.log10(max(float(np.abs(values).max()), 1e-300))))
+    if abs(power) < 4:
+        return 1.0, unit
+    return 10.0**power, f"$10^{{{power}}}$" + ("" if unit == "1" else f" {unit}")
