@@ -101,6 +101,9 @@ def elastic(rng: Rng) -> tuple[sb.ContactLaw, Callable[[float, float], float]]:
 
 
 def lossy(rng: Rng) -> tuple[sb.ContactLaw, Callable[[float, float], float]]:
+    if rng.random() < 0.3:
+        stiffness, damping = 10.0 ** rng.uniform(5.5, 6.5), 10.0 ** rng.uniform(0.5, 1.5)
+        return sb.KelvinVoigt(stiffness, damping), lambda d, v: stiffness * d + damping * v
     law = sb.HuntCrossley.from_restitution(4e8, rng.uniform(0.4, 0.9), 0.05)
     return law, lambda d, v: 4e8 * max(d, 0.0) ** 1.5 * (1.0 + law.damping_factor * v)
 
@@ -181,8 +184,7 @@ def mixture(seed: int, modes: int) -> Mixture:
 
         words.append("a changing load")
     for j in range(count):
-        may_lose = j == 0 and harvester is None
-        law, force = lossy(rng) if may_lose and rng.random() < 0.4 else elastic(rng)
+        law, force = lossy(rng) if rng.random() < 0.4 else elastic(rng)
         drive, moves, corners, name = driven(rng, unit, first)
         place, side = float(rng.uniform(0.25, 0.75)), 1.0 if j == 0 or rng.random() < 0.5 else -1.0
         gap = float(rng.uniform(0.0, 0.1) * unit) if j == 0 else float(rng.uniform(0.05, 0.3) * unit)

@@ -144,9 +144,10 @@ def require_tangent(system: System) -> None:
     ------
     InputError
     """
-    if system.contact_law is not None and not system.contact_law.properties.smooth:
+    laws = [each.law for each in system.contacts]
+    if jumping := [law for law in laws if not law.properties.smooth]:
         raise InputError(
-            f"tangent with contact = {shown(system.contact_law)}: its force jumps, and so does the tangent flow; give no tangent"
+            f"tangent with contact = {shown(jumping[0])}: its force jumps, and so does the tangent flow; give no tangent"
         )
     if system.striker is not None and system.striker.mass is not None:
         raise InputError(
@@ -161,9 +162,9 @@ def require_tangent(system: System) -> None:
         raise InputError(
             "tangent with a harvester: the tangent flow does not contain its circuit; give no tangent, or no harvester"
         )
-    if system.contact_law is not None and not system.contact_law.properties.tangent:
+    if damped := [law for law in laws if not law.properties.tangent]:
         raise InputError(
-            f"tangent with contact = {system.contact_law!r}: the tangent flow exists for laws whose force depends on the "
+            f"tangent with contact = {damped[0]!r}: the tangent flow exists for laws whose force depends on the "
             "penetration only, such as HertzContact(stiffness); give no tangent"
         )
 

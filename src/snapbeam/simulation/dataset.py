@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.system import System
 from snapbeam.solver.assemble import motions_of, tip_of
+from snapbeam.solver.contact_force import felt_force
 from snapbeam.solver.ensemble import CircuitCoupling, Ensemble
 from snapbeam.solver.further_contacts import OFFSET, REST, SIGN
 from snapbeam.solver.statistics import Recorded
@@ -236,15 +237,16 @@ def strikers_of(
     )
     for j, each in enumerate(system.contacts[1:]):
         numbers, row = others.numbers[0, j], others.rows[others.places[0, j]]
-        reached = recorded.q @ row
-        motion, _ = tip_of(ensemble, system, j + 2, recorded.times)
-        motion = motion + numbers[SIGN] * _follows(ensemble, system, recorded)
-        pressed = numbers[OFFSET] + motion - reached
+        motion, velocity = tip_of(ensemble, system, j + 2, recorded.times)
+        follows = _follows(ensemble, system, recorded)
+        motion, velocity = motion + numbers[SIGN] * follows[0], velocity + numbers[SIGN] * follows[1]
+        pressed = numbers[OFFSET] + motion - recorded.q @ row
+        rates = velocity - recorded.p @ row
         contact: Any = each.law
         kind = contact.numbers_type()
         law = kind(*(getattr(contact, name) for name in kind._fields))
         touching = np.maximum(pressed, 0.0)
-        force[:, j + 1] = [contact.force(law, d) if d > 0.0 else 0.0 for d in touching.tolist()]
+        force[:, j + 1] = [felt_force(law, *at) for at in zip(touching.tolist(), rates.tolist(), strict=True)]
         energy += [contact.energy(law, d) if d > 0.0 else 0.0 for d in touching.tolist()]
         depth[:, j + 1] = pressed / length
         tip[:, j + 1] = sign * numbers[SIGN] * (numbers[REST] + numbers[OFFSET] + motion) / length
@@ -256,12 +258,12 @@ def strikers_of(
     }
 
 
-def _follows(ensemble: Ensemble, system: System, recorded: Recorded) -> _Array:
-    """Return the displacement of fixed tips relative to a moving base, in the direction of the first striker."""
+def _follows(ensemble: Ensemble, system: System, recorded: Recorded) -> tuple[_Array, _Array]:
+    """Return displacement and velocity of fixed tips relative to a moving base, in the direction of the first striker."""
     if system.base_excitation is None or system.base_excitation.striker_on_base:
-        return np.zeros(recorded.times.size)
-    moved = motions_of(ensemble, system, recorded.times)["base_excitation"][0]
-    return np.asarray(-ensemble.structure.sign * moved)
+        return np.zeros(recorded.times.size), np.zeros(recorded.times.size)
+    moved, velocity = motions_of(ensemble, system, recorded.times)["base_excitation"]
+    return -ensemble.structure.sign * moved, -ensemble.structure.sign * velocity
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -368,7 +370,7 @@ def run_dataset(
         variables |= of_each
     if ensemble.circuit_coupling is not None:
         variables |= _harvested(ensemble, ensemble.circuit_coupling, recorded, values)
-    if struck and system.contact_law is not None and system.contact_law.is_dissipative:
+    if any(each.law.is_dissipative for each in system.contacts):
         variables["energy_lost_contact"] = values[:, _COLUMN["lost"]]
     at = recorded.times
     valid = np.asarray(np.isfinite(values[:, 2:]).all(axis=1) & np.isfinite(alpha).all(axis=1))

@@ -11,14 +11,16 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import compiled, inlined, overloaded
-from snapbeam.solver.interpolation import cubic
+from snapbeam.solver.interpolation import cubic, update_extrema
 from snapbeam.solver.simd import Lanes, select_less
 
 __all__ = [
     "Loss",
+    "begins_with_jump",
     "contact_energy",
     "contact_force",
     "contact_slope",
+    "damping_coefficient",
     "felt_force",
     "is_impulsive",
     "jumps",
@@ -26,6 +28,7 @@ __all__ = [
     "lossy_kick",
     "mark_of",
     "peak_force",
+    "peak_in_step",
     "released_at",
     "scalar_function",
     "zero_force_crossing",
@@ -214,16 +217,19 @@ def _is_impulsive(law):
     return lambda law: impulsive
 
 
-def jumps(law: Any) -> bool:
-    """Whether a force that is integrated begins with a jump, so that it matters when exactly it begins."""
-    owner = type(law).owner
+def begins_with_jump(owner: Any) -> bool:
+    """True of a law whose force, which is integrated, begins with a jump, so that it matters when exactly it begins."""
     return bool(owner.rate_dependent and not owner.properties.smooth)
+
+
+def jumps(law: Any) -> bool:
+    """:func:`begins_with_jump` of the law of these numbers."""
+    return begins_with_jump(type(law).owner)
 
 
 @overloaded(jumps)
 def _jumps(law):
-    owner = law.instance_class.owner
-    found = bool(owner.rate_dependent and not owner.properties.smooth)
+    found = begins_with_jump(law.instance_class.owner)
     return lambda law: found
 
 
@@ -248,6 +254,21 @@ def _felt_force(law, penetration, rate):
         return 0.0
 
     return implementation
+
+
+def damping_coefficient(law: Any, penetration: float) -> float:
+    """Derivative of the force by the rate of the penetration, N s/m; 0 of a law without loss."""
+    owner: Any = type(law).owner
+    return float(owner.damping_coefficient(law, penetration)) if owner.rate_dependent else 0.0
+
+
+@overloaded(damping_coefficient)
+def _damping_coefficient(law, penetration):
+    owner = law.instance_class.owner
+    if not owner.rate_dependent:
+        return lambda law, penetration: 0.0
+    own = scalar_function(owner, "damping_coefficient")
+    return lambda law, penetration: own(law, penetration)
 
 
 def kick_force(law: Any, penetration: float, rate: float, mobility: float, push: float, weight: float) -> Any:
@@ -291,6 +312,38 @@ def _mark_of(law, penetration, rate):
             law, _SMALLEST if penetration == 0.0 else penetration, rate
         )
     return lambda law, penetration, rate: max(penetration, 0.0)
+
+
+_PARTS = 24
+"""Equal parts of a step, at whose ends the force is evaluated."""
+
+
+@compiled
+def _peak_on_cubic(law, peak, d0, v0, d1, v1, length):
+    c0, c1, c2, c3 = cubic(d0, v0, d1, v1, length)
+    peak = max(peak, max(felt_force(law, d0, v0), felt_force(law, d1, v1)))
+    for i in range(1, _PARTS):
+        s = i / _PARTS
+        d = c0 + s * (c1 + s * (c2 + s * c3))
+        peak = max(peak, felt_force(law, d, (c1 + s * (2.0 * c2 + s * 3.0 * c3)) / length))
+    return peak
+
+
+def peak_in_step(law: Any, peak: float, d0: float, v0: float, d1: float, v1: float, length: float) -> float:
+    """The maximum penetration of a contact so far, *peak*, or force (:func:`peak_force`), with a step in it.
+
+    The cubic through penetration and rate at both ends is followed.
+    """
+    raise TypeError("peak_in_step runs in compiled code only")
+
+
+@overloaded(peak_in_step)
+def _peak_in_step(law, peak, d0, v0, d1, v1, length):
+    if law.instance_class.owner.rate_dependent:
+        return lambda law, peak, d0, v0, d1, v1, length: _peak_on_cubic(law, peak, d0, v0, d1, v1, length)
+    return lambda law, peak, d0, v0, d1, v1, length: update_extrema(
+        d0, max(peak, d1), d0, v0, d1, v1, length
+    )[1]
 
 
 def zero_force_crossing(law: Any, d0: float, v0: float, d1: float, v1: float, length: float) -> float:

@@ -5,6 +5,7 @@ Their numbers stand in memory, a block each; which functions belong to them foll
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from numba.extending import overload
@@ -13,14 +14,46 @@ from snapbeam.model.contact.base import LAWS, ContactLaw
 from snapbeam.model.drive.combined import MOST_STRIKERS
 from snapbeam.model.quantity import numbers_type
 from snapbeam.solver.compilation import INLINE_HERE, inlined
-from snapbeam.solver.contact_force import contact_energy, contact_force, contact_slope
+from snapbeam.solver.contact_force import (
+    begins_with_jump,
+    contact_energy,
+    contact_force,
+    contact_slope,
+    damping_coefficient,
+    felt_force,
+    jumps,
+    mark_of,
+    peak_force,
+    peak_in_step,
+    released_at,
+    zero_force_crossing,
+)
 from snapbeam.solver.excitation import part_motion
 
-__all__ = ["Several", "count_of", "energy_of", "force_of", "motion_of", "several", "slope_of"]
+__all__ = [
+    "Several",
+    "any_damped",
+    "any_jumps",
+    "count_of",
+    "damped_at",
+    "damping_of",
+    "energy_of",
+    "felt_at",
+    "force_of",
+    "jumps_at",
+    "mark_at",
+    "motion_of",
+    "peak_in_step_of",
+    "peak_of",
+    "several",
+    "slope_of",
+    "way_to_release",
+    "zero_force_of",
+]
 
 
 _SEPARATOR = "__"
-NUMBERS = 32
+NUMBERS = 40
 """Of a striker in memory, a block of whole registers."""
 # given
 OFFSET, REST, SIGN, SPEED = 0, 1, 2, 3
@@ -32,7 +65,10 @@ DEPTH1, RATE1, EVENT_TICKS, FORCE, IMPULSE, WORK, GROSS, KEPT, WORKED = 12, 13, 
 SINCE = 21
 # of the step that tangents go through again: whether the striker touched in it, and the slope of its force
 TOUCHED, SLOPE = 22, 23
-LAW = 24
+# of a law that loses energy: the numbers of its channel in the velocity block; the energy lost, of the step and kept
+DAMPED = 24
+LOST, LOST_KEPT = 29, 30
+LAW = 32
 """The law's numbers follow from there on."""
 
 
@@ -78,21 +114,21 @@ def _law_reader(law: Any) -> Any:
 
 
 def _by_law(laws: tuple[Any, ...], function: Any) -> Any:
-    """*function* of the numbers of striker j and a penetration; the striker is chosen as the integration goes."""
+    """*function* of the numbers of striker j and what follows; the striker is chosen as the integration goes."""
     read, rest = _law_reader(laws[0]), _by_law(laws[1:], function) if len(laws) > 1 else None
 
     @inlined
-    def own(memory, at, j, penetration):
-        return function(read(memory, at), penetration)
+    def own(memory, at, j, *values):
+        return function(read(memory, at), *values)
 
     if rest is None:
         return own
 
     @inlined
-    def chosen(memory, at, j, penetration):
+    def chosen(memory, at, j, *values):
         if j == 0:
-            return function(read(memory, at), penetration)
-        return rest(memory, at, j - 1, penetration)
+            return function(read(memory, at), *values)
+        return rest(memory, at, j - 1, *values)
 
     return chosen
 
@@ -108,37 +144,65 @@ def _count_of(kinds):
     return lambda kinds: count
 
 
-def force_of(kinds: Any, memory: Any, at: int, j: int, penetration: float) -> float:
-    """Force of striker *j* beside the first, N, its law's numbers standing from *at* on; none when apart."""
-    raise TypeError("force_of runs in compiled code only")
+def _any_law(predicate: Callable[[Any], bool]) -> Any:
+    """A function f(kinds): True if a law among them has a property; known when a kernel is compiled."""
+
+    def stub(kinds: Any) -> bool:
+        raise TypeError("laws of further contacts run in compiled code only")
+
+    @overload(stub, jit_options=INLINE_HERE)
+    def chosen(kinds):
+        found = any(predicate(law) for law in kinds.instance_class.owner.laws)
+        return lambda kinds: found
+
+    return stub
 
 
-@overload(force_of, jit_options=INLINE_HERE)
-def _force_of(kinds, memory, at, j, penetration):
-    chosen = _by_law(kinds.instance_class.owner.laws, contact_force)
-    return lambda kinds, memory, at, j, penetration: chosen(memory, at, j, penetration)
+any_damped = _any_law(lambda law: law.rate_dependent)
+any_jumps = _any_law(begins_with_jump)
 
 
-def slope_of(kinds: Any, memory: Any, at: int, j: int, penetration: float) -> float:
-    """Derivative of its force by the penetration, N/m."""
-    raise TypeError("slope_of runs in compiled code only")
+def damped_at(kinds: Any, j: int) -> bool:
+    """True if the law of striker *j* beside the first loses energy."""
+    return type(kinds).owner.laws[j].rate_dependent
 
 
-@overload(slope_of, jit_options=INLINE_HERE)
-def _slope_of(kinds, memory, at, j, penetration):
-    chosen = _by_law(kinds.instance_class.owner.laws, contact_slope)
-    return lambda kinds, memory, at, j, penetration: chosen(memory, at, j, penetration)
+@overload(damped_at, jit_options=INLINE_HERE)
+def _damped_at(kinds, j):
+    damped = tuple(bool(law.rate_dependent) for law in kinds.instance_class.owner.laws)
+    if not any(damped):
+        return lambda kinds, j: False
+    return lambda kinds, j: damped[j]
 
 
-def energy_of(kinds: Any, memory: Any, at: int, j: int, penetration: float) -> float:
-    """Energy that its contact stores, J."""
-    raise TypeError("energy_of runs in compiled code only")
+def _function_of_contact(function: Any) -> Any:
+    """A function f(kinds, memory, at, j, ...): *function* of the law of striker *j* beside the first and what follows.
+
+    The law's numbers stand from *at* on.
+    """
+
+    def stub(kinds: Any, memory: Any, at: int, j: int, *values: float) -> float:
+        raise TypeError("laws of further contacts run in compiled code only")
+
+    @overload(stub, jit_options=INLINE_HERE)
+    def chosen(kinds, memory, at, j, *values):
+        own = _by_law(kinds.instance_class.owner.laws, function)
+        return lambda kinds, memory, at, j, *values: own(memory, at, j, *values)
+
+    return stub
 
 
-@overload(energy_of, jit_options=INLINE_HERE)
-def _energy_of(kinds, memory, at, j, penetration):
-    chosen = _by_law(kinds.instance_class.owner.laws, contact_energy)
-    return lambda kinds, memory, at, j, penetration: chosen(memory, at, j, penetration)
+force_of = _function_of_contact(contact_force)
+slope_of = _function_of_contact(contact_slope)
+energy_of = _function_of_contact(contact_energy)
+damping_of = _function_of_contact(damping_coefficient)
+felt_at = _function_of_contact(felt_force)
+mark_at = _function_of_contact(mark_of)
+peak_of = _function_of_contact(peak_force)
+way_to_release = _function_of_contact(released_at)
+zero_force_of = _function_of_contact(zero_force_crossing)
+peak_in_step_of = _function_of_contact(peak_in_step)
+jumps_at = _function_of_contact(jumps)
 
 
 def _by_part(owner: Any, numbers: tuple[int, ...]) -> Any:

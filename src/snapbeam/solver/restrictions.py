@@ -5,7 +5,7 @@ from __future__ import annotations
 from snapbeam.model.drive.combined import MOST_STRIKERS
 from snapbeam.model.quantity import section_of
 from snapbeam.model.system import System
-from snapbeam.util.validation import InputError, shown
+from snapbeam.util.validation import InputError
 
 __all__ = ["check_integrable"]
 
@@ -41,11 +41,6 @@ def check_integrable(system: System) -> None:
                 f"{section} = {law!r} with {beside}: sticking under Newton's law includes the tip's force only; use a "
                 "HertzContact, or a HuntCrossley with the same restitution"
             )
-        if number > 1 and law.rate_dependent:
-            raise InputError(
-                f"{section} = {law!r}: two forces that depend on the velocity have no exact kick together; of several "
-                "contacts the first alone may lose energy, the others take a HertzContact or a PowerLaw"
-            )
         if number > 1 and striker.mass is not None:
             raise InputError(
                 f"{section}.mass = {striker.mass:g}: of several strikers the first alone may be a body, since the "
@@ -55,14 +50,3 @@ def check_integrable(system: System) -> None:
             raise InputError(
                 f"{section_of('drive', number)} = {striker.drive.name!r} with {beside}: {_RECORD}"
             )
-    rate_dependent = [
-        f"{section_of('contact', number)} = {shown(each.law)}"
-        for number, each in enumerate(contacts, 1)
-        if each.law.rate_dependent
-    ]
-    several = [*rate_dependent, *(shown(each) for each in surroundings if each.rate_dependent)]
-    if len(several) > 1:
-        raise InputError(
-            f"{' with '.join(several)}: the solver has one velocity-dependent force; leave the others out, or let "
-            "damping_ratio stand for the loss"
-        )

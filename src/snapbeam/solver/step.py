@@ -33,7 +33,8 @@ The first kick needs no tension: k at the beginning of a step is k at the end of
 A layout may have further forces, the *terms* (``solver/terms``).  Those that depend on position and time alone add to k,
 or to its two coefficients.  A contact force that depends on velocity
 changes during a kick; its mean follows from the exact solution of the kick along c.  A harvester circuit is coupled with p
-within the kick, also exactly; the damping of a local force by a Runge-Kutta method with steps much shorter than the kick.
+within the kick, also exactly.  Several such forces, and the damping of local forces, follow together from one equation for
+the velocities along their rows, by a Runge-Kutta method with steps much shorter than the kick.
 
 The step itself decides nothing.  Whether a contact is closed is fixed for a whole step.  The caller observes the beam at
 the end, and inside the step where needed.  If a contact began or ended there, the caller takes a shorter step from the same
@@ -171,9 +172,10 @@ class Primitives(NamedTuple):
     Returns the mean force in a kick and the energy lost, of any contact law; *velocity* is that of the striker.
     """
     exchange_energy: Callable[..., Any] | None = None
-    """``exchange_energy(data, stage, weight, along_g, along_r, force, surroundings)``.
+    """``exchange_energy(data, stage, weight, along_g, along_r, contact, surroundings)``.
 
-    Adds the work of the terms in a kick, and couples the circuit with p.
+    Adds the work of the terms in a kick, and the impulses of all forces that depend on p; returns the contact and the
+    surroundings.
     """
 
 
@@ -245,7 +247,9 @@ def build_step(layout: Primitives, compiled_part: Callable[..., Any] = inlined) 
         contact = evaluate_contact(data, stage, weight, along_g, along_r, products.cq, before.contact)
         surroundings = before.surroundings
         if exchange_energy is not None:
-            surroundings = exchange_energy(data, stage, weight, along_g, along_r, contact.force, surroundings)
+            contact, surroundings = exchange_energy(
+                data, stage, weight, along_g, along_r, contact, surroundings
+            )
         state, dissipated = kick_and_flow(
             data, stage, state, weight, along_g, along_r, products.r, contact.force
         )

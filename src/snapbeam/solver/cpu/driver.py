@@ -63,7 +63,9 @@ def usable_cores() -> int:
 
 def _packed(ensemble: Ensemble) -> Packed:
     others = None if ensemble.others is None else several(ensemble.others.laws)
-    return pack(ensemble.structure, ensemble.high_omega, drive=ensemble.drive, several=others)
+    return pack(
+        ensemble.structure, ensemble.high_omega, drive=ensemble.drive, several=others, law=ensemble.law
+    )
 
 
 def _asked(ensemble: Ensemble, packed: Packed, memory: Memory | None) -> KernelInput:

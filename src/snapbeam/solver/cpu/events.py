@@ -8,7 +8,13 @@ from typing import Any, NamedTuple
 from numba.extending import overload
 
 from snapbeam.solver.compilation import INLINE_HERE, compiled, inlined
-from snapbeam.solver.contact_force import felt_force, jumps, scalar_function, zero_force_crossing
+from snapbeam.solver.contact_force import (
+    begins_with_jump,
+    felt_force,
+    jumps,
+    scalar_function,
+    zero_force_crossing,
+)
 from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.mode_lanes import (
     flow_coefficients,
@@ -41,6 +47,7 @@ from snapbeam.solver.cpu.terms.circuit import (
 )
 from snapbeam.solver.cpu.terms.further_contact_events import (
     accumulate_further_contacts,
+    corrections_of_onset,
     first_further_event,
     limit_safe_interval,
     observe_further_contacts,
@@ -273,7 +280,7 @@ def kick_at_onset(
 @overload(kick_at_onset, jit_options=INLINE_HERE)
 def _kick_at_onset(memory, layout, law, p, kinematics, accumulators, outputs):
     owner = law.instance_class.owner
-    if not (owner.rate_dependent and not owner.properties.smooth):
+    if not begins_with_jump(owner):
         return lambda memory, layout, law, p, kinematics, accumulators, outputs: kinematics
     damping_coefficient = scalar_function(owner, "damping_coefficient")
 
@@ -492,9 +499,9 @@ def accept_step(
             ),
             step,
         )
-    contact_event = detect_contact_event(memory, layout, run, now, tip, step, observed, scratch)
     there = step.phase + omega * step.length
     observe_further_contacts(memory, layout.size, layout.others, tip.drive, there, step.q1, step.p1)
+    contact_event = detect_contact_event(memory, layout, run, now, tip, step, observed, scratch)
     edge = first_further_event(
         memory, layout, layout.others, sampling_slot(run), run, t, tip.drive, step, scratch
     )
@@ -512,7 +519,9 @@ def accept_step(
         if contact_event.event:
             accumulators.touching, accumulators.onset = 1, t
             kinematics = kick_at_onset(memory, layout, tip.law, step.p, kinematics, accumulators, outputs)
-        update_further_contacts(memory, layout.others, 0, t, 0.0, tick, accumulators, outputs)
+        update_further_contacts(
+            memory, layout.size, layout.others, step.p, 0, t, 0.0, tick, accumulators, outputs
+        )
         status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
         control = StepControl(
             touching or contact_event.event,
@@ -534,7 +543,9 @@ def accept_step(
         ), step
     whole, event_ticks = step.ticks, contact_event.event_ticks
     corrections = 0 if touching or not contact_event.event else _LOCATIONS if jumps(tip.law) else 1
-    due = edge < whole and not contact_event.event
+    further_corrections = 0
+    if edge < whole and not contact_event.event:
+        further_corrections = corrections_of_onset(layout.others, _LOCATIONS)
     while event_ticks != step.ticks:
         step = shortened_step(step, run, event_ticks, event_ticks * tick)
         prepare(memory, layout, stages, run.tip.drive, step.length, step.at)
@@ -557,9 +568,9 @@ def accept_step(
             event_ticks,
             whole,
             smallest_correction,
-            due,
+            further_corrections,
         )
-        due = False
+        further_corrections -= 1
     store_further_contacts(memory, layout.others)
     kinematics1 = ContactKinematics(
         observed.w + rest_contact, observed.wv, observed.d, observed.dv, observed.c + rest_center, observed.cv
@@ -619,8 +630,8 @@ def accept_step(
             accumulators.touching, accumulators.onset = 1, t
             kinematics1 = kick_at_onset(memory, layout, tip.law, step.p1, kinematics1, accumulators, outputs)
     update_further_contacts(
-        memory, layout.others, contact_event.event_ticks, t, step.length, tick, accumulators, outputs
-    )
+        memory, layout.size, layout.others, step.p1, contact_event.event_ticks, t, step.length, tick, accumulators, outputs
+    )  # fmt: skip
     touching = touching != contact_event.event
     control = StepControl(
         touching, safe_gap, safe_center, now.control.energy_tick, now.control.steps_since_start

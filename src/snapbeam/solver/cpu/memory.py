@@ -7,18 +7,22 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.model.contact.base import ContactLaw
+from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.drive.sine import Sine
 from snapbeam.solver.cpu.mode_lanes import WORK_ROWS, Layout
-from snapbeam.solver.cpu.terms.circuit import Circuit
+from snapbeam.solver.cpu.terms.circuit import Circuit, CircuitDamping
 from snapbeam.solver.cpu.terms.further_contacts import FurtherContacts
+from snapbeam.solver.cpu.terms.velocity_block import ContactDamping, VelocityBlock, numbers_of_block
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.further_contacts import NUMBERS, Several
+from snapbeam.solver.further_contacts import DAMPED, NUMBERS, Several
 from snapbeam.solver.simd import WIDTH
 from snapbeam.solver.splitting import Stages, in_memory, slot_length
 from snapbeam.solver.structure import Structure
 from snapbeam.solver.terms import TERMS_AFTER_CONTACTS, TERMS_BEFORE_CONTACTS
 from snapbeam.solver.terms.interface import TermMemory
+from snapbeam.solver.terms.local_force import DampedLocalForce, LocalDamping
 
 __all__ = ["Memory", "Packed", "lay_out", "pack"]
 
@@ -45,6 +49,8 @@ class Packed(NamedTuple):
     """Modes of each block."""
     own: tuple[dict[str, int], ...]
     """Of each term in the layout, the lengths of what every run has for itself."""
+    unit: int
+    """Place of the row that is 1 for the circuit's own mode, of a layout with a velocity block."""
 
     def spread(self, values: _Array) -> _Array:
         """Numbers of modes, shape (..., N), as padded rows, shape (..., rows)."""
@@ -73,11 +79,13 @@ def pack(
     high_omega: float = np.inf,
     drive: type[Drive] = Sine,
     several: type[Several] | None = None,
+    law: type[ContactLaw] = HertzContact,
 ) -> Packed:
     """Arrange a structure in rows.
 
     Linear modes that the tension does not couple (the symmetric and the antisymmetric ones) become
-    separate blocks, each padded to a multiple of eight rows.  *several*: with room for strikers beside the first.
+    separate blocks, each padded to a multiple of eight rows.  *several*: with room for strikers beside the first, which
+    touches by *law*.
     """
     label = _blocks_of(structure.coupling != 0.0)
     omega, zeta = structure.omega, structure.damping_ratio
@@ -134,6 +142,11 @@ def pack(
     if several is not None:
         arrays["striker_rows"] = np.zeros(len(several.laws) * size)
         arrays["strikers"] = np.zeros(len(several.laws) * NUMBERS)
+    damped = _damped(structure, several, law)
+    if damped:
+        arrays["unit"] = np.zeros(size)
+        arrays["unit"][rows[-1]] = 1.0
+        arrays["velocity_block"] = np.zeros(WIDTH + numbers_of_block(damped))
     starts = np.concatenate(([0], np.cumsum([array.size for array in arrays.values()])))
     placed = dict(zip(arrays, map(int, starts), strict=False))
     circuit, others = None, None
@@ -154,6 +167,7 @@ def pack(
             own.append({name: values.size for name, values in single.items()})
     moving = bool(np.all(omega * np.sqrt(1.0 - zeta * zeta) > 0.0))
     gentle = _LONGEST_DECAY / max(float((zeta * omega).max()), _SLOWEST) if moving else 0.0
+    unit, numbers = (placed.pop("unit"), placed.pop("velocity_block")) if damped else (0, 0)
     layout = Layout(
         size=size,
         **placed,
@@ -165,7 +179,10 @@ def pack(
         circuit=circuit,
         others=others,
         body=None if structure.body_mass is None else int(rows[structure.equilibrium.size]),
+        velocity_block=None,
     )
+    if damped:
+        layout = layout._replace(velocity_block=_velocity_block(layout, law, unit, numbers))
     return Packed(
         np.concatenate(list(arrays.values())),
         np.array(blocks, dtype=np.int64),
@@ -173,7 +190,41 @@ def pack(
         rows,
         tuple(held),
         tuple(own),
+        unit,
     )
+
+
+def _damped(structure: Structure, several: type[Several] | None, law: type[ContactLaw]) -> int:
+    """Rows of the velocity block; 0 where one contact or one circuit alone has an exact solution of its own."""
+    contacts = sum(each.rate_dependent for each in (law, *(several.laws if several is not None else ())))
+    forces = sum(type(each.law).owner.dissipative for each in structure.local_forces)
+    circuit = structure.circuit_row is not None
+    alone = forces == 0 and contacts + circuit <= 1 and (contacts == 0 or law.rate_dependent)
+    return 0 if alone else contacts + forces + circuit * (1 + structure.circuit)
+
+
+def _velocity_block(layout: Layout, law: type[ContactLaw], unit: int, numbers: int) -> VelocityBlock:
+    """Every channel of a layout, and the places of their rows; *unit* is that of the circuit's own mode."""
+    rows: list[int] = []
+    channels: list[Any] = []
+    first, circuit = None, None
+    if law.rate_dependent:
+        first = numbers
+        channels.append(ContactDamping(first, 0))
+        rows.append(layout.contact)
+    for j, each in enumerate(() if layout.others is None else type(layout.others.kinds).owner.laws):
+        if each.rate_dependent:
+            channels.append(ContactDamping(layout.others.numbers + j * NUMBERS + DAMPED, len(rows)))
+            rows.append(layout.others.rows + j * layout.size)
+    for term in layout.terms:
+        if isinstance(term, DampedLocalForce):
+            channels.append(LocalDamping(term.row, term.state, term.law, len(rows)))
+            rows.append(term.row)
+    if layout.circuit is not None:
+        circuit = len(rows)
+        channels.append(CircuitDamping(layout.circuit, circuit))
+        rows += [layout.circuit.coupling, *([unit] if layout.circuit.own is not None else [])]
+    return VelocityBlock(tuple(rows), tuple(channels), numbers + WIDTH, first, circuit)
 
 
 class Memory(NamedTuple):
@@ -186,6 +237,16 @@ class Memory(NamedTuple):
     stages: Stages
     drive_numbers: _Array
     """With the place of the drive's samples in memory."""
+
+
+def _any_contact_damped(ensemble: Ensemble) -> bool:
+    further = () if ensemble.others is None else ensemble.others.laws
+    return any(law.rate_dependent for law in (ensemble.law, *further))
+
+
+def _always_damped(layout: Layout) -> bool:
+    """Whether forces depend on velocities outside of contacts too."""
+    return layout.circuit is not None or any(isinstance(term, DampedLocalForce) for term in layout.terms)
 
 
 def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
@@ -216,9 +277,15 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
             second = second._replace(work=second.work + length)
         terms.append(second.others if term is first.others else term._replace(**places))
     second = second._replace(terms=tuple(terms))
+    if first.velocity_block is not None:
+        length = WIDTH + numbers_of_block(len(first.velocity_block.rows))
+        second = second._replace(
+            velocity_block=_velocity_block(second, ensemble.law, packed.unit, second.work),
+            work=second.work + length,
+        )
     at = second.work + WORK_ROWS * size + slots
     stages, weights = in_memory(
-        ensemble.order, at, general=ensemble.law.rate_dependent, coupled=first.circuit is not None
+        ensemble.order, at, general=_any_contact_damped(ensemble), coupled=_always_damped(first)
     )
     table = stages.flow + weights.size
     length = table + ensemble.samples.size

@@ -91,6 +91,9 @@ class Layout(NamedTuple):
     """Of several strikers, an :class:`~snapbeam.solver.cpu.terms.further_contacts.FurtherContacts`; else None."""
     body: Any
     """Element of a row that holds the mode of a striker with mass; None without one."""
+    velocity_block: Any
+    """Of several forces that depend on velocities, and of damped local forces, a
+    :class:`~snapbeam.solver.cpu.terms.velocity_block.VelocityBlock`; else None."""
 
 
 @inlined

@@ -26,6 +26,7 @@ from snapbeam.solver.cpu.terms.further_contact_events import (
     restart_further_contacts,
 )
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, with_further_contact_energy
+from snapbeam.solver.cpu.terms.velocity_block import prepare_velocity_block
 from snapbeam.solver.excitation import Tip, drive_rate, numbers_of, tip_about_well
 from snapbeam.solver.physics import tension_energy, tension_factors
 from snapbeam.solver.splitting import TURNS, Stages
@@ -341,6 +342,7 @@ def begin(memory, blocks, workspace, kernel_input, i, accumulators):
         record.well_sign,
         work,
     )
+    prepare_velocity_block(memory, size, layout.velocity_block)
     now, energy = restart_from_state(memory, blocks, layout, run, 0, record.well_sign, rows, False, 0, 0)
     kinematics, since = now.kinematics, record.contact_time
     touching = since >= 0.0

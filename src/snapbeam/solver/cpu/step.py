@@ -11,7 +11,7 @@ from numba import types
 from numba.extending import overload
 
 from snapbeam.solver.compilation import INLINE_HERE, called, compiled, inlined
-from snapbeam.solver.contact_force import contact_force, kick_force
+from snapbeam.solver.contact_force import contact_force, damping_coefficient, kick_force
 from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.mode_lanes import (
     acceleration_rows,
@@ -30,32 +30,41 @@ from snapbeam.solver.cpu.terms.circuit import (
     CircuitIncrement,
     apply_tap,
     circuit_acceleration_rows,
-    kick_source,
+    circuit_increment,
     lean_kick,
     no_circuit_increment,
     tap_of,
 )
 from snapbeam.solver.cpu.terms.further_contacts import (
+    accumulate_damped_contacts,
+    add_damped_contacts,
     evaluate_contacts,
     with_further_contact_gross_work,
+    with_further_contact_loss,
     with_further_contact_work,
+)
+from snapbeam.solver.cpu.terms.velocity_block import (
+    IMPULSE_IN_KICK,
+    LOST_IN_KICK,
+    VELOCITY,
+    add_impulses,
+    add_velocity_dependent,
+    enter_contact,
+    open_first_contact,
+    solve_velocity_block,
 )
 from snapbeam.solver.excitation import tip_motion, turned_motion
 from snapbeam.solver.physics import sincos
 from snapbeam.solver.simd import WIDTH, fma, load, store
 from snapbeam.solver.splitting import TURNS
-from snapbeam.solver.step import InnerProducts, Primitives, build_step, rotate_phase
+from snapbeam.solver.step import ContactIncrement, InnerProducts, Primitives, build_step, rotate_phase
 from snapbeam.solver.step_control import ContactKinematics
 from snapbeam.solver.terms.interface import (
     ExternalWork,
     add_acceleration_along,
     add_to_tension,
-    add_velocity_dependent,
     add_work,
-    begin_exchange,
-    depends_on_velocity,
     does_work,
-    end_exchange,
     needs_tension_product,
     no_external_work,
     update_forces,
@@ -144,17 +153,24 @@ def observe(memory, layout, tip, phase, q, p):
 
 
 @inlined
+def _free_accelerations(memory, layout, velocity_block, spare, step):
+    size = layout.size
+    if velocity_block is None:
+        return circuit_acceleration_rows(memory, size, layout.circuit, spare, step)
+    k, k1 = spare, spare + size
+    for row in range(0, size, WIDTH):
+        store(memory, k + row, load(memory, step.k + row))
+        store(memory, k1 + row, load(memory, step.k1 + row))
+    add_velocity_dependent(memory, size, velocity_block, step.q, step.p, k)
+    add_velocity_dependent(memory, size, velocity_block, step.q1, step.p1, k1)
+    add_damped_contacts(memory, size, layout.others, k, k1)
+    return k, k1
+
+
+@inlined
 def with_velocity_dependent(memory, layout, spare, step):
     """A free step for the samples inside it: with the velocity-dependent forces in the accelerations of its ends."""
-    size, terms = layout.size, layout.terms
-    k, k1 = circuit_acceleration_rows(memory, size, layout.circuit, spare, step)
-    if depends_on_velocity(terms):
-        for row in range(0, size, WIDTH):
-            store(memory, spare + row, load(memory, step.k + row))
-            store(memory, spare + size + row, load(memory, step.k1 + row))
-        add_velocity_dependent(memory, size, terms, step.q, step.p, spare)
-        add_velocity_dependent(memory, size, terms, step.q1, step.p1, spare + size)
-        k, k1 = spare, spare + size
+    k, k1 = _free_accelerations(memory, layout, layout.velocity_block, spare, step)
     return Step(
         step.ticks, step.at, step.length, step.phase, step.touching, step.q, step.p, k, step.q1, step.p1, k1, step.r
     )  # fmt: skip
@@ -285,7 +301,7 @@ def _later_kick(memory, layout, step, flow, last, weight, along_g, along_r, r, f
 def _kick_and_flow(data, stage, q, weight, along_g, along_r, r, force):
     memory, layout, step, energy = data.memory, data.layout, data.step, data.with_energy
     if stage == 0:
-        p = step.p1 if depends_on_velocity(layout.terms) else kick_source(layout.circuit, step)
+        p = step.p if layout.circuit is None and layout.velocity_block is None else step.p1
         kick_rows(memory, layout, weight, step.k, force, p, step.p1)
         return step.q1, _flow(memory, layout, step.at, step.q, step.p1, step.q1, step.p1, energy)
     flow = step.at + min(stage, data.flows - 1 - stage) * 4 * layout.size
@@ -299,6 +315,7 @@ def _update_terms(data, stage, weight):
     argument = _argument(data, stage)
     q = step.q1 if stage > 0 else step.q
     update_forces(memory, layout.size, layout.terms, drive, argument, q)
+    open_first_contact(memory, layout.velocity_block)
     evaluate_contacts(memory, layout.size, layout.others, drive, argument, q, weight, stage == 0)
 
 
@@ -329,10 +346,28 @@ def _lossy_force(data, stage, weight, along_g, along_r, penetration, velocity):
     return loss.impulse, loss.lost
 
 
+@inlined
+def _enter_lossy_contact(data, penetration, velocity):
+    """Leave the first contact to the velocity block."""
+    law = data.tip.law
+    # at the very onset rounding leaves a penetration of either sign
+    at = max(penetration, 0.0)
+    enter_contact(
+        data.memory, data.layout.velocity_block.first, contact_force(law, at), damping_coefficient(law, at), velocity
+    )  # fmt: skip
+    return 0.0, 0.0
+
+
 @overload(_rate_dependent_force, jit_options=INLINE_HERE)
 def _rate_dependent_force_by_law(data, stage, weight, along_g, along_r, penetration, velocity):
     tip = data.types[data.fields.index("tip")]
     law = tip.types[tip.fields.index("law")]
+    layout = data.types[data.fields.index("layout")]
+    together = layout.types[layout.fields.index("velocity_block")] != types.none
+    if law.instance_class.owner.rate_dependent and together:
+        return lambda data, stage, weight, along_g, along_r, penetration, velocity: _enter_lossy_contact(
+            data, penetration, velocity
+        )
     if law.instance_class.owner.rate_dependent:
         return lambda data, stage, weight, along_g, along_r, penetration, velocity: _lossy_force(
             data, stage, weight, along_g, along_r, penetration, velocity
@@ -354,44 +389,82 @@ def _whole_acceleration(memory, layout, step, stage, along_g, along_r, force, ki
 
 
 def _exchange_energy(
-    data: Any, stage: int, weight: float, along_g: float, along_r: float, force: float, surroundings: Any
+    data: Any, stage: int, weight: float, along_g: float, along_r: float, contact: Any, surroundings: Any
 ) -> Any:
-    """Work of the terms, and the impulse of the circuit, which p1 then includes."""
+    """Work of the terms, and the impulses of forces that depend on velocities, which p1 then includes."""
     raise TypeError("_exchange_energy runs in compiled code only")
 
 
 @overload(_exchange_energy, jit_options=INLINE_HERE)
-def _exchange_by_layout(data, stage, weight, along_g, along_r, force, surroundings):
+def _exchange_by_layout(data, stage, weight, along_g, along_r, contact, surroundings):
     layout = data.types[data.fields.index("layout")]
-    terms = layout.types[layout.fields.index("terms")]
-    without = layout.types[layout.fields.index("circuit")] == types.none
-    if without and not any(hasattr(each.instance_class, "kick_work") for each in terms):
-        return lambda data, stage, weight, along_g, along_r, force, surroundings: surroundings
-    return lambda data, stage, weight, along_g, along_r, force, surroundings: _exchange(
-        data, data.layout.circuit, stage, weight, along_g, along_r, force, surroundings
+    kinds = dict(zip(layout.fields, layout.types, strict=True))
+    works = any(hasattr(each.instance_class, "kick_work") for each in kinds["terms"])
+    if kinds["circuit"] == types.none and kinds["velocity_block"] == types.none and not works:
+        return lambda data, stage, weight, along_g, along_r, contact, surroundings: (contact, surroundings)
+    return lambda data, stage, weight, along_g, along_r, contact, surroundings: _exchange(
+        data, data.layout.velocity_block, data.layout.circuit, stage, weight, along_g, along_r, contact, surroundings
+    )  # fmt: skip
+
+
+@inlined
+def _first_contact_of_block(memory, first, contact):
+    """The first contact with its impulse in a kick that the velocity block has solved."""
+    if first is None:
+        return contact
+    impulse, work = (
+        memory[first + IMPULSE_IN_KICK],
+        memory[first + IMPULSE_IN_KICK] * memory[first + VELOCITY],
+    )
+    return ContactIncrement(
+        contact.force,
+        contact.impulse + impulse,
+        contact.work + work,
+        contact.gross + abs(work),
+        contact.lost + memory[first + LOST_IN_KICK],
     )
 
 
 @inlined
-def _exchange(data, circuit, stage, weight, along_g, along_r, force, surroundings):
-    memory, layout, step = data.memory, data.layout, data.step
-    size, p = layout.size, step.p if stage == 0 else step.p1
-    work, tap = surroundings
-    kick = kick_row(layout)
-    _whole_acceleration(memory, layout, step, stage, along_g, along_r, force, kick)
+def _solve(memory, layout, velocity_block, circuit, weight, kick, p, tap):
+    """Compute the impulses of a kick; the row *kick* receives the mean of their effect if terms do work."""
+    size = layout.size
+    if velocity_block is not None:
+        solve_velocity_block(memory, size, velocity_block, weight, kick, p)
+        return circuit_increment(memory, velocity_block, velocity_block.circuit, circuit, tap)
     if circuit is not None:
         tap = tap_of(memory, size, circuit, circuit.own, p, kick, weight, tap)
         if does_work(layout.terms):
             lean_kick(memory, size, circuit, kick, weight, tap)
-    begin_exchange(memory, size, layout.terms, weight, kick, p)
+    return tap
+
+
+@inlined
+def _apply(memory, layout, velocity_block, circuit, p, p_to, tap, contact):
+    """p_to = p with the impulses of a kick; returns the first contact with its own."""
+    if velocity_block is not None:
+        add_impulses(memory, layout.size, velocity_block, p, p_to)
+        accumulate_damped_contacts(memory, layout.others)
+        return _first_contact_of_block(memory, velocity_block.first, contact)
+    if circuit is not None:
+        apply_tap(memory, layout.size, circuit, circuit.own, p, p_to, tap)
+    return contact
+
+
+@inlined
+def _exchange(data, velocity_block, circuit, stage, weight, along_g, along_r, contact, surroundings):
+    memory, layout, step = data.memory, data.layout, data.step
+    size, p = layout.size, step.p if stage == 0 else step.p1
+    work, tap = surroundings
+    kick = kick_row(layout)
+    _whole_acceleration(memory, layout, step, stage, along_g, along_r, contact.force, kick)
+    tap = _solve(memory, layout, velocity_block, circuit, weight, kick, p, tap)
     if does_work(layout.terms):
         if stage == 0 and needs_tension_product(layout.terms):
             tension_rows(memory, data.blocks, layout, step.q, step.r)
         work = add_work(memory, size, layout.terms, weight, layout.g, step.r, kick, p, work)
-    if circuit is not None:
-        apply_tap(memory, size, circuit, circuit.own, p, step.p1, tap)
-    end_exchange(memory, size, layout.terms, p, step.p1)
-    return work, tap
+    contact = _apply(memory, layout, velocity_block, circuit, p, step.p1, tap, contact)
+    return contact, (work, tap)
 
 
 _STEP = build_step(
@@ -421,8 +494,9 @@ def _results(memory, layout, increment):
     contact, (external, circuit) = increment.contact, increment.surroundings
     work = with_further_contact_work(memory, layout.others, contact.work)
     gross = with_further_contact_gross_work(memory, layout.others, contact.gross)
+    lost = with_further_contact_loss(memory, layout.others, contact.lost)
     return StepIncrement(
-        increment.gq, increment.qr, contact.impulse, work, gross, contact.lost, increment.dissipated, external, circuit
+        increment.gq, increment.qr, contact.impulse, work, gross, lost, increment.dissipated, external, circuit
     )  # fmt: skip
 
 

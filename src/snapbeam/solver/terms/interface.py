@@ -44,19 +44,16 @@ __all__ = [
     "add_potential_energy",
     "add_to_speed_bound",
     "add_to_tension",
-    "add_velocity_dependent",
     "add_work",
-    "begin_exchange",
     "center_from_barrier",
-    "depends_on_velocity",
     "does_work",
-    "end_exchange",
     "enter_well",
     "has_crossed",
     "kinematics_from_barrier",
     "may_hide_onset",
     "needs_tension_product",
     "no_external_work",
+    "operation",
     "relative_to_nearest_well",
     "total_work",
     "update_forces",
@@ -114,7 +111,7 @@ def _defined(name: str, parameters: str, lines: list[str], names: dict[str, Any]
     return known[name]
 
 
-def _operation(threaded: int = 1) -> Callable[[Any], Any]:
+def operation(threaded: int = 1) -> Callable[[Any], Any]:
     """Declare an operation, whose last *threaded* parameters are its results."""
 
     def declared(stub: Any) -> Any:
@@ -143,31 +140,31 @@ def _of_kernels() -> TypeError:
 # Forces.
 
 
-@_operation(threaded=0)
+@operation(threaded=0)
 def update_forces(memory: Any, size: int, terms: Any, drive: Any, argument: float, q: int) -> Any:
     """Write what follows from time and displacements into memory, for an argument of the drive and the row *q*."""
     raise _of_kernels()
 
 
-@_operation()
+@operation()
 def add_acceleration(memory: Any, size: int, terms: Any, row: int, k: Any) -> Any:
     """Add to *k*, eight elements of the modal acceleration from *row* on."""
     raise _of_kernels()
 
 
-@_operation()
+@operation()
 def add_acceleration_along(memory: Any, size: int, terms: Any, contact: int, along: Any) -> Any:
     """Add to *along*, the product of the modal acceleration with the row *contact*."""
     raise _of_kernels()
 
 
-@_operation(threaded=2)
+@operation(threaded=2)
 def add_to_tension(memory: Any, terms: Any, along_g: Any, along_r: Any) -> Any:
     """Change the two coefficients of the tension's acceleration, along g and along r = G q."""
     raise _of_kernels()
 
 
-@_operation()
+@operation()
 def add_to_speed_bound(
     memory: Any, size: int, terms: Any, drive: Any, along: int, horizon: float, bound: Any
 ) -> Any:
@@ -176,54 +173,28 @@ def add_to_speed_bound(
 
 
 # ----------------------------------------------------------------------------------------------------
-# Forces that depend on the velocities, and so change within a kick.
-
-
-@_operation(threaded=0)
-def begin_exchange(memory: Any, size: int, terms: Any, weight: float, kick: int, p: int) -> Any:
-    """Compute the impulse of a kick of *weight* seconds, exact at fixed displacements.
-
-    The row *kick* is the acceleration by all other forces.  The term adds to it what makes half of it times the weight the mean
-    of its own effect on p.
-    """
-    raise _of_kernels()
-
-
-@_operation(threaded=0)
-def end_exchange(memory: Any, size: int, terms: Any, p: int, p_to: int) -> Any:
-    """Write p with the impulse into *p_to*."""
-    raise _of_kernels()
-
-
-@_operation(threaded=0)
-def add_velocity_dependent(memory: Any, size: int, terms: Any, q: int, p: int, k: int) -> Any:
-    """Add the velocity-dependent part to the row of accelerations *k*."""
-    raise _of_kernels()
-
-
-# ----------------------------------------------------------------------------------------------------
 # Energy and wells.
 
 
-@_operation()
+@operation()
 def add_potential_energy(memory: Any, size: int, terms: Any, q: int, energy: Any) -> Any:
     """Add to the *energy* of linear modes and tension about the present origin."""
     raise _of_kernels()
 
 
-@_operation(threaded=0)
+@operation(threaded=0)
 def enter_well(memory: Any, size: int, terms: Any, well_sign: float) -> Any:
     """Write what depends on the well whose mirror image is the origin of q."""
     raise _of_kernels()
 
 
-@_operation()
+@operation()
 def relative_to_nearest_well(memory: Any, size: int, terms: Any, well_sign: float, spare: int, q: Any) -> Any:
     """The row of the displacements from the well that the beam is near: *q* itself, or *spare*, written here."""
     raise _of_kernels()
 
 
-@_operation()
+@operation()
 def acceleration_about_nearest_well(
     memory: Any, terms: Any, omega_squared: int, q: int, near: int, row: int, k: Any
 ) -> Any:
@@ -231,13 +202,13 @@ def acceleration_about_nearest_well(
     raise _of_kernels()
 
 
-@_operation()
+@operation()
 def center_from_barrier(terms: Any, center: Any) -> Any:
     """The displacement of the centre from the height that divides the wells, m."""
     raise _of_kernels()
 
 
-@_operation()
+@operation()
 def has_crossed(terms: Any, center: float, well_sign: float, crossed: Any) -> Any:
     """Whether the centre has come to the side of the other well."""
     raise _of_kernels()
@@ -288,11 +259,6 @@ def wells_differ(terms: Any) -> bool:
     raise _of_kernels()
 
 
-def depends_on_velocity(terms: Any) -> bool:
-    """Whether a term has an impulse of its own in each kick."""
-    raise _of_kernels()
-
-
 def may_hide_onset(terms: Any) -> bool:
     """Whether a term may change the motion so much within a step that the interval without contact misses one."""
     raise _of_kernels()
@@ -301,7 +267,6 @@ def may_hide_onset(terms: Any) -> bool:
 _compiled_for_terms(does_work, _write_flag("kick_work"))
 _compiled_for_terms(needs_tension_product, _write_flag("needs_tension_product"))
 _compiled_for_terms(wells_differ, _write_flag("relative_to_nearest_well"))
-_compiled_for_terms(depends_on_velocity, _write_flag("end_exchange"))
 _compiled_for_terms(may_hide_onset, _write_flag("may_hide_onset"))
 
 

@@ -1,12 +1,7 @@
 """Local force: a law F(u, v) of one point, with u = u_0 + r.q its displacement or rotation and v = r.p the rate of that.
 
 The conservative part F(u) is constant in a kick: it adds F r to the acceleration.  The damping part D(u, v) changes with
-the velocity within the kick.  At a fixed u, and with a = r.k the acceleration by all other forces along r, v obeys
-
-    v' = a + (r.r) D(u, v),
-
-an equation for v alone.  Its solution over the kick, by the classical Runge-Kutta method in parts that resolve D, gives
-the impulse, integral of D, which acts along r.
+the velocity within the kick, as a channel of the velocity block (``cpu/terms/velocity_block.py``).
 """
 
 from __future__ import annotations
@@ -17,19 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import overload
 
-from snapbeam.solver.compilation import INLINE, called, inlined
+from snapbeam.solver.compilation import INLINE, inlined
 from snapbeam.solver.contact_force import scalar_function
-from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat, store
+from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat
 from snapbeam.solver.terms.interface import TermMemory
 
-__all__ = ["DampedLocalForce", "LocalForce"]
+__all__ = ["DampedLocalForce", "LocalDamping", "LocalForce"]
 
 
-_ORIGIN, _PLACE, _FORCE, _DAMPING, _IMPULSE, _WORK = range(6)
-"""What a run keeps: u at the origin of q; u, F and D at the last kick; impulse and work of D in a kick."""
-_FEWEST_PARTS, _MOST_PARTS = 4, 256
-_PARTS_PER_DECAY = 8.0
-"""Parts of a kick, over the time in which the damping alone halts the point."""
+_ORIGIN, _PLACE, _FORCE, _DAMPING, _WORK = range(5)
+"""Numbers of a run: u at the origin of q; u, F and D at the last kick; work of D in a kick."""
 
 
 def _of_law(name: str) -> Any:
@@ -97,32 +89,6 @@ def _product(memory, size, one, other):
     return lanes_sum(total)
 
 
-@called
-def _damping_kick(law, u, v, push, mobility, weight):
-    """Impulse of D over a kick, the integral of the impulse so far, and the work of D."""
-    fastest = max(_damping_coefficient(law, u, v), _damping_coefficient(law, u, v + push * weight))
-    if v * (v + push * weight) <= 0.0:
-        fastest = max(fastest, _damping_coefficient(law, u, 0.0))
-    count = _FEWEST_PARTS + int(min(_PARTS_PER_DECAY * mobility * fastest * abs(weight), 1e6))
-    count = min(count, _MOST_PARTS)
-    h = weight / count
-    impulse, twice, work = 0.0, 0.0, 0.0
-    for _ in range(count):
-        f1 = _damping_force(law, u, v)
-        v2 = v + 0.5 * h * (push + mobility * f1)
-        f2 = _damping_force(law, u, v2)
-        v3 = v + 0.5 * h * (push + mobility * f2)
-        f3 = _damping_force(law, u, v3)
-        v4 = v + h * (push + mobility * f3)
-        f4 = _damping_force(law, u, v4)
-        part = h / 6.0 * (f1 + 2.0 * (f2 + f3) + f4)
-        twice += h * impulse + h * h / 6.0 * (f1 + f2 + f3)
-        work += h / 6.0 * (f1 * v + 2.0 * (f2 * v2 + f3 * v3) + f4 * v4)
-        impulse += part
-        v += h * push + mobility * part
-    return impulse, twice, work
-
-
 class LocalForce(NamedTuple):
     """Places in memory, and the law."""
 
@@ -187,40 +153,6 @@ class DampedLocalForce(LocalForce):
 
     @staticmethod
     @inlined
-    def begin_exchange(memory, size, term, weight, kick, p):
-        """Compute the impulse of D in a kick; *kick*, the acceleration without it, receives its mean effect on p."""
-        along, push = _product(memory, size, term.row, p), _product(memory, size, term.row, kick)
-        mobility = _product(memory, size, term.row, term.row)
-        u = memory[term.state + _PLACE]
-        impulse, twice, work = _damping_kick(term.law, u, along, push, mobility, weight)
-        memory[term.state + _IMPULSE], memory[term.state + _WORK] = impulse, work
-        memory[term.state + _DAMPING] = _damping_force(
-            term.law, u, along + push * weight + mobility * impulse
-        )
-        if weight != 0.0:
-            mean = 2.0 * twice / (weight * weight)
-            for row in range(0, size, WIDTH):
-                store(memory, kick + row, fma(mean, load(memory, term.row + row), load(memory, kick + row)))
-
-    @staticmethod
-    @inlined
-    def end_exchange(memory, size, term, p, p_to):
-        """p_to = p with the impulse of D."""
-        for row in range(0, size, WIDTH):
-            impulse = broadcast_load(memory, term.state + _IMPULSE)
-            store(memory, p_to + row, fma(impulse, load(memory, term.row + row), load(memory, p + row)))
-
-    @staticmethod
-    @inlined
-    def add_velocity_dependent(memory, size, term, q, p, k):
-        """Add D r to the row k."""
-        u = memory[term.state + _ORIGIN] + _product(memory, size, term.row, q)
-        force = _damping_force(term.law, u, _product(memory, size, term.row, p))
-        for row in range(0, size, WIDTH):
-            store(memory, k + row, fma(force, load(memory, term.row + row), load(memory, k + row)))
-
-    @staticmethod
-    @inlined
     def add_to_speed_bound(memory, size, term, drive, along, horizon, bound):
         """Within a time tau, D changes c.p by about tau |D| sum |r_j c_j|."""
         total = 0.0
@@ -236,6 +168,48 @@ class DampedLocalForce(LocalForce):
     def kick_work(memory, size, term, weight, g, r, kick, p):
         """The integral of D v."""
         return memory[term.state + _WORK]
+
+
+class LocalDamping(NamedTuple):
+    """The damping part of a local force, as a channel of the velocity block."""
+
+    row: int
+    state: int
+    law: Any
+    unknown: int
+
+    @staticmethod
+    @inlined
+    def damping_forces(memory, term, v, d):
+        """D(u, v)."""
+        velocity = memory[v + term.unknown]
+        memory[d + term.unknown] = _damping_force(term.law, memory[term.state + _PLACE], velocity)
+
+    @staticmethod
+    @inlined
+    def add_damping_rate(memory, term, mobility, count, v, change, weight, rate):
+        """r.r times the maximum of -dD/dv at both ends of the kick without D, and at rest if that is between."""
+        u, before = memory[term.state + _PLACE], memory[v + term.unknown]
+        after = before + memory[change + term.unknown] * weight
+        fastest = max(_damping_coefficient(term.law, u, before), _damping_coefficient(term.law, u, after))
+        if before * after <= 0.0:
+            fastest = max(fastest, _damping_coefficient(term.law, u, 0.0))
+        return rate + memory[mobility + (count + 1) * term.unknown] * fastest
+
+    @staticmethod
+    @inlined
+    def end_kick(memory, term, v, impulse, work, path, weight):
+        """Keep the work and the last force."""
+        u, velocity = memory[term.state + _PLACE], memory[v + term.unknown]
+        memory[term.state + _WORK] = memory[work + term.unknown]
+        memory[term.state + _DAMPING] = _damping_force(term.law, u, velocity)
+
+    @staticmethod
+    @inlined
+    def damping_forces_of_state(memory, size, term, q, v, d):
+        """D(u, v) with u = u_0 + r.q."""
+        u = memory[term.state + _ORIGIN] + _product(memory, size, term.row, q)
+        memory[d + term.unknown] = _damping_force(term.law, u, memory[v + term.unknown])
 
 
 def _built(structure: Any, padded: Any, dissipative: bool) -> list[TermMemory]:

@@ -18,17 +18,19 @@ import math
 from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import inlined
+from snapbeam.solver.cpu.terms.velocity_block import IMPULSE, TWICE, WORK, V, value_of
 from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, splat, store, vabs
 from snapbeam.solver.terms.interface import may_hide_onset
 
 __all__ = [
     "Circuit",
+    "CircuitDamping",
     "CircuitIncrement",
     "accumulate_circuit",
     "apply_tap",
     "circuit_acceleration_rows",
+    "circuit_increment",
     "circuit_speed_bound",
-    "kick_source",
     "lean_kick",
     "missed_onset",
     "no_circuit_increment",
@@ -67,6 +69,68 @@ class CircuitIncrement(NamedTuple):
     """Lost in the circuit so far in this step, J."""
     twice: float
     """Integral of the integral of y."""
+
+
+class CircuitDamping(NamedTuple):
+    """The same coupling as a channel of the velocity block: t y along t, and -t.p - lam y for y, the velocity of its own mode.
+
+    Without inertia -rate t.p along t.
+    """
+
+    circuit: Circuit
+    unknown: int
+
+    @staticmethod
+    @inlined
+    def damping_forces(memory, term, v, d):
+        """Both right-hand sides."""
+        _couple(memory, term.circuit.own, memory[term.circuit.rate], v + term.unknown, d + term.unknown)
+
+    @staticmethod
+    @inlined
+    def add_damping_rate(memory, term, mobility, count, v, change, weight, rate):
+        """lam and the rate of exchange |t|; without inertia t.t times the rate."""
+        square, own = memory[mobility + (count + 1) * term.unknown], memory[term.circuit.rate]
+        if term.circuit.own is None:
+            return rate + own * square
+        return rate + own + math.sqrt(square)
+
+    @staticmethod
+    @inlined
+    def end_kick(memory, term, v, impulse, work, path, weight):
+        """Nothing to keep: :func:`circuit_increment` reads the arrays."""
+
+    @staticmethod
+    @inlined
+    def damping_forces_of_state(memory, size, term, q, v, d):
+        """Along t; the circuit's own change matters to no displacement."""
+        _couple(memory, term.circuit.own, memory[term.circuit.rate], v + term.unknown, d + term.unknown)
+
+
+@inlined
+def _couple(memory, own, rate, v, d):
+    if own is None:
+        memory[d] = -rate * memory[v]
+    else:
+        memory[d], memory[d + 1] = memory[v + 1], -memory[v] - rate * memory[v + 1]
+
+
+@inlined
+def circuit_increment(memory, block, i, circuit, before):
+    """The changes of a kick that a velocity block has solved; *i* is the number of the circuit's first row, or None."""
+    if i is None:
+        return before
+    return _increment_of_block(memory, block, i, circuit.own, memory[circuit.rate], before)
+
+
+@inlined
+def _increment_of_block(memory, block, i, own, rate, before):
+    impulse, twice = value_of(memory, block, IMPULSE, i), value_of(memory, block, TWICE, i)
+    lost = -value_of(memory, block, WORK, i)
+    if own is None:
+        return CircuitIncrement(impulse, -rate * value_of(memory, block, V, i), before.energy + lost, twice)
+    lost -= value_of(memory, block, WORK, i + 1)
+    return CircuitIncrement(impulse, value_of(memory, block, V, i + 1), before.energy + lost, twice)
 
 
 @inlined
@@ -177,14 +241,6 @@ def apply_tap(memory, size, circuit, own, p, p_to, tap):
         store(memory, p_to + row, value)
     if own is not None:
         memory[p_to + own] = tap.y
-
-
-@inlined
-def kick_source(circuit, step):
-    """Where the first kick of a step finds p: where the circuit has put it, if there is one."""
-    if circuit is None:
-        return step.p
-    return step.p1
 
 
 @inlined

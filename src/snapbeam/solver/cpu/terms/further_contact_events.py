@@ -23,6 +23,8 @@ from snapbeam.solver.further_contacts import (
     IMPULSE,
     KEPT,
     LAW,
+    LOST,
+    LOST_KEPT,
     NUMBERS,
     ONSET,
     PUSHED,
@@ -35,12 +37,20 @@ from snapbeam.solver.further_contacts import (
     TOUCHING,
     WORK,
     WORKED,
+    any_jumps,
     count_of,
-    force_of,
+    damped_at,
+    damping_of,
+    jumps_at,
+    mark_at,
     motion_of,
+    peak_in_step_of,
+    peak_of,
+    way_to_release,
+    zero_force_of,
 )
-from snapbeam.solver.interpolation import first_downcrossing, first_upcrossing, update_extrema
-from snapbeam.solver.simd import WIDTH, lanes_sum, load
+from snapbeam.solver.interpolation import first_downcrossing, first_upcrossing
+from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, store
 from snapbeam.solver.statistics import OTHER_IMPACTS, OTHER_IMPULSE, OTHER_PEAK, OTHER_WORK
 from snapbeam.solver.step_control import (
     TRUST,
@@ -58,6 +68,7 @@ __all__ = [
     "any_touches",
     "begin_further_contacts",
     "close_further_contacts",
+    "corrections_of_onset",
     "first_further_event",
     "further_contacts_halvings",
     "limit_safe_interval",
@@ -99,7 +110,8 @@ def _begin(memory, size, others, drive, tick, argument, well_sign, q):
         if math.isfinite(since):
             touching = since >= 0.0
         if touching:
-            memory[at + TOUCHING], memory[at + DEEPEST] = 1.0, max(depth, 0.0)
+            memory[at + TOUCHING] = 1.0
+            memory[at + DEEPEST] = mark_at(others.kinds, memory, at + LAW, j, depth, memory[at + RATE])
             if since > 0.0:
                 memory[at + ONSET] = -math.floor(since / tick + 0.5)
 
@@ -155,7 +167,8 @@ def further_contacts_halvings(memory, others, clock, t, touching, level):
         if memory[at + TOUCHING] != 0.0:
             count += 1
             elapsed = (t - memory[at + ONSET]) * clock.tick
-            level = max(level, contact_halvings(clock, elapsed, memory[at + DEPTH], memory[at + RATE]))
+            left = way_to_release(others.kinds, memory, at + LAW, j, memory[at + DEPTH], memory[at + RATE])
+            level = max(level, contact_halvings(clock, elapsed, left, memory[at + RATE]))
     if count > 1:
         level = max(level, min(clock.min_contact_halvings + 1, clock.max_halvings))
     return level
@@ -235,6 +248,15 @@ def _edge(memory, layout, others, slot, run, t, drive, step, scratch):
                     event_ticks = max(
                         1, int(first_downcrossing(depth, rate, depth1, rate1, step.length) * step.ticks)
                     )
+            if damped_at(others.kinds, j):
+                share = zero_force_of(
+                    others.kinds, memory, at + LAW, j, depth, rate, depth1, rate1, step.length
+                )
+                if share >= 0.0 and share * step.ticks + 1.0 < (
+                    step.ticks if event_ticks < 0 else event_ticks
+                ):
+                    # the force begins or ends there, though the contact goes on
+                    event_ticks, earliest = -1, min(earliest, int(share * step.ticks) + 1)
         else:
             if busy:
                 memory[at + SAFE] = t
@@ -281,18 +303,28 @@ def first_further_event(memory, layout, others, slot, run, t, drive, step, scrat
 
 
 @inlined
-def refine_further_onsets(memory, others, clock, edge, event_ticks, whole, smallest_correction, due):
+def corrections_of_onset(others, most):
+    """Corrections of the onset of a further contact, at most: *most* if its force may begin with a jump."""
+    if others is None:
+        return 0
+    return most if any_jumps(others.kinds) else 1
+
+
+@inlined
+def refine_further_onsets(memory, others, clock, edge, event_ticks, whole, smallest_correction, corrections):
     """Where a step that was shortened to *event_ticks* should end, from the gap of the contact that begins there.
 
-    Nothing new unless it is *due*: the *edge* to which the step was shortened first is one of theirs.
+    Nothing new without *corrections* left: the *edge* to which the step was shortened first is one of theirs.
     """
     if others is None:
         return event_ticks
-    if due:
+    if corrections > 0:
         for j in range(count_of(others.kinds)):
             at = block(others, j)
             if memory[at + TOUCHING] == 0.0 and memory[at + EVENT_TICKS] == edge:
                 kinematics = ContactKinematics(0.0, 0.0, memory[at + DEPTH1], memory[at + RATE1], 0.0, 0.0)
+                if jumps_at(others.kinds, memory, at + LAW, j):
+                    smallest_correction = 0.5 * clock.tick
                 return refine_onset(clock, event_ticks, whole, kinematics, smallest_correction)
     return event_ticks
 
@@ -305,6 +337,7 @@ def store_further_contacts(memory, others):
     for j in range(count_of(others.kinds)):
         at = block(others, j)
         memory[at + KEPT], memory[at + WORKED] = memory[at + IMPULSE], memory[at + WORK]
+        memory[at + LOST_KEPT] = memory[at + LOST]
 
 
 @inlined
@@ -316,6 +349,7 @@ def add_stored_contacts(memory, others):
         at = block(others, j)
         memory[at + IMPULSE] += memory[at + KEPT]
         memory[at + WORK] += memory[at + WORKED]
+        memory[at + LOST] += memory[at + LOST_KEPT]
 
 
 @inlined
@@ -328,6 +362,7 @@ def accumulate_further_contacts(memory, others, touching, done, accumulators):
     if not touching:
         accumulators.work += done.work
         accumulators.gross_work += done.gross
+        accumulators.lost += done.lost
 
 
 @inlined
@@ -336,9 +371,9 @@ def _leave(memory, others, j, accumulators, outputs, t, tick):
     at = block(others, j)
     deepest = memory[at + DEEPEST]
     if deepest > 0.0:
-        onset, add_static_load = memory[at + ONSET], memory[at + PUSHED]
-        duration, force = (t - onset) * tick, force_of(others.kinds, memory, at + LAW, j, deepest)
-        _write_impact(outputs, accumulators, onset * tick, duration, force, add_static_load, j)
+        onset, impulse = memory[at + ONSET], memory[at + PUSHED]
+        duration, force = (t - onset) * tick, peak_of(others.kinds, memory, at + LAW, j, deepest)
+        _write_impact(outputs, accumulators, onset * tick, duration, force, impulse, j)
         accumulators.impacts += 1
         # of a contact that began before the run, what falls into it
         accumulators.contact_time += duration if onset >= 0.0 else t * tick
@@ -361,7 +396,31 @@ def _write_impact(outputs, accumulators, onset, duration, force, impulse, j):
 
 
 @called
-def _turn(memory, others, edge, t, length, tick, accumulators, outputs):
+def _kick_at_onset(memory, size, others, j, p, accumulators, outputs):
+    """The impulse of a force that begins with a jump, from the onset to the tick at which the contact begins.
+
+    As of the first contact (``cpu/events.py: kick_at_onset``).
+    """
+    at, row = block(others, j), others.rows + j * size
+    damping, rate = damping_of(others.kinds, memory, at + LAW, j, 0.0), memory[at + RATE]
+    impulse = damping * memory[at + DEPTH]
+    gained, velocity = impulse * dot(memory, size, row, row), rate + dot(memory, size, row, p)
+    for i in range(0, size, WIDTH):
+        store(memory, p + i, fma(impulse, load(memory, row + i), load(memory, p + i)))
+    work, lost = impulse * velocity, impulse * (rate - 0.5 * gained)
+    accumulators.work += work
+    accumulators.gross_work += abs(work)
+    accumulators.others[j, OTHER_WORK] += work
+    accumulators.lost += lost
+    if outputs is not None:
+        accumulators.dissipated += lost
+    memory[at + RATE] = rate - gained
+    memory[at + PUSHED] += impulse
+    memory[at + DEEPEST] = max(memory[at + DEEPEST], damping * rate)
+
+
+@called
+def _turn(memory, size, others, p, edge, t, length, tick, accumulators, outputs):
     for j in range(count_of(others.kinds)):
         at = block(others, j)
         depth, rate, depth1, rate1 = (
@@ -369,9 +428,9 @@ def _turn(memory, others, edge, t, length, tick, accumulators, outputs):
         )  # fmt: skip
         touching = memory[at + TOUCHING] != 0.0
         if touching and length > 0.0:
-            memory[at + DEEPEST] = update_extrema(
-                memory[at + DEPTH], max(memory[at + DEEPEST], depth1), depth, rate, depth1, rate1, length
-            )[1]
+            memory[at + DEEPEST] = peak_in_step_of(
+                others.kinds, memory, at + LAW, j, memory[at + DEEPEST], depth, rate, depth1, rate1, length
+            )
             memory[at + PUSHED] += memory[at + KEPT]
         if length > 0.0:
             memory[at + DEPTH], memory[at + RATE] = depth1, rate1
@@ -383,17 +442,19 @@ def _turn(memory, others, edge, t, length, tick, accumulators, outputs):
             else:
                 memory[at + TOUCHING], memory[at + ONSET] = 1.0, t
                 memory[at + DEEPEST], memory[at + PUSHED] = 0.0, 0.0
+                if jumps_at(others.kinds, memory, at + LAW, j):
+                    _kick_at_onset(memory, size, others, j, p, accumulators, outputs)
 
 
 @inlined
-def update_further_contacts(memory, others, edge, t, length, tick, accumulators, outputs):
+def update_further_contacts(memory, size, others, p, edge, t, length, tick, accumulators, outputs):
     """Where they stand at tick *t*, after a step of *length* (s) whose first edge was at tick *edge* of it.
 
-    With a length of 0 nothing has moved: those turn whose gap closes as the step begins.
+    Velocities stand in the row *p*.  With a length of 0 nothing has moved: those turn whose gap closes as the step begins.
     """
     if others is None:
         return
-    _turn(memory, others, edge, t, length, tick, accumulators, outputs)
+    _turn(memory, size, others, p, edge, t, length, tick, accumulators, outputs)
 
 
 @inlined
@@ -413,7 +474,7 @@ def _accumulate_open(memory, others, accumulators, t, tick):
     for j in range(count_of(others.kinds)):
         at = block(others, j)
         if memory[at + TOUCHING] != 0.0:
-            force = force_of(others.kinds, memory, at + LAW, j, memory[at + DEEPEST])
+            force = peak_of(others.kinds, memory, at + LAW, j, memory[at + DEEPEST])
             accumulators.contact_time += (t - max(memory[at + ONSET], 0.0)) * tick
             accumulators.total_impulse += memory[at + PUSHED]
             accumulators.others[j, OTHER_IMPULSE] += memory[at + PUSHED]

@@ -5,7 +5,8 @@ Striker j has the contact's row c_j, with the sign of its own side, and pushes t
     d_j = offset_j + motion_j(t) - c_j . q.
 
 A force without loss is a kick like that of the tension, p' += sum_j c_j f_j: it stands in memory beside the first
-striker's, is entered before each kick, and is part of the acceleration that a step keeps for the next.
+striker's, is entered before each kick, and is part of the acceleration that a step keeps for the next.  A force with loss is
+a channel of the velocity block.
 
 *others* is an :class:`FurtherContacts` or None, by type: with one striker nothing of this is compiled.
 """
@@ -16,23 +17,38 @@ from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import called, inlined
 from snapbeam.solver.cpu.dot import dot
+from snapbeam.solver.cpu.terms.velocity_block import (
+    IMPULSE_IN_KICK,
+    LOST_IN_KICK,
+    VELOCITY,
+    enter_contact,
+)
 from snapbeam.solver.further_contacts import (
+    DAMPED,
     DEPTH,
+    DEPTH1,
     FORCE,
     GROSS,
     HERE,
     IMPULSE,
     LAW,
+    LOST,
     NUMBERS,
     OFFSET,
+    RATE,
+    RATE1,
     REST,
     SIGN,
     SLOPE,
     TOUCHED,
     TOUCHING,
     WORK,
+    any_damped,
     count_of,
+    damped_at,
+    damping_of,
     energy_of,
+    felt_at,
     force_of,
     motion_of,
     slope_of,
@@ -41,6 +57,8 @@ from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, sp
 
 __all__ = [
     "FurtherContacts",
+    "accumulate_damped_contacts",
+    "add_damped_contacts",
     "block",
     "evaluate_contacts",
     "kick_tangent_by_further_contacts",
@@ -50,6 +68,7 @@ __all__ = [
     "penetration_of",
     "with_further_contact_energy",
     "with_further_contact_gross_work",
+    "with_further_contact_loss",
     "with_further_contact_work",
 ]
 
@@ -105,9 +124,18 @@ def _press(memory, size, others, drive, argument, q, weight, begins):
         at, force, velocity = block(others, j), 0.0, 0.0
         if begins:
             memory[at + IMPULSE], memory[at + WORK], memory[at + GROSS] = 0.0, 0.0, 0.0
+            memory[at + LOST] = 0.0
+        damping = 0.0
         if memory[at + TOUCHING] != 0.0:
             depth, velocity = penetration_of(memory, size, others, drive, argument, j, q)
+            if damped_at(others.kinds, j):
+                # at the very onset rounding leaves a penetration of either sign
+                depth = max(depth, 0.0)
+                damping = damping_of(others.kinds, memory, at + LAW, j, depth)
             force = force_of(others.kinds, memory, at + LAW, j, depth)
+        if damped_at(others.kinds, j):
+            enter_contact(memory, at + DAMPED, force, damping, velocity)
+            continue
         memory[at + FORCE] = force
         memory[at + IMPULSE] += weight * force
         memory[at + WORK] += weight * force * velocity
@@ -123,6 +151,48 @@ def evaluate_contacts(memory, size, others, drive, argument, q, weight, begins):
     if others is None:
         return
     _press(memory, size, others, drive, argument, q, weight, begins)
+
+
+@called
+def _accumulate_damped(memory, others):
+    for j in range(count_of(others.kinds)):
+        if damped_at(others.kinds, j):
+            at = block(others, j)
+            impulse = memory[at + DAMPED + IMPULSE_IN_KICK]
+            work = impulse * memory[at + DAMPED + VELOCITY]
+            memory[at + IMPULSE] += impulse
+            memory[at + WORK] += work
+            memory[at + GROSS] += abs(work)
+            memory[at + LOST] += memory[at + DAMPED + LOST_IN_KICK]
+
+
+@inlined
+def accumulate_damped_contacts(memory, others):
+    """Add up the impulses that the velocity block has given in a kick."""
+    if others is None:
+        return
+    if any_damped(others.kinds):
+        _accumulate_damped(memory, others)
+
+
+@called
+def _add_damped(memory, size, others, depth, rate, k):
+    for j in range(count_of(others.kinds)):
+        at, row = block(others, j), others.rows + j * size
+        if damped_at(others.kinds, j) and memory[at + TOUCHING] != 0.0:
+            force = felt_at(others.kinds, memory, at + LAW, j, memory[at + depth], memory[at + rate])
+            for i in range(0, size, WIDTH):
+                store(memory, k + i, fma(force, load(memory, row + i), load(memory, k + i)))
+
+
+@inlined
+def add_damped_contacts(memory, size, others, k, k1):
+    """Add the forces of contacts that lose energy at both ends of a step to the rows of its accelerations."""
+    if others is None:
+        return
+    if any_damped(others.kinds):
+        _add_damped(memory, size, others, DEPTH, RATE, k)
+        _add_damped(memory, size, others, DEPTH1, RATE1, k1)
 
 
 @inlined
@@ -153,6 +223,16 @@ def with_further_contact_gross_work(memory, others, gross):
     for j in range(count_of(others.kinds)):
         gross += memory[block(others, j) + GROSS]
     return gross
+
+
+@inlined
+def with_further_contact_loss(memory, others, lost):
+    """Energy lost in the first contact in a step with that of the others."""
+    if others is None:
+        return lost
+    for j in range(count_of(others.kinds)):
+        lost += memory[block(others, j) + LOST]
+    return lost
 
 
 @inlined

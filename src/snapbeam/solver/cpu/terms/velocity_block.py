@@ -1,0 +1,315 @@
+"""Forces that depend on velocities, together: one equation for the velocities along their rows within a kick.
+
+At fixed displacements, with K the acceleration of a kick by all other forces and D_i the force along the row r_i,
+
+    p' = K + sum_i D_i(v) r_i,    v_i = r_i.p,
+
+the velocities along the rows obey an equation for themselves alone,
+
+    v' = a + M D(v),    a_i = r_i.K,    M_ij = r_i.r_j.
+
+The classical Runge-Kutta method, in parts that resolve D, gives the impulses, integrals of D_i, which act along the rows.
+One after the other, such forces would leave an error of first order in the length of the step.
+
+A *channel* is a named tuple with ``unknown``, the number of its first row, and the operations below as static methods.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from snapbeam.solver.compilation import called, inlined
+from snapbeam.solver.cpu.dot import dot
+from snapbeam.solver.simd import WIDTH, fma, load, store
+from snapbeam.solver.terms.interface import operation
+
+__all__ = [
+    "CONTACT_NUMBERS",
+    "DAMPING",
+    "ELASTIC",
+    "IMPULSE",
+    "IMPULSE_IN_KICK",
+    "LOST_IN_KICK",
+    "TWICE",
+    "VELOCITY",
+    "WORK",
+    "ContactDamping",
+    "V",
+    "VelocityBlock",
+    "add_impulses",
+    "add_velocity_dependent",
+    "enter_contact",
+    "numbers_of_block",
+    "open_first_contact",
+    "prepare_velocity_block",
+    "solve_velocity_block",
+    "value_of",
+]
+
+
+_FEWEST_PARTS, _MOST_PARTS = 4, 256
+_PARTS_PER_DECAY = 8.0
+"""Parts of a kick, over the time in which the damping alone halts the motion along the rows."""
+V, _PUSH, _STAGE, _FORCE, _SUM, _POWER, IMPULSE, TWICE, WORK, _PATH = range(10)
+"""Arrays of one number for each row: v, a, v and D of a part, their sums; then integrals over the kick: of D, of that
+integral, of D v and of v."""
+
+
+class VelocityBlock(NamedTuple):
+    """Places in memory of the forces of one structure that depend on velocities."""
+
+    rows: Any
+    """A tuple of places."""
+    channels: Any
+    """A tuple of channels, in the order of their rows."""
+    numbers: int
+    """M, then the arrays."""
+    first: Any
+    """Place of the numbers of the first contact; None if its force does not depend on the velocity."""
+    circuit: Any
+    """Number of the first row of a circuit; None without one."""
+
+
+def numbers_of_block(count: int) -> int:
+    """Length in memory of the numbers of a block of *count* rows, in whole registers."""
+    return -(-count * (count + _PATH + 1) // WIDTH) * WIDTH
+
+
+# ----------------------------------------------------------------------------------------------------
+# Operations of channels.
+
+
+@operation(threaded=0)
+def damping_forces(memory: Any, terms: Any, v: int, d: int) -> Any:
+    """Write D of the velocities in the array *v* into the array *d*."""
+    raise TypeError("operations of channels run in compiled code only")
+
+
+@operation()
+def add_damping_rate(
+    memory: Any, terms: Any, mobility: int, count: int, v: int, change: int, weight: float, rate: Any
+) -> Any:
+    """Add the rate, 1/s, at which the channel alone changes its velocity, at most within the kick.
+
+    *mobility* is the place of M of *count* rows; over the kick all other forces change the velocities by *weight* times the
+    array *change*.
+    """
+    raise TypeError("operations of channels run in compiled code only")
+
+
+@operation(threaded=0)
+def end_kick(memory: Any, terms: Any, v: int, impulse: int, work: int, path: int, weight: float) -> Any:
+    """Keep the results of a kick: arrays of the velocity at its end and of the integrals of D, D v and v."""
+    raise TypeError("operations of channels run in compiled code only")
+
+
+@operation(threaded=0)
+def damping_forces_of_state(memory: Any, size: int, terms: Any, q: int, v: int, d: int) -> Any:
+    """Write D of a free state into the array *d*: displacements in the row *q*, velocities in the array *v*."""
+    raise TypeError("operations of channels run in compiled code only")
+
+
+# ----------------------------------------------------------------------------------------------------
+# A contact that loses energy: D = max(0, F + C (V - v)) with the striker's velocity V.
+
+
+ELASTIC, DAMPING, VELOCITY, IMPULSE_IN_KICK, LOST_IN_KICK = range(5)
+"""Numbers of a contact: F, N; C, N s/m; V, m/s; of a kick the impulse, N s, and the energy lost, J."""
+CONTACT_NUMBERS = 5
+
+
+class ContactDamping(NamedTuple):
+    """The force of one contact; F = C = 0 while it is open."""
+
+    numbers: int
+    unknown: int
+
+    @staticmethod
+    @inlined
+    def damping_forces(memory, term, v, d):
+        """The force of the contact, N."""
+        at = term.numbers
+        rate = memory[at + VELOCITY] - memory[v + term.unknown]
+        memory[d + term.unknown] = max(0.0, memory[at + ELASTIC] + memory[at + DAMPING] * rate)
+
+    @staticmethod
+    @inlined
+    def add_damping_rate(memory, term, mobility, count, v, change, weight, rate):
+        """C c.c."""
+        return rate + memory[term.numbers + DAMPING] * memory[mobility + (count + 1) * term.unknown]
+
+    @staticmethod
+    @inlined
+    def end_kick(memory, term, v, impulse, work, path, weight):
+        """The energy that the bodies give beyond F times the change of penetration, integral of (D - F) (V - v)."""
+        at, i = term.numbers, term.unknown
+        given, closed = memory[impulse + i], memory[at + VELOCITY] * weight - memory[path + i]
+        memory[at + IMPULSE_IN_KICK] = given
+        memory[at + LOST_IN_KICK] = (
+            given * memory[at + VELOCITY] - memory[work + i] - memory[at + ELASTIC] * closed
+        )
+
+    @staticmethod
+    @inlined
+    def damping_forces_of_state(memory, size, term, q, v, d):
+        """None: in free flight the contact is open."""
+        memory[d + term.unknown] = 0.0
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+@inlined
+def _array(block, which):
+    count = len(block.rows)
+    return block.numbers + count * (count + which)
+
+
+@inlined
+def value_of(memory, block, which, i):
+    """The number of row *i* in an array, such as its impulse."""
+    return memory[_array(block, which) + i]
+
+
+@inlined
+def enter_contact(memory, at, elastic, damping, velocity):
+    """Enter F, C and V of a contact."""
+    memory[at + ELASTIC], memory[at + DAMPING], memory[at + VELOCITY] = elastic, damping, velocity
+
+
+@inlined
+def open_first_contact(memory, block):
+    """No force of the first contact at a kick, unless it is entered."""
+    if block is None:
+        return
+    _open(memory, block.first)
+
+
+@inlined
+def _open(memory, first):
+    if first is None:
+        return
+    memory[first + ELASTIC], memory[first + DAMPING] = 0.0, 0.0
+
+
+@called
+def _enter_mobilities(memory, size, block):
+    count = len(block.rows)
+    for i in range(count):
+        for j in range(count):
+            memory[block.numbers + i * count + j] = dot(memory, size, block.rows[i], block.rows[j])
+
+
+@inlined
+def prepare_velocity_block(memory, size, block):
+    """Write M into memory; rows stay the same in a run."""
+    if block is None:
+        return
+    _enter_mobilities(memory, size, block)
+
+
+@inlined
+def _advance(memory, count, mobility, v, change, force, weight, result):
+    """result = v + weight (a + M D)."""
+    for i in range(count):
+        total = memory[change + i]
+        for j in range(count):
+            total += memory[mobility + i * count + j] * memory[force + j]
+        memory[result + i] = memory[v + i] + weight * total
+
+
+@called
+def _integrate(memory, block, weight):
+    """Integrate the velocities over a kick of *weight* seconds, and D, D v and v."""
+    count, mobility, channels = len(block.rows), block.numbers, block.channels
+    v, change, stage, force = (
+        _array(block, V),
+        _array(block, _PUSH),
+        _array(block, _STAGE),
+        _array(block, _FORCE),
+    )
+    total, power = _array(block, _SUM), _array(block, _POWER)
+    impulse, twice, work, path = (
+        _array(block, IMPULSE), _array(block, TWICE), _array(block, WORK), _array(block, _PATH)
+    )  # fmt: skip
+    for i in range(count):
+        memory[impulse + i], memory[twice + i], memory[work + i] = 0.0, 0.0, 0.0
+        # of v without D; D is added at the end
+        memory[path + i] = memory[v + i] * weight + 0.5 * memory[change + i] * weight * weight
+    rate = add_damping_rate(memory, channels, mobility, count, v, change, weight, 0.0)
+    parts = _FEWEST_PARTS + int(min(_PARTS_PER_DECAY * rate * abs(weight), 1e6))
+    parts = min(parts, _MOST_PARTS)
+    h = weight / parts
+    for _ in range(parts):
+        damping_forces(memory, channels, v, force)
+        for i in range(count):
+            d = memory[force + i]
+            memory[total + i], memory[power + i] = d, d * memory[v + i]
+            memory[twice + i] += h * memory[impulse + i] + h * h / 6.0 * d
+        for _half in range(2):
+            _advance(memory, count, mobility, v, change, force, 0.5 * h, stage)
+            damping_forces(memory, channels, stage, force)
+            for i in range(count):
+                d = memory[force + i]
+                memory[total + i] += 2.0 * d
+                memory[power + i] += 2.0 * d * memory[stage + i]
+                memory[twice + i] += h * h / 6.0 * d
+        _advance(memory, count, mobility, v, change, force, h, stage)
+        damping_forces(memory, channels, stage, force)
+        for i in range(count):
+            d = memory[force + i]
+            memory[power + i] += d * memory[stage + i]
+            memory[force + i] = (memory[total + i] + d) / 6.0
+            memory[impulse + i] += h * memory[force + i]
+            memory[work + i] += h / 6.0 * memory[power + i]
+        _advance(memory, count, mobility, v, change, force, h, stage)
+        for i in range(count):
+            memory[v + i] = memory[stage + i]
+    for i in range(count):
+        for j in range(count):
+            memory[path + i] += memory[mobility + i * count + j] * memory[twice + j]
+    end_kick(memory, channels, v, impulse, work, path, weight)
+
+
+@inlined
+def solve_velocity_block(memory, size, block, weight, kick, p):
+    """Compute the impulses of a kick of *weight* seconds.
+
+    The row *kick* is the acceleration by all other forces.  It receives what makes half of it times the weight the mean of the
+    effect of D on p.
+    """
+    v, change, twice = _array(block, V), _array(block, _PUSH), _array(block, TWICE)
+    for i in range(len(block.rows)):
+        memory[v + i] = dot(memory, size, block.rows[i], p)
+        memory[change + i] = dot(memory, size, block.rows[i], kick)
+    _integrate(memory, block, weight)
+    if weight != 0.0:
+        for i in range(len(block.rows)):
+            _add_row(memory, size, 2.0 * memory[twice + i] / (weight * weight), block.rows[i], kick)
+
+
+@inlined
+def _add_row(memory, size, factor, row, to):
+    for at in range(0, size, WIDTH):
+        store(memory, to + at, fma(factor, load(memory, row + at), load(memory, to + at)))
+
+
+@inlined
+def add_impulses(memory, size, block, p, p_to):
+    """p_to = p with the impulses of a kick."""
+    impulse = _array(block, IMPULSE)
+    for at in range(0, size, WIDTH):
+        store(memory, p_to + at, load(memory, p + at))
+    for i in range(len(block.rows)):
+        _add_row(memory, size, memory[impulse + i], block.rows[i], p_to)
+
+
+@called
+def add_velocity_dependent(memory, size, block, q, p, k):
+    """Add the velocity-dependent forces of a free state to the row of accelerations *k*."""
+    v, force = _array(block, V), _array(block, _FORCE)
+    for i in range(len(block.rows)):
+        memory[v + i] = dot(memory, size, block.rows[i], p)
+    damping_forces_of_state(memory, size, block.channels, q, v, force)
+    for i in range(len(block.rows)):
+        _add_row(memory, size, memory[force + i], block.rows[i], k)
