@@ -189,7 +189,7 @@ def mixture(seed: int, modes: int) -> Mixture:
         place, side = float(rng.uniform(0.25, 0.75)), 1.0 if j == 0 or rng.random() < 0.5 else -1.0
         gap = float(rng.uniform(0.0, 0.1) * unit) if j == 0 else float(rng.uniform(0.05, 0.3) * unit)
         body: tuple[float, float, float] | None = None
-        if j == 0 and striker_on_base and rng.random() < 0.4:
+        if striker_on_base and rng.random() < 0.4:
             body = (rng.uniform(5e-3, 5e-2), rng.uniform(200.0, 900.0), rng.uniform(0.0, 1.0))
         of_body = (
             {}

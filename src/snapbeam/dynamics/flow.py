@@ -207,9 +207,9 @@ def require_map(system: System) -> None:
             "harvester: has a state of its own, which the dynamics tools do not include; sweep a parameter of "
             "such a system by sb.dynamics.hysteresis, or integrate it by sb.advance(system, save_every_period=True)"
         )
-    if system.striker is not None and system.striker.mass is not None:
+    if masses := [each.striker.mass for each in system.contacts if each.striker.mass is not None]:
         raise InputError(
-            f"contact.mass = {system.striker.mass:g}: a striker with a mass has a state of its own, which the dynamics "
+            f"contact.mass = {masses[0]:g}: a striker with a mass has a state of its own, which the dynamics "
             "tools do not include; integrate such a system by sb.advance(system, save_every_period=True)"
         )
 

@@ -149,9 +149,9 @@ def require_tangent(system: System) -> None:
         raise InputError(
             f"tangent with contact = {shown(jumping[0])}: its force jumps, and so does the tangent flow; give no tangent"
         )
-    if system.striker is not None and system.striker.mass is not None:
+    if masses := [each.striker.mass for each in system.contacts if each.striker.mass is not None]:
         raise InputError(
-            f"tangent with contact.mass = {system.striker.mass:g} kg: the tangent flow does not contain the body "
+            f"tangent with contact.mass = {masses[0]:g} kg: the tangent flow does not contain the body "
             "of the striker; give no tangent, or no mass"
         )
     if system.local_forces:

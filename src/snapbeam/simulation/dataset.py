@@ -242,6 +242,9 @@ def strikers_of(
         motion, velocity = motion + numbers[SIGN] * follows[0], velocity + numbers[SIGN] * follows[1]
         pressed = numbers[OFFSET] + motion - recorded.q @ row
         rates = velocity - recorded.p @ row
+        motion = motion - recorded.q @ (
+            row - ensemble.structure.row_of_beam(row)
+        )  # of a striker with mass its own
         contact: Any = each.law
         kind = contact.numbers_type()
         law = kind(*(getattr(contact, name) for name in kind._fields))
@@ -323,9 +326,11 @@ def run_dataset(
     scale, speed = system.scale.length, system.scale.length * system.scale.omega
     alpha, rate = structure.amplitudes(recorded.q), structure.velocities(recorded.p)
     own = np.zeros(recorded.q.shape[0])
-    if structure.body_mass is not None:
-        body = model.modes
-        own = 0.5 * (recorded.p[:, body] ** 2 + (structure.omega[body] * recorded.q[:, body]) ** 2)
+    if structure.bodies:
+        body = structure.modes_of_bodies
+        own = 0.5 * (recorded.p[:, body] ** 2 + (structure.omega[body] * recorded.q[:, body]) ** 2).sum(
+            axis=1
+        )
         values[:, _COLUMN["energy"]] -= own
     if structure.circuit:
         values[:, _COLUMN["energy"]] -= 0.5 * recorded.p[:, -1] ** 2
@@ -360,7 +365,7 @@ def run_dataset(
             "energy_contact": values[:, _COLUMN["contact"]],
             "striker_work": values[:, _COLUMN["work"]],
         }
-    if structure.body_mass is not None:
+    if structure.bodies:
         variables["energy_striker"] = own
     variables["energy_dissipated"] = values[:, _COLUMN["dissipated"]]
     variables |= _around(ensemble, system, recorded, values)

@@ -48,8 +48,8 @@ def states_of(
             runs["offset"] > FAR_AWAY, structure.sign * (runs["rest_contact"] + runs["offset"]), np.nan
         ),
         contact_time=np.where(contact_ticks >= 0, contact_ticks * tick[:, None], -1.0),
-        striker_shift=structure.body_of(q),
-        striker_rate=structure.body_of(p),
+        striker_shift=structure.bodies_of(q),
+        striker_rate=structure.bodies_of(p),
         circuit=structure.circuit_of(p) * circuit_unit(ensemble),
         modal=ModalState(q, p, well_sign.astype(np.float64), np.array(runs["offset"]), structure.hash),
     )

@@ -75,7 +75,7 @@ def others_of(
         different, which = np.unique(location, return_inverse=True)
         shapes = np.array([structure.model.shape_at(float(x)) for x in different])
         places[:, j] = len(rows) + which
-        rows += [sign * structure.row_of_beam(structure.row(shape)) for shape in shapes]
+        rows += [structure.row(shape, j + 1, sign) for shape in shapes]
         numbers[:, j, REST] = sign * structure.sign * structure.rests(shapes)[which]
         begun = _begun(striker.drive, columns, moving, system, runs)
         gap = columns.get(f"{section}.gap", np.full(runs, np.nan))
@@ -370,7 +370,7 @@ def make_ensemble(
     columns = {name: np.array(np.broadcast_to(values, (runs,))) for name, values in columns.items()}
     side = _side(system, state, goes_on=periods is not None)
     structure = structure_of(
-        system.model, side, system.striker, system.base_excitation, system.harvester, system.external_force,
+        system.model, side, tuple(each.striker for each in system.contacts), system.base_excitation, system.harvester, system.external_force,
         system.local_forces, system.unloaded_potential.dividing_height,
     )  # fmt: skip
     plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
@@ -390,12 +390,7 @@ def make_ensemble(
     if coupling is not None:
         table["circuit_rate"] = coupling.rate
     highest = table["rest_contact"] + table["offset"] + driven.highest
-    if (
-        structure.body_mass is not None
-        or driven.kind.parts
-        or len(system.contacts) > 1
-        or system.local_forces
-    ):
+    if structure.bodies or driven.kind.parts or len(system.contacts) > 1 or system.local_forces:
         highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown, and a shaken beam too
     time = clocked(table, system, integration, driven.period, plans, periods)
     _require_record(system, table, driven)
@@ -495,7 +490,7 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
 
     A striker with a mass meets the beam for a shorter time, as the two masses together do: m_s m/(m_s + m).
     """
-    plans, striker = _plans_of(system, integration, columns), system.striker
+    plans = _plans_of(system, integration, columns)
     further = [
         _plans_of(system, integration, columns, section_of("contact", number), each.law)
         for number, each in enumerate(system.contacts[1:], 2)
@@ -521,10 +516,11 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     if integration.step is None and system.local_forces:
         longest = _longest_with_local_forces(system, integration.accuracy)
         plans = [each._replace(step=min(each.step, longest)) for each in plans]
-    if striker is None or striker.mass is None:
+    masses = [each.striker.mass for each in system.contacts if each.striker.mass is not None]
+    if not masses:
         return plans
     mass = _struck(system).lightest_contact_mass
-    more = max(0, math.ceil(0.5 * math.log2(1.0 + mass / striker.mass) - 1e-9))
+    more = max(0, math.ceil(0.5 * math.log2(1.0 + mass / min(masses)) - 1e-9))
     return [
         each._replace(
             min_contact_halvings=each.min_contact_halvings + more, max_halvings=each.max_halvings + more

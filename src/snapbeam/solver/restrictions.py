@@ -41,11 +41,6 @@ def check_integrable(system: System) -> None:
                 f"{section} = {law!r} with {beside}: sticking under Newton's law includes the tip's force only; use a "
                 "HertzContact, or a HuntCrossley with the same restitution"
             )
-        if number > 1 and striker.mass is not None:
-            raise InputError(
-                f"{section}.mass = {striker.mass:g}: of several strikers the first alone may be a body, since the "
-                "reduced structure contains one body; leave the mass out, or make this one the first"
-            )
         if striker.drive.samples().size and (len(contacts) > 1 or len(system.moving) > 1):
             raise InputError(
                 f"{section_of('drive', number)} = {striker.drive.name!r} with {beside}: {_RECORD}"

@@ -19,7 +19,7 @@ from snapbeam.model.local_force import LocalForce
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
 
-__all__ = ["LocalForceRow", "Structure", "UnequalWells", "structure_of"]
+__all__ = ["LocalForceRow", "StrikerBody", "Structure", "UnequalWells", "structure_of"]
 
 
 _Array = NDArray[np.float64]
@@ -56,6 +56,23 @@ class LocalForceRow:
     """u in the well."""
     law: Any
     """Constants of the law."""
+
+
+@dataclass(frozen=True)
+class StrikerBody:
+    """A striker with mass."""
+
+    contact: int
+    """Of which contact, from 0."""
+    mass: float
+    """kg."""
+    sign: float
+    """+1 if it strikes from below."""
+
+    @property
+    def of_hash(self) -> tuple[float, ...]:
+        """Numbers that tell it from others; of the first striker its mass alone."""
+        return (self.mass, float(self.contact), self.sign) if self.contact else (self.mass,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,27 +115,33 @@ class Structure:
     """Of a harvester: its coupling, scaled so that half the square of the circuit's coordinate is its energy."""
     circuit: bool = False
     """Whether the circuit's coordinate is the velocity of a mode of its own, the last one."""
-    body_mass: float | None = None
-    """Of a striker that is a body, whose own mode is then the last one; kg."""
+    bodies: tuple[StrikerBody, ...] = ()
+    """Of strikers with mass, whose own modes follow those of the beam."""
+    strikers: int = 0
 
     def rests(self, shapes: _Array) -> _Array:
         """Displacement at rest of points with these *shapes*, m: each by itself, so that none depends on the others."""
         return np.array([(shape[None, :] @ self.equilibrium)[0] for shape in shapes])
 
-    def row(self, shape: _Array) -> _Array:
-        """V^T shape, positive as the striker pushes."""
-        row: _Array = self.sign * (self.model.linear_modes.T @ shape)
-        if self.body_mass is not None:
-            row = np.append(row, -1.0 / math.sqrt(self.body_mass))
-        return np.append(row, 0.0) if self.circuit else row
+    def row(self, shape: _Array, contact: int = 0, sign: float = 1.0) -> _Array:
+        """The contact row of a striker: *sign* V^T shape, and what its own mode adds.
+
+        *sign* is +1 if it pushes as the first one does.
+        """
+        row: _Array = sign * self.sign * (self.model.linear_modes.T @ shape)
+        own = [-1.0 / math.sqrt(each.mass) if each.contact == contact else 0.0 for each in self.bodies]
+        return np.concatenate((row, own, [0.0] if self.circuit else []))
 
     def row_of_beam(self, row: _Array) -> _Array:
-        """A contact row without the part of the striker's own mode: the beam's displacement at that location."""
-        if self.body_mass is None:
-            return row
+        """A contact row without the parts of strikers' own modes: the beam's displacement at that location."""
         beam = row.copy()
-        beam[self.equilibrium.size] = 0.0
+        beam[self.modes_of_bodies] = 0.0
         return beam
+
+    @property
+    def modes_of_bodies(self) -> slice:
+        """Places of the strikers' own modes among all."""
+        return slice(self.equilibrium.size, self.equilibrium.size + len(self.bodies))
 
     @property
     def wells_are_mirror_images(self) -> bool:
@@ -140,12 +163,15 @@ class Structure:
         """Which modes are vibration modes of the beam above an angular frequency, rad/s; shape (N,)."""
         return (self.omega > omega) & (np.arange(self.omega.size) < self.equilibrium.size)
 
-    def body_of(self, values: _Array) -> _Array:
-        """The striker's own part of q or p of shape (..., N), in space and SI units; NaN if it is no body."""
-        if self.body_mass is None:
-            return np.full(values.shape[:-1], np.nan)
-        own: _Array = self.sign * values[..., self.equilibrium.size] / math.sqrt(self.body_mass)
-        return own
+    def bodies_of(self, values: _Array) -> _Array:
+        """The strikers' own parts of q or p of shape (..., N), in space and SI units; NaN of those without mass.
+
+        Shape (...), or (..., strikers) of several strikers.
+        """
+        found = np.full((*values.shape[:-1], max(1, self.strikers)), np.nan)
+        for mode, each in enumerate(self.bodies, self.equilibrium.size):
+            found[..., each.contact] = each.sign * values[..., mode] / math.sqrt(each.mass)
+        return found if self.strikers > 1 else found[..., 0]
 
     def circuit_of(self, p: _Array) -> _Array:
         """The circuit's coordinate in p of shape (..., N): its own, or none."""
@@ -156,19 +182,20 @@ class Structure:
         self,
         alpha: _Array,
         velocity: _Array,
-        shift: float = np.nan,
-        rate: float = np.nan,
+        shift: float | _Array = np.nan,
+        rate: float | _Array = np.nan,
         circuit: float = np.nan,
     ) -> tuple[_Array, _Array]:
-        """Amplitudes of shape (N,) and their velocities as q and p about the well, and those of the striker's body.
+        """Amplitudes of shape (N,) and their velocities as q and p about the well, and those of the strikers' bodies.
 
         *circuit* is the coordinate of a harvester's circuit.
         """
         back = self.model.linear_modes.T @ self.model.mass
         q, p = back @ (alpha - self.equilibrium), back @ velocity
-        if self.body_mass is not None:
-            scale = self.sign * math.sqrt(self.body_mass)
-            own = [0.0 if np.isnan(value) else scale * float(value) for value in (shift, rate)]
+        for each in self.bodies:
+            scale = each.sign * math.sqrt(each.mass)
+            own = [np.broadcast_to(value, max(1, self.strikers))[each.contact] for value in (shift, rate)]
+            own = [0.0 if np.isnan(value) else scale * float(value) for value in own]
             q, p = np.append(q, own[0]), np.append(p, own[1])
         if self.circuit:
             q, p = np.append(q, 0.0), np.append(p, 0.0 if np.isnan(circuit) else circuit)
@@ -197,8 +224,8 @@ class Structure:
             digest.update(np.ascontiguousarray(self.circuit_row).tobytes())
         if self.base_load is not None:
             digest.update(np.ascontiguousarray(self.base_load).tobytes())
-        if self.body_mass is not None:
-            digest.update(np.array([self.body_mass]).tobytes())
+        if self.bodies:
+            digest.update(np.array([value for each in self.bodies for value in each.of_hash]).tobytes())
         for force in self.local_forces:
             kind = type(force.law).owner
             digest.update(f"{kind.__module__}.{kind.__qualname__}".encode())
@@ -210,7 +237,7 @@ class Structure:
 def structure_of(
     model: ReducedModel,
     side: str,
-    striker: Striker | None = None,
+    strikers: tuple[Striker, ...] = (),
     base: BaseExcitation | None = None,
     harvester: Harvester | None = None,
     force: ExternalForce | None = None,
@@ -219,7 +246,7 @@ def structure_of(
 ) -> Structure:
     """The structure of a reduced model, about the well that a striker from *side* pushes away from.
 
-    A striker that is a body of mass m_s on a spring k_s is one more linear mode, q_s = sqrt(m_s) times its displacement
+    Each striker that is a body of mass m_s on a spring k_s is one more linear mode, q_s = sqrt(m_s) times its displacement
     beyond the motion that its drive gives it: no tension, contact row -1/sqrt(m_s).  The *dividing_height*, in space, is
     that of the model by default; where local forces move it, the wells count as unequal.
     """
@@ -244,8 +271,12 @@ def structure_of(
         base_load=_base_load(model, base, force),
         local_forces=tuple(_local_force(model, equilibrium, each) for each in local_forces),
     )
-    if striker is not None and striker.mass is not None:
-        structure = _with_body(structure, striker, carried_by_base=base is not None and base.striker_on_base)
+    structure = dataclasses.replace(structure, strikers=len(strikers))
+    for contact, striker in enumerate(strikers):
+        if striker.mass is not None:
+            structure = _with_body(
+                structure, striker, contact, carried_by_base=base is not None and base.striker_on_base
+            )
     return structure if harvester is None else _with_circuit(structure, harvester)
 
 
@@ -286,10 +317,11 @@ def _uneven(model: ReducedModel, sign: float, dividing_height: float | None) -> 
     )
 
 
-def _with_body(structure: Structure, striker: Striker, carried_by_base: bool = False) -> Structure:
+def _with_body(structure: Structure, striker: Striker, contact: int, carried_by_base: bool) -> Structure:
     """The structure with the mode of a striker that is a body, which a base shakes too if it carries it."""
     assert striker.mass is not None
-    own = -structure.sign * math.sqrt(striker.mass) if carried_by_base else 0.0
+    body = StrikerBody(contact, striker.mass, 1.0 if striker.side == "below" else -1.0)
+    own = -body.sign * math.sqrt(striker.mass) if carried_by_base else 0.0
     count = structure.omega.size + 1
     coupling = np.zeros((count, count))
     coupling[:-1, :-1] = structure.coupling
@@ -304,7 +336,7 @@ def _with_body(structure: Structure, striker: Striker, carried_by_base: bool = F
         unequal_wells=None if structure.unequal_wells is None else _with_rest(structure.unequal_wells),
         base_load=None if structure.base_load is None else np.append(structure.base_load, own),
         local_forces=_longer(structure.local_forces),
-        body_mass=striker.mass,
+        bodies=(*structure.bodies, body),
     )
 
 

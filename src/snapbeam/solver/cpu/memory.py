@@ -178,7 +178,8 @@ def pack(
         terms=tuple(terms),
         circuit=circuit,
         others=others,
-        body=None if structure.body_mass is None else int(rows[structure.equilibrium.size]),
+        body=_body_of_first(structure, rows),
+        bodies=tuple(map(int, rows[structure.modes_of_bodies])) or None,
         velocity_block=None,
     )
     if damped:
@@ -192,6 +193,13 @@ def pack(
         tuple(own),
         unit,
     )
+
+
+def _body_of_first(structure: Structure, rows: NDArray[np.int64]) -> int | None:
+    """Element of a row that holds the mode of the first striker, or None."""
+    if not structure.bodies or structure.bodies[0].contact > 0:
+        return None
+    return int(rows[structure.equilibrium.size])
 
 
 def _damped(structure: Structure, several: type[Several] | None, law: type[ContactLaw]) -> int:

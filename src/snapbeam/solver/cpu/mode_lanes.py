@@ -90,7 +90,9 @@ class Layout(NamedTuple):
     others: Any
     """Of several strikers, an :class:`~snapbeam.solver.cpu.terms.further_contacts.FurtherContacts`; else None."""
     body: Any
-    """Element of a row that holds the mode of a striker with mass; None without one."""
+    """Element of a row that holds the mode of the first striker; None if it has no mass."""
+    bodies: Any
+    """Those of all strikers with mass, a tuple; None without any."""
     velocity_block: Any
     """Of several forces that depend on velocities, and of damped local forces, a
     :class:`~snapbeam.solver.cpu.terms.velocity_block.VelocityBlock`; else None."""
@@ -352,15 +354,17 @@ def _without_body(memory, body, contact, q, p, w, rate):
 @inlined
 def beam_energy(memory, layout, q, p, energy):
     """The part of the modal *energy* that is in the beam: neither in a striker's mass nor in a circuit."""
-    beam = _without_energy_of(memory, layout.body, layout.omega, q, p, energy)
+    beam = _without_energy_of(memory, layout.bodies, layout.omega, q, p, energy)
     return without_circuit(memory, layout.circuit, p, beam)
 
 
 @inlined
-def _without_energy_of(memory, body, omega, q, p, energy):
-    if body is None:
+def _without_energy_of(memory, bodies, omega, q, p, energy):
+    if bodies is None:
         return energy
-    return energy - mode_energy(memory[omega + body], memory[q + body], memory[p + body])
+    for i in range(len(bodies)):
+        energy = energy - mode_energy(memory[omega + bodies[i]], memory[q + bodies[i]], memory[p + bodies[i]])
+    return energy
 
 
 @inlined
@@ -368,15 +372,17 @@ def beam_power(memory, layout, p, k, force, power, high):
     """The part of the rates of the modal energies that is the beam's; 0 with a circuit, whose force is not in *k*."""
     if layout.circuit is not None:
         return 0.0, 0.0
-    return _without_power_of(memory, layout, layout.body, p, k, force, power), high
+    return _without_power_of(memory, layout, layout.bodies, p, k, force, power), high
 
 
 @inlined
-def _without_power_of(memory, layout, body, p, k, force, power):
-    if body is None:
+def _without_power_of(memory, layout, bodies, p, k, force, power):
+    if bodies is None:
         return power
-    c, damping = memory[layout.contact + body], memory[layout.damping + body]
-    return power - mode_power(damping, memory[k + body], c, force, memory[p + body])
+    for i in range(len(bodies)):
+        c, damping = memory[layout.contact + bodies[i]], memory[layout.damping + bodies[i]]
+        power = power - mode_power(damping, memory[k + bodies[i]], c, force, memory[p + bodies[i]])
+    return power
 
 
 @inlined

@@ -95,7 +95,7 @@ def lay_out_few(ensemble: Ensemble, packed: Packed, subintervals: int) -> FewMem
     )
     blocks = tuple(int(size) for size in packed.members)
     body = None
-    if structure.body_mass is not None:
+    if structure.bodies:
         body = int(np.flatnonzero(order == structure.equilibrium.size)[0])
     lane_settings = LaneSettings(stages, structure.nonlinear_stiffness, structure.stretch, slot, sampling)
     return FewMemory(
