@@ -167,7 +167,7 @@ def pack(
             own.append({name: values.size for name, values in single.items()})
     moving = bool(np.all(omega * np.sqrt(1.0 - zeta * zeta) > 0.0))
     gentle = _LONGEST_DECAY / max(float((zeta * omega).max()), _SLOWEST) if moving else 0.0
-    unit, numbers = (placed.pop("unit"), placed.pop("velocity_block")) if damped else (0, 0)
+    unit, block = (placed.pop("unit"), placed.pop("velocity_block")) if damped else (0, 0)
     layout = Layout(
         size=size,
         **placed,
@@ -183,7 +183,7 @@ def pack(
         velocity_block=None,
     )
     if damped:
-        layout = layout._replace(velocity_block=_velocity_block(layout, law, unit, numbers))
+        layout = layout._replace(velocity_block=_velocity_block(layout, law, unit, block))
     return Packed(
         np.concatenate(list(arrays.values())),
         np.array(blocks, dtype=np.int64),
