@@ -453,7 +453,6 @@ def _refused_systems() -> dict[str, Any]:
         "two external forces": struck(elastic, forces=[push, push]),
         "an external force with a base": struck(elastic, forces=[push], base_excitation=base),
         "two harvesters": struck(elastic, harvesters=[harvester, harvester]),
-        "five contacts": struck(elastic, *4 * [(hertz, stop)]),
         "several strikers, the first with a record": struck((hertz, record), (hertz, stop)),
         "several strikers, another with a record": struck(elastic, (hertz, record)),
         "a record with a base": struck((hertz, record), base_excitation=base),

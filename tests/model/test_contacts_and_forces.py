@@ -165,7 +165,6 @@ def test_questions_of_more_than_a_run_can_have():
     for message, parts in (
         ("forces: the solver has one row of excitation", {}),
         ("harvesters: 2 circuits; must be at most 1", {"forces": []}),
-        ("contacts: 6; must be at most 4", {"forces": [], "harvesters": []}),
     ):
         for run in (sb.simulate, lambda system: sb.sweep(system, {"contact.2.gap": [1e-5]})):
             with pytest.raises(InputError, match=message):

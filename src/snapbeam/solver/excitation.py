@@ -9,6 +9,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload
 
+from snapbeam.model.drive.combined import parts_of
 from snapbeam.solver.compilation import INLINE, inlined, overloaded
 from snapbeam.solver.contact_force import scalar_function
 from snapbeam.solver.physics import shaker_motion, sincos
@@ -19,6 +20,7 @@ __all__ = [
     "joined_motion",
     "kind_acceleration",
     "kind_motion",
+    "motion_by_number",
     "numbers_of",
     "part_acceleration",
     "part_motion",
@@ -170,6 +172,32 @@ def part_motion(owner: Any, part: str) -> Any:
 def part_acceleration(owner: Any, part: str) -> Any:
     """The same of its acceleration, m/s^2."""
     return _of_part(owner, part, "acceleration")
+
+
+def motion_by_number(owner: Any, kind: str) -> Any:
+    """A function of numbers, memory, the argument and j: displacement and velocity of the part *kind* j, if it moves."""
+    return _by_number({j: part_motion(owner, part) for j, part in parts_of(owner, kind).items()}, _no_motion)
+
+
+def _by_number(functions: dict[int, Any], other: Any) -> Any:
+    """A function that calls the one of its last parameter, chosen as the integration goes, or else *other*."""
+    if not functions:
+
+        @inlined
+        def none(drive, memory, argument, number):
+            return other(drive, memory, argument)
+
+        return none
+    (first, own), *later = functions.items()
+    rest = _by_number(dict(later), other)
+
+    @inlined
+    def chosen(drive, memory, argument, number):
+        if number == first:
+            return own(drive, memory, argument)
+        return rest(drive, memory, argument, number)
+
+    return chosen
 
 
 def joined_motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from snapbeam.model.drive.combined import MOST_STRIKERS
 from snapbeam.model.quantity import section_of
 from snapbeam.model.system import System
 from snapbeam.util.validation import InputError, shown
@@ -28,10 +27,6 @@ def check_integrable(system: System) -> None:
     if len(system.harvesters) > 1:
         raise InputError(
             f"harvesters: {len(system.harvesters)} circuits; must be at most 1 in a run; leave the others out"
-        )
-    if len(contacts) > MOST_STRIKERS:
-        raise InputError(
-            f"contacts: {len(contacts)}; must be at most {MOST_STRIKERS} in a run; leave some out"
         )
     beside = "several strikers" if len(contacts) > 1 else surroundings[0].noun if surroundings else ""
     for number, each in enumerate(contacts, 1):

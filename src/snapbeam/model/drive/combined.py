@@ -11,13 +11,9 @@ from typing import Any, ClassVar
 
 from snapbeam.model.drive.base import DRIVES, HORIZON, Drive
 
-__all__ = ["HORIZON", "MOST_STRIKERS", "PARTS", "Joined", "joined"]
+__all__ = ["HORIZON", "Joined", "joined", "parts_of"]
 
 
-MOST_STRIKERS = 4
-"""Of one beam."""
-PARTS = ("tip", *(f"tip{i}" for i in range(1, MOST_STRIKERS)), "base", "load")
-"""What may move; tip1 is the tip of the second striker."""
 _SEPARATOR = "__"
 
 
@@ -35,7 +31,7 @@ class Joined(Drive):
 
 def joined(kinds: Mapping[str, type[Drive]]) -> type[Joined]:
     """The class of a mixture: the kinds of what moves, by part."""
-    named = [(part, kinds[part]) for part in PARTS if part in kinds]
+    named = list(kinds.items())
     for part, kind in named:
         if _known(part, kind.name) is not kind:
             raise TypeError(f"{kind.__name__}: is registered under no name")
@@ -44,6 +40,12 @@ def joined(kinds: Mapping[str, type[Drive]]) -> type[Joined]:
         globals()[name] = _made(name, named)
     found: type[Joined] = globals()[name]
     return found
+
+
+def parts_of(owner: type[Drive], kind: str) -> dict[int, str]:
+    """Parts of a kind that has numbers, by number: ``tip1`` is the tip of the second striker."""
+    names = [part for part, _ in owner.parts]
+    return {int(part[len(kind) :]): part for part in names if part[: len(kind)] == kind and part != kind}
 
 
 def _known(part: str, name: str) -> type[Drive] | None:
