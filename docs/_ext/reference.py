@@ -397,6 +397,15 @@ def _parts() -> dict[str, Any]:
         "an external force": struck(
             forces=[sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=0.9, amplitude=0.1), location=0.4)]
         ),
+        "two external forces and a base": struck(
+            forces=[
+                sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=ratio, amplitude=0.1), location=0.4)
+                for ratio in (0.9, 1.8)
+            ],
+            base_excitation=sb.BaseExcitation(
+                motion=sb.AccelerationSine(frequency_ratio=0.6, acceleration_amplitude=0.25)
+            ),
+        ),
         "a local force": struck(forces=[spring]),
         "a local force with damping": struck(forces=[drag]),
         "several local forces, one with damping, and an external force": struck(
@@ -422,7 +431,7 @@ def _refused_systems() -> dict[str, Any]:
     first = parts["the paper's"].striker
     stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5)
     heavy = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5, mass=2e-3)
-    push = parts["an external force"].external_force
+    push = parts["an external force"].external_forces[0]
     matrices = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0)
     chirp = parts["drive `chirp`"].striker.drive
     half = parts["drive `half_sine`"].striker.drive
@@ -450,8 +459,6 @@ def _refused_systems() -> dict[str, Any]:
         "a contact that loses energy with a harvester": struck(losing, harvesters=[harvester]),
         "a further contact that loses energy": struck(elastic, (lossy, stop)),
         "a further striker with a mass": struck(elastic, (hertz, heavy)),
-        "two external forces": struck(elastic, forces=[push, push]),
-        "an external force with a base": struck(elastic, forces=[push], base_excitation=base),
         "two harvesters": struck(elastic, harvesters=[harvester, harvester]),
         "several strikers, the first with a record": struck((hertz, record), (hertz, stop)),
         "several strikers, another with a record": struck(elastic, (hertz, record)),

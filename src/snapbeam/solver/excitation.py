@@ -16,6 +16,8 @@ from snapbeam.solver.physics import shaker_motion, sincos
 
 __all__ = [
     "Tip",
+    "acceleration_by_number",
+    "bound_by_number",
     "drive_rate",
     "joined_motion",
     "kind_acceleration",
@@ -177,6 +179,29 @@ def part_acceleration(owner: Any, part: str) -> Any:
 def motion_by_number(owner: Any, kind: str) -> Any:
     """A function of numbers, memory, the argument and j: displacement and velocity of the part *kind* j, if it moves."""
     return _by_number({j: part_motion(owner, part) for j, part in parts_of(owner, kind).items()}, _no_motion)
+
+
+def acceleration_by_number(owner: Any, kind: str) -> Any:
+    """The same of the acceleration, or of a force."""
+    parts = parts_of(owner, kind)
+    return _by_number({j: part_acceleration(owner, part) for j, part in parts.items()}, _nothing)
+
+
+def bound_by_number(owner: Any, kind: str) -> Any:
+    """The same of the bound on the acceleration, or on a force."""
+    parts = parts_of(owner, kind)
+    return _by_number({j: _number(owner, f"{part}_hardest") for j, part in parts.items()}, _nothing)
+
+
+def _number(owner: Any, name: str) -> Any:
+    """A function that reads one number of a drive."""
+    at = owner.number_names.index(name)
+
+    @inlined
+    def read(drive, memory, argument):
+        return drive[at]
+
+    return read
 
 
 def _by_number(functions: dict[int, Any], other: Any) -> Any:

@@ -19,11 +19,6 @@ def check_integrable(system: System) -> None:
     InputError
     """
     contacts, surroundings = system.contacts, system.surroundings
-    if sum(each.has_excitation_row for each in surroundings) > 1:
-        raise InputError(
-            "forces: the solver has one row of excitation, for a base excitation or one external force; leave the others "
-            "out, or make a force along one row of their sum"
-        )
     if len(system.harvesters) > 1:
         raise InputError(
             f"harvesters: {len(system.harvesters)} circuits; must be at most 1 in a run; leave the others out"

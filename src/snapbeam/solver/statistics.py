@@ -353,7 +353,7 @@ _ROWS = (
     Statistic("impulse", "float64", "N s", "impulse on the beam, all impacts", _seen("total_impulse")),
     Statistic("striker_work", "float64", "J", "work done by the striker", _seen("work")),
     Statistic(
-        "gross_work", "float64", "J", "work done by the striker, the base and the axial load, taken as positive",
+        "gross_work", "float64", "J", "work done by strikers, base, axial load and external forces, taken as positive",
         _seen("gross_work"),
     ),
     Statistic("mean_power", "float64", "W", "work done by the striker over the time of the run", _mean_power),
