@@ -14,10 +14,8 @@ from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.drive.base import HORIZON, Drive
 from snapbeam.model.drive.combined import joined
-from snapbeam.model.drive.recorded_acceleration import RecordedAcceleration
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.early_termination import decidable_energy, passed_heights
-from snapbeam.model.external_force import RecordedForce
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import RUN as RUN_SCOPE
 from snapbeam.model.quantity import numbered, quantities, section_of, split_name
@@ -426,15 +424,15 @@ def make_ensemble(
 
 
 def _require_record(system: System, table: NDArray[Any], driven: Driven) -> None:
-    """Refuse runs that last longer than a recorded force or acceleration."""
-    records = [each for _, each in system.moving if isinstance(each, (RecordedForce, RecordedAcceleration))]
+    """Refuse runs that last longer than the shortest record."""
+    records: list[Any] = [each for _, each in system.moving if each.samples().size]
     if not records:
         return
     record = min(records, key=lambda each: each.duration)
     omega = driven.numbers[:, driven.kind.number_names.index("omega")]
     ends = float((table["end"] * table["tick"] + table["phase"] / omega).max())
-    if ends > record.duration * (1.0 + 1e-9):
-        what = "force" if isinstance(record, RecordedForce) else "acceleration"
+    if ends > record.duration * (1.0 + 1e-9) + float(table["tick"].max()):
+        what = record.name.removeprefix("recorded_")
         raise InputError(
             f"cycles: the run ends after {ends:g} s, but the recorded {what} lasts {record.duration:g} s; ask for fewer "
             "cycles, or give a longer record"

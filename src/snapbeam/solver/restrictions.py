@@ -8,8 +8,6 @@ from snapbeam.util.validation import InputError, shown
 
 __all__ = ["check_integrable"]
 
-_RECORD = "a recording has its own time axis; use a drive given by a formula, or a FixedStop"
-
 
 def check_integrable(system: System) -> None:
     """Refuse a system that the solver cannot integrate.
@@ -40,10 +38,6 @@ def check_integrable(system: System) -> None:
             raise InputError(
                 f"{section}.mass = {striker.mass:g}: of several strikers the first alone may be a body, since the "
                 "reduced structure contains one body; leave the mass out, or make this one the first"
-            )
-        if striker.drive.samples().size and (len(contacts) > 1 or len(system.moving) > 1):
-            raise InputError(
-                f"{section_of('drive', number)} = {striker.drive.name!r} with {beside}: {_RECORD}"
             )
     rate_dependent = [
         f"{section_of('contact', number)} = {shown(each.law)}"
