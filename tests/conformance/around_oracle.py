@@ -46,11 +46,13 @@ class Surroundings:
     """Of a stop, m, from below, at LOCATION; None: there is none."""
     striker_on_base: bool = True
     """Whether the stop moves with the base."""
+    forces: tuple[tuple[float, Callable[[float], float]], ...] = ()
+    """Place over the length, and force in N over time."""
 
 
 @dataclass
 class Found:
-    """At the times asked for: displacements over b, z, work of base and load, energy lost in the circuit."""
+    """At the times asked for: displacements over b, z, work of base and load, energy lost in the circuit, work of forces."""
 
     displacement: Array
     midspan_displacement: Array
@@ -58,6 +60,7 @@ class Found:
     base_work: Array
     load_work: Array
     circuit: Array
+    force_work: Array
 
 
 def integrals(k: Array) -> Array:
@@ -94,6 +97,7 @@ def live(beam: PaperBeam, around: Surroundings, times: Array, rtol: float = 1e-1
     linear[:n, n:] = np.eye(n)
     linear[n:] = np.hstack((-beam.inverse * beam.stiffness, -beam.damping))
     mass_pull = DENSITY * THICKNESS * WIDTH * integrals(beam.k)
+    rows = [(beam.shape(place * LENGTH), force) for place, force in around.forces]
 
     def depth(t: float, y: Array, pressing: bool = False) -> float:
         if around.gap is None:
@@ -103,7 +107,7 @@ def live(beam: PaperBeam, around: Surroundings, times: Array, rtol: float = 1e-1
 
     def rate(t: float, y: Array, pressing: bool) -> Array:
         a, v, z = y[:n], y[n : 2 * n], y[2 * n]
-        out = np.zeros(2 * n + 4)
+        out = np.zeros(2 * n + 5)
         out[: 2 * n] = linear @ y[: 2 * n]
         out[n : 2 * n] -= beam.inverse @ ((beam.gamma * (a @ a)) * a)
         acceleration, change = around.base(t)[2], around.load(t)
@@ -119,6 +123,9 @@ def live(beam: PaperBeam, around: Surroundings, times: Array, rtol: float = 1e-1
             out[n : 2 * n] += push * (CONTACT_STIFFNESS * max(depth(t, y), 0.0) ** 1.5)
         out[2 * n + 1] = -acceleration * float(mass_pull @ v)
         out[2 * n + 2] = change * float(a @ v)
+        for row, force in rows:
+            out[n : 2 * n] += force(t) * (beam.inverse @ row)
+            out[2 * n + 4] += force(t) * float(row @ v)
         return out
 
     def opens(t: float, y: Array, pressing: bool) -> float:
@@ -132,8 +139,8 @@ def live(beam: PaperBeam, around: Surroundings, times: Array, rtol: float = 1e-1
     size, speed = abs(beam.rest[0]), abs(beam.rest[0]) * beam.omega[0]
     energy = beam.mass[0, 0] * speed**2
     circuit = max(float(np.abs(theta).max()) * speed / max(around.loss, 1e-300), 1e-12)
-    scale = np.concatenate((np.full(n, size), np.full(n, speed), [circuit], np.full(3, energy)))
-    t, y, pressing, states, taken = 0.0, np.concatenate((beam.rest, np.zeros(n + 4))), False, [], []
+    scale = np.concatenate((np.full(n, size), np.full(n, speed), [circuit], np.full(4, energy)))
+    t, y, pressing, states, taken = 0.0, np.concatenate((beam.rest, np.zeros(n + 5))), False, [], []
     longest = 1e-4 if n <= 2 else 2e-5
     while t < times[-1]:
         part = solve_ivp(

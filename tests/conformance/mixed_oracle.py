@@ -92,6 +92,8 @@ class Around:
     inertia: float = 0.0
     loss: float = 1.0
     """m alpha'' + ... = theta z, M z' = -theta . alpha' - loss z."""
+    forces: tuple[tuple[float, Callable[[float], float]], ...] = ()
+    """Place over the length, and force in N over time."""
     breaks: tuple[float, ...] = field(default=())
     """s, where something is not smooth."""
 
@@ -123,6 +125,8 @@ def solve(beam: MixedBeam, tips: Sequence[Tip], around: Around, times: Array, rt
         force = -beam.gradient(a)
         if around.load is not None:
             force = force + around.load(t) * a
+        for place, history in around.forces:
+            force = force + history(t) * beam.shape(place * LENGTH)
         out[:n] = v
         if around.coupling is not None:
             if around.inertia > 0.0:

@@ -25,7 +25,9 @@ def ledger(run: sb.Run) -> float:
     """What the ledger misses at its worst, over the gross work."""
     data = run.dataset
     stored = sum(data[name] for name in ("energy_beam", "energy_contact", "energy_striker") if name in data)
-    given = sum(data[name] for name in ("striker_work", "base_work", "load_work") if name in data)
+    given = sum(
+        data[name] for name in ("striker_work", "base_work", "load_work", "force_work") if name in data
+    )
     taken = sum(
         data[name] for name in ("energy_dissipated", "energy_harvested", "energy_circuit") if name in data
     )
@@ -76,6 +78,60 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
         assert ledger(run) < 1e-4
     if stop != "none":
         assert run.summary.impacts > 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("side", ["below", "above"])
+def test_beside_two_forces(side) -> None:
+    """Against an independent solution: displacements, the works of base and forces, and the mirrored system."""
+    ratio, strength, gap, sign = 0.9, 0.15, 0.05 * LEVEL, 1.0 if side == "below" else -1.0
+    first = float(PaperBeam(3).omega[0])
+    omega, hardest = ratio * first, strength * LEVEL * first**2
+
+    def base(t: float) -> tuple[float, float, float]:
+        s, c = math.sin(omega * t), math.cos(omega * t)
+        return hardest / omega**2 * s, hardest / omega * c, -hardest * s
+
+    pushes = ((0.3, 1.7, 0.02, 0.4), (0.62, 2.3, 0.015, -1.0))
+    forces = tuple(
+        (place, lambda t, a=amplitude, r=rate, at=at: a * math.sin(r * first * t + at))
+        for place, rate, amplitude, at in pushes
+    )
+    times = np.linspace(0.0, 3 * 2.0 * math.pi / omega, 801) * (1.0 - 1e-13)
+    truth = live(PaperBeam(3), Surroundings(base, gap=gap, striker_on_base=False, forces=forces), times)
+    striker = sb.Striker(drive=sb.FixedStop(), gap=gap, location=LOCATION, side=side)
+    system = sb.System(
+        model(3),
+        contacts=[sb.Contact(default_values.CONTACT, striker)],
+        base_excitation=sb.BaseExcitation(
+            motion=sb.AccelerationSine(frequency_ratio=ratio, acceleration_amplitude=strength),
+            striker_on_base=False,
+            direction="up" if side == "below" else "down",
+        ),
+        forces=[
+            sb.ExternalForce(
+                history=sb.HarmonicForce(
+                    frequency_ratio=rate, amplitude=amplitude, phase=at if side == "below" else at + math.pi
+                ),
+                location=place,
+            )
+            for place, rate, amplitude, at in pushes
+        ],
+    )
+    for accuracy, bound in (("standard", 1e-3), ("reference", 1e-7)):
+        run = sb.simulate(system, sb.Integration(cycles=3, accuracy=accuracy), sample_times=times)
+        data = run.dataset
+        for name in ("displacement_at_striker", "midspan_displacement"):
+            expected = sign * getattr(truth, name.removesuffix("_at_striker"))
+            np.testing.assert_allclose(data[name], expected, rtol=0.0, atol=bound)
+        for name in ("base_work", "force_work"):
+            expected = getattr(truth, name)
+            size = float(np.abs(expected).max())
+            np.testing.assert_allclose(data[name], expected, rtol=0.0, atol=max(bound, 1e-6) * size)
+        assert ledger(run) < 1e-4
+    assert run.summary.impacts > 1
+    expected = sign * np.array([[force(t) for _, force in forces] for t in times])
+    np.testing.assert_allclose(data.external_forces, expected, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.slow

@@ -6,8 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from mixed_oracle import Around, MixedBeam, Tip, solve
+from oracle import LEVEL, LOCATION
 from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
+from several_oracle import hertz
 
 import snapbeam as sb
 from snapbeam.model import default_values
@@ -54,11 +57,6 @@ def test_units_identity_and_refusals() -> None:
         sb.RecordedAcceleration(record=[0.0, 1.0, np.nan, 0.0], sampling_frequency=RATE)
     with pytest.raises(InputError, match="'recorded_acceleration' in a sum"):
         motion + sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.1)
-    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
-    with pytest.raises(InputError, match="'recorded_acceleration' with a changing axial load"):
-        load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0))
-        contacts = [sb.Contact(default_values.CONTACT, sb.Striker(drive=motion))]
-        sb.simulate(sb.System(model, contacts=contacts, axial_load=load))
 
 
 def shaken(direction: str = "up", **parts) -> sb.System:
@@ -130,3 +128,87 @@ def test_a_record_of_a_sine_acts_as_the_sine(side: str, on_base: bool) -> None:
         found.append(run.dataset["midspan_displacement"].values)
         assert run.summary.impacts > 0
     np.testing.assert_allclose(found[1], found[0], rtol=0.0, atol=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["a moving base", "a second striker", "four records"])
+def test_records_beside_other_motions(case: str) -> None:
+    """Each by its own samples and their rate, from the first: against SciPy, and the run must end with the shortest."""
+    model, ends = sb.ReducedModel.from_beam(default_values.BEAM, modes=2), (None, None, None)
+    first, cycles = 2.0 * math.pi * model.reference_frequency, 2
+    reach, ratio, lasts = 0.1 * LEVEL, 1.21, 2.4 / model.reference_frequency
+    rates = {
+        name: n * model.reference_frequency for name, n in (("tip", 90.0), ("base", 130.0), ("force", 70.0))
+    }
+    at = {name: np.arange(int(lasts * rate)) / rate for name, rate in rates.items()}
+    turned = ratio * first * at["tip"]
+    moved, speed = reach * np.sin(turned), reach * ratio * first * np.cos(turned)
+    shaken = 0.1 * LEVEL * first**2 * np.sin(2.3 * first * at["base"])
+    pushed = 0.01 * np.cos(1.7 * first * at["force"])
+    record = sb.RecordedMotion(
+        displacement=moved,
+        velocity=speed,
+        sampling_frequency=rates["tip"],
+        frequency=ratio * model.reference_frequency,
+    )
+    tip, acceleration = CubicHermiteSpline(at["tip"], moved, speed), CubicSpline(at["base"], shaken)
+    drift = float(acceleration.antiderivative(2)(at["base"][-1])) / at["base"][-1]
+
+    def recorded(sign: float):
+        """The record counts in space, a tip as it pushes."""
+        return lambda t: (sign * float(tip(t)), sign * float(tip(t, 1)))
+
+    def sine(t: float) -> tuple[float, float]:
+        w = 1.6 * first
+        return 0.05 * LEVEL * math.sin(w * t), 0.05 * LEVEL * w * math.cos(w * t)
+
+    def base(t: float) -> tuple[float, float, float]:
+        if case == "four records":
+            velocity = acceleration.antiderivative()(t) - drift
+            return (
+                float(acceleration.antiderivative(2)(t)) - drift * t,
+                float(velocity),
+                float(acceleration(t)),
+            )
+        s, c, w, hardest = (
+            math.sin(0.7 * first * t),
+            math.cos(0.7 * first * t),
+            0.7 * first,
+            0.15 * LEVEL * first**2,
+        )
+        return hardest / w**2 * s, hardest / w * c, -hardest * s
+
+    force = CubicSpline(at["force"], pushed)
+    tips = [Tip(recorded(1.0), lambda d, v: hertz(d), LOCATION)]
+    strikers = [sb.Striker(drive=record, location=LOCATION)]
+    around, own = Around(), {}
+    if case != "a moving base":
+        tips.append(Tip(recorded(-1.0), lambda d, v: hertz(d), 0.3, -1.0, 0.1 * LEVEL))
+        strikers.append(sb.Striker(drive=record, location=0.3, side="above", gap=0.1 * LEVEL))
+    if case == "a second striker":
+        tips[0] = Tip(sine, lambda d, v: hertz(d), LOCATION)
+        strikers[0] = sb.Striker(
+            drive=sb.DisplacementSine(frequency_ratio=1.6, displacement_amplitude=0.05), location=LOCATION
+        )
+    else:
+        around = Around(base=base, striker_on_base=False)
+        motion = sb.AccelerationSine(frequency_ratio=0.7, acceleration_amplitude=0.15)
+        if case == "four records":
+            around = Around(base=base, striker_on_base=False, forces=((0.4, lambda t: float(force(t))),))
+            motion = sb.RecordedAcceleration(record=shaken, sampling_frequency=rates["base"])
+            history = sb.RecordedForce(record=pushed, sampling_frequency=rates["force"])
+            own["forces"] = [sb.ExternalForce(history=history, location=0.4)]
+        own["base_excitation"] = sb.BaseExcitation(motion=motion, striker_on_base=False)
+    times = np.linspace(0.0, cycles / 1.6 / model.reference_frequency, 301) * (1.0 - 1e-13)
+    truth = solve(MixedBeam(2, ends, {}), tips, around, times)
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, each) for each in strikers], **own)
+    for accuracy, bound in (("standard", 1e-3), ("reference", 1e-6)):
+        run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
+        found = [run.dataset[name] for name in ("displacement_at_striker", "midspan_displacement")]
+        np.testing.assert_allclose(np.stack(found, 1), truth[:, :2], rtol=0.0, atol=bound)
+        assert abs(run.dataset.attrs["energy_error"]) < 1e-4
+    assert run.summary.impacts > 0
+    if case != "a moving base":
+        assert run.summary.impacts_contact_2 > 0
+    with pytest.raises(InputError, match="recorded"):
+        sb.simulate(system, sb.Integration(cycles=5))

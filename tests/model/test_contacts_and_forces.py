@@ -153,7 +153,7 @@ def test_refused_labels(label):
 
 
 def test_questions_of_more_than_a_run_can_have():
-    """Six stops, two harvesters and two external forces: equilibria are found, a run is refused with the reason."""
+    """Two harvesters beside two external forces: equilibria are found, a run is refused with the reason."""
     coil = sb.ElectromagneticHarvester(force_factor=1.0, resistance=10.0)
     weight = sb.ExternalForce(history=sb.ConstantForce(force=-2e-3), location=0.5)
     system = sb.System(
@@ -162,14 +162,9 @@ def test_questions_of_more_than_a_run_can_have():
     one = sb.System(MODEL, forces=[sb.ExternalForce(history=sb.ConstantForce(force=-4e-3), location=0.5)])
     for each, same in zip(system.potential.equilibria, one.potential.equilibria, strict=True):
         np.testing.assert_allclose(each.amplitude, same.amplitude, rtol=1e-9, atol=1e-12)
-    for message, parts in (
-        ("forces: the solver has one row of excitation", {}),
-        ("harvesters: 2 circuits; must be at most 1", {"forces": []}),
-        ("contacts: 6; must be at most 4", {"forces": [], "harvesters": []}),
-    ):
-        for run in (sb.simulate, lambda system: sb.sweep(system, {"contact.2.gap": [1e-5]})):
-            with pytest.raises(InputError, match=message):
-                run(system.replace(**parts))
+    for run in (sb.simulate, lambda system: sb.sweep(system, {"contact.2.gap": [1e-5]})):
+        with pytest.raises(InputError, match="harvesters: 2 circuits; must be at most 1"):
+            run(system)
 
 
 @pytest.mark.slow

@@ -305,6 +305,8 @@ def _summary_text(summary: Any, elapsed: float, system: Any) -> str:
         ]
     if system.base_excitation is not None:
         lines.append(f"  work of the base      {prefixed(summary.base_work, 'J', 4)}")
+    if system.external_forces:
+        lines.append(f"  work of the forces    {prefixed(summary.force_work, 'J', 4)}")
     lines.append(f"  dissipated            {lost}")
     if system.harvester is not None:
         lines += _harvest_lines(summary)

@@ -184,8 +184,6 @@ class AxialLoadModulation:
 
     noun: ClassVar[str] = "a changing axial load"
     """In messages."""
-    has_excitation_row: ClassVar[bool] = False
-    """Whether it pushes along a row as time goes."""
     rate_dependent: ClassVar[bool] = False
     """Whether its force depends on the velocity of the structure."""
 

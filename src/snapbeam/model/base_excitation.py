@@ -69,8 +69,6 @@ class BaseExcitation:
 
     noun: ClassVar[str] = "a moving base"
     """In messages."""
-    has_excitation_row: ClassVar[bool] = True
-    """Whether it pushes along a row as time goes."""
     rate_dependent: ClassVar[bool] = False
     """Whether its force depends on the velocity of the structure."""
 

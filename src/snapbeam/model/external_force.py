@@ -317,8 +317,6 @@ class ExternalForce:
 
     noun: ClassVar[str] = "an external force"
     """In messages."""
-    has_excitation_row: ClassVar[bool] = True
-    """Whether it pushes along a row as time goes."""
     rate_dependent: ClassVar[bool] = False
     """Whether its force depends on the velocity of the structure."""
 

@@ -43,8 +43,6 @@ class Harvester:
     name: ClassVar[str] = ""
     noun: ClassVar[str] = "a harvester"
     """In messages."""
-    has_excitation_row: ClassVar[bool] = False
-    """Whether it pushes along a row as time goes."""
     rate_dependent: ClassVar[bool] = True
     """Whether its force depends on the velocity of the structure."""
     resistance: float

@@ -106,8 +106,6 @@ class LocalForce:
     """In parameter files and attributes."""
     noun: ClassVar[str] = "a local force"
     """In messages."""
-    has_excitation_row: ClassVar[bool] = False
-    """Whether it pushes along a row as time goes."""
     constant_part: ClassVar[float] = 0.0
     """Part of the force that does not depend on the motion, N."""
     dissipative: ClassVar[bool] = False

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -79,7 +79,7 @@ class Potential:
         for each in forces:
             if each.constant_part != 0.0:
                 constant = constant + each.constant_part * each.row(model)
-        local: list[Any] = [each for each in forces if not each.has_excitation_row]
+        local = [each for each in forces if not isinstance(each, ExternalForce)]
         return cls(model, constant, tuple(each for each in local if each.is_conservative))
 
     @cached_property

@@ -230,7 +230,7 @@ class System:
 
         A striker that stands still moves nothing where a base or an axial load does.
         """
-        around = (self.base_excitation, self.axial_load, self.external_force)
+        around = (self.base_excitation, self.axial_load, *self.external_forces)
         drives = [
             (section_of("drive", number), each.striker.drive) for number, each in enumerate(self.contacts, 1)
         ]
@@ -260,14 +260,12 @@ class System:
     @property
     def local_forces(self) -> tuple[LocalForce, ...]:
         """The forces that depend on the displacement or velocity of a point."""
-        found: tuple[Any, ...] = tuple(each for each in self.forces if not each.has_excitation_row)
-        return found
+        return tuple(each for each in self.forces if not isinstance(each, ExternalForce))
 
     @property
-    def external_force(self) -> ExternalForce | None:
-        """The first force that depends on time."""
-        found: list[Any] = [each for each in self.forces if each.has_excitation_row]
-        return found[0] if found else None
+    def external_forces(self) -> tuple[ExternalForce, ...]:
+        """The forces that depend on time."""
+        return tuple(each for each in self.forces if isinstance(each, ExternalForce))
 
     @property
     def harvester(self) -> Harvester | None:
@@ -287,7 +285,7 @@ class System:
 
     @cached_property
     def potential(self) -> Potential:
-        """Potential energy of the structure, the local forces and the constant part of the external force, with its wells."""
+        """Potential energy of the structure, the local forces and the constant parts of the external forces, with its wells."""
         return Potential.of(self.model, self.forces)
 
     @cached_property

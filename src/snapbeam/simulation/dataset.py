@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.model.quantity import numbered
 from snapbeam.model.system import System
 from snapbeam.solver.assemble import motions_of, tip_of
 from snapbeam.solver.contact_force import felt_force
@@ -51,6 +52,7 @@ SCHEMA: dict[str, Variable] = {
     "cycle": Variable(("time",), "1", "cycles of excitation"),
     "mode": Variable(("mode",), "1", "buckling mode"),
     "striker": Variable(("striker",), "1", "number of the striker"),
+    "force": Variable(("force",), "1", "number of the external force"),
     "displacement_at_striker": Variable(("time",), "1", "beam displacement at the striker, over b"),
     "midspan_displacement": Variable(("time",), "1", "beam displacement at mid-span, over b"),
     "velocity_at_striker": Variable(("time",), "1", "beam velocity at the striker, over b omega_1"),
@@ -74,7 +76,8 @@ SCHEMA: dict[str, Variable] = {
     "base_velocity": Variable(("time",), "1", "velocity of the base, over b omega_1"),
     "base_work": Variable(("time",), "J", "work done by the base, in its frame"),
     "external_force": Variable(("time",), "N", "external force"),
-    "force_work": Variable(("time",), "J", "work done by the external force"),
+    "external_forces": Variable(("time", "force"), "N", "each of several external forces"),
+    "force_work": Variable(("time",), "J", "work done by external forces"),
     "load_change": Variable(("time",), "N", "change of the axial load"),
     "load_work": Variable(("time",), "J", "work done by the change of the axial load"),
     "local_force_work": Variable(("time",), "J", "work done by the damping part of a local force"),
@@ -85,11 +88,9 @@ SCHEMA: dict[str, Variable] = {
     "energy_lost_contact": Variable(("time",), "J", "part of the dissipated energy that was lost in contact"),
     "valid": Variable(("time",), "1", "whether the sample was measured"),
 }
-"""Variables of a run by name; ``time``, ``cycle``, ``mode`` and ``striker`` are coordinates."""
+"""Variables of a run by name; ``time``, ``cycle``, ``mode``, ``striker`` and ``force`` are coordinates."""
 
-_MODAL = ("modal_amplitude", "modal_velocity")
-_OF_STRIKERS = ("striker_displacements", "striker_penetrations", "striker_forces")
-_COORDINATES = ("time", "cycle", "mode", "striker")
+_COORDINATES = ("time", "cycle", "mode", "striker", "force")
 
 
 def trajectory_dataset(
@@ -138,10 +139,9 @@ def trajectory_dataset(
         if array.dtype.kind not in "biuf":
             raise InputTypeError(f"{name}: must be an array of numbers, not of {array.dtype}")
         data[name] = _labelled(name, array)
-        if name in _MODAL and array.ndim == 2:
-            coords["mode"] = _labelled("mode", np.arange(1, array.shape[1] + 1))
-        if name in _OF_STRIKERS and array.ndim == 2:
-            coords["striker"] = _labelled("striker", np.arange(1, array.shape[1] + 1))
+        counted = SCHEMA[name].dims[1:]
+        if counted and array.ndim == 2:
+            coords[counted[0]] = _labelled(counted[0], np.arange(1, array.shape[1] + 1))
     length = len(coords["time"][1])
     for name, (dims, values, _) in (*coords.items(), *data.items()):
         if values.ndim != len(dims) or (dims[0] == "time" and values.shape[0] != length):
@@ -417,12 +417,10 @@ def _harvested(
 
 
 def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Array) -> dict[str, _Array]:
-    """Return the variables of a base excitation, of a changing axial load and of an external force."""
+    """Return the variables of a base excitation, of a changing axial load and of external forces."""
     found: dict[str, _Array] = {}
     if any(each.dissipative for each in system.local_forces):
         found["local_force_work"] = values[:, _COLUMN["local_force_work"]]
-    if system.base_excitation is None and system.axial_load is None and system.external_force is None:
-        return found
     motions = motions_of(ensemble, system, recorded.times)
     if system.base_excitation is not None:
         found["base_displacement"] = motions["base_excitation"][0] / system.scale.length
@@ -431,9 +429,13 @@ def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Arr
     if system.axial_load is not None:
         found["load_change"] = motions["axial_load"][0]
         found["load_work"] = values[:, _COLUMN["load_work"]]
-    if system.external_force is not None:
-        found["external_force"] = motions["force"][0]
-        found["force_work"] = values[:, _COLUMN["base_work"]]
+    forces = [motion[0] for section, motion in motions.items() if numbered(section)[0] == "force"]
+    if forces:
+        several = len(forces) > 1
+        found["external_forces" if several else "external_force"] = (
+            np.stack(forces, 1) if several else forces[0]
+        )
+        found["force_work"] = values[:, _COLUMN["force_work"]]
     return found
 
 

@@ -14,10 +14,8 @@ from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.drive.base import HORIZON, Drive
 from snapbeam.model.drive.combined import joined
-from snapbeam.model.drive.recorded_acceleration import RecordedAcceleration
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.early_termination import decidable_energy, passed_heights
-from snapbeam.model.external_force import RecordedForce
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import RUN as RUN_SCOPE
 from snapbeam.model.quantity import numbered, quantities, section_of, split_name
@@ -180,7 +178,7 @@ def driven_of(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
     own = _own(columns, "drive", runs)
     found = drive.numbers(own, scale)
     highest, speed = drive.bounds(own, scale)
-    samples = drive.samples() * (1.0 if striker.side == "below" else -1.0)
+    samples = _samples(system, "drive", drive)
     if striker.side == "above":
         highest = drive.mirrored_bounds(own, scale)
     table = np.stack([found[name] for name in drive.number_names], axis=1)
@@ -190,26 +188,30 @@ def driven_of(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
 
 
 def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Driven:
-    """The motions of a system with a base, a load or several strikers as one drive.
+    """The motions of a system with a base, a load, external forces or several strikers as one drive.
 
     Nothing is said of how high the tip comes to be used: no such run is decided by it.
     """
-    scale, names = (
-        system.scale,
-        {"drive": "tip", "base_excitation": "base", "axial_load": "load"},
-    )
+    scale, names = system.scale, {"drive": "tip", "base_excitation": "base", "axial_load": "load"}
     names |= {section_of("drive", i + 1): f"tip{i}" for i in range(1, len(system.contacts))}
-    names |= {section: "base" for section in _forces(system)}
+    forces = [section for section, _ in system.moving if numbered(section)[0] == "force"]
+    names |= {section: f"force{i}" for i, section in enumerate(forces)}
     kinds: dict[str, type[Drive]] = {}
     found: dict[str, _Array] = {}
-    speed, fastest, samples = np.zeros(runs), np.zeros(runs), np.empty(0)
+    speed, fastest = np.zeros(runs), np.zeros(runs)
+    tables: list[_Array] = []
     for section, drive in system.moving:
         part, own = names[section], _own(columns, section, runs)
         numbers = drive.numbers(own, scale)
         kinds[part] = drive.integrated_as or type(drive)
         found |= {f"{part}_{name}": numbers[name] for name in drive.number_names}
+        if "table" in drive.number_names:
+            found[f"{part}_table"] = np.full(runs, float(sum(each.size for each in tables)))
+        tables.append(_samples(system, section, drive))
         found[f"{part}_phase"] = columns.get(f"{section}.phase", np.zeros(runs))
         fastest = np.maximum(fastest, numbers["fastest" if "fastest" in numbers else "omega"])
+        if section == "base_excitation" or section in forces:
+            found[f"{part}_hardest"] = drive.peak_acceleration(own, scale)
         if section == "drive":
             speed = speed + drive.bounds(own, scale)[1]
     if system.base_excitation is not None:
@@ -217,26 +219,25 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
         sign = 1.0 if base.direction == "up" else -1.0
         side = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
         follow = 0.0 if base.striker_on_base or system.striker is None else -side * sign
-        found["base_hardest"] = base.motion.peak_acceleration(own, scale)
         found["base_sign"], found["base_follow"] = np.full(runs, sign), np.full(runs, follow)
         speed = speed + abs(follow) * base.motion.bounds(own, scale)[1]
-        samples = base.motion.samples()
-    if system.external_force is not None:
-        history = system.external_force.history
-        own = _own(columns, _forces(system)[0], runs)
-        found["base_hardest"] = history.peak_acceleration(own, scale)
-        found["base_sign"], found["base_follow"] = np.ones(runs), np.zeros(runs)
-        samples = history.samples()
     kind, cycle = joined(kinds), cycles_of(system, columns)
     only = next(iter(kinds)) if kind.alone else ""
     found["omega"] = found[f"{only}_omega"] if only else 2.0 * math.pi / (HORIZON * cycle)
     found["fastest"] = fastest
     table = np.stack([found[name] for name in kind.number_names], axis=1)
-    return Driven(kind, table, cycle, np.full(runs, np.inf), speed, samples)
+    return Driven(kind, table, cycle, np.full(runs, np.inf), speed, np.concatenate(tables))
+
+
+def _samples(system: System, section: str, drive: Drive) -> _Array:
+    """What kernels look up of a motion; that of a striker, recorded in space, counts positive as the striker pushes."""
+    kind, number = numbered(section)
+    above = kind == "drive" and system.contacts[number - 1].striker.side == "above"
+    return drive.samples() * (-1.0 if above else 1.0)
 
 
 def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
-    """Greatest angular frequency of the base, the axial load and the external force, rad/s; 0 without them."""
+    """Greatest angular frequency of the base, the axial load and external forces, rad/s; 0 without them."""
     found = np.zeros(runs)
     for section, drive in system.moving:
         if _is_around(section):
@@ -246,7 +247,9 @@ def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
 
 
 def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, tuple[_Array, _Array]]:
-    """Displacement (m) and velocity (m/s) of the base in space, change (N) and rate of the load, and the external force.
+    """Displacement (m) and velocity (m/s) of the base in space, value (N) and rate of the load's change and external forces.
+
+    By section.
 
     *ensemble* is that of the one run, which may begin in the middle of its drives.
     """
@@ -254,7 +257,7 @@ def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, t
     for section, drive in system.moving:
         if not _is_around(section):
             continue
-        pairs = _motion_at(ensemble, system, drive, times)
+        pairs = _motion_at(ensemble, system, section, drive, times)
         sign = (
             -1.0
             if section == "base_excitation"
@@ -262,7 +265,7 @@ def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, t
             and system.base_excitation.direction == "down"
             else 1.0
         )
-        found[numbered(section)[0]] = sign * pairs[:, 0], sign * pairs[:, 1]
+        found[section] = sign * pairs[:, 0], sign * pairs[:, 1]
     return found
 
 
@@ -272,12 +275,12 @@ def tip_of(ensemble: Ensemble, system: System, number: int, times: _Array) -> tu
     Seen from its own side, in the frame of the ends but without what a base does to it.  *ensemble* is that of the one
     run, which may begin in the middle of its drives.
     """
-    striker = system.contacts[number - 1].striker
-    pairs = _motion_at(ensemble, system, striker.drive, times)
+    drive = system.contacts[number - 1].striker.drive
+    pairs = _motion_at(ensemble, system, section_of("drive", number), drive, times)
     return pairs[:, 0], pairs[:, 1]
 
 
-def _motion_at(ensemble: Ensemble, system: System, drive: Drive, times: _Array) -> _Array:
+def _motion_at(ensemble: Ensemble, system: System, section: str, drive: Drive, times: _Array) -> _Array:
     """Displacement and velocity of one motion of the one run of an ensemble, shape (times, 2)."""
     begun, alone = float(ensemble.runs["phase"][0]), getattr(ensemble.drive, "alone", True)
     if not alone:
@@ -285,7 +288,7 @@ def _motion_at(ensemble: Ensemble, system: System, drive: Drive, times: _Array) 
     own = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
     numbers, kind = drive.numbers(own, system.scale), drive.integrated_as or type(drive)
     table = kind.numbers_type()(*(float(numbers[name][0]) for name in kind.number_names))
-    memory = drive.samples()
+    memory = _samples(system, section, drive)
     arguments = numbers["omega"][0] * times + (begun if alone else float(getattr(drive, "phase", 0.0)))
     return np.array([tip_motion(table, memory, at) for at in arguments.tolist()]).reshape(-1, 2)
 
@@ -313,11 +316,6 @@ _Integers = NDArray[np.int64]
 def _is_around(section: str) -> bool:
     """Whether a section is of what acts on the structure itself."""
     return section in ("base_excitation", "axial_load") or numbered(section)[0] == "force"
-
-
-def _forces(system: System) -> list[str]:
-    """Sections of the external forces."""
-    return [section for section, _ in system.moving if numbered(section)[0] == "force"]
 
 
 _LOWEST = {"standard": 1e-9, "reference": 1e-13}
@@ -370,7 +368,7 @@ def make_ensemble(
     columns = {name: np.array(np.broadcast_to(values, (runs,))) for name, values in columns.items()}
     side = _side(system, state, goes_on=periods is not None)
     structure = structure_of(
-        system.model, side, tuple(each.striker for each in system.contacts), system.base_excitation, system.harvester, system.external_force,
+        system.model, side, tuple(each.striker for each in system.contacts), system.base_excitation, system.harvester, system.external_forces,
         system.local_forces, system.unloaded_potential.dividing_height,
     )  # fmt: skip
     plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
@@ -421,15 +419,15 @@ def make_ensemble(
 
 
 def _require_record(system: System, table: NDArray[Any], driven: Driven) -> None:
-    """Refuse runs that last longer than a recorded force or acceleration."""
-    records = [each for _, each in system.moving if isinstance(each, (RecordedForce, RecordedAcceleration))]
+    """Refuse runs that last longer than the shortest record."""
+    records: list[Any] = [each for _, each in system.moving if each.samples().size]
     if not records:
         return
     record = min(records, key=lambda each: each.duration)
     omega = driven.numbers[:, driven.kind.number_names.index("omega")]
     ends = float((table["end"] * table["tick"] + table["phase"] / omega).max())
-    if ends > record.duration * (1.0 + 1e-9):
-        what = "force" if isinstance(record, RecordedForce) else "acceleration"
+    if ends > record.duration * (1.0 + 1e-9) + float(table["tick"].max()):
+        what = record.name.removeprefix("recorded_")
         raise InputError(
             f"cycles: the run ends after {ends:g} s, but the recorded {what} lasts {record.duration:g} s; ask for fewer "
             "cycles, or give a longer record"

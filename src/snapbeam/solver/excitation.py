@@ -9,16 +9,20 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload
 
+from snapbeam.model.drive.combined import parts_of
 from snapbeam.solver.compilation import INLINE, inlined, overloaded
 from snapbeam.solver.contact_force import scalar_function
 from snapbeam.solver.physics import shaker_motion, sincos
 
 __all__ = [
     "Tip",
+    "acceleration_by_number",
+    "bound_by_number",
     "drive_rate",
     "joined_motion",
     "kind_acceleration",
     "kind_motion",
+    "motion_by_number",
     "numbers_of",
     "part_acceleration",
     "part_motion",
@@ -170,6 +174,55 @@ def part_motion(owner: Any, part: str) -> Any:
 def part_acceleration(owner: Any, part: str) -> Any:
     """The same of its acceleration, m/s^2."""
     return _of_part(owner, part, "acceleration")
+
+
+def motion_by_number(owner: Any, kind: str) -> Any:
+    """A function of numbers, memory, the argument and j: displacement and velocity of the part *kind* j, if it moves."""
+    return _by_number({j: part_motion(owner, part) for j, part in parts_of(owner, kind).items()}, _no_motion)
+
+
+def acceleration_by_number(owner: Any, kind: str) -> Any:
+    """The same of the acceleration, or of a force."""
+    parts = parts_of(owner, kind)
+    return _by_number({j: part_acceleration(owner, part) for j, part in parts.items()}, _nothing)
+
+
+def bound_by_number(owner: Any, kind: str) -> Any:
+    """The same of the bound on the acceleration, or on a force."""
+    parts = parts_of(owner, kind)
+    return _by_number({j: _number(owner, f"{part}_hardest") for j, part in parts.items()}, _nothing)
+
+
+def _number(owner: Any, name: str) -> Any:
+    """A function that reads one number of a drive."""
+    at = owner.number_names.index(name)
+
+    @inlined
+    def read(drive, memory, argument):
+        return drive[at]
+
+    return read
+
+
+def _by_number(functions: dict[int, Any], other: Any) -> Any:
+    """A function that calls the one of its last parameter, chosen as the integration goes, or else *other*."""
+    if not functions:
+
+        @inlined
+        def none(drive, memory, argument, number):
+            return other(drive, memory, argument)
+
+        return none
+    (first, own), *later = functions.items()
+    rest = _by_number(dict(later), other)
+
+    @inlined
+    def chosen(drive, memory, argument, number):
+        if number == first:
+            return own(drive, memory, argument)
+        return rest(drive, memory, argument, number)
+
+    return chosen
 
 
 def joined_motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:

@@ -11,7 +11,6 @@ from typing import Any
 from numba.extending import overload
 
 from snapbeam.model.contact.base import LAWS, ContactLaw
-from snapbeam.model.drive.combined import MOST_STRIKERS
 from snapbeam.model.quantity import numbers_type
 from snapbeam.solver.compilation import INLINE_HERE, inlined
 from snapbeam.solver.contact_force import (
@@ -28,7 +27,7 @@ from snapbeam.solver.contact_force import (
     released_at,
     zero_force_crossing,
 )
-from snapbeam.solver.excitation import part_motion
+from snapbeam.solver.excitation import motion_by_number, part_motion
 
 __all__ = [
     "Several",
@@ -205,29 +204,6 @@ peak_in_step_of = _function_of_contact(peak_in_step)
 jumps_at = _function_of_contact(jumps)
 
 
-def _by_part(owner: Any, numbers: tuple[int, ...]) -> Any:
-    """The motion of striker j, of those that move."""
-    own = part_motion(owner, f"tip{numbers[0]}")
-    first, rest = numbers[0] - 1, _by_part(owner, numbers[1:]) if len(numbers) > 1 else None
-
-    @inlined
-    def alone(drive, memory, argument, j):
-        if j == first:
-            return own(drive, memory, argument)
-        return 0.0, 0.0
-
-    if rest is None:
-        return alone
-
-    @inlined
-    def chosen(drive, memory, argument, j):
-        if j == first:
-            return own(drive, memory, argument)
-        return rest(drive, memory, argument, j)
-
-    return chosen
-
-
 def motion_of(drive: Any, memory: Any, argument: float, j: int, sign: float) -> tuple[float, float]:
     """Displacement (m) and velocity (m/s) of striker *j* beside the first, in the frame of the ends.
 
@@ -239,26 +215,12 @@ def motion_of(drive: Any, memory: Any, argument: float, j: int, sign: float) -> 
 @overload(motion_of, jit_options=INLINE_HERE)
 def _motion_of(drive, memory, argument, j, sign):
     owner = drive.instance_class.owner
-    moving = dict(owner.parts)
-    numbers = tuple(i for i in range(1, MOST_STRIKERS) if f"tip{i}" in moving)
-    base = part_motion(owner, "base")
-    if numbers:
-        own = _by_part(owner, numbers)
+    base, own = part_motion(owner, "base"), motion_by_number(owner, "tip")
     if "base_follow" not in drive.fields:
-        if not numbers:
-            return lambda drive, memory, argument, j, sign: (0.0, 0.0)
-        return lambda drive, memory, argument, j, sign: own(drive, memory, argument, j)
-
-    def with_base(drive, memory, argument, j, sign):
-        y, rate = base(drive, memory, argument)
-        share = sign * drive.base_follow
-        return share * y, share * rate
-
-    if not numbers:
-        return with_base
+        return lambda drive, memory, argument, j, sign: own(drive, memory, argument, j + 1)
 
     def both(drive, memory, argument, j, sign):
-        moved, speed = own(drive, memory, argument, j)
+        moved, speed = own(drive, memory, argument, j + 1)
         y, rate = base(drive, memory, argument)
         share = sign * drive.base_follow
         return moved + share * y, speed + share * rate

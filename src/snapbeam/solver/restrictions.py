@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from snapbeam.model.drive.combined import MOST_STRIKERS
 from snapbeam.model.quantity import section_of
 from snapbeam.model.system import System
 from snapbeam.util.validation import InputError
 
 __all__ = ["check_integrable"]
-
-_RECORD = "a recording has its own time axis; use a drive given by a formula, or a FixedStop"
 
 
 def check_integrable(system: System) -> None:
@@ -20,18 +17,9 @@ def check_integrable(system: System) -> None:
     InputError
     """
     contacts, surroundings = system.contacts, system.surroundings
-    if sum(each.has_excitation_row for each in surroundings) > 1:
-        raise InputError(
-            "forces: the solver has one row of excitation, for a base excitation or one external force; leave the others "
-            "out, or make a force along one row of their sum"
-        )
     if len(system.harvesters) > 1:
         raise InputError(
             f"harvesters: {len(system.harvesters)} circuits; must be at most 1 in a run; leave the others out"
-        )
-    if len(contacts) > MOST_STRIKERS:
-        raise InputError(
-            f"contacts: {len(contacts)}; must be at most {MOST_STRIKERS} in a run; leave some out"
         )
     beside = "several strikers" if len(contacts) > 1 else surroundings[0].noun if surroundings else ""
     for number, each in enumerate(contacts, 1):
@@ -40,8 +28,4 @@ def check_integrable(system: System) -> None:
             raise InputError(
                 f"{section} = {law!r} with {beside}: sticking under Newton's law includes the tip's force only; use a "
                 "HertzContact, or a HuntCrossley with the same restitution"
-            )
-        if striker.drive.samples().size and (len(contacts) > 1 or len(system.moving) > 1):
-            raise InputError(
-                f"{section_of('drive', number)} = {striker.drive.name!r} with {beside}: {_RECORD}"
             )

@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.combined import MOST_STRIKERS
 from snapbeam.model.early_termination import crossing_energy, decidable_energy, passed_heights
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.terms import WORKS
@@ -354,7 +353,7 @@ _ROWS = (
     Statistic("impulse", "float64", "N s", "impulse on the beam, all impacts", _seen("total_impulse")),
     Statistic("striker_work", "float64", "J", "work done by the striker", _seen("work")),
     Statistic(
-        "gross_work", "float64", "J", "work done by the striker, the base and the axial load, taken as positive",
+        "gross_work", "float64", "J", "work done by strikers, base, axial load and external forces, taken as positive",
         _seen("gross_work"),
     ),
     Statistic("mean_power", "float64", "W", "work done by the striker over the time of the run", _mean_power),
@@ -485,7 +484,6 @@ _EACH = {
     "striker_work": (OTHER_WORK, "work done"),
 }
 """What each of several has: where the others' is kept, and words."""
-_NUMBERS = {str(number) for number in range(1, MOST_STRIKERS + 1)}
 
 
 def rows_for(strikers: int) -> dict[str, Statistic]:
@@ -497,7 +495,7 @@ def rows_for(strikers: int) -> dict[str, Statistic]:
 def of_one_named(name: str) -> Statistic | None:
     """The row of one of several strikers by its name; None if there is no such row."""
     whole, _, number = name.rpartition("_contact_")
-    if whole not in _EACH or number not in _NUMBERS:
+    if whole not in _EACH or not number.isdecimal() or number != str(int(number)) or number == "0":
         return None
     return _of_one(whole, int(number))
 

@@ -375,14 +375,19 @@ def clocked(
     require_resolved(system, integration, cycle)
     lengths = np.array([plan.step for plan in plans])
     drive = system.primary_excitation[1] if system.primary_excitation is not None else None
-    repeats = drive is None or (drive.is_periodic and len(system.moving) < 2)
+    alone = len(system.moving) < 2
+    repeats = drive is None or (drive.is_periodic and alone)
     table["step"] = SUBDIVISION
     table["min_contact_halvings"] = [plan.min_contact_halvings for plan in plans]
     table["max_halvings"] = [plan.max_halvings for plan in plans]
     if isinstance(drive, RecordedMotion):
-        turn = np.full(table.size, drive.duration)
-        left = 1.0 - table["phase"] / (2.0 * math.pi)
+        # the argument makes one turn over a record alone, and over HORIZON cycles of several motions
+        left = 1.0 - table["phase"] / (2.0 * math.pi) * (1.0 if alone else HORIZON * cycle / drive.duration)
         cycles_asked = _asked_cycles(drive, integration, periods, float(left.min()))
+    else:
+        cycles_asked = float(integration.cycles_or_default if periods is None else periods)
+    if isinstance(drive, RecordedMotion) and alone:
+        turn = np.full(table.size, drive.duration)
         steps = _whole_steps(turn, lengths, 1.0)
         table["period"] = steps * SUBDIVISION
         table["tick"] = turn / table["period"]
@@ -395,7 +400,7 @@ def clocked(
         table["end"] = np.minimum(table["end"], np.rint(left * table["period"]))
         cycles = float(table["end"][0] * table["tick"][0] * drive.frequency)
     else:
-        cycles = float(integration.cycles_or_default if periods is None else periods)
+        cycles = cycles_asked
         steps = _whole_steps(cycle, lengths, cycles)
         table["period"] = steps * SUBDIVISION
         table["tick"] = cycle / table["period"]

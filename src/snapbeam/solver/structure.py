@@ -108,8 +108,9 @@ class Structure:
     unequal_wells: UnequalWells | None = None
     """Of unequal wells."""
     base_load: _Array | None = None
-    """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi).  Of an external force
-    F(t) along a row h: V^T h, where F stands for the acceleration."""
+    """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi)."""
+    force_rows: tuple[_Array, ...] = ()
+    """Of each external force F(t) along a row h: V^T h."""
     local_forces: tuple[LocalForceRow, ...] = ()
     circuit_row: _Array | None = None
     """Of a harvester: its coupling, scaled so that half the square of the circuit's coordinate is its energy."""
@@ -224,6 +225,8 @@ class Structure:
             digest.update(np.ascontiguousarray(self.circuit_row).tobytes())
         if self.base_load is not None:
             digest.update(np.ascontiguousarray(self.base_load).tobytes())
+        for row in self.force_rows:
+            digest.update(np.ascontiguousarray(row).tobytes())
         if self.bodies:
             digest.update(np.array([value for each in self.bodies for value in each.of_hash]).tobytes())
         for force in self.local_forces:
@@ -240,7 +243,7 @@ def structure_of(
     strikers: tuple[Striker, ...] = (),
     base: BaseExcitation | None = None,
     harvester: Harvester | None = None,
-    force: ExternalForce | None = None,
+    forces: tuple[ExternalForce, ...] = (),
     local_forces: tuple[LocalForce, ...] = (),
     dividing_height: float | None = None,
 ) -> Structure:
@@ -268,7 +271,8 @@ def structure_of(
         equilibrium=equilibrium,
         model=model,
         unequal_wells=_uneven(model, sign, dividing_height),
-        base_load=_base_load(model, base, force),
+        base_load=None if base is None else -(modes.T @ rigid_mass(model)),
+        force_rows=tuple(np.asarray(modes.T @ each.row(model)) for each in forces),
         local_forces=tuple(_local_force(model, equilibrium, each) for each in local_forces),
     )
     structure = dataclasses.replace(structure, strikers=len(strikers))
@@ -278,15 +282,6 @@ def structure_of(
                 structure, striker, contact, carried_by_base=base is not None and base.striker_on_base
             )
     return structure if harvester is None else _with_circuit(structure, harvester)
-
-
-def _base_load(
-    model: ReducedModel, base: BaseExcitation | None, force: ExternalForce | None
-) -> _Array | None:
-    """What the base's acceleration, or the external force, does to p."""
-    if force is not None:
-        return np.asarray(model.linear_modes.T @ force.row(model))
-    return None if base is None else -(model.linear_modes.T @ rigid_mass(model))
 
 
 def _local_force(model: ReducedModel, equilibrium: _Array, local_force: LocalForce) -> LocalForceRow:
@@ -335,6 +330,7 @@ def _with_body(structure: Structure, striker: Striker, contact: int, carried_by_
         shift=np.append(structure.shift, 0.0),
         unequal_wells=None if structure.unequal_wells is None else _with_rest(structure.unequal_wells),
         base_load=None if structure.base_load is None else np.append(structure.base_load, own),
+        force_rows=tuple(np.append(each, 0.0) for each in structure.force_rows),
         local_forces=_longer(structure.local_forces),
         bodies=(*structure.bodies, body),
     )
@@ -361,6 +357,7 @@ def _with_circuit(structure: Structure, harvester: Harvester) -> Structure:
         coupling=tension,
         unequal_wells=None if structure.unequal_wells is None else _with_rest(structure.unequal_wells),
         base_load=None if structure.base_load is None else np.append(structure.base_load, 0.0),
+        force_rows=tuple(np.append(each, 0.0) for each in structure.force_rows),
         local_forces=_longer(structure.local_forces),
         circuit_row=np.append(coupling, 0.0),
         circuit=True,

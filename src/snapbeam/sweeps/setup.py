@@ -343,7 +343,8 @@ class SweepSetup:
 
     def _cycles(self) -> float:
         """Return the number of cycles of each run; a recorded motion determines it if none is given."""
-        drive = None if self.system.striker is None else self.system.striker.drive
+        leads = self.system.primary_excitation
+        drive = None if leads is None else leads[1]
         if isinstance(drive, RecordedMotion) and self.integration.cycles is None:
             return round(drive.duration * drive.frequency, 9)
         return self.integration.cycles_or_default

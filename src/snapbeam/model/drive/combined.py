@@ -1,4 +1,4 @@
-"""Several motions that kernels integrate as one drive: those of the tip, the base and the axial load.
+"""Several motions that kernels integrate as one drive: those of tips, the base, the axial load and external forces.
 
 A run has one clock, whose argument belongs to one drive.  If one thing alone moves, the argument is its own, and what
 repeats goes on repeating; of several each has its argument from the time since they began.
@@ -11,13 +11,9 @@ from typing import Any, ClassVar
 
 from snapbeam.model.drive.base import DRIVES, HORIZON, Drive
 
-__all__ = ["HORIZON", "MOST_STRIKERS", "PARTS", "Joined", "joined"]
+__all__ = ["HORIZON", "Joined", "joined", "parts_of"]
 
 
-MOST_STRIKERS = 4
-"""Of one beam."""
-PARTS = ("tip", *(f"tip{i}" for i in range(1, MOST_STRIKERS)), "base", "load")
-"""What may move; tip1 is the tip of the second striker."""
 _SEPARATOR = "__"
 
 
@@ -25,8 +21,9 @@ class Joined(Drive):
     """Motions of several parts; subclasses are made by :func:`joined`, one for each mixture of kinds.
 
     Kernels see the numbers of each part under its name, as ``base_amplitude``; unless one moves *alone*, its phase at
-    the start too.  Of a base they see the bound ``base_hardest`` on its acceleration, the sign ``base_sign`` with which
-    it counts in space, and ``base_follow``, how much of its motion the tip makes in the frame of the ends.
+    the start too.  Of a base and of each external force they see a bound on its acceleration, or on itself, as
+    ``base_hardest``; of a base the sign ``base_sign`` with which it counts in space, and ``base_follow``, how much of its
+    motion the tip makes in the frame of the ends.
     """
 
     alone: ClassVar[bool] = False
@@ -35,7 +32,7 @@ class Joined(Drive):
 
 def joined(kinds: Mapping[str, type[Drive]]) -> type[Joined]:
     """The class of a mixture: the kinds of what moves, by part."""
-    named = [(part, kinds[part]) for part in PARTS if part in kinds]
+    named = list(kinds.items())
     for part, kind in named:
         if _known(part, kind.name) is not kind:
             raise TypeError(f"{kind.__name__}: is registered under no name")
@@ -46,14 +43,20 @@ def joined(kinds: Mapping[str, type[Drive]]) -> type[Joined]:
     return found
 
 
+def parts_of(owner: type[Drive], kind: str) -> dict[int, str]:
+    """Parts of a kind that has numbers, by number: ``tip1`` is that of the second striker, ``force0`` the first force."""
+    names = [part for part, _ in owner.parts]
+    return {int(part[len(kind) :]): part for part in names if part[: len(kind)] == kind and part != kind}
+
+
 def _known(part: str, name: str) -> type[Drive] | None:
-    """The kind of drive that a part may have, by its name, or None; an external force takes the part of the base."""
+    """The kind of drive that a part may have, by its name, or None."""
     from snapbeam.model.axial_load import LOADS
     from snapbeam.model.external_force import FORCES
 
     if part == "load":
         return LOADS.get(name)
-    return FORCES[name] if part == "base" and name in FORCES else DRIVES.get(name)
+    return (FORCES if part.startswith("force") else DRIVES).get(name)
 
 
 def _made(name: str, named: list[tuple[str, type[Drive]]]) -> type[Joined]:
@@ -62,8 +65,9 @@ def _made(name: str, named: list[tuple[str, type[Drive]]]) -> type[Joined]:
     for part, kind in named:
         numbers += [f"{part}_{each}" for each in kind.number_names]
         numbers += [] if alone else [f"{part}_phase"]
+        numbers += [f"{part}_hardest"] if part == "base" or part.startswith("force") else []
     if any(part == "base" for part, _ in named):
-        numbers += ["base_hardest", "base_sign", "base_follow"]
+        numbers += ["base_sign", "base_follow"]
     body: dict[str, Any] = {
         "__module__": __name__,
         "__qualname__": name,

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.combined import MOST_STRIKERS
 from snapbeam.solver.compilation import kernel, ready
 from snapbeam.solver.cpu.integrate import KernelOutput, integrate_ensemble, integrate_recorded
 from snapbeam.solver.cpu.memory import Memory, Packed, lay_out, pack
@@ -332,7 +331,8 @@ def _beside(ensemble: Ensemble) -> int:
 
 def _impact_rows(ensemble: Ensemble, buffers: _Buffers) -> _Array:
     """Room for impacts, the first striker's number in each row if there are several."""
-    return np.ones((buffers.impacts + MOST_STRIKERS, 4 if ensemble.others is None else 5))
+    strikers = 1 + _beside(ensemble)
+    return np.ones((buffers.impacts + strikers, 4 if strikers == 1 else 5))
 
 
 def record(
@@ -363,7 +363,7 @@ def record(
     accumulators, end = accumulators_of_runs[0], float(ensemble.runs["end"][0])
     outputs = Outputs(
         times, np.empty(buffers.samples), np.empty((buffers.samples, 2 * size)),
-        np.empty((buffers.samples, VALUES)), _impact_rows(ensemble, buffers), marks, buffers.most, in_contact,
+        np.empty((buffers.samples, VALUES)), _impact_rows(ensemble, buffers), buffers.impacts, marks, buffers.most, in_contact,
     )  # fmt: skip
     arguments = (
         memory.memory, memory.blocks, memory.layouts[0], memory.stages, kernel_input, scratch, accumulators, outputs, saved_state, _SLICE_STEPS,

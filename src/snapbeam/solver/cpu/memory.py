@@ -305,7 +305,7 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
     memory[stages.flow : table] = weights
     memory[table:] = ensemble.samples
     numbers: Any = ensemble.drive_numbers
-    sampled = [i for i, name in enumerate(ensemble.drive.number_names) if name in ("table", "base_table")]
+    sampled = [i for i, name in enumerate(ensemble.drive.number_names) if name.split("_")[-1] == "table"]
     if sampled:
         numbers = numbers.copy()
         numbers[:, sampled] += table

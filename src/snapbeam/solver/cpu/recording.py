@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from snapbeam.model.drive.combined import MOST_STRIKERS
 from snapbeam.solver.compilation import compiled, inlined
 from snapbeam.solver.contact_force import contact_energy, felt_force
 from snapbeam.solver.cpu.mode_lanes import modal_energy
@@ -57,7 +56,9 @@ class Outputs(NamedTuple):
     """Shape (samples, VALUES)."""
     impacts: Any
     """Onset, duration, peak force and impulse of each impact, of several strikers which one too, shape (rows, 4 or 5);
-    a few rows more than it takes to be full, since several may end with one step."""
+    a row for each striker more than it takes to be full, since several may end with one step."""
+    most_impacts: int
+    """Impacts that make it full."""
     marks: Any
     """Instants recorded so far; impacts handed on before; samples of the present contact."""
     most: int
@@ -70,7 +71,7 @@ class Outputs(NamedTuple):
 def has_room(now, accumulators, outputs):
     """Whether another step's samples and impact fit."""
     rows = now.sample + outputs.most + 3 <= outputs.at.size
-    return rows and accumulators.impacts - outputs.marks[1] < outputs.impacts.shape[0] - MOST_STRIKERS
+    return rows and accumulators.impacts - outputs.marks[1] < outputs.most_impacts
 
 
 class _Instant(NamedTuple):

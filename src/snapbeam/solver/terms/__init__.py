@@ -9,6 +9,7 @@ from typing import Any
 
 from snapbeam.solver.terms.axial_load import AxialLoad
 from snapbeam.solver.terms.base_excitation import BaseExcitation
+from snapbeam.solver.terms.external_force import ExternalForce
 from snapbeam.solver.terms.local_force import DampedLocalForce, LocalForce
 from snapbeam.solver.terms.second_well import SecondWell
 
@@ -17,7 +18,13 @@ __all__ = ["TERMS_AFTER_CONTACTS", "TERMS_BEFORE_CONTACTS", "WORKS"]
 
 TERMS_BEFORE_CONTACTS: tuple[Any, ...] = (SecondWell,)
 """Terms whose accelerations are added before those of the further contacts: sums keep their order, and so their bits."""
-TERMS_AFTER_CONTACTS: tuple[Any, ...] = (BaseExcitation, AxialLoad, LocalForce, DampedLocalForce)
+TERMS_AFTER_CONTACTS: tuple[Any, ...] = (
+    BaseExcitation,
+    ExternalForce,
+    AxialLoad,
+    LocalForce,
+    DampedLocalForce,
+)
 
 WORKS: dict[str, str] = {
     term.accumulator: term.work_description

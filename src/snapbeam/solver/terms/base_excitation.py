@@ -17,7 +17,7 @@ from snapbeam.solver.excitation import part_acceleration
 from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat
 from snapbeam.solver.terms.interface import TermMemory
 
-__all__ = ["BaseExcitation"]
+__all__ = ["BaseExcitation", "absolute_product"]
 
 
 def _acceleration(drive: Any, memory: Any, argument: float) -> float:
@@ -31,13 +31,24 @@ def _acceleration_of_kind(drive, memory, argument):
     return lambda drive, memory, argument: drive.base_sign * own(drive, memory, argument)
 
 
+@inlined
+def absolute_product(memory, size, row, along):
+    """The sum of the sizes of the products of two rows."""
+    total = 0.0
+    for i in range(size):
+        total += abs(memory[row + i] * memory[along + i])
+    return total
+
+
 class BaseExcitation(NamedTuple):
-    """Places in memory."""
+    """Places in memory, and which of several."""
 
     row: int
     """b, a row."""
     acceleration: int
     """a at the kick, m/s^2."""
+    number: int = 0
+    """0: there is one base."""
 
     @staticmethod
     def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
@@ -71,13 +82,10 @@ class BaseExcitation(NamedTuple):
     @inlined
     def add_to_speed_bound(memory, size, term, drive, along, horizon, bound):
         """Within a time tau the base changes c.p by no more than tau max|a| sum |b_j c_j|."""
-        total = 0.0
-        for row in range(size):
-            total += abs(memory[term.row + row] * memory[along + row])
-        return bound + total * drive.base_hardest * horizon
+        return bound + absolute_product(memory, size, term.row, along) * drive.base_hardest * horizon
 
     accumulator = "base_work"  # type: ignore[misc]
-    work_description = "work done by the base, in its frame, or by an external force"  # type: ignore[misc]
+    work_description = "work done by the base, in its frame"  # type: ignore[misc]
 
     @staticmethod
     @inlined

@@ -342,8 +342,10 @@ def works_so_far(accumulators: tuple[str, ...]) -> Any:
         raise _of_kernels()
 
     def write(classes: list[Any]) -> tuple[list[str], dict[str, Any]]:
-        place = {classes[i].accumulator: f" + external.works[{i}]" for i in _working(classes)}
-        found = [f"sums.{name}{place.get(name, '')}" for name in accumulators]
+        parts = {name: [f"sums.{name}"] for name in accumulators}
+        for i in _working(classes):
+            parts[classes[i].accumulator].append(f"external.works[{i}]")
+        found = [" + ".join(each) for each in parts.values()]
         return [f"return {_tuple(found)}"], {}
 
     return _compiled_for_terms(works, write)
