@@ -23,7 +23,7 @@ def check_integrable(system: System) -> None:
         )
     beside = "several strikers" if len(contacts) > 1 else surroundings[0].noun if surroundings else ""
     for number, each in enumerate(contacts, 1):
-        section, law, striker = section_of("contact", number), each.law, each.striker
+        section, law = section_of("contact", number), each.law
         if law.impulsive and beside:
             raise InputError(
                 f"{section} = {law!r} with {beside}: sticking under Newton's law includes the tip's force only; use a "
