@@ -36,9 +36,9 @@ def check_integrable(system: System) -> None:
     beside = "several strikers" if len(contacts) > 1 else surroundings[0].noun if surroundings else ""
     for number, each in enumerate(contacts, 1):
         section, law, striker = section_of("contact", number), each.law, each.striker
-        if law.impulsive and beside:
+        if law.impulsive and len(contacts) > 1:
             raise InputError(
-                f"{section} = {law!r} with {beside}: sticking under Newton's law includes the tip's force only; use a "
+                f"{section} = {law!r} with several strikers: sticking under Newton's law includes one tip only; use a "
                 "HertzContact, or a HuntCrossley with the same restitution"
             )
         if number > 1 and law.rate_dependent:
