@@ -224,7 +224,7 @@ def compared(names: set[str], e: float, step: float = 4e-6) -> dict[str, float]:
         contacts.append(sb.Contact(default_values.CONTACT, stop))
     system = sb.System(model, contacts=contacts, **parts)
     times = np.linspace(0.0, CYCLES / (RATIO * model.reference_frequency), 401) * (1.0 - 1e-9)
-    how = sb.Integration(cycles=float(CYCLES), accuracy="reference", step=step)
+    how = sb.Integration(cycles=CYCLES, accuracy="reference", step=step)
     leads = system.primary_excitation
     assert leads is not None
     run = sb.simulate(system, how, sample_times=times)
