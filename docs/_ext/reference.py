@@ -451,11 +451,6 @@ def _refused_systems() -> dict[str, Any]:
         "contact `restitution` with two modes": struck(newtonian),
         "contact `restitution` with a striker with a mass": struck((newton, heavy), of=one),
         "contact `restitution` with several strikers": struck(newtonian, (hertz, stop), of=one),
-        "contact `restitution` with a base": struck(newtonian, of=one, base_excitation=base),
-        "contact `restitution` with a changing load": struck(newtonian, of=one, axial_load=load),
-        "contact `restitution` with a harvester": struck(newtonian, of=one, harvesters=[harvester]),
-        "contact `restitution` with an external force": struck(newtonian, of=one, forces=[push]),
-        "contact `restitution` with a local force": struck(newtonian, of=one, forces=[drag]),
         "a local force with damping, with a harvester": struck(
             elastic, forces=[drag], harvesters=[harvester]
         ),

@@ -194,13 +194,3 @@ def test_refusals():
         sb.BaseExcitation(motion=harmonic)
     with pytest.raises(InputError, match="at least 4"):
         sb.RecordedForce(record=[1.0, 2.0], sampling_frequency=10.0)
-    with pytest.raises(InputError, match="with an external force: sticking"):
-        sb.simulate(
-            sb.System(
-                sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0]),
-                contacts=[
-                    sb.Contact(sb.Restitution(coefficient=0.8), sb.Striker(drive=sb.FixedStop(), gap=1.0))
-                ],
-                forces=[sb.ExternalForce(history=harmonic)],
-            )
-        )

@@ -109,8 +109,8 @@ def mass_on_a_stop() -> list[Row]:
 def bouncing_ball() -> list[Row]:
     """A ball on a sine table: the amplitude from which period 1 exists, and that at which its period doubles.
 
-    Under Newton's law the solver takes no external force.  A spring and a damper without inertia have the same
-    restitution at any speed; their contact lasts 1/400 of the table's period.
+    A spring and a damper without inertia have the same restitution at any speed as Newton's law; their contact lasts
+    1/400 of the table's period.
     """
     rows = []
     for e, least, doubling in ((0.5, 1.0471976, 1.5268237), (0.8, 0.3490659, 1.0708365)):

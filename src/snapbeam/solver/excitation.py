@@ -317,6 +317,8 @@ def tip_acceleration(drive: Any, memory: Any, argument: float) -> float:
         sine, _ = sincos.py_func(argument)
         return float(-drive.omega * drive.omega * drive.amplitude * sine)
     owner: Any = type(drive).owner
+    if owner.parts:
+        raise TypeError("accelerations of joined motions are known in compiled code only")
     return float(owner.acceleration(drive, memory, argument))
 
 
@@ -330,8 +332,13 @@ def _tip_acceleration(drive, memory, argument):
             return -drive.omega * drive.omega * drive.amplitude * sine
 
         return harmonic
-    if owner.parts:  # under Newton's law alone, which is refused beside what else moves
-        return lambda drive, memory, argument: 0.0
+    if owner.parts:
+        tip, base = _of_part(owner, "tip", "acceleration"), _of_part(owner, "base", "acceleration")
+        if "base_follow" not in drive.fields:
+            return lambda drive, memory, argument: tip(drive, memory, argument)
+        return lambda drive, memory, argument: (
+            tip(drive, memory, argument) + drive.base_follow * base(drive, memory, argument)
+        )
     acceleration = kind_acceleration(owner)
     return lambda drive, memory, argument: acceleration(drive, memory, argument)
 

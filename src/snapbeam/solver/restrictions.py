@@ -16,16 +16,15 @@ def check_integrable(system: System) -> None:
     ------
     InputError
     """
-    contacts, surroundings = system.contacts, system.surroundings
+    contacts = system.contacts
     if len(system.harvesters) > 1:
         raise InputError(
             f"harvesters: {len(system.harvesters)} circuits; must be at most 1 in a run; leave the others out"
         )
-    beside = "several strikers" if len(contacts) > 1 else surroundings[0].noun if surroundings else ""
     for number, each in enumerate(contacts, 1):
         section, law = section_of("contact", number), each.law
-        if law.impulsive and beside:
+        if law.impulsive and len(contacts) > 1:
             raise InputError(
-                f"{section} = {law!r} with {beside}: sticking under Newton's law includes the tip's force only; use a "
+                f"{section} = {law!r} with several strikers: sticking under Newton's law includes one tip only; use a "
                 "HertzContact, or a HuntCrossley with the same restitution"
             )

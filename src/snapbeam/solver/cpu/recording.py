@@ -189,20 +189,14 @@ def record_held(memory, blocks, layout, run, tip, now, step, accumulators, outpu
         if times[done] > (now.t + step.ticks) * clock.tick and now.t + step.ticks < clock.end:
             break
         part = min(max(0.0, times[done] - now.t * clock.tick), step.length)
-        phase = step.phase + tip.drive.omega * part
-        _, work, _, dissipated, _ = held_for(memory, blocks, layout, run, tip, step.phase, part)
-        force, gq, qr = hold(memory, blocks, layout, tip, phase, q2, p2, run.spare + 2 * size)
+        here, _ = held_for(memory, blocks, layout, run, tip, step.phase, step.p, part)
+        force, gq, qr = hold(
+            memory, blocks, layout, tip, step.phase, part, step.p, q2, p2, run.spare + 2 * size
+        )
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, gq, qr)
         energy = add_potential_energy(memory, size, layout.terms, q2, energy)
-        so_far = _sums(layout.terms, accumulators)
-        sums = _Sums(
-            so_far.work + work,
-            so_far.dissipated + dissipated,
-            so_far.lost,
-            so_far.works,
-            so_far.circuit,
-        )
         instant = _Instant(times[done], q2, p2, _TOGETHER, energy)
+        sums = _sums_with(layout.terms, accumulators, here)
         _write(memory, layout, now.well_sign, tip.law, outputs, sample, instant, sums)
         outputs.values[sample, 1] = force
         sample, done = sample + 1, done + 1

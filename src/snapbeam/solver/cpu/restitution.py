@@ -16,10 +16,24 @@ import math
 from snapbeam.solver.compilation import compiled, inlined
 from snapbeam.solver.cpu.events import detect_contact_event, monitor_energy, shortened_step, swap_rows
 from snapbeam.solver.cpu.recording import record_held, record_instants
-from snapbeam.solver.cpu.state import IntegratorState, StepControl, phase_at, variable_slot
+from snapbeam.solver.cpu.state import IntegratorState, StepControl, phase_at, sampling_slot, variable_slot
 from snapbeam.solver.cpu.step import Step, observe, prepare, take_step
 from snapbeam.solver.cpu.sticking import PANELS, constraint_force, held_for, hold
-from snapbeam.solver.excitation import tip_about_well
+from snapbeam.solver.cpu.terms.circuit import accumulate_circuit
+from snapbeam.solver.cpu.terms.discontinuities import up_to_discontinuity
+from snapbeam.solver.cpu.terms.further_contact_events import (
+    accumulate_further_contacts,
+    add_stored_contacts,
+    any_touches,
+    first_further_event,
+    observe_further_contacts,
+    refine_further_onsets,
+    restart_further_contacts,
+    store_further_contacts,
+    update_further_contacts,
+)
+from snapbeam.solver.cpu.terms.step_across import in_succession
+from snapbeam.solver.excitation import drive_rate, tip_about_well
 from snapbeam.solver.interpolation import cubic, first_upcrossing, root
 from snapbeam.solver.registered_statistics import observe as observe_extras
 from snapbeam.solver.step_control import (
@@ -29,7 +43,7 @@ from snapbeam.solver.step_control import (
     contact_halvings,
     count_zero_crossings_in_step,
 )
-from snapbeam.solver.terms.interface import center_from_barrier, kinematics_from_barrier
+from snapbeam.solver.terms.interface import accumulate_work, center_from_barrier, kinematics_from_barrier
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["accept_step_restitution", "carry"]
@@ -39,19 +53,19 @@ __all__ = ["accept_step_restitution", "carry"]
 # A step in which the tip carries a single mode along, up to the release.
 
 
-_OK_CARRIED, _RUNNING_CARRIED = int(RunStatus.OK), int(RunStatus.INTERRUPTED)
+_OK, _RUNNING, _DIVERGED = int(RunStatus.OK), int(RunStatus.INTERRUPTED), int(RunStatus.DIVERGED)
+_STEP_LIMIT = int(RunStatus.STEP_LIMIT)
 _BISECTIONS = 60
 
 
 @inlined
-def _release_between(memory, blocks, layout, run, tip, phase, low, high):
+def _release_between(memory, blocks, layout, run, tip, phase, source, low, high):
     """Where between *low* (pushing) and *high* (pulling), s after *phase*, the force vanishes."""
-    omega = tip.drive.omega
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high:
             break
-        if constraint_force(memory, blocks, layout, run, tip, phase + omega * middle) < 0.0:
+        if constraint_force(memory, blocks, layout, run, tip, phase, middle, source) < 0.0:
             high = middle
         else:
             low = middle
@@ -59,32 +73,104 @@ def _release_between(memory, blocks, layout, run, tip, phase, low, high):
 
 
 @compiled
-def _release(memory, blocks, layout, run, tip, phase, length):
+def _release(memory, blocks, layout, run, tip, phase, source, length):
     """When within *length* the force first has to pull, s; negative if it does not.
 
     The force is evaluated in *PANELS* panels; where it dips between them, its minimum is located.
     """
-    subinterval, omega = length / PANELS, tip.drive.omega
-    before = force = constraint_force(memory, blocks, layout, run, tip, phase)
+    subinterval = length / PANELS
+    before = force = constraint_force(memory, blocks, layout, run, tip, phase, 0.0, source)
     if force < 0.0:
         return 0.0
     for i in range(1, PANELS + 1):
-        after = constraint_force(memory, blocks, layout, run, tip, phase + omega * (i * subinterval))
+        after = constraint_force(memory, blocks, layout, run, tip, phase, i * subinterval, source)
         if after < 0.0:
             return _release_between(
-                memory, blocks, layout, run, tip, phase, (i - 1) * subinterval, i * subinterval
+                memory, blocks, layout, run, tip, phase, source, (i - 1) * subinterval, i * subinterval
             )
         if i > 1 and force < before and force <= after:
             # the minimum of the parabola through the three
             bend = before - 2.0 * force + after
             if bend > 0.0:
                 at = (i - 1 + 0.5 * (before - after) / bend) * subinterval
-                if constraint_force(memory, blocks, layout, run, tip, phase + omega * at) < 0.0:
+                if constraint_force(memory, blocks, layout, run, tip, phase, at, source) < 0.0:
                     return _release_between(
-                        memory, blocks, layout, run, tip, phase, (i - 2) * subinterval, at
+                        memory, blocks, layout, run, tip, phase, source, (i - 2) * subinterval, at
                     )
         before, force = force, after
     return -1.0
+
+
+@inlined
+def _held_step(step, ticks, length):
+    """A step of another length in which the tip carries the beam."""
+    return Step(
+        ticks, step.at, length, step.phase, True, step.q, step.p, step.k, step.q1, step.p1, step.k1, step.r
+    )
+
+
+@inlined
+def _held_to(memory, blocks, layout, tip, step):
+    """The phase at the end of a step in which the tip carries the beam, g.q and q.Gq; further contacts are observed."""
+    there = step.phase + tip.drive.omega * step.length
+    _, gq, qr = hold(memory, blocks, layout, tip, step.phase, step.length, step.p, step.q1, step.p1, step.k1)
+    observe_further_contacts(memory, layout.size, layout.others, tip.drive, there, step.q1, step.p1)
+    return there, gq, qr
+
+
+@inlined
+def _up_to_further_event(memory, blocks, layout, others, run, tip, t, step, scratch):
+    """Ticks within a carried step to the first onset or release of another striker: as detected, and as located."""
+    if others is None:
+        return step.ticks, step.ticks
+    clock, whole = run.clock, step.ticks
+    _held_to(memory, blocks, layout, tip, step)
+    edge = first_further_event(memory, layout, others, sampling_slot(run), run, t, tip.drive, step, scratch)
+    if edge < 1 or edge == whole:
+        return edge, edge
+    _held_to(memory, blocks, layout, tip, _held_step(step, edge, edge * clock.tick))
+    smallest_correction = (clock.step >> clock.max_halvings) * clock.tick
+    return edge, refine_further_onsets(memory, others, clock, edge, edge, whole, smallest_correction, True)
+
+
+@inlined
+def _turned(memory, layout, run, now, accumulators, outputs):
+    """Where a run stands if a contact of another striker begins or ends as a step begins: nothing has moved."""
+    clock, t = run.clock, now.t
+    update_further_contacts(memory, layout.others, 0, t, 0.0, clock.tick, accumulators, outputs)
+    status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
+    return IntegratorState(
+        t, now.well_sign, now.stretch, now.rows, now.kinematics, now.control, now.sample, now.stored_states, status
+    )  # fmt: skip
+
+
+@inlined
+def _account_for_surroundings(
+    memory, layout, run, t, step, p, edge, done, touching, accumulators, outputs, jumped
+):
+    """Enter works and further contacts of a step up to tick *t* in the statistics; p is the row of the velocities there.
+
+    *jumped*: the velocity did not follow from the step alone.
+    """
+    size, others, clock, drive = layout.size, layout.others, run.clock, run.tip.drive
+    accumulate_further_contacts(memory, others, touching, done, accumulators)
+    accumulate_work(layout.terms, accumulators, done.external)
+    late = min(max((t - clock.last_quarter) / step.ticks, 0.0), 1.0)
+    accumulate_circuit(memory, layout, layout.circuit, p, accumulators, done.circuit, late)
+    update_further_contacts(memory, others, edge, t, step.length, clock.tick, accumulators, outputs)
+    if jumped:
+        restart_further_contacts(memory, size, others, drive, phase_at(run, t), t, p - size)
+
+
+@inlined
+def _further_step(memory, blocks, workspace, run, tip, rest, done):
+    """Take the *rest* of a tick after a hit or a release; returns its results, and those of the whole step."""
+    layout, stages = workspace.layout, workspace.stages
+    prepare(memory, layout, stages, run.tip.drive, rest.length, rest.at)
+    two = take_step(memory, blocks, layout, stages, tip, rest, True)
+    add_stored_contacts(memory, layout.others)
+    store_further_contacts(memory, layout.others)
+    return two, in_succession(layout, done, two)
 
 
 @inlined
@@ -97,29 +183,36 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
     rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center
     t, kinematics, control = now.t, now.kinematics, now.control
     # however strongly it is stretched, a beam that is carried moves no faster than the tip
-    left = min((now.stored_states + 1) * clock.output_interval, clock.end) - t
+    left = min((now.stored_states + 1) * clock.output_interval, clock.end)
+    left = up_to_discontinuity(tip.drive, run.phase, clock.period, t, left) - t
     ticks = min(clock.step >> contact_halvings(clock, (t - accumulators.onset) * tick, 0.0, 0.0), left)
     ticks = max(1, ticks // 4)
+    if any_touches(memory, layout.others, False):
+        ticks = min(ticks, step.ticks)
+    step = _held_step(step, ticks, ticks * tick)
+    edge, ticks = _up_to_further_event(memory, blocks, layout, layout.others, run, tip, t, step, scratch)
+    if ticks < 1:
+        return _turned(memory, layout, run, now, accumulators, outputs), step
     length = ticks * tick
-    release = _release(memory, blocks, layout, run, tip, step.phase, length)
+    release = _release(memory, blocks, layout, run, tip, step.phase, step.p, length)
     released = release >= 0.0
     if released:
         length = release
+        if release <= (ticks - 1) * tick:
+            edge = -1
         ticks = min(max(1, math.ceil(release / tick)), ticks)
-    impulse, work, gross, dissipated, peak = held_for(memory, blocks, layout, run, tip, step.phase, length)
-    step = Step(
-        ticks, step.at, length, step.phase, True, step.q, step.p, step.k, step.q1, step.p1, step.k1, step.r
-    )
-    there = step.phase + tip.drive.omega * length
+    step = _held_step(step, ticks, length)
+    done, peak = held_for(memory, blocks, layout, run, tip, step.phase, step.p, length)
+    store_further_contacts(memory, layout.others)
     sample = now.sample
     if outputs is not None:
         sample = record_held(memory, blocks, layout, run, tip, now, step, accumulators, outputs)
-    accumulators.impulse += impulse
-    accumulators.work += work
-    accumulators.gross_work += gross
-    accumulators.dissipated += dissipated
+    accumulators.impulse += done.impulse
+    accumulators.work += done.work
+    accumulators.gross_work += done.gross
+    accumulators.dissipated += done.dissipated
     accumulators.deepest = max(accumulators.deepest, peak)
-    _, gq, qr = hold(memory, blocks, layout, tip, there, step.q1, step.p1, step.k1)
+    there, gq, qr = _held_to(memory, blocks, layout, tip, step)
     observed = observe(memory, layout, tip, there, step.q1, step.p1)
     kinematics1 = ContactKinematics(
         observed.w + rest_contact, observed.wv, 0.0, 0.0, observed.c + rest_center, observed.cv
@@ -132,7 +225,9 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
     )  # fmt: skip
     observe_extras(kernel_input.extras, accumulators, t * tick, length, kinematics, kinematics1, True)
     t += ticks
-    status = _RUNNING_CARRIED if t < clock.end else _OK_CARRIED
+    status = _RUNNING if t < clock.end else _OK
+    if not math.isfinite(done.impulse):
+        status = _DIVERGED
     rows, touching = swap_rows(now.rows), True
     if released:
         touching = False
@@ -141,10 +236,11 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
             0, variable_slot(run), after, there, False, step.q1, step.p1, step.k1,
             step.q, step.p, step.k, step.r,
         )  # fmt: skip
-        prepare(memory, layout, workspace.stages, run.tip.drive, after, rest.at)
-        done = take_step(memory, blocks, layout, workspace.stages, tip, rest, True)
-        gq, qr, rows = done.gq, done.qr, now.rows
-        accumulators.dissipated += done.dissipated
+        two, done = _further_step(memory, blocks, workspace, run, tip, rest, done)
+        gq, qr, rows = two.gq, two.qr, now.rows
+        accumulators.dissipated += two.dissipated
+        accumulators.work += two.work
+        accumulators.gross_work += two.gross
         if outputs is None:
             close_impact(accumulators, None, 0, tip.law, t, tick)
         else:
@@ -154,6 +250,9 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
         kinematics1 = ContactKinematics(
             observed.w + rest_contact, observed.wv, d, observed.dv, observed.c + rest_center, observed.cv
         )
+    _account_for_surroundings(
+        memory, layout, run, t, step, rows.p, edge, done, True, accumulators, outputs, released
+    )
     next_control = StepControl(touching, t, t, control.energy_tick, control.steps_since_start)
     state = rows.q, rows.p, rows.k, gq, qr
     next_control, status = monitor_energy(
@@ -178,8 +277,6 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
 # ----------------------------------------------------------------------------------------------------
 
 
-_OK, _RUNNING, _DIVERGED = int(RunStatus.OK), int(RunStatus.INTERRUPTED), int(RunStatus.DIVERGED)
-_STEP_LIMIT = int(RunStatus.STEP_LIMIT)
 _LOCATIONS = 24
 """Newton steps in which a hit is located, at most."""
 _NOISE = 1e-12
@@ -205,9 +302,8 @@ def apply_impact_law(memory, blocks, workspace, run, tip, p, kinematics, when, p
     lost = 0.5 * (1.0 - e * e) * kinematics.dv * kinematics.dv / (c * c)
     accumulators.dissipated += lost
     accumulators.lost += lost
-    spare, size = run.spare, layout.size
     away = e * kinematics.dv
-    force, _, _ = hold(memory, blocks, layout, tip, phase, spare, spare + size, spare + 2 * size)
+    force = constraint_force(memory, blocks, layout, run, tip, phase, 0.0, p)
     pressed = force * c * c
     if e == 0.0 and pressed > 0.0:
         # without a rebound, landing and sustained contact are one impact: closed, and counted, at its release
@@ -230,12 +326,10 @@ def apply_impact_law(memory, blocks, workspace, run, tip, p, kinematics, when, p
     if height > run.lowest or e >= 1.0:
         return False
     lasts = 2.0 * away / (pressed * (1.0 - e))
-    shortest = 2.0 * math.pi / max(memory[layout.omega], tip.drive.omega)
+    shortest = 2.0 * math.pi / max(memory[layout.omega], drive_rate(tip.drive))
     if lasts > _SOON * shortest:
         return False
-    after = phase + tip.drive.omega * lasts
-    later, _, _ = hold(memory, blocks, layout, tip, after, spare, spare + size, spare + 2 * size)
-    return later > 0.0
+    return constraint_force(memory, blocks, layout, run, tip, phase, lasts, p) > 0.0
 
 
 @inlined
@@ -403,17 +497,42 @@ def _located(memory, blocks, workspace, run, tip, step, onset_time, top, at_end,
 
 
 @inlined
-def _moved_on(memory, blocks, workspace, run, tip, step, q, p, k, after, phase, together):
-    """From a hit or a release to the next tick, into the rows that the step began from; returns g.q and q.Gq."""
-    layout, stages = workspace.layout, workspace.stages
+def _up_to_further_event_in_flight(
+    memory, blocks, workspace, others, run, tip, t, step, done, observed, scratch
+):
+    """A free step up to the first onset or release of another striker: the tick as detected, the step and its results."""
+    if others is None:
+        return step.ticks, step, done, observed
+    layout, clock, drive, whole = workspace.layout, run.clock, tip.drive, step.ticks
+    there = step.phase + drive.omega * step.length
+    observe_further_contacts(memory, layout.size, others, drive, there, step.q1, step.p1)
+    edge = first_further_event(memory, layout, others, sampling_slot(run), run, t, drive, step, scratch)
+    event_ticks, due = edge, True
+    if edge < 1:
+        return edge, shortened_step(step, run, 0, 0.0), done, observed
+    while event_ticks != step.ticks:
+        step = shortened_step(step, run, event_ticks, event_ticks * clock.tick)
+        prepare(memory, layout, workspace.stages, run.tip.drive, step.length, step.at)
+        done = take_step(memory, blocks, layout, workspace.stages, tip, step, True)
+        there = step.phase + drive.omega * step.length
+        observed = observe(memory, layout, tip, there, step.q1, step.p1)
+        observe_further_contacts(memory, layout.size, others, drive, there, step.q1, step.p1)
+        event_ticks = refine_further_onsets(
+            memory, others, clock, edge, event_ticks, whole, (clock.step >> clock.max_halvings) * clock.tick, due
+        )  # fmt: skip
+        due = False
+    return edge, step, done, observed
+
+
+@inlined
+def _moved_on(memory, blocks, workspace, run, tip, step, done, q, p, k, after, phase, together):
+    """From a hit to the next tick, into the rows that the step began from; returns g.q, q.Gq, and the results of all."""
     if together:
-        there = phase + tip.drive.omega * after
-        _, gq, qr = hold(memory, blocks, layout, tip, there, step.q, step.p, step.k)
-        return gq, qr
+        _, gq, qr = hold(memory, blocks, workspace.layout, tip, phase, after, p, step.q, step.p, step.k)
+        return gq, qr, done
     rest = Step(0, variable_slot(run), after, phase, False, q, p, k, step.q, step.p, step.k, step.r)
-    prepare(memory, layout, stages, run.tip.drive, after, rest.at)
-    done = take_step(memory, blocks, layout, stages, tip, rest, True)
-    return done.gq, done.qr
+    two, done = _further_step(memory, blocks, workspace, run, tip, rest, done)
+    return two.gq, two.qr, done
 
 
 @inlined
@@ -439,7 +558,8 @@ def accept_step_restitution(
         if together:
             _stuck(memory, workspace, run, kinematics, p, accumulators)
             accumulators.onset = t
-            hold(memory, blocks, layout, tip, step.phase, q, p, k)
+            hold(memory, blocks, layout, tip, step.phase, 0.0, p, q, p, k)
+        restart_further_contacts(memory, layout.size, layout.others, tip.drive, step.phase, t, q)
         status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
         away = 0.0 if together else tip.law.coefficient * kinematics.dv
         wv = kinematics.wv + kinematics.dv + away
@@ -473,6 +593,12 @@ def accept_step_restitution(
             ),
             step,
         )
+    edge, step, done, observed = _up_to_further_event_in_flight(
+        memory, blocks, workspace, layout.others, run, tip, t, step, done, observed, scratch
+    )
+    if step.ticks < 1:
+        return _turned(memory, layout, run, now, accumulators, outputs), step
+    whole = step.ticks
     contact_event = detect_contact_event(memory, layout, run, now, tip, step, observed, scratch)
     onset_time = contact_event.onset_time
     if contact_event.subintervals > 0:
@@ -508,6 +634,11 @@ def accept_step_restitution(
     kinematics1 = ContactKinematics(
         observed.w + rest_contact, observed.wv, observed.d, observed.dv, observed.c + rest_center, observed.cv
     )
+    if step.ticks < whole:
+        edge = -1
+    there = step.phase + tip.drive.omega * step.length
+    observe_further_contacts(memory, layout.size, layout.others, tip.drive, there, step.q1, step.p1)
+    store_further_contacts(memory, layout.others)
     sample = now.sample
     if outputs is not None:
         sample = record_instants(
@@ -533,8 +664,8 @@ def accept_step_restitution(
         if together:
             _stuck(memory, workspace, run, kinematics1, step.p1, accumulators)
             accumulators.onset = t
-        gq, qr = _moved_on(
-            memory, blocks, workspace, run, tip, step, step.q1, step.p1, step.k1,
+        gq, qr, done = _moved_on(
+            memory, blocks, workspace, run, tip, step, done, step.q1, step.p1, step.k1,
             (t - now.t) * tick - step.length, phase, together,
         )  # fmt: skip
         rows = now.rows
@@ -543,6 +674,9 @@ def accept_step_restitution(
         kinematics1 = ContactKinematics(
             observed.w + rest_contact, observed.wv, d, dv, observed.c + rest_center, observed.cv
         )
+    _account_for_surroundings(
+        memory, layout, run, t, step, rows.p, edge, done, False, accumulators, outputs, hit
+    )
     safe_gap, safe_center = (
         (t, t) if onset_time >= 0.0 else (contact_event.safe_gap, contact_event.safe_center)
     )

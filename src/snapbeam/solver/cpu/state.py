@@ -64,6 +64,7 @@ __all__ = [
     "change_origin",
     "close_energy",
     "finish",
+    "form_acceleration",
     "restart_from_state",
     "sample_energy",
 ]
@@ -288,17 +289,25 @@ def change_energy_origin(memory, layout, run, now, accumulators, span):
     begin_other_well(accumulators, whole, high, power, high_power, span)
 
 
-@called
-def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching, stored, sample):
-    """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from an output state."""
-    q, p, k, r = rows.q, rows.p, rows.k, layout.work + 9 * layout.size
-    update_forces(memory, layout.size, layout.terms, run.tip.drive, phase_at(run, t), q)
-    evaluate_contacts(memory, layout.size, layout.others, run.tip.drive, phase_at(run, t), q, 0.0, False)
-    restart_further_contacts(memory, layout.size, layout.others, run.tip.drive, phase_at(run, t), t, q)
+@inlined
+def form_acceleration(memory, blocks, layout, drive, argument, q, k):
+    """Write the acceleration k by all forces of place and time, but the first striker's; returns g.q and q.Gq."""
+    r = layout.work + 9 * layout.size
+    update_forces(memory, layout.size, layout.terms, drive, argument, q)
+    evaluate_contacts(memory, layout.size, layout.others, drive, argument, q, 0.0, False)
     gq, qr = tension_rows(memory, blocks, layout, q, r)
     along_g, along_r = tension_factors(layout.gamma, gq, qr)
     along_g, along_r = add_to_tension(memory, layout.terms, along_g, along_r)
     acceleration_rows(memory, layout, along_g, along_r, r, k)
+    return gq, qr
+
+
+@called
+def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching, stored, sample):
+    """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from an output state."""
+    q, p = rows.q, rows.p
+    gq, qr = form_acceleration(memory, blocks, layout, run.tip.drive, phase_at(run, t), q, rows.k)
+    restart_further_contacts(memory, layout.size, layout.others, run.tip.drive, phase_at(run, t), t, q)
     tip = tip_about_well(run.tip, well_sign, run.rest_contact)
     observed = observe(memory, layout, tip, phase_at(run, t), q, p)
     rest_contact, rest_center = well_sign * run.rest_contact, well_sign * run.rest_center

@@ -23,6 +23,8 @@ from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, splat, store, vabs
 from snapbeam.solver.terms.interface import may_hide_onset
 
 __all__ = [
+    "NODES",
+    "WEIGHTS",
     "Circuit",
     "CircuitDamping",
     "CircuitIncrement",
@@ -43,8 +45,8 @@ __all__ = [
 
 _TERMS = 15
 # Nodes and weights of Gauss's rule of four points on [0, 1].
-_NODES = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
-_WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
+NODES = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
+WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
 
 
 class Circuit(NamedTuple):
@@ -169,7 +171,7 @@ def _flow(s, y, push, size, rate, weight, energy):
     impulse, twice, end = y * weight, 0.5 * y * weight * weight, y
     # y at the four nodes, summed with the terms
     y0, y1, y2, y3 = y, y, y, y
-    n0, n1, n2, n3 = _NODES
+    n0, n1, n2, n3 = NODES
     power, a0, a1, a2, a3 = 1.0, 1.0, 1.0, 1.0, 1.0
     for k in range(1, _TERMS):
         power *= weight / k
@@ -180,7 +182,7 @@ def _flow(s, y, push, size, rate, weight, energy):
         twice += term * weight * weight / ((k + 1) * (k + 2))
         y0, y1, y2, y3 = y0 + term * a0, y1 + term * a1, y2 + term * a2, y3 + term * a3
         ds, dy = size * dy, -ds - rate * dy
-    w0, w1, w2, w3 = _WEIGHTS
+    w0, w1, w2, w3 = WEIGHTS
     squares = w0 * y0 * y0 + w1 * y1 * y1 + w2 * y2 * y2 + w3 * y3 * y3
     return CircuitIncrement(impulse, end, energy + rate * squares * weight, twice)
 
@@ -191,7 +193,7 @@ def _resistive_flow(s, push, size, rate, weight, energy):
     lam = size * rate
     impulse, twice, end = s * weight, 0.5 * s * weight * weight, s
     s0, s1, s2, s3 = s, s, s, s
-    n0, n1, n2, n3 = _NODES
+    n0, n1, n2, n3 = NODES
     power, a0, a1, a2, a3, ds = 1.0, 1.0, 1.0, 1.0, 1.0, push - lam * s
     for k in range(1, _TERMS):
         power *= weight / k
@@ -202,7 +204,7 @@ def _resistive_flow(s, push, size, rate, weight, energy):
         twice += term * weight * weight / ((k + 1) * (k + 2))
         s0, s1, s2, s3 = s0 + term * a0, s1 + term * a1, s2 + term * a2, s3 + term * a3
         ds = -lam * ds
-    w0, w1, w2, w3 = _WEIGHTS
+    w0, w1, w2, w3 = WEIGHTS
     squares = w0 * s0 * s0 + w1 * s1 * s1 + w2 * s2 * s2 + w3 * s3 * s3
     return CircuitIncrement(-rate * impulse, -rate * end, energy + rate * squares * weight, -rate * twice)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from numba.extending import overload
 
-from snapbeam.solver.compilation import INLINE_HERE, called
+from snapbeam.solver.compilation import INLINE_HERE, called, inlined
 from snapbeam.solver.contact_force import mark_of
 from snapbeam.solver.cpu.mode_lanes import acceleration_rows
 from snapbeam.solver.cpu.state import variable_slot
@@ -25,11 +25,22 @@ from snapbeam.solver.terms.interface import (
     update_forces,
 )
 
-__all__ = ["mark_at_jump", "taken_across"]
+__all__ = ["in_succession", "mark_at_jump", "taken_across"]
 
 
 _NEAR = 0.5
 """Ticks: a jump so near behind the end of a step counts as within it."""
+
+
+@inlined
+def in_succession(layout, one, two):
+    """The results of two parts of a step."""
+    return StepIncrement(
+        two.gq, two.qr, one.impulse + two.impulse, one.work + two.work, one.gross + two.gross, one.lost + two.lost,
+        one.dissipated + two.dissipated,
+        total_work(layout.terms, one.external, two.external),
+        CircuitIncrement(two.circuit.impulse, two.circuit.y, one.circuit.energy + two.circuit.energy, two.circuit.twice),
+    )  # fmt: skip
 
 
 @called
@@ -54,12 +65,7 @@ def _in_two_parts(memory, blocks, layout, stages, run, tip, step, length, with_e
     prepare(memory, layout, stages, drive, rest.length, at)
     two = take_step(memory, blocks, layout, stages, tip, rest, with_energy)
     add_stored_contacts(memory, layout.others)
-    return StepIncrement(
-        two.gq, two.qr, one.impulse + two.impulse, one.work + two.work, one.gross + two.gross, one.lost + two.lost,
-        one.dissipated + two.dissipated,
-        total_work(layout.terms, one.external, two.external),
-        CircuitIncrement(two.circuit.impulse, two.circuit.y, one.circuit.energy + two.circuit.energy, two.circuit.twice),
-    )  # fmt: skip
+    return in_succession(layout, one, two)
 
 
 def taken_across(
