@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from benchmarks.cases import CONTACT, Case
 from benchmarks.peers.equations import equations_of
-from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.memory import pack
 from snapbeam.solver.cpu.mode_lanes import tension_rows
 from snapbeam.solver.physics import sincos, tension_factors

@@ -56,8 +56,8 @@ class State:
     striker_shift, striker_rate : array_like of shape (...) or (..., strikers)
         Of strikers with mass: displacement (m) and velocity (m/s) of the tip beyond the motion of its drive, positive
         towards the upper well; NaN of strikers without.  Of several strikers one number for each.
-    circuit : array_like of shape (...)
-        Of a harvester's circuit: voltage (V) of piezoelectric layers, current (A) of a coil with an inductance; NaN
+    circuit : array_like of shape (...) or (..., harvesters)
+        Of the circuits of harvesters: voltage (V) of piezoelectric layers, current (A) of a coil with an inductance; NaN
         where there is none, or where it is at rest.
     tangent : array_like of shape (..., k, 2, N), optional
         Small changes of amplitude and velocity that were carried along, k of them.
@@ -113,9 +113,8 @@ class State:
         position = np.nan if self.striker_position is None else self.striker_position
         found["striker_position"] = _maybe("state striker_position", position, batch)
         found["contact_time"] = _contact_times(self.contact_time, batch)
-        for name in ("striker_shift", "striker_rate"):
-            found[name] = _of_strikers(f"state {name}", getattr(self, name), batch)
-        found["circuit"] = _maybe("state circuit", self.circuit, batch)
+        for name in ("striker_shift", "striker_rate", "circuit"):
+            found[name] = _of_parts(f"state {name}", getattr(self, name), batch)
         for name, array in found.items():
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -195,7 +194,7 @@ class State:
             contact_time=self.contact_time.reshape(count, -1),
             striker_shift=self.striker_shift.reshape(count, *self.striker_shift.shape[len(self.batch) :]),
             striker_rate=self.striker_rate.reshape(count, *self.striker_rate.shape[len(self.batch) :]),
-            circuit=self.circuit.ravel(),
+            circuit=self.circuit.reshape(count, *self.circuit.shape[len(self.batch) :]),
             modal=modal,
         )
 
@@ -256,8 +255,8 @@ def _contact_times(value: ArrayLike, batch: tuple[int, ...]) -> _Array:
     return _spread("state contact_time", given, (*batch, given.shape[-1]))
 
 
-def _of_strikers(name: str, value: ArrayLike, batch: tuple[int, ...]) -> _Array:
-    """One number for the striker of every state, or one for each of several."""
+def _of_parts(name: str, value: ArrayLike, batch: tuple[int, ...]) -> _Array:
+    """One number for the striker or circuit of every state, or one for each of several."""
     given = _numbers(name, value)
     several = given.ndim == len(batch) + 1 and given.shape[:-1] == batch and given.shape[-1] > 1
     return given if several else _spread(name, given, batch)

@@ -17,7 +17,7 @@ from snapbeam.model.quantity import numbered
 from snapbeam.model.system import System
 from snapbeam.solver.assemble import motions_of, tip_of
 from snapbeam.solver.contact_force import felt_force
-from snapbeam.solver.ensemble import CircuitCoupling, Ensemble
+from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.further_contacts import OFFSET, REST, SIGN
 from snapbeam.solver.statistics import Recorded
 from snapbeam.solver.terms import WORKS
@@ -53,6 +53,7 @@ SCHEMA: dict[str, Variable] = {
     "mode": Variable(("mode",), "1", "buckling mode"),
     "striker": Variable(("striker",), "1", "number of the striker"),
     "force": Variable(("force",), "1", "number of the external force"),
+    "harvester": Variable(("harvester",), "1", "number of the harvester"),
     "displacement_at_striker": Variable(("time",), "1", "beam displacement at the striker, over b"),
     "midspan_displacement": Variable(("time",), "1", "beam displacement at mid-span, over b"),
     "velocity_at_striker": Variable(("time",), "1", "beam velocity at the striker, over b omega_1"),
@@ -81,16 +82,17 @@ SCHEMA: dict[str, Variable] = {
     "load_change": Variable(("time",), "N", "change of the axial load"),
     "load_work": Variable(("time",), "J", "work done by the change of the axial load"),
     "local_force_work": Variable(("time",), "J", "work done by the damping part of a local force"),
-    "voltage": Variable(("time",), "V", "voltage across the harvester's load"),
-    "power_load": Variable(("time",), "W", "power in the harvester's load"),
-    "energy_harvested": Variable(("time",), "J", "energy dissipated in the harvester's load"),
-    "energy_circuit": Variable(("time",), "J", "energy stored in the harvester's circuit"),
+    "voltage": Variable(("time",), "V", "voltage across the (first) harvester's load"),
+    "voltages": Variable(("time", "harvester"), "V", "voltages across the loads of several harvesters"),
+    "power_load": Variable(("time",), "W", "power in the loads of harvesters"),
+    "energy_harvested": Variable(("time",), "J", "energy dissipated in the loads of harvesters"),
+    "energy_circuit": Variable(("time",), "J", "energy stored in the circuits of harvesters"),
     "energy_lost_contact": Variable(("time",), "J", "part of the dissipated energy that was lost in contact"),
     "valid": Variable(("time",), "1", "whether the sample was measured"),
 }
 """Variables of a run by name; ``time``, ``cycle``, ``mode``, ``striker`` and ``force`` are coordinates."""
 
-_COORDINATES = ("time", "cycle", "mode", "striker", "force")
+_COORDINATES = ("time", "cycle", "mode", "striker", "force", "harvester")
 
 
 def trajectory_dataset(
@@ -278,10 +280,12 @@ _Array = NDArray[np.float64]
 _COLUMN = {
     name: number
     for number, name in enumerate(
-        ("penetration", "force", "energy", "contact", "work", "dissipated", "lost", *WORKS, "circuit")
+        ("penetration", "force", "energy", "contact", "work", "dissipated", "lost", *WORKS)
     )
 }
 """Columns of the recorded values."""
+_CIRCUITS = len(_COLUMN)
+"""The first column of the energies lost in circuits."""
 IMPACT_COLUMNS = (
     ("onset", "s", "onset of the impact"),
     ("duration", "s", "duration of the impact"),
@@ -332,12 +336,9 @@ def run_dataset(
             axis=1
         )
         values[:, _COLUMN["energy"]] -= own
-    if structure.circuit:
-        values[:, _COLUMN["energy"]] -= 0.5 * recorded.p[:, -1] ** 2
-    if ensemble.circuit_coupling is not None:  # dissipated in the resistance of the coil
-        values[:, _COLUMN["dissipated"]] += (1.0 - ensemble.circuit_coupling.share[0]) * values[
-            :, _COLUMN["circuit"]
-        ]
+    values[:, _COLUMN["energy"]] -= _stored_in_circuits(ensemble, recorded)
+    for i, circuit in enumerate(ensemble.circuits):  # dissipated in the resistance of the coil
+        values[:, _COLUMN["dissipated"]] += (1.0 - circuit.share[0]) * values[:, _CIRCUITS + i]
     location = 0.5 if system.striker is None else system.striker.location
     shape = model.shape_at(location)
     displacement = alpha @ shape / scale
@@ -373,8 +374,8 @@ def run_dataset(
         of_each = strikers_of(ensemble, system, recorded, values, variables["striker_displacement"])
         variables["energy_contact"] = of_each.pop("energy_contact")
         variables |= of_each
-    if ensemble.circuit_coupling is not None:
-        variables |= _harvested(ensemble, ensemble.circuit_coupling, recorded, values)
+    if ensemble.circuits:
+        variables |= _harvested(ensemble, recorded, values)
     if any(each.law.is_dissipative for each in system.contacts):
         variables["energy_lost_contact"] = values[:, _COLUMN["lost"]]
     at = recorded.times
@@ -395,24 +396,30 @@ def run_dataset(
     return trajectory_dataset(at, at / period, attrs=attrs, **variables)
 
 
-def _harvested(
-    ensemble: Ensemble, coupling: CircuitCoupling, recorded: Recorded, values: _Array
-) -> dict[str, _Array]:
-    """Return the variables of a harvester."""
+def _stored_in_circuits(ensemble: Ensemble, recorded: Recorded) -> _Array:
+    """Return the energy in circuits, y^2/2 each, J, shape (samples,)."""
+    y = ensemble.structure.circuits_of(recorded.q).reshape(recorded.q.shape[0], -1)
+    return 0.5 * (np.nan_to_num(y) ** 2).sum(axis=1)
+
+
+def _harvested(ensemble: Ensemble, recorded: Recorded, values: _Array) -> dict[str, _Array]:
+    """Return the variables of harvesters."""
     structure = ensemble.structure
-    assert structure.circuit_row is not None
-    if structure.circuit:
-        y = structure.circuit_of(recorded.p)
-    else:
-        y = -coupling.rate[0] * (recorded.p @ structure.circuit_row)
-    lost = (coupling.rate[0] if structure.circuit else 1.0 / coupling.rate[0]) * y * y
-    found = {
-        "voltage": coupling.volts[0] * y,
-        "power_load": coupling.share[0] * lost,
-        "energy_harvested": coupling.share[0] * values[:, _COLUMN["circuit"]],
-    }
-    if structure.circuit:
-        found["energy_circuit"] = 0.5 * y * y
+    y = structure.circuits_of(recorded.q).reshape(recorded.q.shape[0], -1)
+    voltage, power, energy = np.zeros(y.shape), np.zeros(y.shape), np.zeros(y.shape[0])
+    for i, (circuit, row) in enumerate(zip(ensemble.circuits, structure.circuits, strict=True)):
+        per_square = circuit.rate[0]
+        if row.mode is None:
+            y[:, i] = -circuit.rate[0] * (recorded.p @ row.row)
+            per_square = 1.0 / circuit.rate[0]
+        voltage[:, i] = circuit.volts[0] * y[:, i]
+        power[:, i] = circuit.share[0] * per_square * y[:, i] ** 2
+        energy += circuit.share[0] * values[:, _CIRCUITS + i]
+    found = {"voltage": voltage[:, 0], "power_load": power.sum(axis=1), "energy_harvested": energy}
+    if len(ensemble.circuits) > 1:
+        found["voltages"] = voltage
+    if any(row.mode is not None for row in structure.circuits):
+        found["energy_circuit"] = _stored_in_circuits(ensemble, recorded)
     return found
 
 

@@ -27,7 +27,7 @@ from snapbeam.solver.assemble import make_ensemble, plans_of, run_columns
 from snapbeam.solver.cpu.driver import usable_cores
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.registry import resolve
-from snapbeam.solver.statistics import Recorded, statistics_of
+from snapbeam.solver.statistics import Recorded, lost_in_circuits, statistics_of
 from snapbeam.solver.step_size import Plan
 from snapbeam.solver.terms import WORKS
 from snapbeam.util.diagnostics import Diagnostic, counting, sharing, tell
@@ -271,7 +271,7 @@ def _energy_error(accumulators_of_runs: Any) -> float:
             given
             - (accumulators["energy"] - accumulators["first_energy"])
             - accumulators["dissipated"]
-            - accumulators["circuit_energy"]
+            - lost_in_circuits(accumulators_of_runs)[0]
         )
     scale = (
         float(accumulators["gross_work"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,19 +11,17 @@ from numpy.typing import NDArray
 from snapbeam.model.state import ModalState, State
 from snapbeam.solver.ensemble import FAR_AWAY, Ensemble
 
-__all__ = ["circuit_unit", "states_of"]
+__all__ = ["states_of"]
 
 
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
 
 
-def circuit_unit(ensemble: Ensemble) -> float:
-    """Return the factor from the coordinate of a circuit to volts or amperes."""
-    harvester = ensemble.harvester
-    if harvester is None or harvester.inertia == 0.0:
-        return 1.0
-    return harvester.unit
+def _units(ensemble: Ensemble) -> Any:
+    """Return the factors from the coordinates of circuits to volts or amperes."""
+    units = np.array([each.unit for each in ensemble.circuits] or [1.0])
+    return units if units.size > 1 else units[0]
 
 
 def states_of(
@@ -50,6 +49,6 @@ def states_of(
         contact_time=np.where(contact_ticks >= 0, contact_ticks * tick[:, None], -1.0),
         striker_shift=structure.bodies_of(q),
         striker_rate=structure.bodies_of(p),
-        circuit=structure.circuit_of(p) * circuit_unit(ensemble),
+        circuit=structure.circuits_of(q) * _units(ensemble),
         modal=ModalState(q, p, well_sign.astype(np.float64), np.array(runs["offset"]), structure.hash),
     )

@@ -323,8 +323,9 @@ _LOWEST = {"standard": 1e-9, "reference": 1e-13}
 _RESOLVED = 24.0
 """Flight steps, at least, in a period of a base's or an axial load's fastest part."""
 _TAPPED = {"standard": 0.35, "reference": 0.1}
-"""Longest step with a harvester, over the reciprocal of the maximum angular frequency with an open circuit. It
-is in the kicks, and at 0.5 a run of one or three modes still loses up to 5e-3 of its gross work."""
+"""Longest step over the reciprocal of the angular frequency or rate of what is in the kicks beside tension and contacts."""
+_DECAY = 4.0
+"""Decay of the state of a circuit in a step, lam h, at most."""
 
 
 def make_ensemble(
@@ -368,7 +369,8 @@ def make_ensemble(
     columns = {name: np.array(np.broadcast_to(values, (runs,))) for name, values in columns.items()}
     side = _side(system, state, goes_on=periods is not None)
     structure = structure_of(
-        system.model, side, tuple(each.striker for each in system.contacts), system.base_excitation, system.harvester, system.external_forces,
+        system.model, side, tuple(each.striker for each in system.contacts), system.base_excitation, tuple(system.harvesters),
+        system.external_forces,
         system.local_forces, system.unloaded_potential.dividing_height,
     )  # fmt: skip
     plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
@@ -379,14 +381,11 @@ def make_ensemble(
     table = np.zeros(runs, dtype=RUN)
     places = _places(structure, table, columns.get("contact.location", np.full(runs, 0.5)))
     since = state.flat().contact_times(max(1, len(system.contacts)))
-    unit = 1.0 if system.harvester is None else system.harvester.unit
-    starts = _starts(structure, table, state, since, unit)
+    units = np.array([each.unit for each in system.harvesters] or [1.0])
+    starts = _starts(structure, table, state, since, units)
     table["phase"] = np.where(np.isnan(state.phase), phases_of(system, columns, runs), state.phase)
     table["offset"] = _offsets(system, structure, state, columns, table, places.rows, starts, driven)
     table["tip_speed"] = driven.speed
-    coupling = _circuit_coupling(system, columns, runs)
-    if coupling is not None:
-        table["circuit_rate"] = coupling.rate
     highest = table["rest_contact"] + table["offset"] + driven.highest
     if structure.bodies or driven.kind.parts or len(system.contacts) > 1 or system.local_forces:
         highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown, and a shaken beam too
@@ -412,8 +411,7 @@ def make_ensemble(
         max_steps=most_steps(integration, system.model.modes),
         high_omega=integration.high_frequency_ratio * system.scale.omega,
         cycles=time.cycles,
-        circuit_coupling=coupling,
-        harvester=system.harvester,
+        circuits=_circuits(system, columns, runs),
         others=others_of(system, structure, columns, runs, since),
     )
 
@@ -467,8 +465,8 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
             }
         moving = section_of("drive", number)
         own |= {f"{moving}.{name}": value for name, value in each.striker.drive.values().items()}
-    if system.harvester is not None:
-        own["harvester.resistance"] = float(system.harvester.resistance)
+    for number, harvester in enumerate(system.harvesters, 1):
+        own[f"{section_of('harvester', number)}.resistance"] = float(harvester.resistance)
     for section, motion in system.moving:
         if _is_around(section):
             own |= {f"{section}.{name}": value for name, value in motion.values().items()}
@@ -501,15 +499,10 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
             each._replace(step=min(each.step, 2.0 * math.pi / (_RESOLVED * rate))) if rate > 0.0 else each
             for each, rate in zip(plans, fastest.tolist(), strict=True)
         ]
-    if integration.step is None and system.harvester is not None:
-        coupling = _circuit_coupling(system, columns, len(plans))
-        assert coupling is not None
-        # a circuit couples the fastest modes too, and is in its kicks
-        longest = _TAPPED[integration.accuracy] / _fastest_open(system)
-        rates = coupling.rate if system.harvester.inertia > 0.0 else np.zeros(len(plans))
+    if integration.step is None and system.harvesters:
+        allowed = _longest_with_circuits(system, columns, len(plans), integration.accuracy)
         plans = [
-            each._replace(step=min(each.step, longest, 1.0 / rate if rate > 0.0 else math.inf))
-            for each, rate in zip(plans, rates.tolist(), strict=True)
+            each._replace(step=min(each.step, own)) for each, own in zip(plans, allowed.tolist(), strict=True)
         ]
     if integration.step is None and system.local_forces:
         longest = _longest_with_local_forces(system, integration.accuracy)
@@ -546,15 +539,23 @@ def _longest_with_local_forces(system: System, accuracy: str) -> float:
     return _TAPPED[accuracy] / max(math.sqrt(squared), decay, 1e-300)
 
 
-def _fastest_open(system: System) -> float:
-    """Greatest angular frequency of the beam in its well, rad/s, while no current flows: theta^2/C stiffens it."""
-    model, harvester = _struck(system), system.harvester
-    assert harvester is not None
-    stiffness = np.diag(model.omega**2)
-    if harvester.inertia > 0.0:
+def _longest_with_circuits(system: System, columns: Mapping[str, _Array], runs: int, accuracy: str) -> _Array:
+    """Longest step with harvesters, s, of each run.
+
+    The stiffness t.t of circuits with inertia, and the damping rate t.t of those without, are in the kicks.  Flows backwards in
+    time let a state of a circuit grow by exp(lam t).
+    """
+    model, squared, decay = _struck(system), np.zeros(runs), np.zeros(runs)
+    rates = np.zeros(runs)
+    for harvester, circuit in zip(system.harvesters, _circuits(system, columns, runs), strict=True):
         row = model.linear_modes.T @ harvester.row(model)
-        stiffness = stiffness + np.outer(row, row) / harvester.inertia
-    return float(np.sqrt(np.linalg.eigvalsh(stiffness)[-1]))
+        if harvester.inertia > 0.0:
+            squared += float(row @ row) / harvester.inertia
+            rates = np.maximum(rates, circuit.rate)
+        else:
+            decay += float(row @ row) * circuit.rate
+    exchange = np.maximum(np.maximum(np.sqrt(squared), decay), 1e-300)
+    return np.minimum(2.0 * _TAPPED[accuracy] / exchange, _DECAY / np.maximum(rates, 1e-300))
 
 
 def _struck(system: System) -> ReducedModel:
@@ -632,7 +633,7 @@ def _places(structure: Structure, table: NDArray[Any], location: _Array) -> _Pla
     return _Places(location, np.array([structure.row(shape) for shape in shapes]))
 
 
-def _starts(structure: Structure, table: NDArray[Any], state: State, since: _Array, unit: float) -> _Array:
+def _starts(structure: Structure, table: NDArray[Any], state: State, since: _Array, units: _Array) -> _Array:
     """q and p of every start; which start, well and contact time *since* each run has is entered in the table."""
     flat, modal = state.flat(), state.flat().modal
     count = flat.batch[0]
@@ -641,7 +642,13 @@ def _starts(structure: Structure, table: NDArray[Any], state: State, since: _Arr
     if modal is not None and modal.structure == structure.hash:
         table["well_sign"] = modal.well_sign
         return np.stack((modal.q, modal.p), axis=1)
-    parts = (flat.amplitude, flat.velocity, flat.striker_shift, flat.striker_rate, flat.circuit / unit)
+    parts = (
+        flat.amplitude,
+        flat.velocity,
+        flat.striker_shift,
+        flat.striker_rate,
+        _per_unit(flat.circuit, units),
+    )
     pairs = [structure.to_modal(*each) for each in zip(*parts, strict=True)]
     return np.array(pairs)
 
@@ -688,16 +695,23 @@ def _reach_at_rest(system: System, structure: Structure, table: NDArray[Any], ro
     return np.asarray(rows[table["contact_row"]] @ q)
 
 
-def _circuit_coupling(system: System, columns: Mapping[str, _Array], runs: int) -> CircuitCoupling | None:
-    """The circuit of a harvester, for every run."""
-    harvester = system.harvester
-    if harvester is None:
-        return None
-    resistance = columns.get("harvester.resistance", np.zeros(runs))
-    loss, inertia = harvester.loss(resistance), harvester.inertia
-    rate = loss / inertia if inertia > 0.0 else 1.0 / loss
-    unit = 1.0 / math.sqrt(inertia) if inertia > 0.0 else 1.0
-    return CircuitCoupling(rate, harvester.share(resistance), harvester.volts(resistance) * unit)
+def _per_unit(circuit: _Array, units: _Array) -> _Array:
+    """States of circuits as coordinates: one of each start, or one for each of several circuits."""
+    if units.size == 1:
+        return circuit / units[0]
+    return np.broadcast_to(circuit.reshape(circuit.shape[0], -1), (circuit.shape[0], units.size)) / units
+
+
+def _circuits(system: System, columns: Mapping[str, _Array], runs: int) -> tuple[CircuitCoupling, ...]:
+    """The circuits of the harvesters, for every run."""
+    found = []
+    for number, harvester in enumerate(system.harvesters, 1):
+        resistance = columns.get(f"{section_of('harvester', number)}.resistance", np.zeros(runs))
+        loss, inertia = harvester.loss(resistance), harvester.inertia
+        rate = loss / inertia if inertia > 0.0 else 1.0 / loss
+        volts = harvester.volts(resistance) * (1.0 / math.sqrt(inertia) if inertia > 0.0 else 1.0)
+        found.append(CircuitCoupling(rate, harvester.share(resistance), volts, harvester.unit))
+    return tuple(found)
 
 
 def _law_numbers(law: type[ContactLaw], system: System, columns: Mapping[str, _Array], runs: int) -> _Array:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.drive.base import Drive, Scale
-from snapbeam.model.harvester import Harvester
 from snapbeam.solver.structure import Structure
 
 __all__ = ["FAR_AWAY", "RUN", "CircuitCoupling", "Ensemble", "FurtherContactTable"]
@@ -33,6 +32,8 @@ class CircuitCoupling(NamedTuple):
     """Of the loss, that ends in the load."""
     volts: _Array
     """Across the load, V, per unit of the circuit's coordinate."""
+    unit: float
+    """Volts or amperes of the circuit's state per unit of its coordinate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +80,14 @@ class Ensemble:
     """Angular frequency above which a mode counts as high, rad/s."""
     cycles: float
     """Cycles of excitation of each run."""
-    circuit_coupling: CircuitCoupling | None = None
-    harvester: Harvester | None = None
+    circuits: tuple[CircuitCoupling, ...] = ()
+    """Of the harvesters."""
     others: FurtherContactTable | None = None
+
+    @property
+    def circuit_rates(self) -> _Array:
+        """Rates of loss, shape (runs, circuits)."""
+        return np.array([each.rate for each in self.circuits]).reshape(len(self.circuits), self.size).T.copy()
 
     @property
     def has_striker(self) -> bool:
@@ -141,7 +147,6 @@ _REALS = (
     "decide_reach",  # highest future position of the tip, or 0 if that is higher
     "contact_time",  # s since the present contact began; negative: apart; NaN: the penetration decides
     "lowest",  # height of a flight that is too low to be resolved, m
-    "circuit_rate",  # of a harvester's circuit, 1/s
     "well_sign",  # +1 if q and p are counted from the first well, -1 from the other
 )
 _INTEGERS = (

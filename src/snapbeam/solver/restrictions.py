@@ -17,10 +17,6 @@ def check_integrable(system: System) -> None:
     InputError
     """
     contacts = system.contacts
-    if len(system.harvesters) > 1:
-        raise InputError(
-            f"harvesters: {len(system.harvesters)} circuits; must be at most 1 in a run; leave the others out"
-        )
     for number, each in enumerate(contacts, 1):
         section, law = section_of("contact", number), each.law
         if law.impulsive and len(contacts) > 1:

@@ -23,7 +23,7 @@ from numba.core import cgutils
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, overload, register_model
 
-from snapbeam.solver.compilation import INLINE_HERE, overloaded
+from snapbeam.solver.compilation import INLINE_HERE, inlined, overloaded
 
 __all__ = [
     "ALL",
@@ -31,6 +31,7 @@ __all__ = [
     "bits",
     "both",
     "broadcast_load",
+    "dot",
     "fma",
     "halvings",
     "lanes_sum",
@@ -488,3 +489,12 @@ def lanes_tuple(typingctx: Any, template: Any, array: Any, index: Any) -> Any:
         return context.make_tuple(builder, signature.return_type, values)
 
     return types.NamedUniTuple(LANES, count, template.instance_class)(template, array, types.intp), codegen
+
+
+@inlined
+def dot(memory, size, a, b):
+    """a.b over a row."""
+    total = splat(0.0)
+    for row in range(0, size, WIDTH):
+        total = fma(load(memory, a + row), load(memory, b + row), total)
+    return lanes_sum(total)

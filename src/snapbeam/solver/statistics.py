@@ -37,6 +37,7 @@ __all__ = [
     "Statistic",
     "accumulators_dtype",
     "empty_accumulators",
+    "lost_in_circuits",
     "of_one_named",
     "register_statistic",
     "rows_for",
@@ -101,9 +102,6 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
     ("dissipated", np.float64, 0.0),  # integrated, where an energy balance is computed
     ("lost", np.float64, 0.0),  # in contact
     *((name, np.float64, 0.0) for name in WORKS),
-    ("circuit_energy", np.float64, 0.0),  # lost in a harvester's circuit, load included
-    ("circuit_energy_last_quarter", np.float64, 0.0),
-    ("peak_circuit", np.float64, 0.0),  # maximum voltage or current, as the circuit's coordinate
     ("first_energy", np.float64, 0.0),
     ("energy", np.float64, 0.0),  # at the end, contact included
     ("displacement", np.float64, 0.0),  # of contact point and centre, at the end
@@ -226,9 +224,16 @@ def _dissipated(reading: Reading) -> Values:
     return given - (reading.seen("energy") - reading.seen("first_energy")) - _harvested(reading)
 
 
+def _in_loads(reading: Reading, column: int) -> Values:
+    """Energies lost in circuits that ended in their loads."""
+    found = np.zeros(reading.accumulators.size)
+    for i, circuit in enumerate(reading.ensemble.circuits):
+        found = found + circuit.share * reading.accumulators["circuits"][:, i, column]
+    return np.where(reading.good, found, np.nan)
+
+
 def _harvested(reading: Reading) -> Values:
-    coupling = reading.ensemble.circuit_coupling
-    return reading.seen("circuit_energy") * (0.0 if coupling is None else coupling.share)
+    return _in_loads(reading, CIRCUIT_LOSS)
 
 
 def _harvested_power(reading: Reading) -> Values:
@@ -243,30 +248,31 @@ def _harvested_per_cycle(reading: Reading) -> Values:
         return np.where(done > 0.0, _harvested(reading) / done, np.nan)
 
 
-def _late_load_power(reading: Reading) -> Values:
-    """Mean power in the circuit over the last quarter of the run; NaN for a run that ended before it."""
+def _late_duration(reading: Reading) -> Values:
+    """Seconds of a run in its last quarter; NaN for a run that ended before it."""
     runs = reading.ensemble.runs
     inside = (reading.accumulators["time"] - runs["last_quarter"]) * runs["tick"]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(inside > 0.0, reading.seen("circuit_energy_last_quarter") / inside, np.nan)
+    return np.where(inside > 0.0, inside, np.nan)
 
 
 def _late_harvested_power(reading: Reading) -> Values:
-    coupling = reading.ensemble.circuit_coupling
-    return _late_load_power(reading) * (0.0 if coupling is None else coupling.share)
+    return _in_loads(reading, CIRCUIT_LATE_LOSS) / _late_duration(reading)
 
 
 def _late_voltage(reading: Reading) -> Values:
-    coupling = reading.ensemble.circuit_coupling
-    if coupling is None:
-        return _late_load_power(reading) * 0.0
-    per_square = coupling.rate if reading.ensemble.structure.circuit else 1.0 / coupling.rate
-    return np.sqrt(_late_load_power(reading) / per_square) * np.abs(coupling.volts)
+    if not reading.ensemble.circuits:
+        return 0.0 * _late_duration(reading)
+    first = reading.ensemble.circuits[0]
+    per_square = 1.0 / first.rate if reading.ensemble.structure.circuits[0].mode is None else first.rate
+    lost = np.where(reading.good, reading.accumulators["circuits"][:, 0, CIRCUIT_LATE_LOSS], np.nan)
+    return np.sqrt(lost / _late_duration(reading) / per_square) * np.abs(first.volts)
 
 
 def _peak_voltage(reading: Reading) -> Values:
-    coupling = reading.ensemble.circuit_coupling
-    return reading.seen("peak_circuit") * (0.0 if coupling is None else np.abs(coupling.volts))
+    if not reading.ensemble.circuits:
+        return np.where(reading.good, 0.0, np.nan)
+    peak = reading.accumulators["circuits"][:, 0, CIRCUIT_PEAK] * np.abs(reading.ensemble.circuits[0].volts)
+    return np.where(reading.good, peak, np.nan)
 
 
 def _mean_power(reading: Reading) -> Values:
@@ -367,23 +373,23 @@ _ROWS = (
         _high_share, comment=_SHARE,
     ),
     *(Statistic(name, "float64", "J", long_name, _seen(name)) for name, long_name in WORKS.items()),
-    Statistic("energy_harvested", "float64", "J", "energy that ended in the harvester's load", _harvested),
+    Statistic("energy_harvested", "float64", "J", "energy that ended in the loads of harvesters", _harvested),
     Statistic(
-        "harvested_power", "float64", "W", "energy in the harvester's load over the time of the run", _harvested_power
+        "harvested_power", "float64", "W", "energy in the loads of harvesters over the time of the run", _harvested_power
     ),
     Statistic(
-        "harvested_per_cycle", "float64", "J", "energy in the harvester's load over the cycles of the run",
+        "harvested_per_cycle", "float64", "J", "energy in the loads of harvesters over the cycles of the run",
         _harvested_per_cycle,
     ),
     Statistic(
-        "harvested_power_last_quarter", "float64", "W", "power in the harvester's load, last quarter of the run",
+        "harvested_power_last_quarter", "float64", "W", "power in the loads of harvesters, last quarter of the run",
         _late_harvested_power,
     ),
     Statistic(
-        "rms_voltage_last_quarter", "float64", "V", "root mean square voltage across the load, last quarter of the run",
+        "rms_voltage_last_quarter", "float64", "V", "root mean square voltage across the (first) load, last quarter of the run",
         _late_voltage,
     ),
-    Statistic("peak_voltage", "float64", "V", "greatest voltage across the load at the end of a step", _peak_voltage),
+    Statistic("peak_voltage", "float64", "V", "maximum voltage across the (first) load at the end of a step", _peak_voltage),
 )  # fmt: skip
 
 
@@ -450,10 +456,15 @@ def unregister_statistic(name: str) -> None:
     del STATISTICS[name]
 
 
-def accumulators_dtype(others: int = 0) -> np.dtype[Any]:
-    """One record of what kernels keep of a run, with *others* strikers beside the first."""
+CIRCUIT_LOSS, CIRCUIT_LATE_LOSS, CIRCUIT_PEAK = range(3)
+"""Of each circuit: energy lost, J, load included; that in the last quarter; maximum of its coordinate at ends of steps."""
+
+
+def accumulators_dtype(others: int = 0, circuits: int = 0) -> np.dtype[Any]:
+    """One record of what kernels keep of a run, with *others* strikers beside the first and so many circuits."""
     # the columns of every kernel come last: Numba takes a record that begins as another one does for one of its kind
     fields: list[Any] = [("others", np.float64, (others, OTHER_WORK + 1))] if others else []
+    fields += [("circuits", np.float64, (circuits, CIRCUIT_PEAK + 1))] if circuits else []
     fields += [(f"own_{row.name}", np.float64) for row in updated()]
     fields += [(name, kind) for name, kind, _ in _KEPT]
     return np.dtype(fields, align=True)
@@ -463,14 +474,21 @@ ACCUMULATORS = accumulators_dtype()
 """Of the package's own statistics."""
 
 
-def empty_accumulators(runs: int, others: int = 0) -> Any:
-    """Accumulators of runs that have not begun, with *others* strikers beside the first."""
-    accumulators_of_runs = np.zeros(runs, dtype=accumulators_dtype(others))
+def empty_accumulators(runs: int, others: int = 0, circuits: int = 0) -> Any:
+    """Accumulators of runs that have not begun, with *others* strikers beside the first and so many circuits."""
+    accumulators_of_runs = np.zeros(runs, dtype=accumulators_dtype(others, circuits))
     for name, _, start in _KEPT:
         accumulators_of_runs[name] = start
     for row in updated():
         accumulators_of_runs[f"own_{row.name}"] = row.start
     return accumulators_of_runs
+
+
+def lost_in_circuits(accumulators_of_runs: Any) -> NDArray[np.float64]:
+    """Energy lost in all circuits of each run, J."""
+    if "circuits" not in accumulators_of_runs.dtype.names:
+        return np.zeros(accumulators_of_runs.size)
+    return np.asarray(accumulators_of_runs["circuits"][:, :, CIRCUIT_LOSS].sum(axis=1))
 
 
 # ----------------------------------------------------------------------------------------------------

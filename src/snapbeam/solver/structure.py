@@ -19,7 +19,7 @@ from snapbeam.model.local_force import LocalForce
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
 
-__all__ = ["LocalForceRow", "StrikerBody", "Structure", "UnequalWells", "structure_of"]
+__all__ = ["CircuitRow", "LocalForceRow", "StrikerBody", "Structure", "UnequalWells", "structure_of"]
 
 
 _Array = NDArray[np.float64]
@@ -56,6 +56,16 @@ class LocalForceRow:
     """u in the well."""
     law: Any
     """Constants of the law."""
+
+
+@dataclass(frozen=True, eq=False)
+class CircuitRow:
+    """The circuit of a harvester."""
+
+    row: _Array
+    """t, the coupling, scaled so that half the square of the circuit's coordinate is its energy; shape (N,)."""
+    mode: int | None
+    """Mode whose displacement is the charge; None of a circuit without inertia."""
 
 
 @dataclass(frozen=True)
@@ -112,10 +122,8 @@ class Structure:
     force_rows: tuple[_Array, ...] = ()
     """Of each external force F(t) along a row h: V^T h."""
     local_forces: tuple[LocalForceRow, ...] = ()
-    circuit_row: _Array | None = None
-    """Of a harvester: its coupling, scaled so that half the square of the circuit's coordinate is its energy."""
-    circuit: bool = False
-    """Whether the circuit's coordinate is the velocity of a mode of its own, the last one."""
+    circuits: tuple[CircuitRow, ...] = ()
+    """Of harvesters.  The modes of their charges come last."""
     bodies: tuple[StrikerBody, ...] = ()
     """Of strikers with mass, whose own modes follow those of the beam."""
     strikers: int = 0
@@ -131,7 +139,7 @@ class Structure:
         """
         row: _Array = sign * self.sign * (self.model.linear_modes.T @ shape)
         own = [-1.0 / math.sqrt(each.mass) if each.contact == contact else 0.0 for each in self.bodies]
-        return np.concatenate((row, own, [0.0] if self.circuit else []))
+        return np.concatenate((row, own, np.zeros(self.omega.size - row.size - len(own))))
 
     def row_of_beam(self, row: _Array) -> _Array:
         """A contact row without the parts of strikers' own modes: the beam's displacement at that location."""
@@ -174,10 +182,16 @@ class Structure:
             found[..., each.contact] = each.sign * values[..., mode] / math.sqrt(each.mass)
         return found if self.strikers > 1 else found[..., 0]
 
-    def circuit_of(self, p: _Array) -> _Array:
-        """The circuit's coordinate in p of shape (..., N): its own, or none."""
-        found: _Array = p[..., -1] if self.circuit else np.full(p.shape[:-1], np.nan)
-        return found
+    def circuits_of(self, q: _Array) -> _Array:
+        """The coordinates y = Q - t.q of the circuits in q of shape (..., N); NaN of those without inertia.
+
+        Shape (...), or (..., circuits) of several circuits.
+        """
+        found = np.full((*q.shape[:-1], max(1, len(self.circuits))), np.nan)
+        for i, each in enumerate(self.circuits):
+            if each.mode is not None:
+                found[..., i] = q[..., each.mode] - q @ each.row
+        return found if len(self.circuits) > 1 else found[..., 0]
 
     def to_modal(
         self,
@@ -185,11 +199,11 @@ class Structure:
         velocity: _Array,
         shift: float | _Array = np.nan,
         rate: float | _Array = np.nan,
-        circuit: float = np.nan,
+        circuit: float | _Array = np.nan,
     ) -> tuple[_Array, _Array]:
         """Amplitudes of shape (N,) and their velocities as q and p about the well, and those of the strikers' bodies.
 
-        *circuit* is the coordinate of a harvester's circuit.
+        *circuit* holds the coordinates of circuits.
         """
         back = self.model.linear_modes.T @ self.model.mass
         q, p = back @ (alpha - self.equilibrium), back @ velocity
@@ -198,8 +212,11 @@ class Structure:
             own = [np.broadcast_to(value, max(1, self.strikers))[each.contact] for value in (shift, rate)]
             own = [0.0 if np.isnan(value) else scale * float(value) for value in own]
             q, p = np.append(q, own[0]), np.append(p, own[1])
-        if self.circuit:
-            q, p = np.append(q, 0.0), np.append(p, 0.0 if np.isnan(circuit) else circuit)
+        for i, row in enumerate(self.circuits):
+            if row.mode is not None:
+                y = float(np.broadcast_to(circuit, len(self.circuits))[i])
+                charge = (0.0 if np.isnan(y) else y) + row.row[: q.size] @ q
+                q, p = np.append(q, charge), np.append(p, 0.0)
         return q, p
 
     def amplitudes(self, q: _Array) -> _Array:
@@ -221,8 +238,8 @@ class Structure:
         digest.update(np.array([self.nonlinear_stiffness, self.sign]).tobytes())
         if self.unequal_wells is not None:
             digest.update(np.ascontiguousarray(self.unequal_wells.force).tobytes())
-        if self.circuit_row is not None:
-            digest.update(np.ascontiguousarray(self.circuit_row).tobytes())
+        for circuit in self.circuits:
+            digest.update(np.ascontiguousarray(circuit.row).tobytes())
         if self.base_load is not None:
             digest.update(np.ascontiguousarray(self.base_load).tobytes())
         for row in self.force_rows:
@@ -242,7 +259,7 @@ def structure_of(
     side: str,
     strikers: tuple[Striker, ...] = (),
     base: BaseExcitation | None = None,
-    harvester: Harvester | None = None,
+    harvesters: tuple[Harvester, ...] = (),
     forces: tuple[ExternalForce, ...] = (),
     local_forces: tuple[LocalForce, ...] = (),
     dividing_height: float | None = None,
@@ -281,7 +298,9 @@ def structure_of(
             structure = _with_body(
                 structure, striker, contact, carried_by_base=base is not None and base.striker_on_base
             )
-    return structure if harvester is None else _with_circuit(structure, harvester)
+    for harvester in harvesters:
+        structure = _with_circuit(structure, harvester)
+    return structure
 
 
 def _local_force(model: ReducedModel, equilibrium: _Array, local_force: LocalForce) -> LocalForceRow:
@@ -312,66 +331,63 @@ def _uneven(model: ReducedModel, sign: float, dividing_height: float | None) -> 
     )
 
 
+def _with_mode(
+    structure: Structure,
+    omega: float = 0.0,
+    damping_ratio: float = 0.0,
+    base_load: float = 0.0,
+    shift: float = 0.0,
+) -> Structure:
+    """The structure with one more mode, which the tension does not couple with the others."""
+    count = structure.omega.size + 1
+    coupling = np.zeros((count, count))
+    coupling[:-1, :-1] = structure.coupling
+    wells = structure.unequal_wells
+    return dataclasses.replace(
+        structure,
+        omega=np.append(structure.omega, omega),
+        damping_ratio=np.append(structure.damping_ratio, damping_ratio),
+        coupling=coupling,
+        well=np.append(structure.well, 0.0),
+        center=np.append(structure.center, 0.0),
+        shift=np.append(structure.shift, shift),
+        unequal_wells=None
+        if wells is None
+        else dataclasses.replace(
+            wells, force=np.append(wells.force, 0.0), second=np.append(wells.second, 0.0)
+        ),
+        base_load=None if structure.base_load is None else np.append(structure.base_load, base_load),
+        force_rows=tuple(np.append(each, 0.0) for each in structure.force_rows),
+        local_forces=_longer(structure.local_forces),
+        circuits=_longer(structure.circuits),
+    )
+
+
+def _longer(parts: Any) -> Any:
+    """Parts whose rows have one more mode."""
+    return tuple(dataclasses.replace(each, row=np.append(each.row, 0.0)) for each in parts)
+
+
 def _with_body(structure: Structure, striker: Striker, contact: int, carried_by_base: bool) -> Structure:
     """The structure with the mode of a striker that is a body, which a base shakes too if it carries it."""
     assert striker.mass is not None
     body = StrikerBody(contact, striker.mass, 1.0 if striker.side == "below" else -1.0)
     own = -body.sign * math.sqrt(striker.mass) if carried_by_base else 0.0
-    count = structure.omega.size + 1
-    coupling = np.zeros((count, count))
-    coupling[:-1, :-1] = structure.coupling
-    return dataclasses.replace(
-        structure,
-        omega=np.append(structure.omega, math.sqrt(striker.suspension_stiffness / striker.mass)),
-        damping_ratio=np.append(structure.damping_ratio, striker.damping_ratio),
-        coupling=coupling,
-        well=np.append(structure.well, 0.0),
-        center=np.append(structure.center, 0.0),
-        shift=np.append(structure.shift, 0.0),
-        unequal_wells=None if structure.unequal_wells is None else _with_rest(structure.unequal_wells),
-        base_load=None if structure.base_load is None else np.append(structure.base_load, own),
-        force_rows=tuple(np.append(each, 0.0) for each in structure.force_rows),
-        local_forces=_longer(structure.local_forces),
-        bodies=(*structure.bodies, body),
-    )
+    omega = math.sqrt(striker.suspension_stiffness / striker.mass)
+    structure = _with_mode(structure, omega, striker.damping_ratio, own)
+    return dataclasses.replace(structure, bodies=(*structure.bodies, body))
 
 
 def _with_circuit(structure: Structure, harvester: Harvester) -> Structure:
-    """The structure with a harvester, and with the mode of its circuit if that has inertia.
+    """The structure with a harvester, and with the mode of its charge if the circuit has inertia.
 
-    That mode has no frequency, no tension and no row: its velocity is the circuit's coordinate.
+    That mode has no frequency, no tension and no velocity.  The charge y + t.q changes with the origin of q.
     """
     modes = structure.model.linear_modes.shape[1]
-    coupling = np.zeros(structure.omega.size)
-    coupling[:modes] = structure.model.linear_modes.T @ harvester.row(structure.model)
-    if harvester.inertia == 0.0:
-        return dataclasses.replace(structure, circuit_row=coupling)
-    coupling = coupling / math.sqrt(harvester.inertia)
-    count = structure.omega.size + 1
-    tension = np.zeros((count, count))
-    tension[:-1, :-1] = structure.coupling
-    longer: dict[str, Any] = {name: np.append(getattr(structure, name), 0.0) for name in _ROWS}
-    return dataclasses.replace(
-        structure,
-        **longer,
-        coupling=tension,
-        unequal_wells=None if structure.unequal_wells is None else _with_rest(structure.unequal_wells),
-        base_load=None if structure.base_load is None else np.append(structure.base_load, 0.0),
-        force_rows=tuple(np.append(each, 0.0) for each in structure.force_rows),
-        local_forces=_longer(structure.local_forces),
-        circuit_row=np.append(coupling, 0.0),
-        circuit=True,
-    )
-
-
-_ROWS = ("omega", "damping_ratio", "well", "center", "shift")
-
-
-def _longer(forces: tuple[LocalForceRow, ...]) -> tuple[LocalForceRow, ...]:
-    return tuple(dataclasses.replace(each, row=np.append(each.row, 0.0)) for each in forces)
-
-
-def _with_rest(unequal_wells: UnequalWells) -> UnequalWells:
-    return dataclasses.replace(
-        unequal_wells, force=np.append(unequal_wells.force, 0.0), second=np.append(unequal_wells.second, 0.0)
-    )
+    row = np.zeros(structure.omega.size)
+    row[:modes] = structure.model.linear_modes.T @ harvester.row(structure.model)
+    mode = None
+    if harvester.inertia > 0.0:
+        row, mode = row / math.sqrt(harvester.inertia), structure.omega.size
+        structure, row = _with_mode(structure, shift=float(row @ structure.shift)), np.append(row, 0.0)
+    return dataclasses.replace(structure, circuits=(*structure.circuits, CircuitRow(row, mode)))

@@ -81,6 +81,7 @@ def _asked(ensemble: Ensemble, packed: Packed, memory: Memory | None) -> KernelI
         other_numbers=None if ensemble.others is None else ensemble.others.numbers,
         other_places=None if ensemble.others is None else ensemble.others.places,
         other_rows=None if ensemble.others is None else packed.spread(ensemble.others.rows),
+        circuit_rates=ensemble.circuit_rates if ensemble.circuits else None,
         extras=extras_of_table(),
         max_steps=ensemble.max_steps,
         high=bool(ensemble.structure.high_modes(ensemble.high_omega).any()),
@@ -259,7 +260,7 @@ def _spread_over(
     """Hand the runs to threads, in chunks; *arguments* are those of *integrate*, whose memory is a thread's own."""
     size = packed.layout.size
     kernel_output = KernelOutput(
-        empty_accumulators(ensemble.size, _beside(ensemble)),
+        empty_accumulators(ensemble.size, _beside(ensemble), len(ensemble.circuits)),
         np.empty((ensemble.size, output_states, 2 * size)),
         np.empty((ensemble.size, output_states, 2 + _beside(ensemble)), dtype=np.int64),
         np.zeros(1, dtype=np.int64),
@@ -354,7 +355,10 @@ def record(
     """
     packed = _packed(ensemble)
     size, march = packed.layout.size, _kernel(integrate_recorded, ensemble)
-    memory, accumulators_of_runs = lay_out(ensemble, packed), empty_accumulators(1, _beside(ensemble))
+    memory, accumulators_of_runs = (
+        lay_out(ensemble, packed),
+        empty_accumulators(1, _beside(ensemble), len(ensemble.circuits)),
+    )
     kernel_input, scratch = _asked(ensemble, packed, memory), _room(ensemble)
     buffers = _buffers(ensemble, times, size)
     saved_state = np.zeros(MARKS, dtype=np.int64), np.zeros(REALS)
@@ -363,7 +367,7 @@ def record(
     accumulators, end = accumulators_of_runs[0], float(ensemble.runs["end"][0])
     outputs = Outputs(
         times, np.empty(buffers.samples), np.empty((buffers.samples, 2 * size)),
-        np.empty((buffers.samples, VALUES)), _impact_rows(ensemble, buffers), buffers.impacts, marks, buffers.most, in_contact,
+        np.empty((buffers.samples, VALUES + len(ensemble.circuits))), _impact_rows(ensemble, buffers), buffers.impacts, marks, buffers.most, in_contact,
     )  # fmt: skip
     arguments = (
         memory.memory, memory.blocks, memory.layouts[0], memory.stages, kernel_input, scratch, accumulators, outputs, saved_state, _SLICE_STEPS,

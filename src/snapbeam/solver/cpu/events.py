@@ -15,13 +15,13 @@ from snapbeam.solver.contact_force import (
     scalar_function,
     zero_force_crossing,
 )
-from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.mode_lanes import (
     flow_coefficients,
     modal_energy,
     propagate_free,
     signals,
-    speed_bound,
+    speed_bound_with_terms,
+    validity_horizon,
 )
 from snapbeam.solver.cpu.recording import record_contact, record_inside_step, record_instants
 from snapbeam.solver.cpu.state import (
@@ -38,12 +38,6 @@ from snapbeam.solver.cpu.step import (
     prepare,
     take_step,
     with_velocity_dependent,
-)
-from snapbeam.solver.cpu.terms.circuit import (
-    accumulate_circuit,
-    circuit_speed_bound,
-    missed_onset,
-    validity_horizon,
 )
 from snapbeam.solver.cpu.terms.further_contact_events import (
     accumulate_further_contacts,
@@ -66,9 +60,8 @@ from snapbeam.solver.interpolation import (
 )
 from snapbeam.solver.physics import sincos, tension_energy
 from snapbeam.solver.registered_statistics import observe as observe_extras
-from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, store
+from snapbeam.solver.simd import WIDTH, dot, fma, lanes_sum, load, store
 from snapbeam.solver.step_control import (
-    TRUST,
     ContactKinematics,
     accumulate_displacement,
     close_impact,
@@ -78,12 +71,14 @@ from snapbeam.solver.step_control import (
     safe_interval,
 )
 from snapbeam.solver.terms.interface import (
+    accumulate_loss,
     accumulate_work,
     add_potential_energy,
-    add_to_speed_bound,
     center_from_barrier,
     kinematics_from_barrier,
+    may_hide_onset,
     relative_to_nearest_well,
+    store_loss,
     wells_differ,
 )
 from snapbeam.util.status_codes import RunStatus
@@ -367,25 +362,13 @@ def detect_contact_event(memory, layout, run, now, tip, step, kinematics1, scrat
             # the force begins or ends there, though the contact goes on
             event, event_ticks = False, int(zero_force_fraction * step.ticks) + 1
         return ContactEvent(event, event_ticks, onset_time, safe_gap, safe_center, subintervals, subinterval)
-    size, known = layout.size, validity_horizon(layout.circuit, run.step_time)
+    size, known = layout.size, validity_horizon(layout, run.step_time)
     if after > safe_gap:
-        bound = speed_bound(memory, layout, layout.contact, step.q, step.p)
-        bound = circuit_speed_bound(
-            memory, size, layout.omega, layout.circuit, layout.contact, step.q, step.p, bound, TRUST * known
-        )
-        bound = add_to_speed_bound(
-            memory, size, layout.terms, tip.drive, layout.contact, TRUST * run.step_time, bound
-        )
+        bound = speed_bound_with_terms(memory, layout, tip.drive, layout.contact, step.q, step.p, known)
         push = dot(memory, size, layout.contact, step.k)
         safe_gap = now.t + int(safe_interval(-kinematics.d, bound, run.tip_speed, push, known) / tick)
     if after > safe_center:
-        bound = speed_bound(memory, layout, layout.center, step.q, step.p)
-        bound = circuit_speed_bound(
-            memory, size, layout.omega, layout.circuit, layout.center, step.q, step.p, bound, TRUST * known
-        )
-        bound = add_to_speed_bound(
-            memory, size, layout.terms, tip.drive, layout.center, TRUST * run.step_time, bound
-        )
+        bound = speed_bound_with_terms(memory, layout, tip.drive, layout.center, step.q, step.p, known)
         push = dot(memory, size, layout.center, step.k)
         safe_center = now.t + int(
             safe_interval(abs(center_from_barrier(layout.terms, kinematics.c)), bound, 0.0, push, known)
@@ -408,7 +391,8 @@ def detect_contact_event(memory, layout, run, now, tip, step, kinematics1, scrat
             onset_time = first_contact_onset(scratch.inner_samples, subintervals, subinterval)
             if onset_time >= 0.0:
                 event, event_ticks = True, min(step.ticks, int(onset_time / tick))
-    if missed_onset(layout.circuit, layout.terms, event, kinematics.d, kinematics1.d):
+    if may_hide_onset(layout.terms) and not event and kinematics1.d > 0.0 and kinematics.d <= 0.0:
+        # a free step ended in the contact unseen: the accelerations changed more than was foreseen
         onset_time = (
             first_upcrossing(kinematics.d, kinematics.dv, kinematics1.d, kinematics1.dv, step.length)
             * step.length
@@ -572,6 +556,7 @@ def accept_step(
         )
         further_corrections -= 1
     store_further_contacts(memory, layout.others)
+    store_loss(memory, layout.terms)
     kinematics1 = ContactKinematics(
         observed.w + rest_contact, observed.wv, observed.d, observed.dv, observed.c + rest_center, observed.cv
     )
@@ -594,7 +579,7 @@ def accept_step(
     accumulate_further_contacts(memory, layout.others, touching, done, accumulators)
     accumulate_work(layout.terms, accumulators, done.external)
     late = min(max((t + step.ticks - clock.last_quarter) / step.ticks, 0.0), 1.0)
-    accumulate_circuit(memory, layout, layout.circuit, step.p1, accumulators, done.circuit, late)
+    accumulate_loss(memory, layout.size, layout.terms, accumulators, step.q1, step.p1, late)
     if outputs is not None:
         accumulators.dissipated += done.dissipated + done.lost
     accumulate_displacement(accumulators, kinematics, kinematics1, step.length)

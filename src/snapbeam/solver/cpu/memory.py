@@ -12,7 +12,6 @@ from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.drive.sine import Sine
 from snapbeam.solver.cpu.mode_lanes import WORK_ROWS, Layout
-from snapbeam.solver.cpu.terms.circuit import Circuit, CircuitDamping
 from snapbeam.solver.cpu.terms.further_contacts import FurtherContacts
 from snapbeam.solver.cpu.terms.velocity_block import ContactDamping, VelocityBlock, numbers_of_block
 from snapbeam.solver.ensemble import Ensemble
@@ -21,6 +20,7 @@ from snapbeam.solver.simd import WIDTH
 from snapbeam.solver.splitting import Stages, in_memory, slot_length
 from snapbeam.solver.structure import Structure
 from snapbeam.solver.terms import TERMS_AFTER_CONTACTS, TERMS_BEFORE_CONTACTS
+from snapbeam.solver.terms.circuit import CircuitDamping, ResistiveCircuit
 from snapbeam.solver.terms.interface import TermMemory
 from snapbeam.solver.terms.local_force import DampedLocalForce, LocalDamping
 
@@ -49,8 +49,6 @@ class Packed(NamedTuple):
     """Modes of each block."""
     own: tuple[dict[str, int], ...]
     """Of each term in the layout, the lengths of what every run has for itself."""
-    unit: int
-    """Place of the row that is 1 for the circuit's own mode, of a layout with a velocity block."""
 
     def spread(self, values: _Array) -> _Array:
         """Numbers of modes, shape (..., N), as padded rows, shape (..., rows)."""
@@ -107,6 +105,10 @@ def pack(
         out[rows] = values
         return out
 
+    # the elements of circuits are no oscillators: they have a flow of their own
+    states = np.isin(
+        np.arange(omega.size), [each.mode for each in structure.circuits if each.mode is not None]
+    )
     full = np.zeros((size, size))
     full[np.ix_(rows, rows)] = structure.coupling
     strips = []
@@ -119,7 +121,7 @@ def pack(
     arrays = {
         "omega": padded(omega),
         "omega_squared": padded(omega * omega),
-        "omega_damped": padded(omega * np.sqrt(1.0 - zeta * zeta), 1.0),
+        "omega_damped": padded(np.where(states, 1.0, omega * np.sqrt(1.0 - zeta * zeta)), 1.0),
         "damping": padded(zeta * omega),
         "g": padded(structure.well),
         "contact": np.zeros(size),
@@ -137,22 +139,15 @@ def pack(
             prefix = f"{kind.__name__}.{i}."
             built.append((kind, prefix, found))
             arrays |= {f"{prefix}{name}": values for name, values in (found.shared | found.own).items()}
-    if structure.circuit_row is not None:
-        arrays |= {"circuit_row": padded(structure.circuit_row), "rate": np.zeros(WIDTH)}
     if several is not None:
         arrays["striker_rows"] = np.zeros(len(several.laws) * size)
         arrays["strikers"] = np.zeros(len(several.laws) * NUMBERS)
     damped = _damped(structure, several, law)
     if damped:
-        arrays["unit"] = np.zeros(size)
-        arrays["unit"][rows[-1]] = 1.0
         arrays["velocity_block"] = np.zeros(WIDTH + numbers_of_block(damped))
     starts = np.concatenate(([0], np.cumsum([array.size for array in arrays.values()])))
     placed = dict(zip(arrays, map(int, starts), strict=False))
-    circuit, others = None, None
-    if structure.circuit_row is not None:
-        element = int(rows[-1]) if structure.circuit else None
-        circuit = Circuit(placed.pop("circuit_row"), placed.pop("rate"), element)
+    others = None
     if several is not None:
         others = FurtherContacts(placed.pop("striker_rows"), placed.pop("strikers"), several.numbers_type()())
     terms: list[Any] = []
@@ -165,9 +160,9 @@ def pack(
             places = {name: placed.pop(f"{prefix}{name}") for name in (*shared, *single)}
             terms.append(kind(**places, **numbers))
             own.append({name: values.size for name, values in single.items()})
-    moving = bool(np.all(omega * np.sqrt(1.0 - zeta * zeta) > 0.0))
+    moving = bool(np.all(states | (omega * np.sqrt(1.0 - zeta * zeta) > 0.0)))
     gentle = _LONGEST_DECAY / max(float((zeta * omega).max()), _SLOWEST) if moving else 0.0
-    unit, block = (placed.pop("unit"), placed.pop("velocity_block")) if damped else (0, 0)
+    block = placed.pop("velocity_block") if damped else 0
     layout = Layout(
         size=size,
         **placed,
@@ -176,14 +171,13 @@ def pack(
         stretch=structure.stretch,
         gentle=gentle,
         terms=tuple(terms),
-        circuit=circuit,
         others=others,
         body=_body_of_first(structure, rows),
         bodies=tuple(map(int, rows[structure.modes_of_bodies])) or None,
         velocity_block=None,
     )
     if damped:
-        layout = layout._replace(velocity_block=_velocity_block(layout, law, unit, block))
+        layout = layout._replace(velocity_block=_velocity_block(layout, law, block))
     return Packed(
         np.concatenate(list(arrays.values())),
         np.array(blocks, dtype=np.int64),
@@ -191,7 +185,6 @@ def pack(
         rows,
         tuple(held),
         tuple(own),
-        unit,
     )
 
 
@@ -203,19 +196,18 @@ def _body_of_first(structure: Structure, rows: NDArray[np.int64]) -> int | None:
 
 
 def _damped(structure: Structure, several: type[Several] | None, law: type[ContactLaw]) -> int:
-    """Rows of the velocity block; 0 where one contact or one circuit alone has an exact solution of its own."""
+    """Rows of the velocity block; 0 where the first contact alone has an exact solution of its own."""
     contacts = sum(each.rate_dependent for each in (law, *(several.laws if several is not None else ())))
     forces = sum(type(each.law).owner.dissipative for each in structure.local_forces)
-    circuit = structure.circuit_row is not None
-    alone = forces == 0 and contacts + circuit <= 1 and (contacts == 0 or law.rate_dependent)
-    return 0 if alone else contacts + forces + circuit * (1 + structure.circuit)
+    forces += sum(each.mode is None for each in structure.circuits)
+    return 0 if forces == 0 and contacts == law.rate_dependent else contacts + forces
 
 
-def _velocity_block(layout: Layout, law: type[ContactLaw], unit: int, numbers: int) -> VelocityBlock:
-    """Every channel of a layout, and the places of their rows; *unit* is that of the circuit's own mode."""
+def _velocity_block(layout: Layout, law: type[ContactLaw], numbers: int) -> VelocityBlock:
+    """Every channel of a layout, and the places of their rows."""
     rows: list[int] = []
     channels: list[Any] = []
-    first, circuit = None, None
+    first = None
     if law.rate_dependent:
         first = numbers
         channels.append(ContactDamping(first, 0))
@@ -228,11 +220,10 @@ def _velocity_block(layout: Layout, law: type[ContactLaw], unit: int, numbers: i
         if isinstance(term, DampedLocalForce):
             channels.append(LocalDamping(term.row, term.state, term.law, len(rows)))
             rows.append(term.row)
-    if layout.circuit is not None:
-        circuit = len(rows)
-        channels.append(CircuitDamping(layout.circuit, circuit))
-        rows += [layout.circuit.coupling, *([unit] if layout.circuit.own is not None else [])]
-    return VelocityBlock(tuple(rows), tuple(channels), numbers + WIDTH, first, circuit)
+        if isinstance(term, ResistiveCircuit):
+            channels.append(CircuitDamping(term.state, len(rows)))
+            rows.append(term.row)
+    return VelocityBlock(tuple(rows), tuple(channels), numbers + WIDTH, first)
 
 
 class Memory(NamedTuple):
@@ -254,7 +245,7 @@ def _any_contact_damped(ensemble: Ensemble) -> bool:
 
 def _always_damped(layout: Layout) -> bool:
     """Whether forces depend on velocities outside of contacts too."""
-    return layout.circuit is not None or any(isinstance(term, DampedLocalForce) for term in layout.terms)
+    return any(isinstance(term, (DampedLocalForce, ResistiveCircuit)) for term in layout.terms)
 
 
 def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
@@ -268,8 +259,6 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
     second = first._replace(
         g=first.work + work, contact=first.work + work + size, work=first.work + work + 2 * size
     )
-    if first.circuit is not None:
-        second = second._replace(work=second.work + WIDTH, circuit=first.circuit._replace(rate=second.work))
     if first.others is not None:
         count = len(type(first.others.kinds).owner.laws)
         rows = second.work
@@ -288,7 +277,7 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
     if first.velocity_block is not None:
         length = WIDTH + numbers_of_block(len(first.velocity_block.rows))
         second = second._replace(
-            velocity_block=_velocity_block(second, ensemble.law, packed.unit, second.work),
+            velocity_block=_velocity_block(second, ensemble.law, second.work),
             work=second.work + length,
         )
     at = second.work + WORK_ROWS * size + slots

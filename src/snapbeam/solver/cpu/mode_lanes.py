@@ -12,8 +12,6 @@ import math
 from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import called, inlined
-from snapbeam.solver.cpu.dot import dot
-from snapbeam.solver.cpu.terms.circuit import without_circuit
 from snapbeam.solver.physics import (
     decay_less_one,
     mode_energy,
@@ -25,7 +23,15 @@ from snapbeam.solver.physics import (
 )
 from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat, store, vabs
 from snapbeam.solver.step import flow_mode, kick_mode
-from snapbeam.solver.terms.interface import acceleration_about_nearest_well, add_acceleration
+from snapbeam.solver.step_control import TRUST
+from snapbeam.solver.terms.interface import (
+    acceleration_about_nearest_well,
+    add_acceleration,
+    add_potential_energy,
+    add_to_speed_bound,
+    bounds_by_energy,
+    enter_flow,
+)
 
 __all__ = [
     "Layout",
@@ -33,7 +39,6 @@ __all__ = [
     "beam_energy",
     "beam_power",
     "beam_signals",
-    "dot",
     "flow_coefficients",
     "flow_rows",
     "kick_and_flow_rows",
@@ -43,9 +48,10 @@ __all__ = [
     "modal_energy",
     "propagate_free",
     "signals",
-    "speed_bound",
+    "speed_bound_with_terms",
     "tension_rows",
     "tension_rows_twice",
+    "validity_horizon",
 ]
 
 
@@ -85,8 +91,6 @@ class Layout(NamedTuple):
     """Longest flow, s, that polynomials serve; 0 if there is an overdamped or a still mode."""
     terms: Any
     """The terms of the structure, a tuple (:mod:`snapbeam.solver.terms`)."""
-    circuit: Any
-    """Of a harvester, a :class:`~snapbeam.solver.cpu.terms.circuit.Circuit`; else None."""
     others: Any
     """Of several strikers, an :class:`~snapbeam.solver.cpu.terms.further_contacts.FurtherContacts`; else None."""
     body: Any
@@ -323,6 +327,25 @@ def speed_bound(memory, layout, c, q, p):
 
 
 @inlined
+def validity_horizon(layout, step_time):
+    """Time for which the bound of a free flight is trusted, in flight steps of *step_time*: a circuit changes soon."""
+    return 0.25 * step_time if bounds_by_energy(layout.terms) else step_time
+
+
+@inlined
+def speed_bound_with_terms(memory, layout, drive, along, q, p, horizon):
+    """The same with what the terms can change while the bound is trusted; *horizon* is :func:`validity_horizon`."""
+    bound, energy = speed_bound(memory, layout, along, q, p), 0.0
+    if bounds_by_energy(layout.terms):
+        energy = add_potential_energy(
+            memory, layout.size, layout.terms, q, modal_energy(memory, layout, q, p)
+        )
+    return add_to_speed_bound(
+        memory, layout.size, layout.terms, drive, along, q, p, energy, TRUST * horizon, bound
+    )
+
+
+@inlined
 def signals(memory, layout, q, p):
     """Displacement of the contact point and of the centre from rest and their rates: c.q, c.p, e.q, e.p."""
     cq, cp, eq, ep = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
@@ -353,9 +376,8 @@ def _without_body(memory, body, contact, q, p, w, rate):
 
 @inlined
 def beam_energy(memory, layout, q, p, energy):
-    """The part of the modal *energy* that is in the beam: neither in a striker's mass nor in a circuit."""
-    beam = _without_energy_of(memory, layout.bodies, layout.omega, q, p, energy)
-    return without_circuit(memory, layout.circuit, p, beam)
+    """The part of the modal *energy* that is in the beam and not in a striker's mass."""
+    return _without_energy_of(memory, layout.bodies, layout.omega, q, p, energy)
 
 
 @inlined
@@ -369,8 +391,8 @@ def _without_energy_of(memory, bodies, omega, q, p, energy):
 
 @inlined
 def beam_power(memory, layout, p, k, force, power, high):
-    """The part of the rates of the modal energies that is the beam's; 0 with a circuit, whose force is not in *k*."""
-    if layout.circuit is not None:
+    """The part of the rates of the modal energies that is the beam's; 0 with forces that are not in *k*."""
+    if layout.velocity_block is not None:
         return 0.0, 0.0
     return _without_power_of(memory, layout, layout.bodies, p, k, force, power), high
 
@@ -419,6 +441,13 @@ def propagate_free(memory, layout, contact, flow, subintervals, subinterval, q, 
 @called
 def flow_coefficients(memory, layout, length, at):
     """Rows a11 - 1, a12, a21, a22 - 1 of the exact flow over *length* seconds, written from *at* on."""
+    size = layout.size
+    _linear_flow(memory, layout, length, at)
+    enter_flow(memory, size, layout.terms, length, at)
+
+
+@inlined
+def _linear_flow(memory, layout, length, at):
     size = layout.size
     if abs(length) < layout.gentle:
         for row in range(0, size, WIDTH):

@@ -15,7 +15,7 @@ from snapbeam.solver.cpu.terms.step_across import taken_across
 from snapbeam.solver.physics import tension_energy
 from snapbeam.solver.step_control import ContactKinematics
 from snapbeam.solver.terms import WORKS
-from snapbeam.solver.terms.interface import add_potential_energy, no_external_work, works_so_far
+from snapbeam.solver.terms.interface import add_potential_energy, no_external_work, works_so_far, write_loss
 
 __all__ = [
     "MARKS",
@@ -32,9 +32,9 @@ __all__ = [
 ]
 
 
-VALUES = 8 + len(WORKS)
-"""Penetration, contact force, beam energy, contact energy, work, dissipation, loss in contact, works of the terms, and
-energy lost in the circuit, of a sample."""
+VALUES = 7 + len(WORKS)
+"""Penetration, contact force, beam energy, contact energy, work, dissipation, loss in contact and works of the terms, of a
+sample; the energies lost in circuits follow."""
 MARKS, REALS = 24, 10
 """Number of integers and floats of a saved state."""
 _TOGETHER = ContactKinematics(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -95,7 +95,8 @@ class _Sums(NamedTuple):
     lost: float
     works: Any
     """Of the terms, a tuple."""
-    circuit: float
+    within: float
+    """1 with what a part of a step gave, 0 without."""
 
 
 @inlined
@@ -106,7 +107,7 @@ def _sums(terms, accumulators):
         accumulators.dissipated,
         accumulators.lost,
         _works_so_far(terms, accumulators, no_external_work(terms)),
-        accumulators.circuit_energy,
+        0.0,
     )
 
 
@@ -115,12 +116,12 @@ def _sums_with(terms, accumulators, done):
     """The same with what a part of a step gave."""
     return _Sums(
         accumulators.work + done.work, accumulators.dissipated + done.dissipated + done.lost, accumulators.lost + done.lost,
-        _works_so_far(terms, accumulators, done.external), accumulators.circuit_energy + done.circuit.energy,
+        _works_so_far(terms, accumulators, done.external), 1.0,
     )  # fmt: skip
 
 
 @inlined
-def _write(memory, layout, well_sign, law, outputs, sample, instant, sums):
+def _write(memory, layout, well_sign, law, outputs, sample, instant, accumulators, sums):
     """One sample, about the first well."""
     size, kinematics = layout.size, instant.kinematics
     for row in range(size):
@@ -138,7 +139,7 @@ def _write(memory, layout, well_sign, law, outputs, sample, instant, sums):
     outputs.values[sample, 6] = sums.lost
     for i in range(len(sums.works)):
         outputs.values[sample, 7 + i] = sums.works[i]
-    outputs.values[sample, VALUES - 1] = sums.circuit
+    write_loss(memory, layout.terms, accumulators, outputs.values, sample, VALUES, sums.within)
 
 
 @compiled
@@ -170,6 +171,7 @@ def record_instants(memory, blocks, layout, stages, run, tip, now, step, accumul
             outputs,
             sample,
             instant,
+            accumulators,
             _sums_with(layout.terms, accumulators, here),
         )
         sample, done = sample + 1, done + 1
@@ -189,15 +191,15 @@ def record_held(memory, blocks, layout, run, tip, now, step, accumulators, outpu
         if times[done] > (now.t + step.ticks) * clock.tick and now.t + step.ticks < clock.end:
             break
         part = min(max(0.0, times[done] - now.t * clock.tick), step.length)
-        here, _ = held_for(memory, blocks, layout, run, tip, step.phase, step.p, part)
+        here, _ = held_for(memory, blocks, layout, run, tip, step.phase, step.q, part)
         force, gq, qr = hold(
-            memory, blocks, layout, tip, step.phase, part, step.p, q2, p2, run.spare + 2 * size
+            memory, blocks, layout, tip, step.phase, part, step.q, q2, p2, run.spare + 2 * size
         )
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, gq, qr)
         energy = add_potential_energy(memory, size, layout.terms, q2, energy)
         instant = _Instant(times[done], q2, p2, _TOGETHER, energy)
         sums = _sums_with(layout.terms, accumulators, here)
-        _write(memory, layout, now.well_sign, tip.law, outputs, sample, instant, sums)
+        _write(memory, layout, now.well_sign, tip.law, outputs, sample, instant, accumulators, sums)
         outputs.values[sample, 1] = force
         sample, done = sample + 1, done + 1
     outputs.marks[0] = done
@@ -220,6 +222,7 @@ def record_inside_step(memory, layout, tip, now, short, here, when, observed, sa
         outputs,
         sample,
         instant,
+        accumulators,
         _sums_with(layout.terms, accumulators, here),
     )
     return sample + 1
@@ -241,8 +244,8 @@ def record_contact(memory, layout, run, tip, now, step, done, kinematics1, sampl
     energy = add_potential_energy(memory, layout.size, layout.terms, step.q1, energy)
     instant = _Instant(when, step.q1, step.p1, kinematics1, energy)
     _write(
-        memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums(layout.terms, accumulators)
-    )
+        memory, layout, now.well_sign, tip.law, outputs, sample, instant, accumulators, _sums(layout.terms, accumulators)
+    )  # fmt: skip
     return sample + 1
 
 

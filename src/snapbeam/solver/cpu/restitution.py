@@ -19,7 +19,6 @@ from snapbeam.solver.cpu.recording import record_held, record_instants
 from snapbeam.solver.cpu.state import IntegratorState, StepControl, phase_at, sampling_slot, variable_slot
 from snapbeam.solver.cpu.step import Step, observe, prepare, take_step
 from snapbeam.solver.cpu.sticking import PANELS, constraint_force, held_for, hold
-from snapbeam.solver.cpu.terms.circuit import accumulate_circuit
 from snapbeam.solver.cpu.terms.discontinuities import up_to_discontinuity
 from snapbeam.solver.cpu.terms.further_contact_events import (
     accumulate_further_contacts,
@@ -43,7 +42,14 @@ from snapbeam.solver.step_control import (
     contact_halvings,
     count_zero_crossings_in_step,
 )
-from snapbeam.solver.terms.interface import accumulate_work, center_from_barrier, kinematics_from_barrier
+from snapbeam.solver.terms.interface import (
+    accumulate_loss,
+    accumulate_work,
+    add_stored_loss,
+    center_from_barrier,
+    kinematics_from_barrier,
+    store_loss,
+)
 from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["accept_step_restitution", "carry"]
@@ -113,7 +119,7 @@ def _held_step(step, ticks, length):
 def _held_to(memory, blocks, layout, tip, step):
     """The phase at the end of a step in which the tip carries the beam, g.q and q.Gq; further contacts are observed."""
     there = step.phase + tip.drive.omega * step.length
-    _, gq, qr = hold(memory, blocks, layout, tip, step.phase, step.length, step.p, step.q1, step.p1, step.k1)
+    _, gq, qr = hold(memory, blocks, layout, tip, step.phase, step.length, step.q, step.q1, step.p1, step.k1)
     observe_further_contacts(memory, layout.size, layout.others, tip.drive, there, step.q1, step.p1)
     return there, gq, qr
 
@@ -130,14 +136,16 @@ def _up_to_further_event(memory, blocks, layout, others, run, tip, t, step, scra
         return edge, edge
     _held_to(memory, blocks, layout, tip, _held_step(step, edge, edge * clock.tick))
     smallest_correction = (clock.step >> clock.max_halvings) * clock.tick
-    return edge, refine_further_onsets(memory, others, clock, edge, edge, whole, smallest_correction, True)
+    return edge, refine_further_onsets(memory, others, clock, edge, edge, whole, smallest_correction, 1)
 
 
 @inlined
 def _turned(memory, layout, run, now, accumulators, outputs):
     """Where a run stands if a contact of another striker begins or ends as a step begins: nothing has moved."""
     clock, t = run.clock, now.t
-    update_further_contacts(memory, layout.others, 0, t, 0.0, clock.tick, accumulators, outputs)
+    update_further_contacts(
+        memory, layout.size, layout.others, now.rows.p, 0, t, 0.0, clock.tick, accumulators, outputs
+    )
     status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
     return IntegratorState(
         t, now.well_sign, now.stretch, now.rows, now.kinematics, now.control, now.sample, now.stored_states, status
@@ -156,8 +164,8 @@ def _account_for_surroundings(
     accumulate_further_contacts(memory, others, touching, done, accumulators)
     accumulate_work(layout.terms, accumulators, done.external)
     late = min(max((t - clock.last_quarter) / step.ticks, 0.0), 1.0)
-    accumulate_circuit(memory, layout, layout.circuit, p, accumulators, done.circuit, late)
-    update_further_contacts(memory, others, edge, t, step.length, clock.tick, accumulators, outputs)
+    accumulate_loss(memory, size, layout.terms, accumulators, p - size, p, late)
+    update_further_contacts(memory, size, others, p, edge, t, step.length, clock.tick, accumulators, outputs)
     if jumped:
         restart_further_contacts(memory, size, others, drive, phase_at(run, t), t, p - size)
 
@@ -169,7 +177,9 @@ def _further_step(memory, blocks, workspace, run, tip, rest, done):
     prepare(memory, layout, stages, run.tip.drive, rest.length, rest.at)
     two = take_step(memory, blocks, layout, stages, tip, rest, True)
     add_stored_contacts(memory, layout.others)
+    add_stored_loss(memory, layout.terms)
     store_further_contacts(memory, layout.others)
+    store_loss(memory, layout.terms)
     return two, in_succession(layout, done, two)
 
 
@@ -194,7 +204,7 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
     if ticks < 1:
         return _turned(memory, layout, run, now, accumulators, outputs), step
     length = ticks * tick
-    release = _release(memory, blocks, layout, run, tip, step.phase, step.p, length)
+    release = _release(memory, blocks, layout, run, tip, step.phase, step.q, length)
     released = release >= 0.0
     if released:
         length = release
@@ -202,8 +212,9 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
             edge = -1
         ticks = min(max(1, math.ceil(release / tick)), ticks)
     step = _held_step(step, ticks, length)
-    done, peak = held_for(memory, blocks, layout, run, tip, step.phase, step.p, length)
+    done, peak = held_for(memory, blocks, layout, run, tip, step.phase, step.q, length)
     store_further_contacts(memory, layout.others)
+    store_loss(memory, layout.terms)
     sample = now.sample
     if outputs is not None:
         sample = record_held(memory, blocks, layout, run, tip, now, step, accumulators, outputs)
@@ -303,7 +314,7 @@ def apply_impact_law(memory, blocks, workspace, run, tip, p, kinematics, when, p
     accumulators.dissipated += lost
     accumulators.lost += lost
     away = e * kinematics.dv
-    force = constraint_force(memory, blocks, layout, run, tip, phase, 0.0, p)
+    force = constraint_force(memory, blocks, layout, run, tip, phase, 0.0, p - layout.size)
     pressed = force * c * c
     if e == 0.0 and pressed > 0.0:
         # without a rebound, landing and sustained contact are one impact: closed, and counted, at its release
@@ -329,7 +340,7 @@ def apply_impact_law(memory, blocks, workspace, run, tip, p, kinematics, when, p
     shortest = 2.0 * math.pi / max(memory[layout.omega], drive_rate(tip.drive))
     if lasts > _SOON * shortest:
         return False
-    return constraint_force(memory, blocks, layout, run, tip, phase, lasts, p) > 0.0
+    return constraint_force(memory, blocks, layout, run, tip, phase, lasts, p - layout.size) > 0.0
 
 
 @inlined
@@ -507,7 +518,7 @@ def _up_to_further_event_in_flight(
     there = step.phase + drive.omega * step.length
     observe_further_contacts(memory, layout.size, others, drive, there, step.q1, step.p1)
     edge = first_further_event(memory, layout, others, sampling_slot(run), run, t, drive, step, scratch)
-    event_ticks, due = edge, True
+    event_ticks, corrections = edge, 1
     if edge < 1:
         return edge, shortened_step(step, run, 0, 0.0), done, observed
     while event_ticks != step.ticks:
@@ -518,9 +529,9 @@ def _up_to_further_event_in_flight(
         observed = observe(memory, layout, tip, there, step.q1, step.p1)
         observe_further_contacts(memory, layout.size, others, drive, there, step.q1, step.p1)
         event_ticks = refine_further_onsets(
-            memory, others, clock, edge, event_ticks, whole, (clock.step >> clock.max_halvings) * clock.tick, due
+            memory, others, clock, edge, event_ticks, whole, (clock.step >> clock.max_halvings) * clock.tick, corrections
         )  # fmt: skip
-        due = False
+        corrections -= 1
     return edge, step, done, observed
 
 
@@ -528,7 +539,7 @@ def _up_to_further_event_in_flight(
 def _moved_on(memory, blocks, workspace, run, tip, step, done, q, p, k, after, phase, together):
     """From a hit to the next tick, into the rows that the step began from; returns g.q, q.Gq, and the results of all."""
     if together:
-        _, gq, qr = hold(memory, blocks, workspace.layout, tip, phase, after, p, step.q, step.p, step.k)
+        _, gq, qr = hold(memory, blocks, workspace.layout, tip, phase, after, q, step.q, step.p, step.k)
         return gq, qr, done
     rest = Step(0, variable_slot(run), after, phase, False, q, p, k, step.q, step.p, step.k, step.r)
     two, done = _further_step(memory, blocks, workspace, run, tip, rest, done)
@@ -558,7 +569,7 @@ def accept_step_restitution(
         if together:
             _stuck(memory, workspace, run, kinematics, p, accumulators)
             accumulators.onset = t
-            hold(memory, blocks, layout, tip, step.phase, 0.0, p, q, p, k)
+            hold(memory, blocks, layout, tip, step.phase, 0.0, q, q, p, k)
         restart_further_contacts(memory, layout.size, layout.others, tip.drive, step.phase, t, q)
         status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
         away = 0.0 if together else tip.law.coefficient * kinematics.dv
@@ -639,6 +650,7 @@ def accept_step_restitution(
     there = step.phase + tip.drive.omega * step.length
     observe_further_contacts(memory, layout.size, layout.others, tip.drive, there, step.q1, step.p1)
     store_further_contacts(memory, layout.others)
+    store_loss(memory, layout.terms)
     sample = now.sample
     if outputs is not None:
         sample = record_instants(

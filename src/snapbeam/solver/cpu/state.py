@@ -19,7 +19,6 @@ from snapbeam.solver.cpu.mode_lanes import (
     tension_rows,
 )
 from snapbeam.solver.cpu.step import observe, prepare
-from snapbeam.solver.cpu.terms.circuit import put_rate
 from snapbeam.solver.cpu.terms.further_contact_events import (
     accumulate_open_further_contacts,
     begin_further_contacts,
@@ -44,6 +43,7 @@ from snapbeam.solver.step_control import (
 from snapbeam.solver.terms.interface import (
     add_potential_energy,
     add_to_tension,
+    begin_run,
     enter_well,
     kinematics_from_barrier,
     relative_to_nearest_well,
@@ -89,6 +89,8 @@ class KernelInput(NamedTuple):
     """Of the strikers beside the first, shape (runs, strikers, numbers); so are the places of their rows."""
     other_places: Any
     other_rows: Any
+    circuit_rates: Any
+    """Rates of loss of the circuits, shape (runs, circuits)."""
     extras: Any
     """Statistics that were registered, by type."""
     max_steps: int
@@ -332,13 +334,13 @@ def begin(memory, blocks, workspace, kernel_input, i, accumulators):
         memory[layout.contact + row] = kernel_input.contact_rows[record.contact_row, row]
         memory[work + row] = kernel_input.starts[record.start_row, 0, row]
         memory[work + size + row] = kernel_input.starts[record.start_row, 1, row]
+    begin_run(memory, size, layout.terms, kernel_input.circuit_rates, i, layout.omega_squared, layout.damping)
     run = run_of(memory, layout, workspace.stages, kernel_input, i)
     rows = Rows(work, work + size, work + 2 * size, work + 3 * size, work + 4 * size, work + 5 * size)
     if record.well_sign < 0.0:
         for row in range(size):
             memory[layout.g + row] = -memory[layout.g + row]
     enter_well(memory, size, layout.terms, record.well_sign)
-    put_rate(memory, layout.circuit, record.circuit_rate)
     begin_further_contacts(
         memory,
         size,

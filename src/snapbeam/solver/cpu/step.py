@@ -12,7 +12,6 @@ from numba.extending import overload
 
 from snapbeam.solver.compilation import INLINE_HERE, called, compiled, inlined
 from snapbeam.solver.contact_force import contact_force, damping_coefficient, kick_force
-from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.mode_lanes import (
     acceleration_rows,
     beam_signals,
@@ -25,15 +24,6 @@ from snapbeam.solver.cpu.mode_lanes import (
     signals,
     tension_rows,
     tension_rows_twice,
-)
-from snapbeam.solver.cpu.terms.circuit import (
-    CircuitIncrement,
-    apply_tap,
-    circuit_acceleration_rows,
-    circuit_increment,
-    lean_kick,
-    no_circuit_increment,
-    tap_of,
 )
 from snapbeam.solver.cpu.terms.further_contacts import (
     accumulate_damped_contacts,
@@ -55,7 +45,7 @@ from snapbeam.solver.cpu.terms.velocity_block import (
 )
 from snapbeam.solver.excitation import tip_motion, turned_motion
 from snapbeam.solver.physics import sincos
-from snapbeam.solver.simd import WIDTH, fma, load, store
+from snapbeam.solver.simd import WIDTH, dot, fma, load, store
 from snapbeam.solver.splitting import TURNS
 from snapbeam.solver.step import ContactIncrement, InnerProducts, Primitives, build_step, rotate_phase
 from snapbeam.solver.step_control import ContactKinematics
@@ -64,7 +54,11 @@ from snapbeam.solver.terms.interface import (
     add_acceleration_along,
     add_to_tension,
     add_work,
+    after_flow,
+    before_flow,
+    begin_kick,
     does_work,
+    has_state,
     needs_tension_product,
     no_external_work,
     update_forces,
@@ -119,15 +113,12 @@ class StepIncrement(NamedTuple):
     dissipated: float
     external: ExternalWork
     """Of the terms."""
-    circuit: CircuitIncrement
 
 
 @inlined
 def nothing_done(layout):
     """The results of no step."""
-    return StepIncrement(
-        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, no_external_work(layout.terms), no_circuit_increment()
-    )
+    return StepIncrement(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, no_external_work(layout.terms))
 
 
 @called
@@ -154,10 +145,9 @@ def observe(memory, layout, tip, phase, q, p):
 
 @inlined
 def _free_accelerations(memory, layout, velocity_block, spare, step):
-    size = layout.size
     if velocity_block is None:
-        return circuit_acceleration_rows(memory, size, layout.circuit, spare, step)
-    k, k1 = spare, spare + size
+        return step.k, step.k1
+    size, k, k1 = layout.size, spare, spare + layout.size
     for row in range(0, size, WIDTH):
         store(memory, k + row, load(memory, step.k + row))
         store(memory, k1 + row, load(memory, step.k1 + row))
@@ -216,7 +206,7 @@ def _zero(data):
 
 @inlined
 def _begin(data):
-    return data.step.q, (no_external_work(data.layout.terms), no_circuit_increment())
+    return data.step.q, no_external_work(data.layout.terms)
 
 
 @inlined
@@ -273,12 +263,15 @@ def _where_closed(data, force):
 
 @inlined
 def _flow(memory, layout, flow, q, p, q1, p1, with_energy):
-    """Apply a flow; returns the energy that it dissipates."""
+    """Apply a flow; returns the energy that it dissipates in the modes."""
+    before_flow(memory, layout.size, layout.terms, flow, q, p)
     if with_energy is None:
         flow_rows(memory, layout.size, flow, q, p, q1, p1)
+        after_flow(memory, layout.size, layout.terms, q1, p1)
         return 0.0
     before = modal_energy(memory, layout, q, p)
     flow_rows(memory, layout.size, flow, q, p, q1, p1)
+    after_flow(memory, layout.size, layout.terms, q1, p1)
     return before - modal_energy(memory, layout, q1, p1)
 
 
@@ -287,7 +280,7 @@ def _later_kick(memory, layout, step, flow, last, weight, along_g, along_r, r, f
     """A kick after the first, and the flow after it unless it is the last."""
     q1, p1, k1 = step.q1, step.p1, step.k1
     if with_energy is None:
-        if not last:
+        if not last and not has_state(layout.terms):
             kick_and_flow_rows(memory, layout, flow, weight, along_g, along_r, r, force, q1, p1)
             return 0.0
     acceleration_rows(memory, layout, along_g, along_r, r, k1)
@@ -301,7 +294,7 @@ def _later_kick(memory, layout, step, flow, last, weight, along_g, along_r, r, f
 def _kick_and_flow(data, stage, q, weight, along_g, along_r, r, force):
     memory, layout, step, energy = data.memory, data.layout, data.step, data.with_energy
     if stage == 0:
-        p = step.p if layout.circuit is None and layout.velocity_block is None else step.p1
+        p = step.p if layout.velocity_block is None else step.p1
         kick_rows(memory, layout, weight, step.k, force, p, step.p1)
         return step.q1, _flow(memory, layout, step.at, step.q, step.p1, step.q1, step.p1, energy)
     flow = step.at + min(stage, data.flows - 1 - stage) * 4 * layout.size
@@ -315,6 +308,7 @@ def _update_terms(data, stage, weight):
     argument = _argument(data, stage)
     q = step.q1 if stage > 0 else step.q
     update_forces(memory, layout.size, layout.terms, drive, argument, q)
+    begin_kick(memory, layout.terms, weight, stage == 0)
     open_first_contact(memory, layout.velocity_block)
     evaluate_contacts(memory, layout.size, layout.others, drive, argument, q, weight, stage == 0)
 
@@ -400,11 +394,11 @@ def _exchange_by_layout(data, stage, weight, along_g, along_r, contact, surround
     layout = data.types[data.fields.index("layout")]
     kinds = dict(zip(layout.fields, layout.types, strict=True))
     works = any(hasattr(each.instance_class, "kick_work") for each in kinds["terms"])
-    if kinds["circuit"] == types.none and kinds["velocity_block"] == types.none and not works:
+    if kinds["velocity_block"] == types.none and not works:
         return lambda data, stage, weight, along_g, along_r, contact, surroundings: (contact, surroundings)
     return lambda data, stage, weight, along_g, along_r, contact, surroundings: _exchange(
-        data, data.layout.velocity_block, data.layout.circuit, stage, weight, along_g, along_r, contact, surroundings
-    )  # fmt: skip
+        data, data.layout.velocity_block, stage, weight, along_g, along_r, contact, surroundings
+    )
 
 
 @inlined
@@ -426,45 +420,22 @@ def _first_contact_of_block(memory, first, contact):
 
 
 @inlined
-def _solve(memory, layout, velocity_block, circuit, weight, kick, p, tap):
-    """Compute the impulses of a kick; the row *kick* receives the mean of their effect if terms do work."""
-    size = layout.size
-    if velocity_block is not None:
-        solve_velocity_block(memory, size, velocity_block, weight, kick, p)
-        return circuit_increment(memory, velocity_block, velocity_block.circuit, circuit, tap)
-    if circuit is not None:
-        tap = tap_of(memory, size, circuit, circuit.own, p, kick, weight, tap)
-        if does_work(layout.terms):
-            lean_kick(memory, size, circuit, kick, weight, tap)
-    return tap
-
-
-@inlined
-def _apply(memory, layout, velocity_block, circuit, p, p_to, tap, contact):
-    """p_to = p with the impulses of a kick; returns the first contact with its own."""
-    if velocity_block is not None:
-        add_impulses(memory, layout.size, velocity_block, p, p_to)
-        accumulate_damped_contacts(memory, layout.others)
-        return _first_contact_of_block(memory, velocity_block.first, contact)
-    if circuit is not None:
-        apply_tap(memory, layout.size, circuit, circuit.own, p, p_to, tap)
-    return contact
-
-
-@inlined
-def _exchange(data, velocity_block, circuit, stage, weight, along_g, along_r, contact, surroundings):
+def _exchange(data, velocity_block, stage, weight, along_g, along_r, contact, work):
     memory, layout, step = data.memory, data.layout, data.step
     size, p = layout.size, step.p if stage == 0 else step.p1
-    work, tap = surroundings
     kick = kick_row(layout)
     _whole_acceleration(memory, layout, step, stage, along_g, along_r, contact.force, kick)
-    tap = _solve(memory, layout, velocity_block, circuit, weight, kick, p, tap)
+    if velocity_block is not None:
+        solve_velocity_block(memory, size, velocity_block, weight, kick, p)
     if does_work(layout.terms):
         if stage == 0 and needs_tension_product(layout.terms):
             tension_rows(memory, data.blocks, layout, step.q, step.r)
         work = add_work(memory, size, layout.terms, weight, layout.g, step.r, kick, p, work)
-    contact = _apply(memory, layout, velocity_block, circuit, p, step.p1, tap, contact)
-    return contact, (work, tap)
+    if velocity_block is not None:
+        add_impulses(memory, size, velocity_block, p, step.p1)
+        accumulate_damped_contacts(memory, layout.others)
+        contact = _first_contact_of_block(memory, velocity_block.first, contact)
+    return contact, work
 
 
 _STEP = build_step(
@@ -491,12 +462,12 @@ _take_step, _begin_step, _take_stage = _STEP.take_step, _STEP.begin_step, _STEP.
 @inlined
 def _results(memory, layout, increment):
     """The results of a step, with the work of further contacts."""
-    contact, (external, circuit) = increment.contact, increment.surroundings
+    contact = increment.contact
     work = with_further_contact_work(memory, layout.others, contact.work)
     gross = with_further_contact_gross_work(memory, layout.others, contact.gross)
     lost = with_further_contact_loss(memory, layout.others, contact.lost)
     return StepIncrement(
-        increment.gq, increment.qr, contact.impulse, work, gross, lost, increment.dissipated, external, circuit
+        increment.gq, increment.qr, contact.impulse, work, gross, lost, increment.dissipated, increment.surroundings
     )  # fmt: skip
 
 

@@ -15,7 +15,6 @@ from __future__ import annotations
 from snapbeam.solver.compilation import compiled
 from snapbeam.solver.contact_force import contact_force, contact_slope
 from snapbeam.solver.cpu.contact_dispatch import accept_step_by_law
-from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.integrate import propose_step, store_state
 from snapbeam.solver.cpu.mode_lanes import acceleration_rows, flow_rows, kick_rows, tension_rows
 from snapbeam.solver.cpu.state import Workspace, begin, finish, variable_slot
@@ -27,7 +26,7 @@ from snapbeam.solver.cpu.terms.further_contacts import (
 )
 from snapbeam.solver.excitation import tip_about_well, tip_motion
 from snapbeam.solver.physics import tension_factors
-from snapbeam.solver.simd import WIDTH, fma, load, store
+from snapbeam.solver.simd import WIDTH, dot, fma, load, store
 from snapbeam.solver.terms.interface import add_to_tension, update_forces
 from snapbeam.util.status_codes import RunStatus
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from snapbeam.solver.terms.axial_load import AxialLoad
 from snapbeam.solver.terms.base_excitation import BaseExcitation
+from snapbeam.solver.terms.circuit import Circuit, ResistiveCircuit
 from snapbeam.solver.terms.external_force import ExternalForce
 from snapbeam.solver.terms.local_force import DampedLocalForce, LocalForce
 from snapbeam.solver.terms.second_well import SecondWell
@@ -24,6 +25,8 @@ TERMS_AFTER_CONTACTS: tuple[Any, ...] = (
     AxialLoad,
     LocalForce,
     DampedLocalForce,
+    Circuit,
+    ResistiveCircuit,
 )
 
 WORKS: dict[str, str] = {

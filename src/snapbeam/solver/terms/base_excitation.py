@@ -80,7 +80,7 @@ class BaseExcitation(NamedTuple):
 
     @staticmethod
     @inlined
-    def add_to_speed_bound(memory, size, term, drive, along, horizon, bound):
+    def add_to_speed_bound(memory, size, term, drive, along, q, p, energy, horizon, bound):
         """Within a time tau the base changes c.p by no more than tau max|a| sum |b_j c_j|."""
         return bound + absolute_product(memory, size, term.row, along) * drive.base_hardest * horizon
 

@@ -59,7 +59,7 @@ class ExternalForce(BaseExcitation):
 
     @staticmethod
     @inlined
-    def add_to_speed_bound(memory, size, term, drive, along, horizon, bound):
+    def add_to_speed_bound(memory, size, term, drive, along, q, p, energy, horizon, bound):
         """As of a base, with max|F|."""
         greatest = _greatest_force(drive, memory, term.number)
         return bound + absolute_product(memory, size, term.row, along) * greatest * horizon

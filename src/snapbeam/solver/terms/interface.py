@@ -38,27 +38,39 @@ __all__ = [
     "ExternalWork",
     "TermMemory",
     "acceleration_about_nearest_well",
+    "accumulate_loss",
     "accumulate_work",
     "add_acceleration",
     "add_acceleration_along",
     "add_potential_energy",
+    "add_stored_loss",
     "add_to_speed_bound",
     "add_to_tension",
     "add_work",
+    "after_flow",
+    "before_flow",
+    "begin_kick",
+    "begin_run",
+    "bounds_by_energy",
+    "carry_state",
     "center_from_barrier",
     "does_work",
+    "enter_flow",
     "enter_well",
     "has_crossed",
+    "has_state",
     "kinematics_from_barrier",
     "may_hide_onset",
     "needs_tension_product",
     "no_external_work",
     "operation",
     "relative_to_nearest_well",
+    "store_loss",
     "total_work",
     "update_forces",
     "wells_differ",
     "works_so_far",
+    "write_loss",
 ]
 
 
@@ -166,9 +178,102 @@ def add_to_tension(memory: Any, terms: Any, along_g: Any, along_r: Any) -> Any:
 
 @operation()
 def add_to_speed_bound(
-    memory: Any, size: int, terms: Any, drive: Any, along: int, horizon: float, bound: Any
+    memory: Any,
+    size: int,
+    terms: Any,
+    drive: Any,
+    along: int,
+    q: int,
+    p: int,
+    energy: float,
+    horizon: float,
+    bound: Any,
 ) -> Any:
-    """Add to a *bound* of the speed along a row what the term can change within a time, for the interval without contact."""
+    """Add to a *bound* of the speed along a row what the term can change within a time, for the interval without contact.
+
+    *energy* is that of linear modes and circuits at q and p, if a term :func:`bounds_by_energy`.
+    """
+    raise _of_kernels()
+
+
+# ----------------------------------------------------------------------------------------------------
+# States of terms: first-order equations, whose flow the linear modes drive.
+
+
+@operation(threaded=0)
+def begin_run(
+    memory: Any, size: int, terms: Any, rates: Any, i: int, omega_squared: int, damping: int
+) -> Any:
+    """Write the numbers of run *i*; *rates* are those of circuits, shape (runs, circuits)."""
+    raise _of_kernels()
+
+
+@operation(threaded=0)
+def begin_kick(memory: Any, terms: Any, weight: float, begins: bool) -> Any:
+    """Add up losses over a kick, after :func:`update_forces`; *begins*: the first of a step."""
+    raise _of_kernels()
+
+
+@operation(threaded=0)
+def enter_flow(memory: Any, size: int, terms: Any, length: float, at: int) -> Any:
+    """Write the elements of a state in the rows of a flow over *length* seconds."""
+    raise _of_kernels()
+
+
+@operation(threaded=0)
+def before_flow(memory: Any, size: int, terms: Any, flow: int, q: int, p: int) -> Any:
+    """Keep what :func:`after_flow` needs of the beginning of a flow."""
+    raise _of_kernels()
+
+
+@operation(threaded=0)
+def after_flow(memory: Any, size: int, terms: Any, q: int, p: int) -> Any:
+    """Complete the states at the end of a flow."""
+    raise _of_kernels()
+
+
+@operation(threaded=0)
+def carry_state(
+    memory: Any,
+    size: int,
+    terms: Any,
+    source: int,
+    q: int,
+    length: float,
+    u0: float,
+    u1: float,
+    u2: float,
+    u3: float,
+) -> Any:
+    """Write the states after a time in which a single mode has a prescribed displacement."""
+    raise _of_kernels()
+
+
+@operation(threaded=0)
+def store_loss(memory: Any, terms: Any) -> Any:
+    """Keep the losses of the step at hand: a trial step that follows writes over them."""
+    raise _of_kernels()
+
+
+@operation(threaded=0)
+def add_stored_loss(memory: Any, terms: Any) -> Any:
+    """Add the losses of the first part of a step to those of the second."""
+    raise _of_kernels()
+
+
+@operation(threaded=0)
+def accumulate_loss(
+    memory: Any, size: int, terms: Any, accumulators: Any, q: int, p: int, late: float
+) -> Any:
+    """Enter the losses of the accepted step in the statistics; the share *late* of it is in the last quarter."""
+    raise _of_kernels()
+
+
+@operation(threaded=0)
+def write_loss(
+    memory: Any, terms: Any, accumulators: Any, values: Any, sample: int, first: int, within: float
+) -> Any:
+    """Record the losses so far from column *first* on; *within* is 1 in a step and 0 at its end."""
     raise _of_kernels()
 
 
@@ -264,10 +369,22 @@ def may_hide_onset(terms: Any) -> bool:
     raise _of_kernels()
 
 
+def bounds_by_energy(terms: Any) -> bool:
+    """Whether the speed bound of a term needs the energy; it is then trusted for a quarter of the time."""
+    raise _of_kernels()
+
+
+def has_state(terms: Any) -> bool:
+    """Whether a term has a state that changes in flows."""
+    raise _of_kernels()
+
+
 _compiled_for_terms(does_work, _write_flag("kick_work"))
 _compiled_for_terms(needs_tension_product, _write_flag("needs_tension_product"))
 _compiled_for_terms(wells_differ, _write_flag("relative_to_nearest_well"))
 _compiled_for_terms(may_hide_onset, _write_flag("may_hide_onset"))
+_compiled_for_terms(bounds_by_energy, _write_flag("bounds_by_energy"))
+_compiled_for_terms(has_state, _write_flag("after_flow"))
 
 
 def no_external_work(terms: Any) -> ExternalWork:

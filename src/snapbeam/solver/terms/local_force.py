@@ -14,7 +14,7 @@ from numba.extending import overload
 
 from snapbeam.solver.compilation import INLINE, inlined
 from snapbeam.solver.contact_force import scalar_function
-from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat
+from snapbeam.solver.simd import WIDTH, broadcast_load, dot, fma, load
 from snapbeam.solver.terms.interface import TermMemory
 
 __all__ = ["DampedLocalForce", "LocalDamping", "LocalForce"]
@@ -81,14 +81,6 @@ _damping_force, _damping_coefficient = (
 )
 
 
-@inlined
-def _product(memory, size, one, other):
-    total = splat(0.0)
-    for row in range(0, size, WIDTH):
-        total = fma(load(memory, one + row), load(memory, other + row), total)
-    return lanes_sum(total)
-
-
 class LocalForce(NamedTuple):
     """Places in memory, and the law."""
 
@@ -110,7 +102,7 @@ class LocalForce(NamedTuple):
     @inlined
     def update_forces(memory, size, term, drive, argument, q):
         """Write u and F(u) into memory."""
-        u = memory[term.state + _ORIGIN] + _product(memory, size, term.row, q)
+        u = memory[term.state + _ORIGIN] + dot(memory, size, term.row, q)
         memory[term.state + _PLACE] = u
         memory[term.state + _FORCE] = _force(term.law, u)
 
@@ -130,13 +122,13 @@ class LocalForce(NamedTuple):
     @inlined
     def add_acceleration_along(memory, size, term, contact, along):
         """c.k + F c.r."""
-        return along + memory[term.state + _FORCE] * _product(memory, size, term.row, contact)
+        return along + memory[term.state + _FORCE] * dot(memory, size, term.row, contact)
 
     @staticmethod
     @inlined
     def add_potential_energy(memory, size, term, q, energy):
         """The potential energy of F."""
-        return energy + _energy(term.law, memory[term.state + _ORIGIN] + _product(memory, size, term.row, q))
+        return energy + _energy(term.law, memory[term.state + _ORIGIN] + dot(memory, size, term.row, q))
 
     may_hide_onset = True  # type: ignore[misc]
 
@@ -153,7 +145,7 @@ class DampedLocalForce(LocalForce):
 
     @staticmethod
     @inlined
-    def add_to_speed_bound(memory, size, term, drive, along, horizon, bound):
+    def add_to_speed_bound(memory, size, term, drive, along, q, p, energy, horizon, bound):
         """Within a time tau, D changes c.p by about tau |D| sum |r_j c_j|."""
         total = 0.0
         for row in range(size):
@@ -208,7 +200,7 @@ class LocalDamping(NamedTuple):
     @inlined
     def damping_forces_of_state(memory, size, term, q, v, d):
         """D(u, v) with u = u_0 + r.q."""
-        u = memory[term.state + _ORIGIN] + _product(memory, size, term.row, q)
+        u = memory[term.state + _ORIGIN] + dot(memory, size, term.row, q)
         memory[d + term.unknown] = _damping_force(term.law, u, memory[v + term.unknown])
 
 

@@ -46,7 +46,7 @@ def suits(ensemble: Ensemble, packed: Packed, most: int = at.MOST) -> bool:
     return (
         packed.rows.size <= most
         and not packed.layout.terms
-        and ensemble.structure.circuit_row is None
+        and not ensemble.structure.circuits
         and ensemble.size > 1
         and ensemble.drive.harmonic
         and law.vectorizable

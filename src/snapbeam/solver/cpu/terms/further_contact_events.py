@@ -9,10 +9,13 @@ from __future__ import annotations
 import math
 
 from snapbeam.solver.compilation import called, inlined
-from snapbeam.solver.cpu.dot import dot
-from snapbeam.solver.cpu.mode_lanes import flow_coefficients, propagate_free, speed_bound
+from snapbeam.solver.cpu.mode_lanes import (
+    flow_coefficients,
+    propagate_free,
+    speed_bound_with_terms,
+    validity_horizon,
+)
 from snapbeam.solver.cpu.step import with_velocity_dependent
-from snapbeam.solver.cpu.terms.circuit import circuit_speed_bound, validity_horizon
 from snapbeam.solver.cpu.terms.further_contacts import block, mirror_further_contacts, penetration_of
 from snapbeam.solver.further_contacts import (
     DEEPEST,
@@ -50,16 +53,14 @@ from snapbeam.solver.further_contacts import (
     zero_force_of,
 )
 from snapbeam.solver.interpolation import first_downcrossing, first_upcrossing
-from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, store
+from snapbeam.solver.simd import WIDTH, dot, fma, lanes_sum, load, store
 from snapbeam.solver.statistics import OTHER_IMPACTS, OTHER_IMPULSE, OTHER_PEAK, OTHER_WORK
 from snapbeam.solver.step_control import (
-    TRUST,
     ContactKinematics,
     contact_halvings,
     refine_onset,
     safe_interval,
 )
-from snapbeam.solver.terms.interface import add_to_speed_bound
 
 __all__ = [
     "accumulate_further_contacts",
@@ -261,16 +262,8 @@ def _edge(memory, layout, others, slot, run, t, drive, step, scratch):
             if busy:
                 memory[at + SAFE] = t
             elif after > memory[at + SAFE]:
-                bound, known = (
-                    speed_bound(memory, layout, row, step.q, step.p),
-                    validity_horizon(layout.circuit, run.step_time),
-                )
-                bound = circuit_speed_bound(
-                    memory, size, layout.omega, layout.circuit, row, step.q, step.p, bound, TRUST * known
-                )
-                bound = add_to_speed_bound(
-                    memory, size, layout.terms, drive, row, TRUST * run.step_time, bound
-                )
+                known = validity_horizon(layout, run.step_time)
+                bound = speed_bound_with_terms(memory, layout, drive, row, step.q, step.p, known)
                 push = dot(memory, size, row, step.k)
                 safe = safe_interval(-depth, bound, memory[at + SPEED], push, known)
                 memory[at + SAFE] = t + int(safe / tick)

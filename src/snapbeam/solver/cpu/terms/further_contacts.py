@@ -16,7 +16,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import called, inlined
-from snapbeam.solver.cpu.dot import dot
 from snapbeam.solver.cpu.terms.velocity_block import (
     IMPULSE_IN_KICK,
     LOST_IN_KICK,
@@ -53,7 +52,7 @@ from snapbeam.solver.further_contacts import (
     motion_of,
     slope_of,
 )
-from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat, store
+from snapbeam.solver.simd import WIDTH, broadcast_load, dot, fma, lanes_sum, load, splat, store
 
 __all__ = [
     "FurtherContacts",

@@ -14,13 +14,14 @@ from snapbeam.solver.contact_force import mark_of
 from snapbeam.solver.cpu.mode_lanes import acceleration_rows
 from snapbeam.solver.cpu.state import variable_slot
 from snapbeam.solver.cpu.step import Step, StepIncrement, observe, prepare, take_step
-from snapbeam.solver.cpu.terms.circuit import CircuitIncrement
 from snapbeam.solver.cpu.terms.discontinuities import APART, discontinuity_within, jumps_of
 from snapbeam.solver.cpu.terms.further_contact_events import add_stored_contacts, store_further_contacts
 from snapbeam.solver.physics import tension_factors
 from snapbeam.solver.terms.interface import (
+    add_stored_loss,
     add_to_tension,
     does_work,
+    store_loss,
     total_work,
     update_forces,
 )
@@ -39,7 +40,6 @@ def in_succession(layout, one, two):
         two.gq, two.qr, one.impulse + two.impulse, one.work + two.work, one.gross + two.gross, one.lost + two.lost,
         one.dissipated + two.dissipated,
         total_work(layout.terms, one.external, two.external),
-        CircuitIncrement(two.circuit.impulse, two.circuit.y, one.circuit.energy + two.circuit.energy, two.circuit.twice),
     )  # fmt: skip
 
 
@@ -53,6 +53,7 @@ def _in_two_parts(memory, blocks, layout, stages, run, tip, step, length, with_e
     prepare(memory, layout, stages, drive, to_jump.length, at)
     one = take_step(memory, blocks, layout, stages, tip, to_jump, with_energy)
     store_further_contacts(memory, layout.others)
+    store_loss(memory, layout.terms)
     phase = step.phase + drive.omega * length + APART
     if does_work(layout.terms):
         update_forces(memory, layout.size, layout.terms, drive, phase, step.q1)
@@ -65,6 +66,7 @@ def _in_two_parts(memory, blocks, layout, stages, run, tip, step, length, with_e
     prepare(memory, layout, stages, drive, rest.length, at)
     two = take_step(memory, blocks, layout, stages, tip, rest, with_energy)
     add_stored_contacts(memory, layout.others)
+    add_stored_loss(memory, layout.terms)
     return in_succession(layout, one, two)
 
 

@@ -19,38 +19,33 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import called, inlined
-from snapbeam.solver.cpu.dot import dot
-from snapbeam.solver.simd import WIDTH, fma, load, store
+from snapbeam.solver.simd import WIDTH, dot, fma, load, store
 from snapbeam.solver.terms.interface import operation
 
 __all__ = [
     "CONTACT_NUMBERS",
     "DAMPING",
     "ELASTIC",
-    "IMPULSE",
     "IMPULSE_IN_KICK",
     "LOST_IN_KICK",
-    "TWICE",
     "VELOCITY",
-    "WORK",
     "ContactDamping",
-    "V",
     "VelocityBlock",
     "add_impulses",
     "add_velocity_dependent",
     "enter_contact",
+    "keep_velocities",
     "numbers_of_block",
     "open_first_contact",
     "prepare_velocity_block",
     "solve_velocity_block",
-    "value_of",
 ]
 
 
 _FEWEST_PARTS, _MOST_PARTS = 4, 256
 _PARTS_PER_DECAY = 8.0
 """Parts of a kick, over the time in which the damping alone halts the motion along the rows."""
-V, _PUSH, _STAGE, _FORCE, _SUM, _POWER, IMPULSE, TWICE, WORK, _PATH = range(10)
+_V, _PUSH, _STAGE, _FORCE, _SUM, _POWER, _IMPULSE, _TWICE, _WORK, _PATH = range(10)
 """Arrays of one number for each row: v, a, v and D of a part, their sums; then integrals over the kick: of D, of that
 integral, of D v and of v."""
 
@@ -66,8 +61,6 @@ class VelocityBlock(NamedTuple):
     """M, then the arrays."""
     first: Any
     """Place of the numbers of the first contact; None if its force does not depend on the velocity."""
-    circuit: Any
-    """Number of the first row of a circuit; None without one."""
 
 
 def numbers_of_block(count: int) -> int:
@@ -114,7 +107,7 @@ def damping_forces_of_state(memory: Any, size: int, terms: Any, q: int, v: int, 
 
 
 ELASTIC, DAMPING, VELOCITY, IMPULSE_IN_KICK, LOST_IN_KICK = range(5)
-"""Numbers of a contact: F, N; C, N s/m; V, m/s; of a kick the impulse, N s, and the energy lost, J."""
+"""Numbers of a contact: F, N; C, N s/m; _V, m/s; of a kick the impulse, N s, and the energy lost, J."""
 CONTACT_NUMBERS = 5
 
 
@@ -163,12 +156,6 @@ class ContactDamping(NamedTuple):
 def _array(block, which):
     count = len(block.rows)
     return block.numbers + count * (count + which)
-
-
-@inlined
-def value_of(memory, block, which, i):
-    """The number of row *i* in an array, such as its impulse."""
-    return memory[_array(block, which) + i]
 
 
 @inlined
@@ -223,14 +210,14 @@ def _integrate(memory, block, weight):
     """Integrate the velocities over a kick of *weight* seconds, and D, D v and v."""
     count, mobility, channels = len(block.rows), block.numbers, block.channels
     v, change, stage, force = (
-        _array(block, V),
+        _array(block, _V),
         _array(block, _PUSH),
         _array(block, _STAGE),
         _array(block, _FORCE),
     )
     total, power = _array(block, _SUM), _array(block, _POWER)
     impulse, twice, work, path = (
-        _array(block, IMPULSE), _array(block, TWICE), _array(block, WORK), _array(block, _PATH)
+        _array(block, _IMPULSE), _array(block, _TWICE), _array(block, _WORK), _array(block, _PATH)
     )  # fmt: skip
     for i in range(count):
         memory[impulse + i], memory[twice + i], memory[work + i] = 0.0, 0.0, 0.0
@@ -278,7 +265,7 @@ def solve_velocity_block(memory, size, block, weight, kick, p):
     The row *kick* is the acceleration by all other forces.  It receives what makes half of it times the weight the mean of the
     effect of D on p.
     """
-    v, change, twice = _array(block, V), _array(block, _PUSH), _array(block, TWICE)
+    v, change, twice = _array(block, _V), _array(block, _PUSH), _array(block, _TWICE)
     for i in range(len(block.rows)):
         memory[v + i] = dot(memory, size, block.rows[i], p)
         memory[change + i] = dot(memory, size, block.rows[i], kick)
@@ -297,7 +284,7 @@ def _add_row(memory, size, factor, row, to):
 @inlined
 def add_impulses(memory, size, block, p, p_to):
     """p_to = p with the impulses of a kick."""
-    impulse = _array(block, IMPULSE)
+    impulse = _array(block, _IMPULSE)
     for at in range(0, size, WIDTH):
         store(memory, p_to + at, load(memory, p + at))
     for i in range(len(block.rows)):
@@ -307,9 +294,23 @@ def add_impulses(memory, size, block, p, p_to):
 @called
 def add_velocity_dependent(memory, size, block, q, p, k):
     """Add the velocity-dependent forces of a free state to the row of accelerations *k*."""
-    v, force = _array(block, V), _array(block, _FORCE)
+    v, force = _array(block, _V), _array(block, _FORCE)
     for i in range(len(block.rows)):
         memory[v + i] = dot(memory, size, block.rows[i], p)
     damping_forces_of_state(memory, size, block.channels, q, v, force)
     for i in range(len(block.rows)):
         _add_row(memory, size, memory[force + i], block.rows[i], k)
+
+
+@called
+def keep_velocities(memory, size, block, weight, q, p):
+    """The results of *weight* seconds in which a constraint keeps the velocities."""
+    v, force = _array(block, _V), _array(block, _FORCE)
+    impulse, work, path = _array(block, _IMPULSE), _array(block, _WORK), _array(block, _PATH)
+    for i in range(len(block.rows)):
+        memory[v + i] = dot(memory, size, block.rows[i], p)
+    damping_forces_of_state(memory, size, block.channels, q, v, force)
+    for i in range(len(block.rows)):
+        memory[impulse + i], memory[path + i] = weight * memory[force + i], weight * memory[v + i]
+        memory[work + i] = memory[impulse + i] * memory[v + i]
+    end_kick(memory, block.channels, v, impulse, work, path, weight)
