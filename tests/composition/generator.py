@@ -422,6 +422,17 @@ def external(kind: str, number: Numbers) -> tuple[sb.ForceHistory, Callable[[flo
     return made, lambda t: float(spline(t))
 
 
+def loading(kind: str, number: Numbers) -> tuple[sb.Drive, Callable[[float], float], list[float]]:
+    """The change of the axial load."""
+    size, ratio, phase, length = number(1.0, 6.0), number(0.5, 2.5), number(-1.0, 1.0), number(0.3, 2.0)
+    rate, end = ratio * number.first, length * 2.0 * math.pi / number.first
+    if kind == "sine":
+        harmonic = sb.HarmonicLoad(frequency_ratio=ratio, amplitude=size, phase=phase)
+        return harmonic, lambda t: size * math.sin(rate * t + phase), []
+    ramp = sb.LoadRamp(change=size * phase, duration=length)
+    return ramp, lambda t: size * phase * smooth(t / end)[0], [end]
+
+
 def tapping(kind: str, number: Numbers, beam: ReferenceBeam) -> tuple[sb.Harvester, Circuit, float]:
     """A harvester, its circuit, and the voltage across the load per z."""
     if kind == "piezo":
@@ -519,16 +530,9 @@ def composed(seed: int, features: Features | None = None, mirror: bool = False) 
         local.append(other)
     axial, load = None, None
     if features.load is not None:
-        size, ratio, phase = number(1.0, 6.0), number(0.5, 2.5), number(-1.0, 1.0)
-        length = number(0.3, 2.0) * 2.0 * math.pi / number.first
-        if features.load == "sine":
-            how: Any = sb.HarmonicLoad(frequency_ratio=ratio, amplitude=size, phase=phase)
-            load = lambda t: size * math.sin(ratio * number.first * t + phase)  # noqa: E731
-        else:
-            how = sb.LoadRamp(change=size * phase, duration=length * number.first / (2.0 * math.pi))
-            load = lambda t: size * phase * smooth(t / length)[0]  # noqa: E731
-            breaks.append(length)
-        axial = sb.AxialLoadModulation(motion=how)
+        change, load, corners = loading(features.load, number)
+        axial = sb.AxialLoadModulation(motion=change)
+        breaks += corners
     harvesters, circuits, volts = [], [], []
     for kind in features.circuits:
         harvester, circuit, volt = tapping(kind, number, beam)
@@ -547,7 +551,8 @@ def composed(seed: int, features: Features | None = None, mirror: bool = False) 
         initial_state=state,
     )  # fmt: skip
     parts = Parts(tips, rows, local, shaking, features.carried, load, circuits, start, tuple(sorted(breaks)))
-    known = set(features.local) <= set(KNOWN_FORCES)
+    # without a striker the damping is that of the lower well, also of the mirror image
+    known = set(features.local) <= set(KNOWN_FORCES) and bool(features.contacts or not features.uneven)
     places = [tip.location for tip in tips] + [i / 8.0 for i in range(1, 8)]
     return Composition(features, system, beam, parts, volts, known, places)
 

@@ -39,6 +39,13 @@ NOT_YET = {
     "Newton's law": r"sticking under Newton's law",
 }
 """Refusals by limits of the solver, which are to go."""
+QUICK = (
+    Features(2, (("hertz", "sine", False),), base="acceleration_sine", local=("local_spring",), uneven=True),
+    Features(3, (("hunt_crossley", "burst", False), ("hertz", "fixed", False))),
+    Features(2, (("power", "displacement_sine", True),), load="sine", circuits=("piezo",)),
+    Features(4, external=("harmonic_force",), local=("quadratic_damping", "magnetic_force"), started=True),
+)
+"""Parts whose numbers are drawn in the quick tests."""
 LIMIT = {"standard": 1e-3, "reference": 1e-7}
 """Greatest errors of a run, over b, of well-conditioned problems."""
 LOCAL = {"standard": 1e-5, "reference": 1e-9}
@@ -49,6 +56,10 @@ KICK = 1e-10
 """Relative change of the start by which the conditioning is measured."""
 BALANCE = {"standard": 1e-4, "reference": 1e-6}
 """Greatest errors of the energy balance, over the gross work."""
+ROUNDING = 1e-11
+"""Difference over b of runs whose numbers agree to rounding, before the conditioning enlarges it."""
+PIECES = 1e-6
+"""Greatest relative difference of runs in pieces that agree to rounding, which their conditioning enlarges."""
 COUNT = int(os.environ.get("SNAPBEAM_COMPOSITIONS", "2000"))
 CHUNK = 20
 
@@ -154,6 +165,9 @@ def checked(seed: int, features: Features | None = None, levels: tuple[str, ...]
             report.failures.append(f"{level}: energy balance {report.balance[level]:.2e}")
         if len(system.harvesters) == 1:
             check_voltage(composition, truth, run, within, LIMIT[level], amplified, report)
+    if composition.mirrors:
+        level, run = next(iter(runs.items()))
+        check_mirror(composition, cycles, times, level, run, amplified, report)
     return report
 
 
@@ -172,3 +186,136 @@ def check_voltage(
     # impacts change the velocity, which the voltage follows, within short times
     if within.any() and not float((error / amplified)[within].max()) < 100.0 * limit:
         report.failures.append(f"voltage: error {float(error[within].max()):.2e} of its greatest")
+
+
+def check_mirror(
+    composition: Composition,
+    cycles: int,
+    times: Array,
+    level: str,
+    run: sb.Run,
+    amplified: Array,
+    report: Report,
+) -> None:
+    """Compare the run of the mirror image: to the last bit where its numbers differ by signs only."""
+    image = composed(report.seed, composition.features, mirror=True)
+    found = sb.simulate(image.system, sb.Integration(cycles=cycles, accuracy=level), sample_times=times)
+    one, other = run.dataset["modal_amplitude"].values, found.dataset["modal_amplitude"].values
+    if composition.exact_mirror:
+        if not np.array_equal(one, -other):
+            report.failures.append(f"mirror image: differs by {np.abs(one + other).max():.2e} m^0.5")
+        return
+    shapes = np.array([composition.beam.shape(place) for place in composition.places])
+    error = np.abs((one + other) @ shapes.T).max(axis=1) / composition.system.scale.length
+    if not (error < ROUNDING * amplified).all():
+        report.failures.append(f"mirror image: differs by {error.max():.2e} b")
+
+
+def inconsistent(seed: int, folder: Path, features: Features | None = None) -> list[str]:
+    """Compare one system run by run: saved and loaded, advanced in pieces, swept; the differences in words."""
+    composition, found = composed(seed, features), []
+    system = composition.system
+    cycles = lasting(system)[0]
+    how = sb.Integration(cycles=cycles)
+    try:
+        run = sb.simulate(system, how)
+    except InputError as error:
+        reason(error)
+        return []
+    system.save(folder / "system.toml")
+    loaded = sb.System.load(folder / "system.toml")
+    if loaded != system or loaded.hash != system.hash:
+        found.append("loaded system: not equal")
+    if not sb.simulate(loaded, how).dataset.identical(run.dataset):
+        found.append("loaded system: another run")
+    run.save(folder / "run.nc")
+    back = sb.load(folder / "run.nc").dataset
+    for name in run.dataset.data_vars:
+        if not np.array_equal(back[name].values, run.dataset[name].values):
+            found.append(f"loaded run: {name}")
+    found += pieces(composition, cycles) + points(composition, how, run)
+    return found
+
+
+def pieces(composition: Composition, cycles: int) -> list[str]:
+    """Differences between an advance in one call and one period at a time."""
+    system = composition.system
+    whole, state, found = sb.advance(system, periods=2), None, []
+    for _ in range(2):
+        state = sb.advance(system, state)
+    assert state is not None
+    again = sb.advance(system, periods=2, save_every_period=True)[-1]
+    repeats = len(system.moving) == 0 or (len(system.moving) == 1 and system.moving[0][1].is_periodic)
+    scale = float(np.abs(system.model.well_amplitude).max())
+    for name in ("amplitude", "velocity", "striker_shift", "circuit", "contact_time"):
+        one, two, three = (getattr(each, name) for each in (whole, state, again))
+        if not np.array_equal(one, three, equal_nan=True):
+            found.append(f"every period saved: {name}")
+        if repeats and not np.array_equal(one, two, equal_nan=True):
+            found.append(f"advanced in pieces: {name}")
+    if not repeats and not np.abs(whole.amplitude - state.amplitude).max() < PIECES * scale:
+        found.append(
+            f"advanced in pieces: differs by {np.abs(whole.amplitude - state.amplitude).max() / scale:.2e}"
+        )
+    return found
+
+
+def points(composition: Composition, how: sb.Integration, run: sb.Run) -> list[str]:
+    """Differences between a run and the point of a sweep."""
+    ratio = float(composition.system.model.damping_ratio[0])
+    swept = sb.sweep(composition.system, {"model.damping_ratio": [ratio, 1.1 * ratio]}, how)
+    alone = sb.sweep(composition.system, {"model.damping_ratio": [ratio]}, how)
+    found, summary = [], dict(run.summary)
+    for name in swept.data_vars:
+        one, two = swept[name].values[0], alone[name].values[0]
+        if not np.array_equal(one, two, equal_nan=bool(np.asarray(one).dtype.kind == "f")):
+            found.append(f"neighbours of a sweep: {name}")
+        own: Any = summary.get(str(name))
+        if isinstance(own, (int, float)) and not (one == own or (math.isnan(own) and math.isnan(one))):
+            found.append(f"sweep: {name} {float(one)!r}, of the run {own!r}")
+    return found
+
+
+@pytest.mark.parametrize("kind", range(len(QUICK)))
+def test_ten_systems_of_the_same_parts(kind: int) -> None:
+    """The numbers of ten seeds."""
+    judge([checked(seed, QUICK[kind]) for seed in range(10)])
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=[pytest.mark.slow] if kind != 2 else []) for kind in range(len(QUICK))],
+)
+def test_runs_of_the_same_parts_are_consistent(kind: int, tmp_path: Path) -> None:
+    """Saved and loaded, advanced in pieces, swept."""
+    assert inconsistent(0, tmp_path, QUICK[kind]) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(0, COUNT, CHUNK))
+def test_random_systems(first: int) -> None:
+    """Any parts with any numbers; every tenth also at the standard level."""
+    judge([
+        checked(seed, levels=("reference", "standard") if seed % 10 == 0 else ("reference",))
+        for seed in range(first, min(first + CHUNK, COUNT))
+    ])  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(0, COUNT, 4 * CHUNK))
+def test_runs_of_random_systems_are_consistent(seed: int, tmp_path: Path) -> None:
+    """Saved and loaded, advanced in pieces, swept."""
+    assert inconsistent(seed, tmp_path) == [], features_of(seed)
+
+
+def judge(reports: list[Report]) -> None:
+    """Print what was compared, and fail with the seeds that disagree."""
+    tested = [each for each in reports if not each.refused]
+    for each in reports:
+        print(each)
+    if tested:
+        print(f"compared up to {np.mean([each.compared for each in tested]):.0%} of the runs")
+    wrong = {each.seed: each.failures for each in reports if each.failures}
+    assert not wrong, (
+        f"repeat with python tests/composition/generator.py {' '.join(map(str, wrong))}: {wrong}"
+    )
