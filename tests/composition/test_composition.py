@@ -137,7 +137,7 @@ def checked(seed: int, features: Features | None = None, levels: tuple[str, ...]
     kick = np.random.default_rng([seed, 2]).uniform(-KICK, KICK, 200)
     truth, moved = (
         Solution(composition.beam, composition.parts, times, longest=longest, kick=each)
-        for longest, each in ((400.0, None), (700.0, kick))
+        for longest, each in ((150.0, None), (240.0, kick))
     )
     expected = observed(composition, truth, times)
     growth = np.abs(observed(composition, moved, times) - expected).max(axis=1) / KICK
