@@ -200,7 +200,7 @@ class Solution:
         beam: ReferenceBeam,
         parts: Parts,
         times: Array,
-        rtol: float = 1e-11,
+        rtol: float = 2e-12,
         longest: float = 150.0,
         kick: Array | None = None,
     ) -> None:
