@@ -1,0 +1,321 @@
+"""Random systems against an independent reference: whether parts combine.
+
+``SNAPBEAM_COMPOSITIONS=200 pytest tests/composition -m slow`` tests 200 seeds in place of 2,000, and
+``python tests/composition/generator.py SEED`` repeats one.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from composition_reference import Solution
+from generator import Composition, Features, composed, features_of
+from numpy.typing import NDArray
+
+import snapbeam as sb
+from snapbeam.util.validation import InputError
+
+Array = NDArray[np.float64]
+
+PHYSICAL = {
+    "no well": r"leave no well where a run begins",
+    "kink of a chirp": r"striker_on_base = False with a chirp",
+}
+"""Refusals with a physical reason, or for data that are missing."""
+NOT_YET = {
+    "rows of excitation": r"one row of excitation",
+    "velocity-dependent forces": r"one velocity-dependent force|the first alone may lose energy",
+    "circuits": r"\d circuits; must be at most 1",
+    "contacts": r"contacts: \d+; must be at most 4",
+    "records": r"own time axis",
+    "bodies": r"the first alone may be a body",
+    "Newton's law": r"sticking under Newton's law",
+}
+"""Refusals by limits of the solver, which are to go."""
+QUICK = (
+    Features(2, (("hertz", "sine", False),), base="acceleration_sine", local=("local_spring",), uneven=True),
+    Features(3, (("hunt_crossley", "burst", False), ("hertz", "fixed", False))),
+    Features(2, (("power", "displacement_sine", True),), load="sine", circuits=("piezo",)),
+    Features(4, external=("harmonic_force",), local=("quadratic_damping", "magnetic_force"), started=True),
+)
+"""Parts whose numbers are drawn in the quick tests."""
+LIMIT = {"standard": 1e-3, "reference": 5e-7}
+"""Greatest errors of a run, over b, of well-conditioned problems; most are a hundred times smaller."""
+LOCAL = {"standard": 1e-5, "reference": 1e-9}
+"""Errors over b that a run makes on its way, which its conditioning enlarges."""
+BEYOND = 100.0
+"""Multiple of the limit up to which an error that the conditioning enlarges is compared."""
+KICK = 1e-10
+"""Relative change of the start by which the conditioning is measured."""
+BALANCE = {"standard": 1e-4, "reference": 1e-6}
+"""Greatest errors of the energy balance, over the gross work."""
+ROUNDING = 1e-11
+"""Difference over b of runs whose numbers agree to rounding, before the conditioning enlarges it."""
+PIECES = 1e-6
+"""Greatest relative difference of runs in pieces that agree to rounding, which their conditioning enlarges."""
+COUNT = int(os.environ.get("SNAPBEAM_COMPOSITIONS", "2000"))
+CHUNK = 20
+
+
+@dataclass
+class Report:
+    """The results of one system."""
+
+    seed: int
+    refused: str = ""
+    compared: float = math.nan
+    """Share of the run up to the horizon."""
+    error: dict[str, float] = field(default_factory=dict)
+    """Greatest error over b up to the horizon, over what is allowed, by level."""
+    balance: dict[str, float] = field(default_factory=dict)
+    largest: float = math.nan
+    """Greatest amplification of a change of the start."""
+    failures: list[str] = field(default_factory=list)
+    impacts: int = 0
+
+
+def reason(error: InputError) -> str:
+    """The name of a refusal; raises what is not in the lists."""
+    for name, words in (*PHYSICAL.items(), *NOT_YET.items()):
+        if re.search(words, str(error)):
+            return name
+    raise error
+
+
+def lasting(system: sb.System) -> tuple[int, float]:
+    """Cycles that take about one and a half periods of the first mode, at most 3, and their duration."""
+    lead, first = system.primary_excitation, 2.0 * math.pi / system.scale.omega
+    cycle = first
+    if lead is not None:
+        columns = {name: np.array([value]) for name, value in lead[1].values().items()} or {"": np.zeros(1)}
+        cycle = float(lead[1].cycle(columns, system.scale)[0])
+    cycles = min(max(round(1.5 * first / cycle), 1), 3)
+    return cycles, cycles * cycle
+
+
+def observed(composition: Composition, solution: Solution, times: Array) -> Array:
+    """Heights at many places, penetrations and voltages of the reference, over b and over their greatest."""
+    length = composition.system.scale.length
+    heights, depths = solution.heights(composition.places) / length, solution.depths(times) / length
+    return np.concatenate((heights, depths.reshape(times.size, -1)), axis=1)
+
+
+def recorded(composition: Composition, run: sb.Run) -> Array:
+    """The same of a run."""
+    data, system = run.dataset, composition.system
+    shapes = np.array([system.model.shape_at(place) for place in composition.places])
+    found = [data["modal_amplitude"].values @ shapes.T / system.scale.length]
+    if len(system.contacts) > 1:
+        found.append(data["striker_penetrations"].values)
+    elif system.contacts:
+        found.append(data["penetration_normalised"].values[:, None])
+    return np.concatenate(found, axis=1)
+
+
+def checked(seed: int, features: Features | None = None, levels: tuple[str, ...] = ("reference",)) -> Report:
+    """Compare one system with the reference; failures are listed in the report."""
+    report = Report(seed)
+    try:
+        composition = composed(seed, features)
+        system = composition.system
+        cycles, end = lasting(system)
+        times = np.linspace(0.0, end, 121)[1:] * (1.0 - 1e-9)
+        runs = {
+            level: sb.simulate(system, sb.Integration(cycles=cycles, accuracy=level), sample_times=times)
+            for level in levels
+        }
+    except InputError as error:
+        report.refused = reason(error)
+        return report
+    kick = np.random.default_rng([seed, 2]).uniform(-KICK, KICK, 200)
+    truth, moved = (
+        Solution(composition.beam, composition.parts, times, longest=longest, kick=each)
+        for longest, each in ((150.0, None), (240.0, kick))
+    )
+    expected = observed(composition, truth, times)
+    growth = np.abs(observed(composition, moved, times) - expected).max(axis=1) / KICK
+    amplified = np.maximum.accumulate(np.maximum(growth, 1.0))
+    report.largest = float(amplified[-1])
+    for level, run in runs.items():
+        report.impacts = run.summary.impacts
+        allowed = np.maximum(LIMIT[level], LOCAL[level] * amplified)
+        within = allowed <= BEYOND * LIMIT[level]
+        found = recorded(composition, run)
+        error = np.abs(found - expected).max(axis=1)
+        report.compared = float(within.mean())
+        report.error[level] = float((error / allowed)[within].max()) if within.any() else math.nan
+        report.balance[level] = abs(float(run.dataset.attrs["energy_error"]))
+        if run.summary.status.name != "OK":
+            report.failures.append(f"{level}: status {run.summary.status.name}")
+        if not report.error[level] < 1.0:
+            at = int(np.argmax((error / allowed) * within))
+            worst = int(np.argmax(np.abs(found - expected)[at]))
+            report.failures.append(
+                f"{level}: error {error[at]:.2e} b at t = {times[at]:.5g} s of {end:.5g} s in column {worst}, "
+                f"allowed {allowed[at]:.2e} b"
+            )
+        if not report.balance[level] < BALANCE[level]:
+            report.failures.append(f"{level}: energy balance {report.balance[level]:.2e}")
+        if len(system.harvesters) == 1:
+            check_voltage(composition, truth, run, within, LIMIT[level], amplified, report)
+    if composition.mirrors:
+        level, run = next(iter(runs.items()))
+        check_mirror(composition, cycles, times, level, run, amplified, report)
+    return report
+
+
+def check_voltage(
+    composition: Composition,
+    truth: Solution,
+    run: sb.Run,
+    within: NDArray[np.bool_],
+    limit: float,
+    amplified: Array,
+    report: Report,
+) -> None:
+    """Compare the voltage of one harvester."""
+    expected = composition.volts[0] * truth.currents()[:, 0]
+    error = np.abs(run.dataset["voltage"].values - expected) / float(np.abs(expected).max())
+    # impacts change the velocity, which the voltage follows, within short times
+    if within.any() and not float((error / amplified)[within].max()) < 100.0 * limit:
+        report.failures.append(f"voltage: error {float(error[within].max()):.2e} of its greatest")
+
+
+def check_mirror(
+    composition: Composition,
+    cycles: int,
+    times: Array,
+    level: str,
+    run: sb.Run,
+    amplified: Array,
+    report: Report,
+) -> None:
+    """Compare the run of the mirror image: to the last bit where its numbers differ by signs only."""
+    image = composed(report.seed, composition.features, mirror=True)
+    found = sb.simulate(image.system, sb.Integration(cycles=cycles, accuracy=level), sample_times=times)
+    one, other = run.dataset["modal_amplitude"].values, found.dataset["modal_amplitude"].values
+    if composition.exact_mirror:
+        if not np.array_equal(one, -other):
+            report.failures.append(f"mirror image: differs by {np.abs(one + other).max():.2e} m^0.5")
+        return
+    shapes = np.array([composition.beam.shape(place) for place in composition.places])
+    error = np.abs((one + other) @ shapes.T).max(axis=1) / composition.system.scale.length
+    if not (error < ROUNDING * amplified).all():
+        report.failures.append(f"mirror image: differs by {error.max():.2e} b")
+
+
+def inconsistent(seed: int, folder: Path, features: Features | None = None) -> list[str]:
+    """Compare one system run by run: saved and loaded, advanced in pieces, swept; the differences in words."""
+    composition, found = composed(seed, features), []
+    system = composition.system
+    cycles = lasting(system)[0]
+    how = sb.Integration(cycles=cycles)
+    try:
+        run = sb.simulate(system, how)
+    except InputError as error:
+        reason(error)
+        return []
+    system.save(folder / "system.toml")
+    loaded = sb.System.load(folder / "system.toml")
+    if loaded != system or loaded.hash != system.hash:
+        found.append("loaded system: not equal")
+    if not sb.simulate(loaded, how).dataset.identical(run.dataset):
+        found.append("loaded system: another run")
+    run.save(folder / "run.nc")
+    back = sb.load(folder / "run.nc").dataset
+    for name in run.dataset.data_vars:
+        if not np.array_equal(back[name].values, run.dataset[name].values):
+            found.append(f"loaded run: {name}")
+    found += pieces(composition, cycles) + points(composition, how, run)
+    return found
+
+
+def pieces(composition: Composition, cycles: int) -> list[str]:
+    """Differences between an advance in one call and one period at a time."""
+    system = composition.system
+    whole, state, found = sb.advance(system, periods=2), None, []
+    for _ in range(2):
+        state = sb.advance(system, state)
+    assert state is not None
+    again = sb.advance(system, periods=2, save_every_period=True)[-1]
+    repeats = len(system.moving) == 0 or (len(system.moving) == 1 and system.moving[0][1].is_periodic)
+    scale = float(np.abs(system.model.well_amplitude).max())
+    for name in ("amplitude", "velocity", "striker_shift", "circuit", "contact_time"):
+        one, two, three = (getattr(each, name) for each in (whole, state, again))
+        if not np.array_equal(one, three, equal_nan=True):
+            found.append(f"every period saved: {name}")
+        if repeats and not np.array_equal(one, two, equal_nan=True):
+            found.append(f"advanced in pieces: {name}")
+    if not repeats and not np.abs(whole.amplitude - state.amplitude).max() < PIECES * scale:
+        found.append(
+            f"advanced in pieces: differs by {np.abs(whole.amplitude - state.amplitude).max() / scale:.2e}"
+        )
+    return found
+
+
+def points(composition: Composition, how: sb.Integration, run: sb.Run) -> list[str]:
+    """Differences between a run and the point of a sweep."""
+    ratio = float(composition.system.model.damping_ratio[0])
+    swept = sb.sweep(composition.system, {"model.damping_ratio": [ratio, 1.1 * ratio]}, how)
+    alone = sb.sweep(composition.system, {"model.damping_ratio": [ratio]}, how)
+    found, summary = [], dict(run.summary)
+    for name in swept.data_vars:
+        one, two = swept[name].values[0], alone[name].values[0]
+        if not np.array_equal(one, two, equal_nan=bool(np.asarray(one).dtype.kind == "f")):
+            found.append(f"neighbours of a sweep: {name}")
+        own: Any = summary.get(str(name))
+        if isinstance(own, (int, float)) and not (one == own or (math.isnan(own) and math.isnan(one))):
+            found.append(f"sweep: {name} {float(one)!r}, of the run {own!r}")
+    return found
+
+
+@pytest.mark.parametrize("kind", range(len(QUICK)))
+def test_ten_systems_of_the_same_parts(kind: int) -> None:
+    """The numbers of ten seeds."""
+    judge([checked(seed, QUICK[kind]) for seed in range(10)])
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=[pytest.mark.slow] if kind != 2 else []) for kind in range(len(QUICK))],
+)
+def test_runs_of_the_same_parts_are_consistent(kind: int, tmp_path: Path) -> None:
+    """Saved and loaded, advanced in pieces, swept."""
+    assert inconsistent(0, tmp_path, QUICK[kind]) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(0, COUNT, CHUNK))
+def test_random_systems(first: int) -> None:
+    """Any parts with any numbers; every tenth also at the standard level."""
+    judge([
+        checked(seed, levels=("reference", "standard") if seed % 10 == 0 else ("reference",))
+        for seed in range(first, min(first + CHUNK, COUNT))
+    ])  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(0, COUNT, 4 * CHUNK))
+def test_runs_of_random_systems_are_consistent(seed: int, tmp_path: Path) -> None:
+    """Saved and loaded, advanced in pieces, swept."""
+    assert inconsistent(seed, tmp_path) == [], features_of(seed)
+
+
+def judge(reports: list[Report]) -> None:
+    """Print what was compared, and fail with the seeds that disagree."""
+    tested = [each for each in reports if not each.refused]
+    for each in reports:
+        print(each)
+    if tested:
+        print(f"compared up to {np.mean([each.compared for each in tested]):.0%} of the runs")
+    wrong = {each.seed: each.failures for each in reports if each.failures}
+    assert not wrong, (
+        f"repeat with python tests/composition/generator.py {' '.join(map(str, wrong))}: {wrong}"
+    )
