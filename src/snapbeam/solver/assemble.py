@@ -324,7 +324,7 @@ _RESOLVED = 24.0
 """Flight steps, at least, in a period of a base's or an axial load's fastest part."""
 _TAPPED = {"standard": 0.35, "reference": 0.1}
 """Longest step over the reciprocal of the angular frequency or rate of what is in the kicks beside tension and contacts."""
-_DECAY = 4.0
+_DECAY = 3.0
 """Decay of the state of a circuit in a step, lam h, at most."""
 
 
