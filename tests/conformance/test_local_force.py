@@ -214,15 +214,6 @@ def test_file_and_dotted_names(tmp_path):
         (sb.LocalSpring(stiffness=1.0), {}, "force.location = None"),
         (sb.LocalSpring(stiffness=1.0, shape=[1.0, 0.0, 0.0]), {}, "leave shape out"),
         (3.0, {}, r"forces\[0\] = 3.0: must be an ExternalForce"),
-        (
-            FORCES["drag"],
-            {
-                "harvesters": [
-                    sb.PiezoelectricHarvester(moment_per_volt=1e-5, capacitance=1e-8, resistance=1e5)
-                ]
-            },
-            "one velocity-dependent force",
-        ),
     ],
 )
 def test_refusals(force, more, words):

@@ -20,9 +20,7 @@ from snapbeam.solver.simd import WIDTH
 from snapbeam.solver.splitting import Stages, in_memory, slot_length
 from snapbeam.solver.structure import Structure
 from snapbeam.solver.terms import TERMS_AFTER_CONTACTS, TERMS_BEFORE_CONTACTS
-from snapbeam.solver.terms.circuit import CircuitDamping, ResistiveCircuit
 from snapbeam.solver.terms.interface import TermMemory
-from snapbeam.solver.terms.local_force import DampedLocalForce, LocalDamping
 
 __all__ = ["Memory", "Packed", "lay_out", "pack"]
 
@@ -142,7 +140,10 @@ def pack(
     if several is not None:
         arrays["striker_rows"] = np.zeros(len(several.laws) * size)
         arrays["strikers"] = np.zeros(len(several.laws) * NUMBERS)
-    damped = _damped(structure, several, law)
+    forces = sum(hasattr(kind, "channel") for kind, _, _ in built)
+    contacts = sum(each.rate_dependent for each in (law, *(several.laws if several is not None else ())))
+    # the first contact alone has an exact solution of its own
+    damped = 0 if forces == 0 and contacts == law.rate_dependent else contacts + forces
     if damped:
         arrays["velocity_block"] = np.zeros(WIDTH + numbers_of_block(damped))
     starts = np.concatenate(([0], np.cumsum([array.size for array in arrays.values()])))
@@ -195,14 +196,6 @@ def _body_of_first(structure: Structure, rows: NDArray[np.int64]) -> int | None:
     return int(rows[structure.equilibrium.size])
 
 
-def _damped(structure: Structure, several: type[Several] | None, law: type[ContactLaw]) -> int:
-    """Rows of the velocity block; 0 where the first contact alone has an exact solution of its own."""
-    contacts = sum(each.rate_dependent for each in (law, *(several.laws if several is not None else ())))
-    forces = sum(type(each.law).owner.dissipative for each in structure.local_forces)
-    forces += sum(each.mode is None for each in structure.circuits)
-    return 0 if forces == 0 and contacts == law.rate_dependent else contacts + forces
-
-
 def _velocity_block(layout: Layout, law: type[ContactLaw], numbers: int) -> VelocityBlock:
     """Every channel of a layout, and the places of their rows."""
     rows: list[int] = []
@@ -217,11 +210,8 @@ def _velocity_block(layout: Layout, law: type[ContactLaw], numbers: int) -> Velo
             channels.append(ContactDamping(layout.others.numbers + j * NUMBERS + DAMPED, len(rows)))
             rows.append(layout.others.rows + j * layout.size)
     for term in layout.terms:
-        if isinstance(term, DampedLocalForce):
-            channels.append(LocalDamping(term.row, term.state, term.law, len(rows)))
-            rows.append(term.row)
-        if isinstance(term, ResistiveCircuit):
-            channels.append(CircuitDamping(term.state, len(rows)))
+        if hasattr(term, "channel"):
+            channels.append(term.channel(len(rows)))
             rows.append(term.row)
     return VelocityBlock(tuple(rows), tuple(channels), numbers + WIDTH, first)
 
@@ -245,7 +235,7 @@ def _any_contact_damped(ensemble: Ensemble) -> bool:
 
 def _always_damped(layout: Layout) -> bool:
     """Whether forces depend on velocities outside of contacts too."""
-    return any(isinstance(term, (DampedLocalForce, ResistiveCircuit)) for term in layout.terms)
+    return any(hasattr(term, "channel") for term in layout.terms)
 
 
 def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:

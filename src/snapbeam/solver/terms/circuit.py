@@ -248,6 +248,10 @@ class ResistiveCircuit(NamedTuple):
         y = memory[term.state + _RATE] * dot(memory, size, term.row, p)
         _accumulate(accumulators, term.number, memory[term.state + _STORED], y, late)
 
+    def channel(self, unknown: int) -> CircuitDamping:
+        """Channel of the velocity block."""
+        return CircuitDamping(self.state, unknown)
+
     store_loss = Circuit.store_loss  # type: ignore[misc]
     add_stored_loss = Circuit.add_stored_loss  # type: ignore[misc]
     write_loss = Circuit.write_loss  # type: ignore[misc]

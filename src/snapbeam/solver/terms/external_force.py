@@ -1,4 +1,4 @@
-"""External force: F(t) along a row h accelerates the modes by F(t) V^T h (``structure.force_rows``), as a base does."""
+"""External force: F(t) along a row h accelerates the modes by F(t) V^T h (``structure.force_rows``)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numba.extending import overload
 from snapbeam.solver.compilation import INLINE, inlined
 from snapbeam.solver.excitation import acceleration_by_number, bound_by_number
 from snapbeam.solver.simd import WIDTH
-from snapbeam.solver.terms.base_excitation import BaseExcitation, absolute_product
+from snapbeam.solver.terms.force_of_time import ForceOfTime, absolute_product
 from snapbeam.solver.terms.interface import TermMemory
 
 __all__ = ["ExternalForce"]
@@ -38,8 +38,8 @@ def _greatest_force_of_kind(drive, memory, number):
     return lambda drive, memory, number: own(drive, memory, 0.0, number)
 
 
-class ExternalForce(BaseExcitation):
-    """The same of a force F: its row is V^T h, and F stands for the acceleration."""
+class ExternalForce(ForceOfTime):
+    """A force F, N, along the row V^T h."""
 
     __slots__ = ()
 
@@ -47,7 +47,7 @@ class ExternalForce(BaseExcitation):
     def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
         """Of every external force, in their order."""
         return [
-            TermMemory({"row": padded(row)}, {"acceleration": np.zeros(WIDTH)}, {"number": i})
+            TermMemory({"row": padded(row)}, {"coefficient": np.zeros(WIDTH)}, {"number": i})
             for i, row in enumerate(structure.force_rows)
         ]
 
@@ -55,7 +55,7 @@ class ExternalForce(BaseExcitation):
     @inlined
     def update_forces(memory, size, term, drive, argument, q):
         """Write F(t) into memory."""
-        memory[term.acceleration] = _force(drive, memory, argument, term.number)
+        memory[term.coefficient] = _force(drive, memory, argument, term.number)
 
     @staticmethod
     @inlined

@@ -15,6 +15,8 @@ Beside operations, a class has
 ``kick_work(memory, size, term, weight, g, r, kick, p)``, ``accumulator`` and ``work_description``
     Its work in a kick of *weight* seconds, J, exact: the row *kick* is the whole acceleration of the kick, contact
     included, and p the row of the velocities before it.  With it, the name and long name of the statistic of the work.
+``channel(unknown)``
+    Of a damping force: its channel of the velocity block (``cpu/terms/velocity_block.py``) with the number of its row.
 ``may_hide_onset``
     True if the term changes the motion within a step more than the interval without contact allows for.
 ``needs_tension_product``

@@ -152,6 +152,10 @@ class DampedLocalForce(LocalForce):
             total += abs(memory[term.row + row] * memory[along + row])
         return bound + total * abs(memory[term.state + _DAMPING]) * horizon
 
+    def channel(self, unknown: int) -> LocalDamping:
+        """Channel of the velocity block for the damping part."""
+        return LocalDamping(self.row, self.state, self.law, unknown)
+
     accumulator = "local_force_work"
     work_description = "work done by the damping part of a local force"
 
