@@ -76,7 +76,7 @@ OF_OTHERS = {
     "local_force_work",
     "valid", "energy_striker", "energy_lost_contact", "base_displacement", "base_velocity", "base_work", "external_force",
     "force_work", "load_change",
-    "load_work", "voltage", "power_load", "energy_harvested", "energy_circuit", "striker", "striker_displacements",
+    "load_work", "voltage", "power_load", "energy_harvested", "energy_circuit", "harvester", "voltages", "striker", "striker_displacements",
     "striker_penetrations", "striker_forces", "force", "external_forces",
 }  # fmt: skip
 """What runs have with dropouts, strikers with a mass or several, contacts with loss, bases, loads, forces, harvesters only."""

@@ -398,14 +398,14 @@ def run_dataset(
 
 def _stored_in_circuits(ensemble: Ensemble, recorded: Recorded) -> _Array:
     """Return the energy in circuits, y^2/2 each, J, shape (samples,)."""
-    y = ensemble.structure.circuits_of(recorded.q).reshape(recorded.q.shape[0], -1)
+    y = ensemble.structure.circuits_of(recorded.q).reshape(-1, max(1, len(ensemble.circuits)))
     return 0.5 * (np.nan_to_num(y) ** 2).sum(axis=1)
 
 
 def _harvested(ensemble: Ensemble, recorded: Recorded, values: _Array) -> dict[str, _Array]:
     """Return the variables of harvesters."""
     structure = ensemble.structure
-    y = structure.circuits_of(recorded.q).reshape(recorded.q.shape[0], -1)
+    y = structure.circuits_of(recorded.q).reshape(-1, len(ensemble.circuits))
     voltage, power, energy = np.zeros(y.shape), np.zeros(y.shape), np.zeros(y.shape[0])
     for i, (circuit, row) in enumerate(zip(ensemble.circuits, structure.circuits, strict=True)):
         per_square = circuit.rate[0]
