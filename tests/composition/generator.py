@@ -438,7 +438,7 @@ def loading(kind: str, number: Numbers) -> tuple[sb.Drive, Callable[[float], flo
 def tapping(kind: str, number: Numbers, beam: ReferenceBeam) -> tuple[sb.Harvester, Circuit, float]:
     """A harvester, its circuit, and the voltage across the load per z."""
     if kind == "piezo":
-        moment, c, r = number(1e-3, 4e-3), 80e-9, 10.0 ** number(4.0, 5.5)
+        moment, c, r = number(4e-5, 1.6e-4), 80e-9, 10.0 ** number(4.0, 5.5)
         begin, end = number(0.0, 0.15), number(0.25, 0.45)
         layers = sb.PiezoelectricHarvester(
             moment_per_volt=moment, capacitance=c, resistance=r, patch_start=begin, patch_end=end

@@ -30,12 +30,6 @@ PHYSICAL = {
 }
 """Refusals with a physical reason, or for data that are missing."""
 NOT_YET = {
-    "rows of excitation": r"one row of excitation",
-    "velocity-dependent forces": r"one velocity-dependent force|the first alone may lose energy",
-    "circuits": r"\d circuits; must be at most 1",
-    "contacts": r"contacts: \d+; must be at most 4",
-    "records": r"own time axis",
-    "bodies": r"the first alone may be a body",
     "Newton's law": r"sticking under Newton's law",
 }
 """Refusals by limits of the solver, which are to go."""
