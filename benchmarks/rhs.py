@@ -20,6 +20,7 @@ from benchmarks.peers.equations import equations_of
 from snapbeam.solver.cpu.memory import pack
 from snapbeam.solver.cpu.mode_lanes import tension_rows
 from snapbeam.solver.physics import sincos, tension_factors
+from snapbeam.solver.simd import dot
 from snapbeam.solver.structure import structure_of
 
 __all__ = ["CompiledSystem", "aligned", "compiled_system"]

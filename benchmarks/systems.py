@@ -21,9 +21,10 @@ __all__ = ["MODELS", "run"]
 _SEED = 20240118
 _MODES = 8
 SINE = sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.2)
-PIEZO = sb.PiezoelectricHarvester(
-    moment_per_volt=4e-3, capacitance=60e-9, resistance=2e4, patch_start=0.0, patch_end=0.25
-)
+PIEZO = sb.PiezoelectricHarvester.from_material(  # PZT-5H
+    stress_constant=-16.6, permittivity=25.55e-9, layer_thickness=0.1e-3, layer_width=default_values.BEAM.width,
+    beam=default_values.BEAM, resistance=1e4, patch_end=0.25, wiring="parallel",
+)  # fmt: skip
 COIL = sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)
 Parts = Mapping[str, Any]
 
@@ -64,6 +65,11 @@ MODELS: dict[str, Parts] = {
     "a changing load": {"axial_load": sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))},
     "a piezo": {"harvesters": [PIEZO]},
     "a coil": {"harvesters": [COIL]},
+    "a coil and a piezo": {"harvesters": [COIL, PIEZO]},
+    "an external force": {
+        "forces": [sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=0.9, amplitude=0.02), location=0.4)]
+    },
+    "a local force with damping": {"forces": [sb.QuadraticDamping(coefficient=0.3, location=0.4)]},
 }  # fmt: skip
 """What differs from the paper's system."""
 

@@ -32,9 +32,8 @@ The first kick needs no tension: k at the beginning of a step is k at the end of
 
 A layout may have further forces, the *terms* (``solver/terms``).  Those that depend on position and time alone add to k,
 or to its two coefficients.  A contact force that depends on velocity
-changes during a kick; its mean follows from the exact solution of the kick along c.  A harvester circuit is coupled with p
-within the kick, also exactly.  Several such forces, and the damping of local forces, follow together from one equation for
-the velocities along their rows, by a Runge-Kutta method with steps much shorter than the kick.
+changes during a kick, as does the damping of a local force.  All such forces follow together from one equation for the
+velocities along their rows, by a Runge-Kutta method with steps much shorter than the kick.
 
 The step itself decides nothing.  Whether a contact is closed is fixed for a whole step.  The caller observes the beam at
 the end, and inside the step where needed.  If a contact began or ended there, the caller takes a shorter step from the same
@@ -166,10 +165,11 @@ class Primitives(NamedTuple):
     """
     add_to_tension: Callable[..., Any] | None = None
     """``add_to_tension(data, along_g, along_r)``: both coefficients of k with what terms add to the tension."""
-    rate_dependent_force: Callable[..., Any] | None = None
-    """``rate_dependent_force(data, stage, weight, along_g, along_r, penetration, velocity)``.
+    force_of_contact: Callable[..., Any] | None = None
+    """``force_of_contact(data, penetration, velocity)``.
 
-    Returns the mean force in a kick and the energy lost, of any contact law; *velocity* is that of the striker.
+    The force in a kick, of any contact law; 0 of a law whose force :attr:`exchange_energy` adds, since it depends on the
+    velocity too.  *velocity* is that of the striker.
     """
     exchange_energy: Callable[..., Any] | None = None
     """``exchange_energy(data, stage, weight, along_g, along_r, contact, surroundings)``.
@@ -207,25 +207,25 @@ def build_step(layout: Primitives, compiled_part: Callable[..., Any] = inlined) 
     form_products, where_closed = layout.form_products, layout.where_closed
     kick_and_flow = layout.kick_and_flow
     update_terms, add_to_tension = layout.update_terms, layout.add_to_tension
-    rate_dependent_force, exchange_energy = layout.rate_dependent_force, layout.exchange_energy
+    force_of_contact, exchange_energy = layout.force_of_contact, layout.exchange_energy
 
     @compiled_part
-    def evaluate_contact(data, stage, weight, along_g, along_r, cq, before):
+    def evaluate_contact(data, stage, weight, cq, before):
         """The contact at a kick of *weight* seconds."""
         if not data.in_contact:
             return before
         displacement, velocity = tip_motion(data, stage)
         penetration = data.tip.offset + displacement - cq
-        if rate_dependent_force is None:
-            force, lost = where_closed(data, contact_force(data.tip.law, penetration)), zero(data)
+        if force_of_contact is None:
+            force = where_closed(data, contact_force(data.tip.law, penetration))
         else:
-            force, lost = rate_dependent_force(data, stage, weight, along_g, along_r, penetration, velocity)
+            force = force_of_contact(data, penetration, velocity)
         return ContactIncrement(
             force,
             before.impulse + weight * force,
             before.work + weight * force * velocity,
             before.gross + weight * abs(force * velocity),
-            before.lost + lost,
+            before.lost,
         )
 
     @compiled_part
@@ -244,7 +244,7 @@ def build_step(layout: Primitives, compiled_part: Callable[..., Any] = inlined) 
             update_terms(data, stage, weight)
         if add_to_tension is not None:
             along_g, along_r = add_to_tension(data, along_g, along_r)
-        contact = evaluate_contact(data, stage, weight, along_g, along_r, products.cq, before.contact)
+        contact = evaluate_contact(data, stage, weight, products.cq, before.contact)
         surroundings = before.surroundings
         if exchange_energy is not None:
             contact, surroundings = exchange_energy(

@@ -142,8 +142,7 @@ def pack(
         arrays["strikers"] = np.zeros(len(several.laws) * NUMBERS)
     forces = sum(hasattr(kind, "channel") for kind, _, _ in built)
     contacts = sum(each.rate_dependent for each in (law, *(several.laws if several is not None else ())))
-    # the first contact alone has an exact solution of its own
-    damped = 0 if forces == 0 and contacts == law.rate_dependent else contacts + forces
+    damped = contacts + forces
     if damped:
         arrays["velocity_block"] = np.zeros(WIDTH + numbers_of_block(damped))
     starts = np.concatenate(([0], np.cumsum([array.size for array in arrays.values()])))

@@ -98,7 +98,7 @@ class Layout(NamedTuple):
     bodies: Any
     """Those of all strikers with mass, a tuple; None without any."""
     velocity_block: Any
-    """Of several forces that depend on velocities, and of damped local forces, a
+    """Of forces that depend on velocities, a
     :class:`~snapbeam.solver.cpu.terms.velocity_block.VelocityBlock`; else None."""
 
 

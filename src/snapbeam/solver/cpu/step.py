@@ -11,7 +11,7 @@ from numba import types
 from numba.extending import overload
 
 from snapbeam.solver.compilation import INLINE_HERE, called, compiled, inlined
-from snapbeam.solver.contact_force import contact_force, damping_coefficient, kick_force
+from snapbeam.solver.contact_force import contact_force, damping_coefficient
 from snapbeam.solver.cpu.mode_lanes import (
     acceleration_rows,
     beam_signals,
@@ -51,7 +51,6 @@ from snapbeam.solver.step import ContactIncrement, InnerProducts, Primitives, bu
 from snapbeam.solver.step_control import ContactKinematics
 from snapbeam.solver.terms.interface import (
     ExternalWork,
-    add_acceleration_along,
     add_to_tension,
     add_work,
     after_flow,
@@ -318,26 +317,9 @@ def _add_to_tension(data, along_g, along_r):
     return add_to_tension(data.memory, data.layout.terms, along_g, along_r)
 
 
-def _rate_dependent_force(
-    data: Any, stage: int, weight: float, along_g: float, along_r: float, penetration: float, velocity: float
-) -> Any:
-    """Mean contact force in a kick and the energy lost, for any contact law."""
-    raise TypeError("_rate_dependent_force runs in compiled code only")
-
-
-@inlined
-def _lossy_force(data, stage, weight, along_g, along_r, penetration, velocity):
-    memory, layout, step = data.memory, data.layout, data.step
-    size, contact = layout.size, layout.contact
-    if stage == 0:
-        rate, along = dot(memory, size, contact, step.p), dot(memory, size, contact, step.k)
-    else:
-        rate = dot(memory, size, contact, step.p1)
-        along = along_g * dot(memory, size, contact, layout.g) + along_r * dot(memory, size, contact, step.r)
-        along = add_acceleration_along(memory, size, layout.terms, contact, along)
-    mobility = dot(memory, size, contact, contact)
-    loss = kick_force(data.tip.law, penetration, velocity - rate, mobility, along, weight)
-    return loss.impulse, loss.lost
+def _force_of_contact(data: Any, penetration: float, velocity: float) -> float:
+    """The contact force in a kick, of any law; that of a law that loses energy is left to the velocity block."""
+    raise TypeError("_force_of_contact runs in compiled code only")
 
 
 @inlined
@@ -349,27 +331,16 @@ def _enter_lossy_contact(data, penetration, velocity):
     enter_contact(
         data.memory, data.layout.velocity_block.first, contact_force(law, at), damping_coefficient(law, at), velocity
     )  # fmt: skip
-    return 0.0, 0.0
+    return 0.0
 
 
-@overload(_rate_dependent_force, jit_options=INLINE_HERE)
-def _rate_dependent_force_by_law(data, stage, weight, along_g, along_r, penetration, velocity):
+@overload(_force_of_contact, jit_options=INLINE_HERE)
+def _force_of_contact_by_law(data, penetration, velocity):
     tip = data.types[data.fields.index("tip")]
     law = tip.types[tip.fields.index("law")]
-    layout = data.types[data.fields.index("layout")]
-    together = layout.types[layout.fields.index("velocity_block")] != types.none
-    if law.instance_class.owner.rate_dependent and together:
-        return lambda data, stage, weight, along_g, along_r, penetration, velocity: _enter_lossy_contact(
-            data, penetration, velocity
-        )
     if law.instance_class.owner.rate_dependent:
-        return lambda data, stage, weight, along_g, along_r, penetration, velocity: _lossy_force(
-            data, stage, weight, along_g, along_r, penetration, velocity
-        )
-    return lambda data, stage, weight, along_g, along_r, penetration, velocity: (
-        contact_force(data.tip.law, penetration),
-        0.0,
-    )
+        return lambda data, penetration, velocity: _enter_lossy_contact(data, penetration, velocity)
+    return lambda data, penetration, velocity: contact_force(data.tip.law, penetration)
 
 
 @inlined
@@ -402,7 +373,7 @@ def _exchange_by_layout(data, stage, weight, along_g, along_r, contact, surround
 
 
 @inlined
-def _first_contact_of_block(memory, first, contact):
+def _first_contact_of_block(memory, first, weight, contact):
     """The first contact with its impulse in a kick that the velocity block has solved."""
     if first is None:
         return contact
@@ -414,7 +385,7 @@ def _first_contact_of_block(memory, first, contact):
         contact.force,
         contact.impulse + impulse,
         contact.work + work,
-        contact.gross + abs(work),
+        contact.gross + (abs(work) if weight > 0.0 else -abs(work)),
         contact.lost + memory[first + LOST_IN_KICK],
     )
 
@@ -433,8 +404,8 @@ def _exchange(data, velocity_block, stage, weight, along_g, along_r, contact, wo
         work = add_work(memory, size, layout.terms, weight, layout.g, step.r, kick, p, work)
     if velocity_block is not None:
         add_impulses(memory, size, velocity_block, p, step.p1)
-        accumulate_damped_contacts(memory, layout.others)
-        contact = _first_contact_of_block(memory, velocity_block.first, contact)
+        accumulate_damped_contacts(memory, layout.others, weight)
+        contact = _first_contact_of_block(memory, velocity_block.first, weight, contact)
     return contact, work
 
 
@@ -449,7 +420,7 @@ _STEP = build_step(
         kick_and_flow=_kick_and_flow,
         update_terms=_update_terms,
         add_to_tension=_add_to_tension,
-        rate_dependent_force=_rate_dependent_force,
+        force_of_contact=_force_of_contact,
         exchange_energy=_exchange_energy,
     )
 )

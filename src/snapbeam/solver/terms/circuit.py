@@ -90,12 +90,6 @@ class Circuit(NamedTuple):
 
     @staticmethod
     @inlined
-    def add_acceleration_along(memory, size, term, contact, along):
-        """c.k + y c.t."""
-        return along + memory[term.state + _Y] * dot(memory, size, term.row, contact)
-
-    @staticmethod
-    @inlined
     def add_potential_energy(memory, size, term, q, energy):
         """y^2/2."""
         y = memory[q + term.own] - dot(memory, size, term.row, q)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from snapbeam.solver.compilation import inlined
-from snapbeam.solver.simd import WIDTH, broadcast_load, dot, fma, lanes_sum, load, splat
+from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat
 
 __all__ = ["ForceOfTime", "absolute_product"]
 
@@ -36,12 +36,6 @@ class ForceOfTime(NamedTuple):
     def add_acceleration(memory, size, term, row, k):
         """k + F r."""
         return fma(broadcast_load(memory, term.coefficient), load(memory, term.row + row), k)
-
-    @staticmethod
-    @inlined
-    def add_acceleration_along(memory, size, term, contact, along):
-        """c.k + F c.r."""
-        return along + memory[term.coefficient] * dot(memory, size, term.row, contact)
 
     @staticmethod
     @inlined

@@ -43,7 +43,6 @@ __all__ = [
     "accumulate_loss",
     "accumulate_work",
     "add_acceleration",
-    "add_acceleration_along",
     "add_potential_energy",
     "add_stored_loss",
     "add_to_speed_bound",
@@ -163,12 +162,6 @@ def update_forces(memory: Any, size: int, terms: Any, drive: Any, argument: floa
 @operation()
 def add_acceleration(memory: Any, size: int, terms: Any, row: int, k: Any) -> Any:
     """Add to *k*, eight elements of the modal acceleration from *row* on."""
-    raise _of_kernels()
-
-
-@operation()
-def add_acceleration_along(memory: Any, size: int, terms: Any, contact: int, along: Any) -> Any:
-    """Add to *along*, the product of the modal acceleration with the row *contact*."""
     raise _of_kernels()
 
 

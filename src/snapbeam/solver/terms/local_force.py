@@ -120,12 +120,6 @@ class LocalForce(NamedTuple):
 
     @staticmethod
     @inlined
-    def add_acceleration_along(memory, size, term, contact, along):
-        """c.k + F c.r."""
-        return along + memory[term.state + _FORCE] * dot(memory, size, term.row, contact)
-
-    @staticmethod
-    @inlined
     def add_potential_energy(memory, size, term, q, energy):
         """The potential energy of F."""
         return energy + _energy(term.law, memory[term.state + _ORIGIN] + dot(memory, size, term.row, q))

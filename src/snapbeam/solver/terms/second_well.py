@@ -65,15 +65,6 @@ class SecondWell(NamedTuple):
 
     @staticmethod
     @inlined
-    def add_acceleration_along(memory, size, term, contact, along):
-        """The same along the contact's row."""
-        total = splat(0.0)
-        for row in range(0, size, WIDTH):
-            total = fma(load(memory, term.present + row), load(memory, contact + row), total)
-        return along + lanes_sum(total)
-
-    @staticmethod
-    @inlined
     def add_potential_energy(memory, size, term, q, energy):
         """The energy of the origin, less force times displacement."""
         total = splat(0.0)

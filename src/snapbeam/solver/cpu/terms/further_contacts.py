@@ -52,7 +52,7 @@ from snapbeam.solver.further_contacts import (
     motion_of,
     slope_of,
 )
-from snapbeam.solver.simd import WIDTH, broadcast_load, dot, fma, lanes_sum, load, splat, store
+from snapbeam.solver.simd import WIDTH, broadcast_load, dot, fma, load, store
 
 __all__ = [
     "FurtherContacts",
@@ -90,17 +90,6 @@ class FurtherContacts(NamedTuple):
             force = broadcast_load(memory, block(term, j) + FORCE)
             k = fma(force, load(memory, term.rows + j * size + row), k)
         return k
-
-    @staticmethod
-    @inlined
-    def add_acceleration_along(memory, size, term, contact, along):
-        """The same along the first contact's row."""
-        for j in range(count_of(term.kinds)):
-            total = splat(0.0)
-            for row in range(0, size, WIDTH):
-                total = fma(load(memory, term.rows + j * size + row), load(memory, contact + row), total)
-            along += memory[block(term, j) + FORCE] * lanes_sum(total)
-        return along
 
 
 @inlined
@@ -153,7 +142,7 @@ def evaluate_contacts(memory, size, others, drive, argument, q, weight, begins):
 
 
 @called
-def _accumulate_damped(memory, others):
+def _accumulate_damped(memory, others, weight):
     for j in range(count_of(others.kinds)):
         if damped_at(others.kinds, j):
             at = block(others, j)
@@ -161,17 +150,17 @@ def _accumulate_damped(memory, others):
             work = impulse * memory[at + DAMPED + VELOCITY]
             memory[at + IMPULSE] += impulse
             memory[at + WORK] += work
-            memory[at + GROSS] += abs(work)
+            memory[at + GROSS] += abs(work) if weight > 0.0 else -abs(work)
             memory[at + LOST] += memory[at + DAMPED + LOST_IN_KICK]
 
 
 @inlined
-def accumulate_damped_contacts(memory, others):
-    """Add up the impulses that the velocity block has given in a kick."""
+def accumulate_damped_contacts(memory, others, weight):
+    """Add up the impulses that the velocity block has given in a kick of *weight* seconds."""
     if others is None:
         return
     if any_damped(others.kinds):
-        _accumulate_damped(memory, others)
+        _accumulate_damped(memory, others, weight)
 
 
 @called
