@@ -43,6 +43,7 @@ from .model.harvester import ElectromagneticHarvester as ElectromagneticHarveste
 from .model.harvester import PiezoelectricHarvester as PiezoelectricHarvester
 from .model.imperfection import Imperfection as Imperfection
 from .model.integration import Integration as Integration
+from .model.local_force import CoulombFriction as CoulombFriction
 from .model.local_force import ElectrostaticForce as ElectrostaticForce
 from .model.local_force import LocalForce as LocalForce
 from .model.local_force import LocalSpring as LocalSpring
