@@ -368,6 +368,7 @@ def _parts() -> dict[str, Any]:
         "contact `power`": struck(contact=sb.PowerLaw.from_stiffness(1e13, 2.0)),
         "contact `hunt_crossley`": struck(contact=sb.HuntCrossley(4e8, 1.0)),
         "contact `kelvin_voigt`": struck(contact=sb.KelvinVoigt(1e5, 1.0)),
+        "contact `elastic_plastic`": struck(contact=sb.ElasticPlasticContact(1e5, 2e5)),
         "contact `restitution`": struck(contact=sb.Restitution(0.9), of=sb.ReducedModel.from_beam(beam, modes=1)),
         "drive `two_tone`, in a ratio of small whole numbers": struck(
             sb.TwoTone(frequency_ratio=1.2, velocity_amplitude=0.1, **second)

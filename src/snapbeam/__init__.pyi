@@ -12,6 +12,7 @@ from .model.base_excitation import BaseExcitation as BaseExcitation
 from .model.beam import Beam as Beam
 from .model.boundary_conditions import BoundaryConditions as BoundaryConditions
 from .model.contact.base import ContactLaw as ContactLaw
+from .model.contact.elastic_plastic import ElasticPlasticContact as ElasticPlasticContact
 from .model.contact.hertz import HertzContact as HertzContact
 from .model.contact.hunt_crossley import HuntCrossley as HuntCrossley
 from .model.contact.kelvin_voigt import KelvinVoigt as KelvinVoigt
@@ -42,6 +43,7 @@ from .model.harvester import ElectromagneticHarvester as ElectromagneticHarveste
 from .model.harvester import PiezoelectricHarvester as PiezoelectricHarvester
 from .model.imperfection import Imperfection as Imperfection
 from .model.integration import Integration as Integration
+from .model.local_force import CoulombFriction as CoulombFriction
 from .model.local_force import ElectrostaticForce as ElectrostaticForce
 from .model.local_force import LocalForce as LocalForce
 from .model.local_force import LocalSpring as LocalSpring

@@ -35,12 +35,12 @@ def friction(tmp_path_factory):
     sys.path.insert(0, str(folder))
     invalidate_caches()
     try:
-        yield import_module("own_force").CoulombFriction(
+        yield import_module("own_force").DryFriction(
             friction_force=2e-3, smoothing_velocity=0.02, location=0.45
         )
     finally:
         sys.path.remove(str(folder))
-        del sys.modules["own_force"], LOCAL_FORCES["coulomb_friction"]
+        del sys.modules["own_force"], LOCAL_FORCES["dry_friction"]
 
 
 def independent(system, start, times):
@@ -227,3 +227,25 @@ def test_tangents_are_refused():
     start = sb.State(amplitude=MODEL.well_amplitude, velocity=np.zeros(MODEL.modes))
     with pytest.raises(InputError, match="tangent with a local force"):
         sb.advance(system, start, tangent=np.zeros((1, 2, MODEL.modes)))
+
+
+@pytest.mark.slow
+def test_coulomb_friction_of_an_oscillator():
+    """Every cycle takes 4 F_c/k of the amplitude, until the smoothing is felt; and the same by DOP853."""
+    mass, frequency, friction, smoothing, start = 2e-3, 80.0, 2e-3, 2e-5, 1e-3
+    omega = 2.0 * math.pi * frequency
+    spring = mass * omega**2
+    model = sb.ReducedModel.from_matrices([[mass]], [spring], contact_shape=[1.0], length_scale=start)
+    law = sb.CoulombFriction(friction_force=friction, smoothing_velocity=smoothing, shape=[1.0])
+    system = sb.System(model, forces=[law], initial_state=sb.State(amplitude=[start]))
+    cycles = 20
+    times = np.arange(cycles + 1) / frequency * (1.0 - 1e-13)
+    run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy="reference"), sample_times=times)
+    found = run.dataset["modal_amplitude"].values[:, 0]
+    np.testing.assert_allclose(np.diff(found), -4.0 * friction / spring, rtol=2e-3)
+
+    def rate(t, z):
+        return [z[1], -(omega**2) * z[0] - friction / mass * math.tanh(z[1] / smoothing)]
+
+    truth = solve_ivp(rate, (0.0, times[-1]), [start, 0.0], "LSODA", t_eval=times, rtol=1e-11, atol=1e-15)
+    np.testing.assert_allclose(found, truth.y[0], rtol=0.0, atol=1e-6 * start)

@@ -108,7 +108,7 @@ REFUSALS = [
     ),
     (
         {"contact": {"type": "spring"}},
-        "[contact] type = 'spring': must be one of 'hertz', 'hunt_crossley'",
+        "[contact] type = 'spring': must be one of 'elastic_plastic', 'hertz', 'hunt_crossley'",
     ),
     ({"contact": {"type": "restitution"}}, "[contact] coefficient: missing for type = 'restitution'"),
     (

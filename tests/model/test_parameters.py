@@ -191,6 +191,7 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
         "kelvin_voigt": sb.KelvinVoigt(1e6, 1.0),
         "power": sb.PowerLaw(1.0, 2.0),
         "layer": sb.LayeredHertz(4e8, 1e13),
+        "elastic_plastic": sb.ElasticPlasticContact(1e5, 2e5),
     }
     pair = {"frequency_ratio": 1.0, "velocity_amplitude": 0.1}
     drives = {

@@ -209,6 +209,10 @@ OF_OTHERS = {
     "kelvin_voigt": (sb.KelvinVoigt(1e6, 2.0), {"linear_stiffness": 2e6, "linear_damping": 1.0}),
     "power": (sb.PowerLaw(1.0, 2.0), {"force_at_1um": 2.0, "exponent": 1.7}),
     "layer": (sb.LayeredHertz(4e8, 1e13), {"stiffness": 3e8, "layer_stiffness": 2e13}),
+    "elastic_plastic": (
+        sb.ElasticPlasticContact(1e5, 2e5),
+        {"loading_stiffness": 9e4, "unloading_stiffness": 3e5},
+    ),
     "restitution": (None, {}),
     "recorded_motion": (None, {}),
     "recorded_acceleration": (None, {}),

@@ -45,7 +45,7 @@ def own(tmp_path_factory):
     drive = tmp_path_factory.mktemp("drive")
     for path, text in zip(
         (
-            law / "own_law.py", statistic / "deepest.py", statistic / "my_statistics.py", drive / "own_drive.py",
+            law / "own_law.py", law / "own_memory.py", statistic / "deepest.py", statistic / "my_statistics.py", drive / "own_drive.py",
             drive / "own_force.py", drive / "run_friction.py", drive / "run_own.py",
         ),
         BLOCKS, strict=True,
@@ -79,7 +79,7 @@ def thrown(law: type[sb.ContactLaw], spring: float) -> sb.System:
 def test_files_touched(own) -> None:
     law, statistic_folder, law_folder = own
     assert len(list(statistic_folder.glob("*.py"))) == 2
-    assert len(list(law_folder.glob("*.py"))) == 1
+    assert len(list(law_folder.glob("*.py"))) == 2
     assert LAWS["linear"] is law
     assert "max_penetration" in STATISTICS
     # the parameter of the law is in the table without a file more, next to another law's of the same name
@@ -96,6 +96,22 @@ def test_contact_steps_follow_from_the_energy_of_a_law(own) -> None:
     general = sb.ContactLaw.impact_duration(hertz, MASS, SPEED)
     assert general == pytest.approx(hertz.impact_duration(MASS, SPEED), rel=1e-6)
     assert law(1e-9).impact_duration(MASS, SPEED) == 0.0
+
+
+@pytest.mark.slow
+def test_impact_on_a_surface_that_yields(own) -> None:
+    """What is given back is the elastic energy at the yield force, f_y^2/(2 k); the rest is in the indentation."""
+    law = import_module("own_memory").YieldingContact(1e6, 0.5)
+    try:
+        run = sb.simulate(thrown(lambda _: law, 0.0), sb.Integration(cycles=1, accuracy="reference"))
+        rebound = 0.5 / math.sqrt(1e6 * MASS)
+        assert run.dataset.modal_velocity.values[-1, 0] == pytest.approx(rebound, rel=1e-7)
+        lost = 0.5 * MASS * (SPEED**2 - rebound**2)
+        assert run.summary.energy_lost_contact == pytest.approx(lost, rel=1e-7)
+        assert float(run.final_state.indentation) == pytest.approx(lost / 0.5, rel=1e-7)
+        assert run.summary.peak_force == pytest.approx(0.5, rel=1e-9)
+    finally:
+        del LAWS["yielding"]
 
 
 @pytest.mark.slow

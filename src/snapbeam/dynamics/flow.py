@@ -212,6 +212,11 @@ def require_map(system: System) -> None:
             f"contact.mass = {masses[0]:g}: a striker with a mass has a state of its own, which the dynamics "
             "tools do not include; integrate such a system by sb.advance(system, save_every_period=True)"
         )
+    if kept := [each.law for each in system.contacts if each.law.memory]:
+        raise InputError(
+            f"contact = {kept[0]!r}: leaves an indentation, a state of its own, which the dynamics tools do not include; "
+            "integrate such a system by sb.advance(system, save_every_period=True)"
+        )
 
 
 _MOST_CYCLES = 100

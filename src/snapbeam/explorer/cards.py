@@ -738,7 +738,7 @@ _INTEGRATION = (
     "integration.early_termination",
 )
 _LAWS = {
-    "hertz": "Hertz", "hunt_crossley": "Hunt and Crossley", "kelvin_voigt": "Kelvin and Voigt", "layer": "elastic layer",
+    "elastic_plastic": "elastic-plastic", "hertz": "Hertz", "hunt_crossley": "Hunt and Crossley", "kelvin_voigt": "Kelvin and Voigt", "layer": "elastic layer",
     "power": "power law", "restitution": "coefficient of restitution",
 }  # fmt: skip
 _PRESETS: dict[str, dict[str, dict[str, Any]]] = {

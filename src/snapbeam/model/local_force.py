@@ -17,6 +17,7 @@ from snapbeam.util.validation import InputError, finite_array
 
 __all__ = [
     "LOCAL_FORCES",
+    "CoulombFriction",
     "ElectrostaticForce",
     "LocalForce",
     "LocalSpring",
@@ -399,3 +400,40 @@ class QuadraticDamping(LocalForce):
     def damping_coefficient(law: Any, displacement: float, velocity: float) -> float:
         """2 c |v|."""
         return 2.0 * law.coefficient * abs(velocity)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoulombFriction(LocalForce):
+    """Coulomb friction at a point, smoothed over a small velocity: F = -F_c tanh(v/v_0).
+
+    Far above v_0 the force is constant.  Below, it is a damper of the coefficient F_c/v_0, so that a point which would stick
+    creeps instead.
+
+    Parameters
+    ----------
+    friction_force : float
+        F_c, N.
+    smoothing_velocity : float
+        v_0, m/s.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> friction = sb.CoulombFriction(friction_force=2e-3, smoothing_velocity=0.02, location=0.5)
+    """
+
+    friction_force: float = quantity("N", "friction force", low=0.0, closed="left")
+    smoothing_velocity: float = quantity("m/s", "velocity that smooths friction", low=0.0)
+    name = "coulomb_friction"
+    dissipative = True
+
+    @staticmethod
+    def damping_force(law: Any, displacement: float, velocity: float) -> float:
+        """-F_c tanh(v/v_0)."""
+        return -law.friction_force * math.tanh(velocity / law.smoothing_velocity)
+
+    @staticmethod
+    def damping_coefficient(law: Any, displacement: float, velocity: float) -> float:
+        """F_c/(v_0 cosh^2(v/v_0))."""
+        cosh = math.cosh(min(abs(velocity / law.smoothing_velocity), 300.0))
+        return law.friction_force / (law.smoothing_velocity * cosh * cosh)

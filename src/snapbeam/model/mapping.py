@@ -45,6 +45,7 @@ _START = (
     "contact_time",
     "striker_shift",
     "striker_rate",
+    "indentation",
     "circuit",
 )
 

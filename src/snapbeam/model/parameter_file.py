@@ -82,7 +82,7 @@ WANTED = {
 """What a loss may follow from: unit and words."""
 _TELLING = {
     "coefficient": "restitution", "damping_factor": "hunt_crossley", "restitution": "hunt_crossley", "speed": "hunt_crossley",
-    "layer_stiffness": "layer",
+    "layer_stiffness": "layer", "loading_stiffness": "elastic_plastic", "unloading_stiffness": "elastic_plastic",
     "linear_stiffness": "kelvin_voigt", "linear_damping": "kelvin_voigt", "force_at_1um": "power", "exponent": "power",
 }  # fmt: skip
 """Names that one law alone has."""

@@ -56,6 +56,9 @@ class State:
     striker_shift, striker_rate : array_like of shape (...) or (..., strikers)
         Of strikers with mass: displacement (m) and velocity (m/s) of the tip beyond the motion of its drive, positive
         towards the upper well; NaN of strikers without.  Of several strikers one number for each.
+    indentation : array_like of shape (...) or (..., strikers)
+        Of contacts under a law with plastic deformation: residual indentation, m; NaN of others, and where there is none
+        yet.  Of several strikers one number for each.
     circuit : array_like of shape (...) or (..., harvesters)
         Of the circuits of harvesters: voltage (V) of piezoelectric layers, current (A) of a coil with an inductance; NaN
         where there is none, or where it is at rest.
@@ -89,6 +92,7 @@ class State:
     contact_time: _Array = np.nan  # type: ignore[assignment]
     striker_shift: _Array = np.nan  # type: ignore[assignment]
     striker_rate: _Array = np.nan  # type: ignore[assignment]
+    indentation: _Array = np.nan  # type: ignore[assignment]
     circuit: _Array = np.nan  # type: ignore[assignment]
     tangent: _Array | None = None
     statistics: Mapping[str, _Array] | None = field(default=None, repr=False)
@@ -113,7 +117,7 @@ class State:
         position = np.nan if self.striker_position is None else self.striker_position
         found["striker_position"] = _maybe("state striker_position", position, batch)
         found["contact_time"] = _contact_times(self.contact_time, batch)
-        for name in ("striker_shift", "striker_rate", "circuit"):
+        for name in ("striker_shift", "striker_rate", "indentation", "circuit"):
             found[name] = _of_parts(f"state {name}", getattr(self, name), batch)
         for name, array in found.items():
             array.setflags(write=False)
@@ -172,6 +176,7 @@ class State:
             contact_time=self.contact_time[index],
             striker_shift=self.striker_shift[index],
             striker_rate=self.striker_rate[index],
+            indentation=self.indentation[index],
             circuit=self.circuit[index],
             tangent=tangent,
             statistics=passed,
@@ -192,9 +197,10 @@ class State:
             phase=self.phase.ravel(),
             striker_position=self.striker_position.ravel(),
             contact_time=self.contact_time.reshape(count, -1),
-            striker_shift=self.striker_shift.reshape(count, *self.striker_shift.shape[len(self.batch) :]),
-            striker_rate=self.striker_rate.reshape(count, *self.striker_rate.shape[len(self.batch) :]),
-            circuit=self.circuit.reshape(count, *self.circuit.shape[len(self.batch) :]),
+            **{
+                name: getattr(self, name).reshape(count, *getattr(self, name).shape[len(self.batch) :])
+                for name in ("striker_shift", "striker_rate", "indentation", "circuit")
+            },
             modal=modal,
         )
 
@@ -218,7 +224,7 @@ class State:
         return State(
             amplitude=amplitude, velocity=velocity, phase=self.phase, striker_position=self.striker_position,
             contact_time=self.contact_time, striker_shift=self.striker_shift, striker_rate=self.striker_rate,
-            circuit=self.circuit,
+            indentation=self.indentation, circuit=self.circuit,
         )  # fmt: skip
 
 

@@ -167,6 +167,7 @@ _RADIUS = 0.10
 _WIDE = 7.0
 """Length of the beam in those units."""
 _LAWS = {
+    "elastic_plastic": "elastic-plastic",
     "hertz": "Hertz",
     "hunt_crossley": "Hunt–Crossley",
     "kelvin_voigt": "Kelvin–Voigt",

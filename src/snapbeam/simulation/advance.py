@@ -219,6 +219,7 @@ def _shaped(
         "contact_time",
         "striker_shift",
         "striker_rate",
+        "indentation",
         "circuit",
     )
     shape = (len(found), *batch) if every else batch

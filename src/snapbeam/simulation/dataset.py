@@ -242,17 +242,21 @@ def strikers_of(
         motion, velocity = tip_of(ensemble, system, j + 2, recorded.times)
         follows = _follows(ensemble, system, recorded)
         motion, velocity = motion + numbers[SIGN] * follows[0], velocity + numbers[SIGN] * follows[1]
-        pressed = numbers[OFFSET] + motion - recorded.q @ row
+        left = _indentation(ensemble, recorded, j + 1)
+        pressed = numbers[OFFSET] + motion - recorded.q @ row - left
         rates = velocity - recorded.p @ row
         motion = motion - recorded.q @ (
             row - ensemble.structure.row_of_beam(row)
         )  # of a striker with mass its own
         contact: Any = each.law
-        kind = contact.numbers_type()
-        law = kind(*(getattr(contact, name) for name in kind._fields))
+        laws = [contact.numbers(each) for each in left.tolist()]
         touching = np.maximum(pressed, 0.0)
-        force[:, j + 1] = [felt_force(law, *at) for at in zip(touching.tolist(), rates.tolist(), strict=True)]
-        energy += [contact.energy(law, d) if d > 0.0 else 0.0 for d in touching.tolist()]
+        force[:, j + 1] = [
+            felt_force(*at) for at in zip(laws, touching.tolist(), rates.tolist(), strict=True)
+        ]
+        energy += [
+            contact.energy(law, d) if d > 0.0 else 0.0 for law, d in zip(laws, touching.tolist(), strict=True)
+        ]
         depth[:, j + 1] = pressed / length
         tip[:, j + 1] = sign * numbers[SIGN] * (numbers[REST] + numbers[OFFSET] + motion) / length
     return {
@@ -261,6 +265,12 @@ def strikers_of(
         "striker_displacements": tip,
         "energy_contact": energy,
     }
+
+
+def _indentation(ensemble: Ensemble, recorded: Recorded, contact: int) -> _Array:
+    """Return the residual indentation under a striker, from 0, m; zeros under a law without one."""
+    mode = ensemble.structure.mode_of_indentation(contact)
+    return np.zeros(recorded.q.shape[0]) if mode is None else recorded.q[:, mode]
 
 
 def _follows(ensemble: Ensemble, system: System, recorded: Recorded) -> tuple[_Array, _Array]:
@@ -352,7 +362,8 @@ def run_dataset(
     if struck:
         penetration = values[:, _COLUMN["penetration"]] / scale
         variables |= {
-            "striker_displacement": displacement + structure.sign * penetration,
+            "striker_displacement": displacement
+            + structure.sign * (penetration + _indentation(ensemble, recorded, 0) / scale),
             "penetration_normalised": penetration,
             "contact_force": values[:, _COLUMN["force"]],
         }

@@ -31,7 +31,8 @@ __all__ = ["compressed", "description", "load", "save_run", "summary_dataset"]
 _FORMAT = "snapbeam run 3"
 _GROUPS = ("impacts", "summary")
 _END = (
-    "amplitude", "velocity", "phase", "striker_position", "contact_time", "striker_shift", "striker_rate", "circuit"
+    "amplitude", "velocity", "phase", "striker_position", "contact_time", "striker_shift", "striker_rate",
+    "indentation", "circuit",
 )  # fmt: skip
 _COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 

@@ -49,6 +49,7 @@ def states_of(
         contact_time=np.where(contact_ticks >= 0, contact_ticks * tick[:, None], -1.0),
         striker_shift=structure.bodies_of(q),
         striker_rate=structure.bodies_of(p),
+        indentation=structure.indentations_of(q),
         circuit=structure.circuits_of(q) * _units(ensemble),
         modal=ModalState(q, p, well_sign.astype(np.float64), np.array(runs["offset"]), structure.hash),
     )

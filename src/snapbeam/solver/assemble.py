@@ -81,9 +81,8 @@ def others_of(
         numbers[:, j, SIGN] = sign
         numbers[:, j, SPEED] = _speed(striker.drive, columns, moving, system, runs)
         numbers[:, j, SINCE] = since[:, number - 1]
-        names = type(each.law).numbers_type()._fields
-        for k, name in enumerate(names):
-            numbers[:, j, LAW + k] = columns[f"{section}.{name}"]
+        own = _law_numbers(each.law, section, columns, runs)
+        numbers[:, j, LAW : LAW + own.shape[1]] = own
     return FurtherContactTable(tuple(type(each.law) for each in further), numbers, places, np.array(rows))
 
 
@@ -372,6 +371,7 @@ def make_ensemble(
         system.model, side, tuple(each.striker for each in system.contacts), system.base_excitation, tuple(system.harvesters),
         system.external_forces,
         system.local_forces, system.unloaded_potential.dividing_height,
+        tuple(i for i, each in enumerate(system.contacts) if each.law.memory),
     )  # fmt: skip
     plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
     if step_factor != 1.0:
@@ -401,7 +401,7 @@ def make_ensemble(
         law=law,
         drive=driven.kind,
         runs=table,
-        law_numbers=_law_numbers(law, system, columns, runs),
+        law_numbers=_law_numbers(system.contact_law, "contact", columns, runs),
         drive_numbers=driven.numbers,
         samples=driven.samples,
         location=places.location,
@@ -647,6 +647,7 @@ def _starts(structure: Structure, table: NDArray[Any], state: State, since: _Arr
         flat.velocity,
         flat.striker_shift,
         flat.striker_rate,
+        flat.indentation,
         _per_unit(flat.circuit, units),
     )
     pairs = [structure.to_modal(*each) for each in zip(*parts, strict=True)]
@@ -691,7 +692,7 @@ def _offsets(
 def _reach_at_rest(system: System, structure: Structure, table: NDArray[Any], rows: _Array) -> _Array:
     """Displacement of the contact point from the well of the structure at rest."""
     state = system.rest_state
-    q = structure.to_modal(state.amplitude, state.velocity, 0.0, 0.0, 0.0)[0]
+    q = structure.to_modal(state.amplitude, state.velocity, 0.0, 0.0)[0]
     return np.asarray(rows[table["contact_row"]] @ q)
 
 
@@ -714,11 +715,15 @@ def _circuits(system: System, columns: Mapping[str, _Array], runs: int) -> tuple
     return tuple(found)
 
 
-def _law_numbers(law: type[ContactLaw], system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
+def _law_numbers(law: ContactLaw | None, section: str, columns: Mapping[str, _Array], runs: int) -> _Array:
+    """Numbers of a law of each run; kernels read a residual indentation from the state."""
+    nothing = np.zeros(runs)
+    if law is None:
+        return np.zeros((runs, len(HertzContact.numbers_type()._fields)))
     names = law.numbers_type()._fields
-    if system.contact_law is None:
-        return np.zeros((runs, len(names)))
-    return np.stack([columns[f"contact.{name}"] for name in names], axis=1)
+    return np.stack(
+        [columns[f"{section}.{name}"] if name != law.memory else nothing for name in names], axis=1
+    )
 
 
 def _decisions(

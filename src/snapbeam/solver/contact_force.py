@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any
 
 from snapbeam.solver.compilation import compiled, inlined, overloaded
-from snapbeam.solver.interpolation import cubic, update_extrema
+from snapbeam.solver.interpolation import cubic, first_upcrossing, turning_point, update_extrema
 from snapbeam.solver.simd import Lanes, select_less
 
 __all__ = [
@@ -20,18 +20,22 @@ __all__ = [
     "contact_slope",
     "damping_coefficient",
     "felt_force",
+    "force_break",
     "is_impulsive",
     "jumps",
     "mark_of",
+    "memory_after",
     "peak_force",
     "peak_in_step",
     "released_at",
     "scalar_function",
-    "zero_force_crossing",
+    "with_memory",
+    "yield_penetration",
 ]
 
 
 _SMALLEST = 2.2250738585072014e-308
+_ROUNDING = 1e-9
 
 
 @cache
@@ -218,17 +222,20 @@ def _peak_in_step(law, peak, d0, v0, d1, v1, length):
     )[1]
 
 
-def zero_force_crossing(law: Any, d0: float, v0: float, d1: float, v1: float, length: float) -> float:
-    """Where in (0, 1) of a step in contact the force vanishes or begins, though the penetration does not; -1: nowhere.
+def force_break(law: Any, d0: float, v0: float, d1: float, v1: float, length: float) -> float:
+    """Where in (0, 1) of a step in contact the force is not smooth, though the contact goes on; -1: nowhere.
 
-    Penetration and rate are those at the two ends, the cubic through them is followed.
+    The force of a law that loses energy vanishes or begins there; that of a law with memory passes to first loading, or
+    from there to unloading.  Penetration and rate are those at the two ends, the cubic through them is followed.
     """
-    raise TypeError("zero_force_crossing runs in compiled code only")
+    raise TypeError("force_break runs in compiled code only")
 
 
-@overloaded(zero_force_crossing)
-def _zero_force_crossing(law, d0, v0, d1, v1, length):
+@overloaded(force_break)
+def _force_break(law, d0, v0, d1, v1, length):
     owner = law.instance_class.owner
+    if owner.memory:
+        return _break_of_memory
     if not owner.rate_dependent:
         return lambda law, d0, v0, d1, v1, length: -1.0
     force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping_coefficient")
@@ -254,6 +261,66 @@ def _zero_force_crossing(law, d0, v0, d1, v1, length):
             else:
                 high = s
         return high
+
+    return implementation
+
+
+def _break_of_memory(law, d0, v0, d1, v1, length):
+    kink = yield_penetration(law)
+    if d0 < kink or v0 <= 0.0:
+        return first_upcrossing(d0 - kink, v0, d1 - kink, v1, length) if 0.0 < kink < math.inf else -1.0
+    return turning_point(d0, v0, d1, v1, length)
+
+
+def with_memory(law: Any, memory: float) -> Any:
+    """The numbers of a law with the residual indentation *memory*, m; as they are of a law without one."""
+    owner: Any = type(law).owner
+    return law._replace(**{owner.memory: memory}) if owner.memory else law
+
+
+@overloaded(with_memory)
+def _with_memory(law, memory):
+    owner = law.instance_class.owner
+    if not owner.memory:
+        return lambda law, memory: law
+    made: dict[str, Any] = {"Numbers": law.instance_class}
+    own = ", ".join(f"law.{name}" for name in law.fields[:-1])
+    exec(f"def implementation(law, memory):\n    return Numbers({own}, memory)", made)
+    return made["implementation"]
+
+
+def yield_penetration(law: Any) -> float:
+    """Penetration beyond which the residual indentation increases, m; infinite of a law without one."""
+    owner: Any = type(law).owner
+    return float(owner.yield_penetration(law)) if owner.memory else math.inf
+
+
+@overloaded(yield_penetration)
+def _yield_penetration(law):
+    owner = law.instance_class.owner
+    if not owner.memory:
+        return lambda law: math.inf
+    own = scalar_function(owner, "yield_penetration")
+    return lambda law: own(law)
+
+
+def memory_after(law: Any, deepest: float) -> float:
+    """Residual indentation of a contact that unloads from a maximum penetration, m: the present one, or more."""
+    raise TypeError("memory_after runs in compiled code only")
+
+
+@overloaded(memory_after)
+def _memory_after(law, deepest):
+    owner = law.instance_class.owner
+    if not owner.memory:
+        return lambda law, deepest: 0.0
+    own = scalar_function(owner, "memory_after")
+
+    def implementation(law, deepest):
+        # within rounding of the change of branches nothing is left to yield
+        if deepest > (1.0 + _ROUNDING) * yield_penetration(law):
+            return own(law, deepest)
+        return law[-1]
 
     return implementation
 

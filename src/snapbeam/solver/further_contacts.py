@@ -20,12 +20,15 @@ from snapbeam.solver.contact_force import (
     contact_slope,
     damping_coefficient,
     felt_force,
+    force_break,
     jumps,
     mark_of,
+    memory_after,
     peak_force,
     peak_in_step,
     released_at,
-    zero_force_crossing,
+    with_memory,
+    yield_penetration,
 )
 from snapbeam.solver.excitation import motion_by_number, part_motion
 
@@ -33,6 +36,8 @@ __all__ = [
     "Several",
     "any_damped",
     "any_jumps",
+    "break_of",
+    "breaks_at",
     "count_of",
     "damped_at",
     "damping_of",
@@ -41,13 +46,16 @@ __all__ = [
     "force_of",
     "jumps_at",
     "mark_at",
+    "memory_after_of",
+    "memory_place",
     "motion_of",
     "peak_in_step_of",
     "peak_of",
     "several",
     "slope_of",
     "way_to_release",
-    "zero_force_of",
+    "with_memory_energy_of",
+    "yield_penetration_of",
 ]
 
 
@@ -67,6 +75,8 @@ TOUCHED, SLOPE = 22, 23
 # of a law that loses energy: the numbers of its channel in the velocity block; the energy lost, of the step and kept
 DAMPED = 24
 LOST, LOST_KEPT = 29, 30
+# of a law with memory: HERE without the indentation
+SURFACE = 31
 LAW = 32
 """The law's numbers follow from there on."""
 
@@ -174,6 +184,33 @@ def _damped_at(kinds, j):
     return lambda kinds, j: damped[j]
 
 
+def breaks_at(kinds: Any, j: int) -> bool:
+    """True if the force of striker *j* beside the first is not smooth within a contact (:func:`force_break`)."""
+    law = type(kinds).owner.laws[j]
+    return bool(law.rate_dependent or law.memory)
+
+
+@overload(breaks_at, jit_options=INLINE_HERE)
+def _breaks_at(kinds, j):
+    breaks = tuple(bool(law.rate_dependent or law.memory) for law in kinds.instance_class.owner.laws)
+    if not any(breaks):
+        return lambda kinds, j: False
+    return lambda kinds, j: breaks[j]
+
+
+def memory_place(kinds: Any, j: int) -> int:
+    """Place of the residual indentation among the numbers of striker *j* beside the first, or -1."""
+    law = type(kinds).owner.laws[j]
+    return LAW + len(law.numbers_type()._fields) - 1 if law.memory else -1
+
+
+@overload(memory_place, jit_options=INLINE_HERE)
+def _memory_place(kinds, j):
+    laws = kinds.instance_class.owner.laws
+    places = tuple(LAW + len(law.numbers_type()._fields) - 1 if law.memory else -1 for law in laws)
+    return lambda kinds, j: places[j]
+
+
 def _function_of_contact(function: Any) -> Any:
     """A function f(kinds, memory, at, j, ...): *function* of the law of striker *j* beside the first and what follows.
 
@@ -199,9 +236,19 @@ felt_at = _function_of_contact(felt_force)
 mark_at = _function_of_contact(mark_of)
 peak_of = _function_of_contact(peak_force)
 way_to_release = _function_of_contact(released_at)
-zero_force_of = _function_of_contact(zero_force_crossing)
+break_of = _function_of_contact(force_break)
+memory_after_of = _function_of_contact(memory_after)
+yield_penetration_of = _function_of_contact(yield_penetration)
 peak_in_step_of = _function_of_contact(peak_in_step)
 jumps_at = _function_of_contact(jumps)
+
+
+@inlined
+def _energy_with_memory(law, memory, penetration):
+    return contact_energy(with_memory(law, memory), penetration)
+
+
+with_memory_energy_of = _function_of_contact(_energy_with_memory)
 
 
 def motion_of(drive: Any, memory: Any, argument: float, j: int, sign: float) -> tuple[float, float]:

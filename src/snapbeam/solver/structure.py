@@ -126,6 +126,8 @@ class Structure:
     """Of harvesters.  The modes of their charges come last."""
     bodies: tuple[StrikerBody, ...] = ()
     """Of strikers with mass, whose own modes follow those of the beam."""
+    indentations: tuple[int, ...] = ()
+    """Contacts, from 0, whose residual indentation is the displacement of a mode of its own, behind those of the bodies."""
     strikers: int = 0
 
     def rests(self, shapes: _Array) -> _Array:
@@ -182,6 +184,22 @@ class Structure:
             found[..., each.contact] = each.sign * values[..., mode] / math.sqrt(each.mass)
         return found if self.strikers > 1 else found[..., 0]
 
+    def mode_of_indentation(self, contact: int) -> int | None:
+        """Place of the mode that holds the residual indentation of a contact, from 0; None without one."""
+        if contact not in self.indentations:
+            return None
+        return self.modes_of_bodies.stop + self.indentations.index(contact)
+
+    def indentations_of(self, q: _Array) -> _Array:
+        """Residual indentations in q of shape (..., N), m; NaN of contacts that leave none.
+
+        Shape (...), or (..., strikers) of several strikers.
+        """
+        found = np.full((*q.shape[:-1], max(1, self.strikers)), np.nan)
+        for contact in self.indentations:
+            found[..., contact] = q[..., self.mode_of_indentation(contact)]
+        return found if self.strikers > 1 else found[..., 0]
+
     def circuits_of(self, q: _Array) -> _Array:
         """The coordinates y = Q - t.q of the circuits in q of shape (..., N); NaN of those without inertia.
 
@@ -199,11 +217,12 @@ class Structure:
         velocity: _Array,
         shift: float | _Array = np.nan,
         rate: float | _Array = np.nan,
+        indentation: float | _Array = np.nan,
         circuit: float | _Array = np.nan,
     ) -> tuple[_Array, _Array]:
         """Amplitudes of shape (N,) and their velocities as q and p about the well, and those of the strikers' bodies.
 
-        *circuit* holds the coordinates of circuits.
+        *indentation* is that of each contact, *circuit* holds the coordinates of circuits.
         """
         back = self.model.linear_modes.T @ self.model.mass
         q, p = back @ (alpha - self.equilibrium), back @ velocity
@@ -212,6 +231,9 @@ class Structure:
             own = [np.broadcast_to(value, max(1, self.strikers))[each.contact] for value in (shift, rate)]
             own = [0.0 if np.isnan(value) else scale * float(value) for value in own]
             q, p = np.append(q, own[0]), np.append(p, own[1])
+        for contact in self.indentations:
+            held = float(np.broadcast_to(indentation, max(1, self.strikers))[contact])
+            q, p = np.append(q, 0.0 if np.isnan(held) else held), np.append(p, 0.0)
         for i, row in enumerate(self.circuits):
             if row.mode is not None:
                 y = float(np.broadcast_to(circuit, len(self.circuits))[i])
@@ -246,6 +268,8 @@ class Structure:
             digest.update(np.ascontiguousarray(row).tobytes())
         if self.bodies:
             digest.update(np.array([value for each in self.bodies for value in each.of_hash]).tobytes())
+        if self.indentations:
+            digest.update(np.array(self.indentations).tobytes())
         for force in self.local_forces:
             kind = type(force.law).owner
             digest.update(f"{kind.__module__}.{kind.__qualname__}".encode())
@@ -263,12 +287,14 @@ def structure_of(
     forces: tuple[ExternalForce, ...] = (),
     local_forces: tuple[LocalForce, ...] = (),
     dividing_height: float | None = None,
+    indentations: tuple[int, ...] = (),
 ) -> Structure:
     """The structure of a reduced model, about the well that a striker from *side* pushes away from.
 
     Each striker that is a body of mass m_s on a spring k_s is one more linear mode, q_s = sqrt(m_s) times its displacement
     beyond the motion that its drive gives it: no tension, contact row -1/sqrt(m_s).  The *dividing_height*, in space, is
-    that of the model by default; where local forces move it, the wells count as unequal.
+    that of the model by default; where local forces move it, the wells count as unequal.  *indentations* are the contacts,
+    from 0, whose law has a residual indentation.
     """
     sign = 1.0 if side == "below" else -1.0
     model = model if sign > 0.0 else model.mirrored
@@ -298,6 +324,14 @@ def structure_of(
             structure = _with_body(
                 structure, striker, contact, carried_by_base=base is not None and base.striker_on_base
             )
+    for contact in indentations:
+        structure = dataclasses.replace(
+            _with_mode(structure), indentations=(*structure.indentations, contact)
+        )
+    for contact in indentations:
+        structure = dataclasses.replace(
+            _with_mode(structure), indentations=(*structure.indentations, contact)
+        )
     for harvester in harvesters:
         structure = _with_circuit(structure, harvester)
     return structure

@@ -56,6 +56,12 @@ class ContactLaw:
     A law that loses energy (``rate_dependent``) has ``damping(law, penetration)`` besides, N s/m: its force is
     max(0, force + damping times the rate of penetration).
 
+    A law with a state of its own (``memory``, the name of a residual indentation D, m, which is the last of the law's
+    numbers) has the penetration measured from the indented surface, and besides
+
+    - ``yield_penetration(law)``: penetration beyond which D increases, m;
+    - ``memory_after(law, deepest)``: D of a contact that unloads from a maximum penetration beyond it.
+
     They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone, and never allocate.
 
     Examples
@@ -75,6 +81,8 @@ class ContactLaw:
     """Whether an impact lasts no time: a jump of the velocity instead of a force."""
     rate_dependent: ClassVar[bool] = False
     """Whether the force depends on the rate of penetration too."""
+    memory: ClassVar[str] = ""
+    """Name of a residual indentation that is a part of the state; it is the last of the law's numbers."""
     vectorizable: ClassVar[bool] = False
     """Whether its force is plain arithmetic and square roots, without branches, so that eight are computed at once."""
     max_modes: ClassVar[int | None] = None
@@ -83,7 +91,13 @@ class ContactLaw:
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if cls.name and not cls.impulsive:
-            missing = [each for each in ("force", "energy", "slope") if not hasattr(cls, each)]
+            wanted = [
+                "force",
+                "energy",
+                "slope",
+                *(["yield_penetration", "memory_after"] if cls.memory else []),
+            ]
+            missing = [each for each in wanted if not hasattr(cls, each)]
             if missing:
                 raise InputError(
                     f"contact law {cls.name!r}: has no {' and no '.join(missing)}; write them as static methods of "
@@ -103,13 +117,13 @@ class ContactLaw:
     @classmethod
     def numbers_type(cls) -> Any:
         """The named tuple of the law's numbers, as kernels see them; an attribute of the class, ``Numbers``."""
-        fields = dataclasses.fields(cls)  # type: ignore[arg-type]
-        return numbers_type(cls, (item.name for item in fields))
+        fields = [item.name for item in dataclasses.fields(cls)]  # type: ignore[arg-type]
+        return numbers_type(cls, (*fields, cls.memory) if cls.memory else fields)
 
     @property
     def is_dissipative(self) -> bool:
         """Whether contacts under it may lose energy."""
-        return self.impulsive or self.rate_dependent
+        return self.impulsive or self.rate_dependent or bool(self.memory)
 
     def impact_duration(self, mass: float, velocity: float) -> float:
         """Duration, s, of the impact of a free *mass* (kg) that arrives with *velocity* (m/s); 0 if it is never stopped.
@@ -121,7 +135,7 @@ class ContactLaw:
         if depth == 0.0:
             return 0.0
         law: Any = type(self)
-        numbers, energy = self._numbers(), law.energy
+        numbers, energy = self.numbers(), law.energy
         # penetration = depth sin(angle): the integrand is smooth at both ends
         nodes, weights = np.polynomial.legendre.leggauss(64)
         angle, total = 0.25 * math.pi * (nodes + 1.0), 0.0
@@ -134,7 +148,7 @@ class ContactLaw:
         """Time, s, that the contact steps follow from: the duration, or less if the force acts in a part of it."""
         depth = self._greatest_penetration(mass, velocity)
         law: Any = type(self)
-        numbers = self._numbers()
+        numbers = self.numbers()
         steepest = (
             max((law.slope(numbers, depth * i / 64.0) for i in range(1, 65)), default=0.0)
             if depth > 0.0
@@ -142,15 +156,17 @@ class ContactLaw:
         )
         return min(self.impact_duration(mass, velocity), hertzian_time(steepest, mass))
 
-    def _numbers(self) -> Any:
-        return self.numbers_type()(*(getattr(self, item.name) for item in dataclasses.fields(self)))  # type: ignore[arg-type]
+    def numbers(self, memory: float = 0.0) -> Any:
+        """The law's numbers, for its scalar functions; *memory* is the residual indentation of a law that has one, m."""
+        own = [getattr(self, item.name) for item in dataclasses.fields(self)]  # type: ignore[arg-type]
+        return self.numbers_type()(*own, *([memory] if self.memory else []))
 
     def _greatest_penetration(self, mass: float, velocity: float) -> float:
         """Penetration, m, at which a free mass stops; 0 if the force does not stop it within a metre."""
         from scipy.optimize import brentq
 
         law: Any = type(self)
-        numbers, energy, arrives = self._numbers(), law.energy, 0.5 * mass * velocity**2
+        numbers, energy, arrives = self.numbers(), law.energy, 0.5 * mass * velocity**2
         high = 1e-12
         while energy(numbers, high) < arrives:
             high *= 2.0

@@ -11,10 +11,11 @@ from snapbeam.solver.compilation import INLINE_HERE, compiled, inlined
 from snapbeam.solver.contact_force import (
     begins_with_jump,
     felt_force,
+    force_break,
     jumps,
     scalar_function,
-    zero_force_crossing,
 )
+from snapbeam.solver.cpu.indentation import tip_at, unload
 from snapbeam.solver.cpu.mode_lanes import (
     flow_coefficients,
     modal_energy,
@@ -50,7 +51,7 @@ from snapbeam.solver.cpu.terms.further_contact_events import (
     update_further_contacts,
 )
 from snapbeam.solver.cpu.terms.step_across import mark_at_jump, taken_across
-from snapbeam.solver.excitation import tip_about_well, turned_motion
+from snapbeam.solver.excitation import turned_motion
 from snapbeam.solver.interpolation import (
     cubic,
     first_downcrossing,
@@ -355,12 +356,12 @@ def detect_contact_event(memory, layout, run, now, tip, step, kinematics1, scrat
                     kinematics.d, kinematics.dv, kinematics1.d, kinematics1.dv, step.length
                 )
                 event_ticks = max(1, int(fall * step.ticks))
-        zero_force_fraction = zero_force_crossing(
+        fraction = force_break(
             tip.law, kinematics.d, kinematics.dv, kinematics1.d, kinematics1.dv, step.length
         )
-        if zero_force_fraction >= 0.0 and zero_force_fraction * step.ticks + 1.0 < event_ticks:
-            # the force begins or ends there, though the contact goes on
-            event, event_ticks = False, int(zero_force_fraction * step.ticks) + 1
+        if fraction >= 0.0 and fraction * step.ticks + 1.0 < event_ticks:
+            # the force is not smooth there, though the contact goes on
+            event, event_ticks = False, int(fraction * step.ticks) + 1
         return ContactEvent(event, event_ticks, onset_time, safe_gap, safe_center, subintervals, subinterval)
     size, known = layout.size, validity_horizon(layout, run.step_time)
     if after > safe_gap:
@@ -462,7 +463,7 @@ def accept_step(
     """
     layout, stages, clock, tick = workspace.layout, workspace.stages, run.clock, run.clock.tick
     with_energy = None if outputs is None else True
-    tip = tip_about_well(run.tip, now.well_sign, run.rest_contact)
+    tip = tip_at(memory, layout, run, now.well_sign, now.rows.q)
     rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center
     t, kinematics, touching = now.t, now.kinematics, now.control.touching
     omega = tip.drive.omega
@@ -504,7 +505,7 @@ def accept_step(
             accumulators.touching, accumulators.onset = 1, t
             kinematics = kick_at_onset(memory, layout, tip.law, step.p, kinematics, accumulators, outputs)
         update_further_contacts(
-            memory, layout.size, layout.others, step.p, 0, t, 0.0, tick, accumulators, outputs
+            memory, layout.size, layout.others, step.q, step.p, 0, t, 0.0, tick, accumulators, outputs
         )
         status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
         control = StepControl(
@@ -614,8 +615,11 @@ def accept_step(
         else:
             accumulators.touching, accumulators.onset = 1, t
             kinematics1 = kick_at_onset(memory, layout, tip.law, step.p1, kinematics1, accumulators, outputs)
+    elif touching:
+        kinematics1 = unload(memory, layout, tip.law, step.q1, kinematics1, accumulators, outputs)
+        tip = tip_at(memory, layout, run, now.well_sign, step.q1)
     update_further_contacts(
-        memory, layout.size, layout.others, step.p1, contact_event.event_ticks, t, step.length, tick, accumulators, outputs
+        memory, layout.size, layout.others, step.q1, step.p1, contact_event.event_ticks, t, step.length, tick, accumulators, outputs
     )  # fmt: skip
     touching = touching != contact_event.event
     control = StepControl(

@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 from snapbeam.solver.compilation import compiled, inlined
 from snapbeam.solver.contact_force import released_at
 from snapbeam.solver.cpu.contact_dispatch import accept_step_by_law
+from snapbeam.solver.cpu.indentation import tip_at
 from snapbeam.solver.cpu.recording import has_room, restore_state, save_state
 from snapbeam.solver.cpu.state import (
     IntegratorState,
@@ -45,7 +46,6 @@ from snapbeam.solver.cpu.terms.further_contact_events import (
     store_contact_states,
 )
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, mirror_further_contacts
-from snapbeam.solver.excitation import tip_about_well
 from snapbeam.solver.step_control import contact_halvings, flight_halvings, time_beyond
 from snapbeam.solver.terms.interface import has_crossed, update_forces
 from snapbeam.util.status_codes import RunStatus
@@ -192,8 +192,8 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
             now_a, step_a = propose_step(memory, blocks, workspace_a, run_a, now_a, accumulators_a)
         if live_b:
             now_b, step_b = propose_step(memory, blocks, workspace_b, run_b, now_b, accumulators_b)
-        tip_a = tip_about_well(run_a.tip, now_a.well_sign, run_a.rest_contact)
-        tip_b = tip_about_well(run_b.tip, now_b.well_sign, run_b.rest_contact)
+        tip_a = tip_at(memory, layouts[0], run_a, now_a.well_sign, now_a.rows.q)
+        tip_b = tip_at(memory, layouts[1], run_b, now_b.well_sign, now_b.rows.q)
         if live_a and live_b:
             done_a, done_b = take_two_steps(
                 memory, blocks, stages, layouts[0], tip_a, step_a, layouts[1], tip_b, step_b
@@ -275,7 +275,7 @@ def integrate_recorded(
     while now.status == _RUNNING and left > 0 and has_room(now, accumulators, outputs):
         left -= 1
         now, step = propose_step(memory, blocks, workspace, run, now, accumulators)
-        tip = tip_about_well(run.tip, now.well_sign, run.rest_contact)
+        tip = tip_at(memory, layout, run, now.well_sign, now.rows.q)
         done = take_step(memory, blocks, layout, stages, tip, step, True)
         now, _ = accept_step_by_law(
             memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, outputs

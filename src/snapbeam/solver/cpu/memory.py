@@ -149,7 +149,13 @@ def pack(
     placed = dict(zip(arrays, map(int, starts), strict=False))
     others = None
     if several is not None:
-        others = FurtherContacts(placed.pop("striker_rows"), placed.pop("strikers"), several.numbers_type()())
+        dents = [_element(structure, rows, j + 1) for j in range(len(several.laws))]
+        others = FurtherContacts(
+            placed.pop("striker_rows"),
+            placed.pop("strikers"),
+            several.numbers_type()(),
+            tuple(each or 0 for each in dents) if any(each is not None for each in dents) else None,
+        )
     terms: list[Any] = []
     own: list[dict[str, int]] = []
     for kind in kinds:
@@ -172,6 +178,7 @@ def pack(
         gentle=gentle,
         terms=tuple(terms),
         others=others,
+        indentation=_element(structure, rows, 0),
         body=_body_of_first(structure, rows),
         bodies=tuple(map(int, rows[structure.modes_of_bodies])) or None,
         velocity_block=None,
@@ -186,6 +193,12 @@ def pack(
         tuple(held),
         tuple(own),
     )
+
+
+def _element(structure: Structure, rows: NDArray[np.int64], contact: int) -> int | None:
+    """Element of a row that holds the residual indentation of a contact, from 0, or None."""
+    mode = structure.mode_of_indentation(contact)
+    return None if mode is None else int(rows[mode])
 
 
 def _body_of_first(structure: Structure, rows: NDArray[np.int64]) -> int | None:

@@ -91,6 +91,8 @@ class Layout(NamedTuple):
     """Longest flow, s, that polynomials serve; 0 if there is an overdamped or a still mode."""
     terms: Any
     """The terms of the structure, a tuple (:mod:`snapbeam.solver.terms`)."""
+    indentation: Any
+    """Of a first contact whose law has a residual indentation, the element of a row that holds it; else None."""
     others: Any
     """Of several strikers, an :class:`~snapbeam.solver.cpu.terms.further_contacts.FurtherContacts`; else None."""
     body: Any

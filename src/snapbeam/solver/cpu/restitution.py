@@ -144,7 +144,17 @@ def _turned(memory, layout, run, now, accumulators, outputs):
     """Where a run stands if a contact of another striker begins or ends as a step begins: nothing has moved."""
     clock, t = run.clock, now.t
     update_further_contacts(
-        memory, layout.size, layout.others, now.rows.p, 0, t, 0.0, clock.tick, accumulators, outputs
+        memory,
+        layout.size,
+        layout.others,
+        now.rows.q,
+        now.rows.p,
+        0,
+        t,
+        0.0,
+        clock.tick,
+        accumulators,
+        outputs,
     )
     status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
     return IntegratorState(
@@ -165,7 +175,9 @@ def _account_for_surroundings(
     accumulate_work(layout.terms, accumulators, done.external)
     late = min(max((t - clock.last_quarter) / step.ticks, 0.0), 1.0)
     accumulate_loss(memory, size, layout.terms, accumulators, p - size, p, late)
-    update_further_contacts(memory, size, others, p, edge, t, step.length, clock.tick, accumulators, outputs)
+    update_further_contacts(
+        memory, size, others, p - size, p, edge, t, step.length, clock.tick, accumulators, outputs
+    )
     if jumped:
         restart_further_contacts(memory, size, others, drive, phase_at(run, t), t, p - size)
 

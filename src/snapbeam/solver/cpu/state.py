@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import called, compiled, inlined
 from snapbeam.solver.contact_force import contact_energy, felt_force, is_impulsive
+from snapbeam.solver.cpu.indentation import law_at, tip_at
 from snapbeam.solver.cpu.mode_lanes import (
     WORK_ROWS,
     Layout,
@@ -26,7 +27,7 @@ from snapbeam.solver.cpu.terms.further_contact_events import (
 )
 from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, with_further_contact_energy
 from snapbeam.solver.cpu.terms.velocity_block import prepare_velocity_block
-from snapbeam.solver.excitation import Tip, drive_rate, numbers_of, tip_about_well
+from snapbeam.solver.excitation import Tip, drive_rate, numbers_of
 from snapbeam.solver.physics import tension_energy, tension_factors
 from snapbeam.solver.splitting import TURNS, Stages
 from snapbeam.solver.step_control import (
@@ -253,7 +254,7 @@ def _energies_at(memory, layout, run, well_sign, rows, kinematics, touching):
     """
     q, p, k = rows
     near = relative_to_nearest_well(memory, layout.size, layout.terms, well_sign, run.spare, q)
-    force = felt_force(run.tip.law, kinematics.d, kinematics.dv) if touching else 0.0
+    force = felt_force(law_at(memory, layout, run, q), kinematics.d, kinematics.dv) if touching else 0.0
     linear, high, power, high_power = modal_energies(memory, layout, q, near, p, k, force)
     whole = beam_energy(memory, layout, near, p, linear)
     power, high_power = beam_power(memory, layout, p, k, force, power, high_power)
@@ -310,7 +311,7 @@ def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching
     q, p = rows.q, rows.p
     gq, qr = form_acceleration(memory, blocks, layout, run.tip.drive, phase_at(run, t), q, rows.k)
     restart_further_contacts(memory, layout.size, layout.others, run.tip.drive, phase_at(run, t), t, q)
-    tip = tip_about_well(run.tip, well_sign, run.rest_contact)
+    tip = tip_at(memory, layout, run, well_sign, q)
     observed = observe(memory, layout, tip, phase_at(run, t), q, p)
     rest_contact, rest_center = well_sign * run.rest_contact, well_sign * run.rest_center
     kinematics = ContactKinematics(
@@ -370,7 +371,7 @@ def begin(memory, blocks, workspace, kernel_input, i, accumulators):
         kinematics,
         run.tip.law,
         with_further_contact_energy(
-            memory, layout.others, energy + contact_energy(run.tip.law, kinematics.d)
+            memory, layout.others, energy + contact_energy(law_at(memory, layout, run, work), kinematics.d)
         ),
     )
     control = StepControl(touching, 0, 0, 0, 0)
@@ -405,11 +406,12 @@ def change_origin(memory, blocks, layout, well_sign, q, k, r):
 def finish(memory, blocks, layout, run, now, accumulators, impacts, before, goes_on):
     """Close a run's record of accumulators; its last contact too, unless the run is to go on from here."""
     q, p, tick = now.rows.q, now.rows.p, run.clock.tick
+    law = law_at(memory, layout, run, q)
     if now.control.touching:
         if goes_on:
-            accumulate_open_contact(accumulators, run.tip.law, now.t, tick)
+            accumulate_open_contact(accumulators, law, now.t, tick)
         else:
-            close_impact(accumulators, impacts, before, run.tip.law, now.t, tick)
+            close_impact(accumulators, impacts, before, law, now.t, tick)
     if goes_on:
         accumulate_open_further_contacts(memory, layout.others, accumulators, now.t, tick)
     if now.status == _EARLY_STOP:
@@ -419,7 +421,7 @@ def finish(memory, blocks, layout, run, now, accumulators, impacts, before, goes
     gq, qr = tension_rows(memory, blocks, layout, q, layout.work + 9 * layout.size)
     stored = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
     stored = add_potential_energy(memory, layout.size, layout.terms, q, stored)
-    stored = stored + contact_energy(run.tip.law, now.kinematics.d)
+    stored = stored + contact_energy(law, now.kinematics.d)
     accumulators.energy = with_further_contact_energy(memory, layout.others, stored)
     accumulators.displacement, accumulators.center = now.kinematics.w, now.kinematics.c
     if now.well_sign < 0.0:

@@ -15,6 +15,7 @@ from __future__ import annotations
 from snapbeam.solver.compilation import compiled
 from snapbeam.solver.contact_force import contact_force, contact_slope
 from snapbeam.solver.cpu.contact_dispatch import accept_step_by_law
+from snapbeam.solver.cpu.indentation import tip_at
 from snapbeam.solver.cpu.integrate import propose_step, store_state
 from snapbeam.solver.cpu.mode_lanes import acceleration_rows, flow_rows, kick_rows, tension_rows
 from snapbeam.solver.cpu.state import Workspace, begin, finish, variable_slot
@@ -24,7 +25,7 @@ from snapbeam.solver.cpu.terms.further_contacts import (
     linearise_further_contacts,
     note_touching,
 )
-from snapbeam.solver.excitation import tip_about_well, tip_motion
+from snapbeam.solver.excitation import tip_motion
 from snapbeam.solver.physics import tension_factors
 from snapbeam.solver.simd import WIDTH, dot, fma, load, store
 from snapbeam.solver.terms.interface import add_to_tension, update_forces
@@ -115,7 +116,7 @@ def integrate_tangent(
             now, step = propose_step(memory, blocks, workspace, run, now, accumulators)
             note_touching(memory, layout.others)
             well_sign = now.well_sign
-            tip = tip_about_well(run.tip, well_sign, run.rest_contact)
+            tip = tip_at(memory, layout, run, well_sign, now.rows.q)
             done = take_step(memory, blocks, layout, stages, tip, step, None)
             now, step = accept_step_by_law(
                 memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, None

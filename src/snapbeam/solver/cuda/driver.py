@@ -79,6 +79,8 @@ def refusal(modes: int, law: type[ContactLaw] | None = None, drive: type[Drive] 
         return f"the law of contact {law.name!r}, whose impacts last no time, is integrated by the CPU engine alone"
     if law is not None and law.rate_dependent:
         return f"the law of contact {law.name!r}, which loses energy, is integrated by the CPU engine alone"
+    if law is not None and law.memory:
+        return f"the law of contact {law.name!r}, which has a state of its own, is integrated by the CPU engine alone"
     if not drive.harmonic:
         return f"the drive {drive.name!r} is integrated by the CPU engine alone"
     if modes > MOST_MODES:

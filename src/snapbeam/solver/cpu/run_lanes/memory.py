@@ -50,7 +50,7 @@ def suits(ensemble: Ensemble, packed: Packed, most: int = at.MOST) -> bool:
         and ensemble.size > 1
         and ensemble.drive.harmonic
         and law.vectorizable
-        and not (law.rate_dependent or law.impulsive)
+        and not (law.rate_dependent or law.impulsive or law.memory)
         and ensemble.law_numbers.shape[1] <= _LAW_NUMBERS
         and ensemble.max_halvings + 1 <= at.LEVELS
         and 2.0 * flow * longest < packed.layout.gentle

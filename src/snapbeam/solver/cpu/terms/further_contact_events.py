@@ -16,7 +16,13 @@ from snapbeam.solver.cpu.mode_lanes import (
     validity_horizon,
 )
 from snapbeam.solver.cpu.step import with_velocity_dependent
-from snapbeam.solver.cpu.terms.further_contacts import block, mirror_further_contacts, penetration_of
+from snapbeam.solver.cpu.terms.further_contacts import (
+    block,
+    mirror_further_contacts,
+    penetration_of,
+    read_indentations,
+    unload_further,
+)
 from snapbeam.solver.further_contacts import (
     DEEPEST,
     DEPTH,
@@ -41,8 +47,9 @@ from snapbeam.solver.further_contacts import (
     WORK,
     WORKED,
     any_jumps,
+    break_of,
+    breaks_at,
     count_of,
-    damped_at,
     damping_of,
     jumps_at,
     mark_at,
@@ -50,7 +57,6 @@ from snapbeam.solver.further_contacts import (
     peak_in_step_of,
     peak_of,
     way_to_release,
-    zero_force_of,
 )
 from snapbeam.solver.interpolation import first_downcrossing, first_upcrossing
 from snapbeam.solver.simd import WIDTH, dot, fma, lanes_sum, load, store
@@ -132,6 +138,7 @@ def begin_further_contacts(memory, size, others, drive, kernel_input, i, tick, a
         place = kernel_input.other_places[i, j]
         for row in range(size):
             memory[others.rows + j * size + row] = kernel_input.other_rows[place, row]
+    read_indentations(memory, others, others.indentations, q)
     _begin(memory, size, others, drive, tick, argument, well_sign, q)
 
 
@@ -249,14 +256,12 @@ def _edge(memory, layout, others, slot, run, t, drive, step, scratch):
                     event_ticks = max(
                         1, int(first_downcrossing(depth, rate, depth1, rate1, step.length) * step.ticks)
                     )
-            if damped_at(others.kinds, j):
-                share = zero_force_of(
-                    others.kinds, memory, at + LAW, j, depth, rate, depth1, rate1, step.length
-                )
+            if breaks_at(others.kinds, j):
+                share = break_of(others.kinds, memory, at + LAW, j, depth, rate, depth1, rate1, step.length)
                 if share >= 0.0 and share * step.ticks + 1.0 < (
                     step.ticks if event_ticks < 0 else event_ticks
                 ):
-                    # the force begins or ends there, though the contact goes on
+                    # the force is not smooth there, though the contact goes on
                     event_ticks, earliest = -1, min(earliest, int(share * step.ticks) + 1)
         else:
             if busy:
@@ -413,7 +418,7 @@ def _kick_at_onset(memory, size, others, j, p, accumulators, outputs):
 
 
 @called
-def _turn(memory, size, others, p, edge, t, length, tick, accumulators, outputs):
+def _turn(memory, size, others, q, p, edge, t, length, tick, accumulators, outputs):
     for j in range(count_of(others.kinds)):
         at = block(others, j)
         depth, rate, depth1, rate1 = (
@@ -437,17 +442,19 @@ def _turn(memory, size, others, p, edge, t, length, tick, accumulators, outputs)
                 memory[at + DEEPEST], memory[at + PUSHED] = 0.0, 0.0
                 if jumps_at(others.kinds, memory, at + LAW, j):
                     _kick_at_onset(memory, size, others, j, p, accumulators, outputs)
+        elif touching:
+            unload_further(memory, others, others.indentations, j, q, accumulators, outputs)
 
 
 @inlined
-def update_further_contacts(memory, size, others, p, edge, t, length, tick, accumulators, outputs):
+def update_further_contacts(memory, size, others, q, p, edge, t, length, tick, accumulators, outputs):
     """Where they stand at tick *t*, after a step of *length* (s) whose first edge was at tick *edge* of it.
 
-    Velocities stand in the row *p*.  With a length of 0 nothing has moved: those turn whose gap closes as the step begins.
+    The state stands in the rows *q* and *p*.  With a length of 0 nothing has moved: those turn whose gap closes as the step begins.
     """
     if others is None:
         return
-    _turn(memory, size, others, p, edge, t, length, tick, accumulators, outputs)
+    _turn(memory, size, others, q, p, edge, t, length, tick, accumulators, outputs)
 
 
 @inlined

@@ -24,6 +24,7 @@ from snapbeam.solver.cpu.terms.velocity_block import (
 )
 from snapbeam.solver.further_contacts import (
     DAMPED,
+    DEEPEST,
     DEPTH,
     DEPTH1,
     FORCE,
@@ -39,6 +40,7 @@ from snapbeam.solver.further_contacts import (
     REST,
     SIGN,
     SLOPE,
+    SURFACE,
     TOUCHED,
     TOUCHING,
     WORK,
@@ -49,8 +51,12 @@ from snapbeam.solver.further_contacts import (
     energy_of,
     felt_at,
     force_of,
+    memory_after_of,
+    memory_place,
     motion_of,
     slope_of,
+    with_memory_energy_of,
+    yield_penetration_of,
 )
 from snapbeam.solver.simd import WIDTH, broadcast_load, dot, fma, load, store
 
@@ -62,9 +68,12 @@ __all__ = [
     "evaluate_contacts",
     "kick_tangent_by_further_contacts",
     "linearise_further_contacts",
+    "lower_surfaces",
     "mirror_further_contacts",
     "note_touching",
     "penetration_of",
+    "read_indentations",
+    "unload_further",
     "with_further_contact_energy",
     "with_further_contact_gross_work",
     "with_further_contact_loss",
@@ -81,6 +90,8 @@ class FurtherContacts(NamedTuple):
     """Their blocks of numbers."""
     kinds: Any
     """A value whose type says which laws they touch by."""
+    indentations: Any
+    """Elements of a row that hold their residual indentations, a tuple; None where no law has one."""
 
     @staticmethod
     @inlined
@@ -191,6 +202,52 @@ def mirror_further_contacts(memory, others, well_sign):
     for j in range(count_of(others.kinds)):
         at = block(others, j)
         memory[at + HERE] = memory[at + OFFSET] + (1.0 - well_sign) * memory[at + REST]
+    lower_surfaces(memory, others, others.indentations)
+
+
+@inlined
+def lower_surfaces(memory, others, indentations):
+    """Measure penetrations from the indented surfaces, once HERE is that of the intact ones."""
+    if indentations is None:
+        return
+    for j in range(count_of(others.kinds)):
+        at, place = block(others, j), memory_place(others.kinds, j)
+        if place >= 0:
+            memory[at + SURFACE] = memory[at + HERE]
+            memory[at + HERE] -= memory[at + place]
+
+
+@inlined
+def read_indentations(memory, others, indentations, q):
+    """Put the residual indentations of a state, the row *q*, among the laws' numbers."""
+    if indentations is None:
+        return
+    for j in range(count_of(others.kinds)):
+        if memory_place(others.kinds, j) >= 0:
+            memory[block(others, j) + memory_place(others.kinds, j)] = memory[q + indentations[j]]
+
+
+@inlined
+def unload_further(memory, others, indentations, j, q, accumulators, outputs):
+    """Let the surface under striker j yield if its contact unloads, as :func:`~snapbeam.solver.cpu.indentation.unload`."""
+    if indentations is None:
+        return
+    at, place = block(others, j), memory_place(others.kinds, j)
+    if place < 0 or memory[at + RATE] > 0.0:
+        return
+    after = memory_after_of(others.kinds, memory, at + LAW, j, memory[at + DEEPEST])
+    growth = after - memory[at + place]
+    if growth <= 0.0:
+        return
+    depth = memory[at + DEPTH]
+    lost = energy_of(others.kinds, memory, at + LAW, j, depth)
+    lost -= with_memory_energy_of(others.kinds, memory, at + LAW, j, after, depth - growth)
+    memory[at + place], memory[q + indentations[j]] = after, after
+    memory[at + HERE], memory[at + DEPTH] = memory[at + SURFACE] - after, depth - growth
+    memory[at + DEEPEST] = yield_penetration_of(others.kinds, memory, at + LAW, j)
+    accumulators.lost += lost
+    if outputs is not None:
+        accumulators.dissipated += lost
 
 
 @inlined
