@@ -6,6 +6,7 @@ once, for whichever engine asks.  In Numba's simulator they run as they stand.
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from typing import Any
 
