@@ -38,7 +38,8 @@ LOADS = ("sine", "ramp")
 CIRCUITS = ("piezo", "coil", "coil with inductance")
 SAME = 4
 """Seeds that have the same parts and other numbers."""
-IMPULSIVE = frozenset(name for name, law in LAWS.items() if law.impulsive)
+SEPARATE = frozenset(name for name, law in LAWS.items() if law.impulsive or law.memory)
+"""Laws with solutions of their own: Newton's (``test_surrounded_bounces``) and those with a memory."""
 """Laws without a force, which the reference does not contain."""
 KNOWN_FORCES = ("local_spring", "rotation", "magnetic_force", "electrostatic_force", "quadratic_damping")
 GRAVITY = 9.80665
@@ -84,7 +85,7 @@ class Composition:
 
 def laws() -> list[str]:
     """The laws that take part, in the order of the alphabet."""
-    return sorted(set(LAWS) - IMPULSIVE)
+    return sorted(set(LAWS) - SEPARATE)
 
 
 def local_forces() -> list[str]:
@@ -366,7 +367,7 @@ def touching(
         return sb.LayeredHertz(k, soft), series, None
     kind: Any = LAWS[name]
     law = kind(**plain_constants(kind, number.rng, {}))
-    numbers = law._numbers()
+    numbers = law.numbers
     loss = (lambda d: float(kind.damping_coefficient(numbers, d))) if law.rate_dependent else None
     return law, lambda d: float(kind.force(numbers, d)) if d > 0.0 else 0.0, loss
 
