@@ -73,11 +73,13 @@ def others_of(
         different, which = np.unique(location, return_inverse=True)
         shapes = np.array([structure.model.shape_at(float(x)) for x in different])
         places[:, j] = len(rows) + which
-        rows += [structure.row(shape, j + 1, sign) for shape in shapes]
+        own_rows = np.array([structure.row(shape, j + 1, sign) for shape in shapes])
+        rows += list(own_rows)
         numbers[:, j, REST] = sign * structure.sign * structure.rests(shapes)[which]
         begun = _begun(striker.drive, columns, moving, system, runs)
         gap = columns.get(f"{section}.gap", np.full(runs, np.nan))
-        numbers[:, j, OFFSET] = np.where(np.isnan(gap), -begun, -gap)
+        rest = _reach_at_rest(system, structure, which, own_rows)
+        numbers[:, j, OFFSET] = rest + np.where(np.isnan(gap), -begun, -gap)
         numbers[:, j, SIGN] = sign
         numbers[:, j, SPEED] = _speed(striker.drive, columns, moving, system, runs)
         numbers[:, j, SINCE] = since[:, number - 1]
@@ -680,20 +682,18 @@ def _offsets(
     offset = touching - begun
     if "contact.gap" in columns:
         # the gap is that to the beam at rest, which a local force moves out of the well of the structure
-        rest = (
-            0.0
-            if system.potential.is_of_the_structure_alone
-            else _reach_at_rest(system, structure, table, rows)
-        )
+        rest = _reach_at_rest(system, structure, table["contact_row"], rows)
         offset = np.where(np.isnan(columns["contact.gap"]), offset, rest - columns["contact.gap"])
     return np.asarray(np.where(np.isnan(flat.striker_position), offset, position))
 
 
-def _reach_at_rest(system: System, structure: Structure, table: NDArray[Any], rows: _Array) -> _Array:
-    """Displacement of the contact point from the well of the structure at rest."""
+def _reach_at_rest(system: System, structure: Structure, which: _Integers, rows: _Array) -> _Array | float:
+    """Displacement of contact points from the well of the structure at rest, which local forces cause; *which* row each has."""
+    if system.potential.is_of_the_structure_alone:
+        return 0.0
     state = system.rest_state
-    q = structure.to_modal(state.amplitude, state.velocity, 0.0, 0.0)[0]
-    return np.asarray(rows[table["contact_row"]] @ q)
+    q = structure.to_modal(state.amplitude, state.velocity, 0.0, 0.0, 0.0)[0]
+    return np.asarray(rows[which] @ q)
 
 
 def _per_unit(circuit: _Array, units: _Array) -> _Array:
