@@ -35,7 +35,9 @@ NOT_YET = {
 """Refusals by limits of the solver, which are to go."""
 QUICK = (
     Features(2, (("hertz", "sine", False),), base="acceleration_sine", local=("local_spring",), uneven=True),
-    Features(3, (("hunt_crossley", "burst", False), ("kelvin_voigt", "fixed", True)), local=("local_spring",)),
+    Features(
+        3, (("hunt_crossley", "burst", False), ("kelvin_voigt", "fixed", True)), local=("local_spring",)
+    ),
     Features(2, (("power", "displacement_sine", True),), load="sine", circuits=("piezo",)),
     Features(4, external=("harmonic_force",), local=("quadratic_damping", "magnetic_force"), started=True),
 )
