@@ -298,3 +298,14 @@ def test_classes_count_crossings_of_the_saddle_of_the_system(modes, rise, side):
         assert run.final_state.amplitude == pytest.approx(
             potential.wells[("lower", "upper").index(well)].amplitude, abs=1e-6
         )
+
+
+def test_magnets_on_both_sides_at_nearly_the_same_place():
+    """Their poles meet only far beyond the wells: two wells, their saddle and one in front of each magnet."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
+    magnets = [
+        sb.MagneticForce(strength=1.86e-10, gap=-1.11e-3, location=0.363),
+        sb.MagneticForce(strength=5.0e-10, gap=9.04e-4, location=0.340),
+    ]
+    found = sb.System(model, forces=magnets).potential.equilibria
+    assert sorted(each.unstable_directions for each in found) == [0, 0, 1, 1, 1]

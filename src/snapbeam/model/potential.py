@@ -37,6 +37,8 @@ _DESCENT_STEP, _DESCENT_STEPS = 0.02, 2000
 """Largest step of a descent, over the largest amplitude, and the maximum number of steps."""
 _TOWARDS = 40
 """Starting points on the way to the end of the range of a law."""
+_FAR = 20.0
+"""Amplitudes, over the size, beyond which equilibria may be missing."""
 _REACH = 3.0
 """Of the region of the starting points, over the largest amplitude of the equilibria without local forces."""
 
@@ -191,7 +193,7 @@ class Potential:
 
         chi is the Euler characteristic of the part of the boundary beyond which laws pull, a union of faces of the convex
         set in which all laws are valid: over every group of faces that have a point in common, the sum of
-        (-1)^(1 + faces).
+        (-1)^(1 + faces).  Points beyond ``_FAR`` times the size may be left out.
         """
         from scipy.optimize import linprog
 
@@ -208,7 +210,7 @@ class Potential:
         limited = np.isfinite(bounds)
         scale = float(np.abs(self.size).max()) / self._length
 
-        def meet(group: tuple[tuple[int, float], ...]) -> bool:
+        def meet(group: tuple[tuple[int, float], ...], reach: float | None) -> bool:
             rows = np.array([self.rows[j] for j, _ in group])
             ends = np.array([end for _, end in group])
             solution = linprog(
@@ -217,16 +219,20 @@ class Potential:
                 b_ub=bounds[limited] / self._length,
                 A_eq=scale * rows,
                 b_eq=ends,
-                bounds=(None, None),
+                bounds=(None if reach is None else -reach, reach),
             )
             return solution.status == 0
 
-        chi = sum(
-            (-1) ** (1 + count) * meet(group)
-            for count in range(1, 1 + len(faces))
-            for group in combinations(faces, count)
-        )
-        return sum((-1) ** each.unstable_directions for each in found) == 1 - chi
+        def characteristic(reach: float | None) -> int:
+            return sum(
+                (-1) ** (1 + count) * meet(group, reach)
+                for count in range(1, 1 + len(faces))
+                for group in combinations(faces, count)
+            )
+
+        # faces that meet far away have an equilibrium there, far beyond every motion
+        total = sum((-1) ** each.unstable_directions for each in found)
+        return total in (1 - characteristic(None), 1 - characteristic(_FAR))
 
     def _is_same(self, one: _Array, other: _Array) -> bool:
         return bool(np.abs(one - other).max() <= _SAME * np.abs(self.size).max())
