@@ -10,7 +10,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.model import default_values
-from snapbeam.solver.splitting import COMPOSITIONS, COUPLED, TURNS, slot_length
+from snapbeam.solver.splitting import COMPOSITIONS, GENERAL, TURNS, slot_length
 
 
 @pytest.mark.parametrize("order", [4, 6])
@@ -83,7 +83,7 @@ def test_measured_order_with_contact(modes: int, pair: tuple[float, float]) -> N
 @pytest.mark.parametrize(("order", "counts"), [(4, (10, 20, 40)), (6, (6, 12, 24))])
 def test_order_with_kicks_that_depend_on_velocity(order: int, counts: tuple[int, ...]) -> None:
     """q'' = -q - q^3 - 0.3 q', the last two terms in the kick, whose flow is exact at a fixed place."""
-    table = COUPLED[order]
+    table = GENERAL[order]
     stages = int(np.flatnonzero(table.elapsed == 1.0)[0])
 
     def end(count: int) -> float:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["COMPOSITIONS", "COUPLED", "GENERAL", "TURNS", "Composition", "Stages", "in_memory", "slot_length"]
+__all__ = ["COMPOSITIONS", "GENERAL", "TURNS", "Composition", "Stages", "in_memory", "slot_length"]
 
 
 TURNS = 16
@@ -35,11 +35,9 @@ class Stages(NamedTuple):
     elapsed: int
 
 
-def in_memory(
-    order: int, at: int, general: bool = False, coupled: bool = False
-) -> tuple[Stages, NDArray[np.float64]]:
+def in_memory(order: int, at: int, general: bool = False) -> tuple[Stages, NDArray[np.float64]]:
     """The composition of *order*, and the numbers that it needs in memory from *at* on."""
-    composition = (COUPLED if coupled else GENERAL if general else COMPOSITIONS)[order]
+    composition = (GENERAL if general else COMPOSITIONS)[order]
     numbers = np.zeros(3 * TURNS)
     for i, weights in enumerate((composition.flow, composition.kick, composition.elapsed)):
         numbers[i * TURNS : i * TURNS + weights.size] = weights
@@ -93,15 +91,7 @@ def _general_sixth() -> Composition:
     return _palindromic([*b, 0.5 - sum(b)], [*a, 1.0 - 2.0 * sum(a)], 10)
 
 
-def _general_fourth() -> Composition:
-    a = [0.0792036964311957, 0.353172906049774, -0.0420650803577195]
-    b = [0.209515106613362, -0.143851773179818]
-    return _palindromic([*b, 0.5 - sum(b)], [*a, 1.0 - 2.0 * sum(a)], 6)
-
-
 COMPOSITIONS = {4: _fourth(), 6: _sixth()}
 """Of kicks that depend on position alone, by order."""
 GENERAL = {4: COMPOSITIONS[4], 6: _general_sixth()}
-"""Of kicks that may depend on velocity too, where they do so in contact alone."""
-COUPLED = {4: _general_fourth(), 6: GENERAL[6]}
-"""Of kicks that depend on velocity all the time, as of a harvester: S_6 of the same table has a far smaller error."""
+"""Of kicks that may depend on velocity too."""

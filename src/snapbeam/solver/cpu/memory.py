@@ -240,16 +240,6 @@ class Memory(NamedTuple):
     """With the place of the drive's samples in memory."""
 
 
-def _any_contact_damped(ensemble: Ensemble) -> bool:
-    further = () if ensemble.others is None else ensemble.others.laws
-    return any(law.rate_dependent for law in (ensemble.law, *further))
-
-
-def _always_damped(layout: Layout) -> bool:
-    """Whether forces depend on velocities outside of contacts too."""
-    return any(hasattr(term, "channel") for term in layout.terms)
-
-
 def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
     """A copy of a structure's rows with room for two runs, aligned to whole registers.
 
@@ -283,9 +273,7 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
             work=second.work + length,
         )
     at = second.work + WORK_ROWS * size + slots
-    stages, weights = in_memory(
-        ensemble.order, at, general=_any_contact_damped(ensemble), coupled=_always_damped(first)
-    )
+    stages, weights = in_memory(ensemble.order, at, general=first.velocity_block is not None)
     table = stages.flow + weights.size
     length = table + ensemble.samples.size
     raw = np.zeros(length + _ALIGNMENT // 8)
