@@ -9,6 +9,7 @@ import snapbeam as sb
 from snapbeam.cli.parameter_options import configured
 from snapbeam.model import default_values
 from snapbeam.model.parameter_file import config_from_mapping, config_text, load_config
+from snapbeam.solver.restrictions import check_integrable
 from snapbeam.util.validation import InputError, InputTypeError
 
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
@@ -152,8 +153,8 @@ def test_refused_labels(label):
             make()
 
 
-def test_questions_of_more_than_a_run_can_have():
-    """Two harvesters beside two external forces: equilibria are found, a run is refused with the reason."""
+def test_questions_and_runs_of_many_parts():
+    """Two external forces beside two harvesters and six contacts: equilibria, and nothing to refuse but Newton's law."""
     coil = sb.ElectromagneticHarvester(force_factor=1.0, resistance=10.0)
     weight = sb.ExternalForce(history=sb.ConstantForce(force=-2e-3), location=0.5)
     system = sb.System(
@@ -162,9 +163,35 @@ def test_questions_of_more_than_a_run_can_have():
     one = sb.System(MODEL, forces=[sb.ExternalForce(history=sb.ConstantForce(force=-4e-3), location=0.5)])
     for each, same in zip(system.potential.equilibria, one.potential.equilibria, strict=True):
         np.testing.assert_allclose(each.amplitude, same.amplitude, rtol=1e-9, atol=1e-12)
+    check_integrable(system)
+    single = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
+    newton = sb.System(single, contacts=[sb.Contact(sb.Restitution(0.5), SHAKER), sb.Contact(HERTZ, STOP)])
     for run in (sb.simulate, lambda system: sb.sweep(system, {"contact.2.gap": [1e-5]})):
-        with pytest.raises(InputError, match="harvesters: 2 circuits; must be at most 1"):
-            run(system)
+        with pytest.raises(InputError, match="with several strikers: sticking under Newton's law"):
+            run(newton)
+
+
+@pytest.mark.slow
+def test_two_equal_coils_are_one():
+    """Two coils of force factor K beside each other damp as one of sqrt(2) K, and so do two layers."""
+    how = sb.Integration(cycles=3)
+    for kind, factor, rest in (
+        (sb.ElectromagneticHarvester, "force_factor", {"resistance": 10.0, "location": 0.4}),
+        (
+            sb.PiezoelectricHarvester,
+            "moment_per_volt",
+            {"resistance": 2e4, "capacitance": 6e-8, "patch_end": 0.25},
+        ),
+    ):
+        ends = []
+        for strength, count in ((1e-4, 2), (1e-4 * 2.0**0.5, 1)):
+            parts = [kind(**{factor: strength * (1e4 if factor == "force_factor" else 1.0)}, **rest)] * count
+            system = sb.System(MODEL, contacts=[sb.Contact(HERTZ, SHAKER)], harvesters=parts)
+            ends.append(sb.simulate(system, how))
+        for name in ("energy_harvested", "max_displacement", "peak_force"):
+            assert getattr(ends[0].summary, name) == pytest.approx(getattr(ends[1].summary, name), rel=1e-7)
+        voltages = ends[0].dataset.voltages.values
+        assert np.array_equal(voltages[:, 0], voltages[:, 1])
 
 
 @pytest.mark.slow
