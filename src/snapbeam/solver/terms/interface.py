@@ -365,12 +365,12 @@ def may_hide_onset(terms: Any) -> bool:
 
 
 def bounds_by_energy(terms: Any) -> bool:
-    """Whether the speed bound of a term needs the energy; it is then trusted for a quarter of the time."""
+    """True with a term whose speed bound needs the energy; it is then trusted for a quarter of the time."""
     raise _of_kernels()
 
 
 def has_state(terms: Any) -> bool:
-    """Whether a term has a state that changes in flows."""
+    """True with a term whose state changes in flows."""
     raise _of_kernels()
 
 
