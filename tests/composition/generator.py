@@ -367,7 +367,7 @@ def touching(
         return sb.LayeredHertz(k, soft), series, None
     kind: Any = LAWS[name]
     law = kind(**plain_constants(kind, number.rng, {}))
-    numbers = law.numbers
+    numbers = law.numbers()
     loss = (lambda d: float(kind.damping_coefficient(numbers, d))) if law.rate_dependent else None
     return law, lambda d: float(kind.force(numbers, d)) if d > 0.0 else 0.0, loss
 

@@ -68,8 +68,6 @@ def test_who_is_not_there_is_refused() -> None:
         sb.uncertainty.optimize_design(
             between_two(), {"velocity_amplitude": (0.1, 0.3)}, "peak_force_contact_3", [], SPREAD
         )
-    with pytest.raises(InputError, match="is not a quantity"):
-        sb.uncertainty.Objective(quantity="peak_force_contact_5")
     with pytest.raises(InputError, match="statistic"):
         sb.uncertainty.sensitivity(between_two(), "peak_force_contact_0", SPREAD, integration=HOW)
 

@@ -284,10 +284,9 @@ def _with_memory(law, memory):
     owner = law.instance_class.owner
     if not owner.memory:
         return lambda law, memory: law
-    made: dict[str, Any] = {"Numbers": law.instance_class}
-    own = ", ".join(f"law.{name}" for name in law.fields[:-1])
-    exec(f"def implementation(law, memory):\n    return Numbers({own}, memory)", made)
-    return made["implementation"]
+    numbers = law.instance_class
+    # one tuple: Numba unpacks no other
+    return lambda law, memory: numbers(*(law[:-1] + (memory,)))  # noqa: RUF005
 
 
 def yield_penetration(law: Any) -> float:
