@@ -23,7 +23,7 @@ SUSPENDED = sb.Striker(
 )
 SPHERE = sb.Striker(drive=sb.ConstantVelocity(speed=0.4), mass=2e-3, gap=1e-4)
 STOP = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5)
-STRUCK = {"suspended": SUSPENDED, "sphere": SPHERE, "two strikers": [SUSPENDED, STOP]}
+STRUCK = {"suspended": [SUSPENDED], "sphere": [SPHERE], "two strikers": [SUSPENDED, STOP]}
 
 
 def recorded(system: sb.System, how: sb.Integration) -> sb.Run:
@@ -50,7 +50,7 @@ def assert_of_beam(run: sb.Run) -> None:
 @pytest.mark.parametrize("name", ["suspended", pytest.param("two strikers", marks=pytest.mark.slow)])
 def test_statistics_are_those_of_the_recorded_beam(name) -> None:
     run = recorded(
-        sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, STRUCK[name])]),
+        sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, each) for each in STRUCK[name]]),
         sb.Integration(cycles=6),
     )
     assert run.summary.impacts > 1
