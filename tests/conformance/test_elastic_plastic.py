@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import snapbeam as sb
+from snapbeam.model import default_values
+from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.registry import resolve
 from snapbeam.util.validation import InputError
 
@@ -328,3 +330,12 @@ def test_force_and_energy() -> None:
         np.diff(force) / np.diff(depths), [LAW.slope(law, d) for d in depths[:-1] + 1e-12]
     )
     assert LAW.memory_after(law, kink) == pytest.approx(2e-6)
+
+
+def test_one_mode_holds_the_indentation_of_each_contact():
+    """Behind the modes of the beam: one for each contact whose law has a memory."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
+    plastic, striker = sb.ElasticPlasticContact(1e5, 2e5), sb.Striker(drive=sb.FixedStop(), gap=1e-5)
+    contacts = [sb.Contact(law, striker) for law in (plastic, default_values.CONTACT, plastic)]
+    structure = make_ensemble(sb.System(model, contacts=contacts), sb.Integration(cycles=1)).structure
+    assert structure.indentations == (0, 2) and structure.omega.size == 4

@@ -328,10 +328,6 @@ def structure_of(
         structure = dataclasses.replace(
             _with_mode(structure), indentations=(*structure.indentations, contact)
         )
-    for contact in indentations:
-        structure = dataclasses.replace(
-            _with_mode(structure), indentations=(*structure.indentations, contact)
-        )
     for harvester in harvesters:
         structure = _with_circuit(structure, harvester)
     return structure
