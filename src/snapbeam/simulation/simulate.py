@@ -435,9 +435,7 @@ def simulate(
     recorded = joined(list(engine.record(ensemble, run.instants, times is None, report)))
     if report is not None:
         report(1.0)
-    summary = RunSummary.from_statistics(
-        statistics_of(ensemble, recorded.accumulators_of_runs, run.end / run.period)
-    )
+    summary = RunSummary.from_statistics(statistics_of(ensemble, recorded.accumulators_of_runs))
     if times is None and summary.status != RunStatus.OK:
         recorded = reached_by(
             recorded, float(recorded.accumulators_of_runs["time"][0] * ensemble.runs["tick"][0])

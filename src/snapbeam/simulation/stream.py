@@ -134,9 +134,7 @@ class _Writer:
 
         run, last = self.run, self.waiting
         assert last is not None  # an engine yields at least one piece
-        summary = RunSummary.from_statistics(
-            statistics_of(run.ensemble, last.accumulators_of_runs, run.end / run.period)
-        )
+        summary = RunSummary.from_statistics(statistics_of(run.ensemble, last.accumulators_of_runs))
         if summary.status != RunStatus.OK:
             last = reached_by(
                 last, float(last.accumulators_of_runs["time"][0] * run.ensemble.runs["tick"][0])

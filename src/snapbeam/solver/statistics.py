@@ -195,7 +195,7 @@ def _response(reading: Reading) -> Values:
     kinds = class_of(
         accumulators["zero_crossings"],
         accumulators["zero_crossings_last_quarter"],
-        reading.cycles,
+        reading.ensemble.cycles,
         -reading.first_side * accumulators["side"],
     )
     ensemble = reading.ensemble
@@ -244,7 +244,7 @@ def _harvested_power(reading: Reading) -> Values:
 def _harvested_per_cycle(reading: Reading) -> Values:
     runs = reading.ensemble.runs
     with np.errstate(invalid="ignore", divide="ignore"):
-        done = reading.cycles * reading.duration / (runs["end"] * runs["tick"])
+        done = reading.ensemble.cycles * reading.duration / (runs["end"] * runs["tick"])
         return np.where(done > 0.0, _harvested(reading) / done, np.nan)
 
 
@@ -547,7 +547,6 @@ class Reading:
 
     ensemble: Ensemble
     accumulators: NDArray[Any]
-    cycles: float
 
     @property
     def sign(self) -> float:
@@ -672,14 +671,9 @@ class Reading:
         return found
 
 
-def statistics_of(
-    ensemble: Ensemble, accumulators_of_runs: NDArray[Any], cycles: float | None = None
-) -> dict[str, NDArray[Any]]:
-    """What an engine found, in the units and signs of a map; arrays of shape (runs,) by name.
-
-    *cycles* is how long the runs lasted, if not as the ensemble says.
-    """
-    reading = Reading(ensemble, accumulators_of_runs, ensemble.cycles if cycles is None else cycles)
+def statistics_of(ensemble: Ensemble, accumulators_of_runs: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    """Statistics of runs in the units and signs of a map, arrays of shape (runs,) by name."""
+    reading = Reading(ensemble, accumulators_of_runs)
     found = {}
     strikers = 1 if ensemble.others is None else 1 + len(ensemble.others.laws)
     for name, row in rows_for(strikers).items():
