@@ -392,9 +392,24 @@ def _without_energy_of(memory, bodies, omega, q, p, energy):
 
 
 @inlined
+def _has_further_channels(velocity_block):
+    """True if forces beside the first contact's depend on velocities."""
+    if velocity_block is None:
+        return False
+    return _more_than(len(velocity_block.rows), velocity_block.first)
+
+
+@inlined
+def _more_than(count, first):
+    if first is None:
+        return True
+    return count > 1
+
+
+@inlined
 def beam_power(memory, layout, p, k, force, power, high):
     """The part of the rates of the modal energies that is the beam's; 0 with forces that are not in *k*."""
-    if layout.velocity_block is not None:
+    if _has_further_channels(layout.velocity_block):
         return 0.0, 0.0
     return _without_power_of(memory, layout, layout.bodies, p, k, force, power), high
 
