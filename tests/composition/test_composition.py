@@ -38,7 +38,7 @@ QUICK = (
     Features(
         3, (("hunt_crossley", "burst", False), ("kelvin_voigt", "fixed", True)), local=("local_spring",)
     ),
-    Features(2, (("power", "displacement_sine", True),), load="sine", circuits=("piezo",)),
+    Features(2, (("power", "displacement_sine", True),), load="sine", circuits=("piezo", "coil")),
     Features(4, external=("harmonic_force",), local=("quadratic_damping", "magnetic_force"), started=True),
 )
 """Parts whose numbers are drawn in the quick tests."""
@@ -159,15 +159,15 @@ def checked(seed: int, features: Features | None = None, levels: tuple[str, ...]
             )
         if not report.balance[level] < BALANCE[level]:
             report.failures.append(f"{level}: energy balance {report.balance[level]:.2e}")
-        if len(system.harvesters) == 1:
-            check_voltage(composition, truth, run, within, LIMIT[level], amplified, report)
+        if system.harvesters:
+            check_voltages(composition, truth, run, within, LIMIT[level], amplified, report)
     if composition.mirrors:
         level, run = next(iter(runs.items()))
         check_mirror(composition, cycles, times, level, run, amplified, report)
     return report
 
 
-def check_voltage(
+def check_voltages(
     composition: Composition,
     truth: Solution,
     run: sb.Run,
@@ -176,9 +176,11 @@ def check_voltage(
     amplified: Array,
     report: Report,
 ) -> None:
-    """Compare the voltage of one harvester."""
-    expected = composition.volts[0] * truth.currents()[:, 0]
-    error = np.abs(run.dataset["voltage"].values - expected) / float(np.abs(expected).max())
+    """Compare the voltages of the harvesters, each over its maximum."""
+    expected = np.array(composition.volts) * truth.currents()
+    several = len(composition.volts) > 1
+    found = run.dataset["voltages"].values if several else run.dataset["voltage"].values[:, None]
+    error = (np.abs(found - expected) / np.abs(expected).max(axis=0)).max(axis=1)
     # impacts change the velocity, which the voltage follows, within short times
     if within.any() and not float((error / amplified)[within].max()) < 100.0 * limit:
         report.failures.append(f"voltage: error {float(error[within].max()):.2e} of its greatest")
@@ -222,7 +224,8 @@ def inconsistent(seed: int, folder: Path, features: Features | None = None) -> l
     loaded = sb.System.load(folder / "system.toml")
     if loaded != system or loaded.hash != system.hash:
         found.append("loaded system: not equal")
-    if not sb.simulate(loaded, how).dataset.identical(run.dataset):
+    again = sb.simulate(loaded, how).dataset.assign_attrs(created=run.dataset.attrs["created"])
+    if not again.identical(run.dataset):
         found.append("loaded system: another run")
     run.save(folder / "run.nc")
     back = sb.load(folder / "run.nc").dataset
