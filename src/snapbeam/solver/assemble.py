@@ -231,7 +231,7 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
 
 
 def _samples(system: System, section: str, drive: Drive) -> _Array:
-    """What kernels look up of a motion; that of a striker, recorded in space, counts positive as the striker pushes."""
+    """Samples of a recorded motion; that of a striker, recorded in space, is positive as the striker pushes."""
     kind, number = numbered(section)
     above = kind == "drive" and system.contacts[number - 1].striker.side == "above"
     return drive.samples() * (-1.0 if above else 1.0)
@@ -248,10 +248,9 @@ def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
 
 
 def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, tuple[_Array, _Array]]:
-    """Displacement (m) and velocity (m/s) of the base in space, value (N) and rate of the load's change and external forces.
+    """Displacement (m) and velocity (m/s) of the base in space; change of the load and external forces (N) and their rates.
 
     By section.
-
     *ensemble* is that of the one run, which may begin in the middle of its drives.
     """
     found = {}

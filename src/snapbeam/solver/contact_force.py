@@ -224,7 +224,7 @@ def _peak_in_step(law, peak, d0, v0, d1, v1, length):
 
 
 def force_break(law: Any, d0: float, v0: float, d1: float, v1: float, length: float) -> float:
-    """Where in (0, 1) of a step in contact the force is not smooth, though the contact goes on; -1: nowhere.
+    """Fraction of a step in contact at which the force is not smooth, though the contact goes on; -1: none.
 
     The force of a law that loses energy vanishes or begins there; that of a law with memory passes to first loading, or
     from there to unloading.  Penetration and rate are those at the two ends, the cubic through them is followed.

@@ -141,7 +141,7 @@ def _up_to_further_event(memory, blocks, layout, others, run, tip, t, step, scra
 
 @inlined
 def _turned(memory, layout, run, now, accumulators, outputs):
-    """Where a run stands if a contact of another striker begins or ends as a step begins: nothing has moved."""
+    """State of a run if a contact of another striker begins or ends as a step begins: nothing has moved."""
     clock, t = run.clock, now.t
     update_further_contacts(
         memory,

@@ -307,7 +307,7 @@ def form_acceleration(memory, blocks, layout, drive, argument, q, k):
 
 @called
 def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching, stored, sample):
-    """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from an output state."""
+    """State of a run at tick *t* from q and p alone, at its beginning and at an output state."""
     q, p = rows.q, rows.p
     gq, qr = form_acceleration(memory, blocks, layout, run.tip.drive, phase_at(run, t), q, rows.k)
     restart_further_contacts(memory, layout.size, layout.others, run.tip.drive, phase_at(run, t), t, q)

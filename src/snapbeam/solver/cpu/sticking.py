@@ -93,7 +93,7 @@ def _work_at_velocity(memory, layout, velocity_block, weight, begins, q, p, exte
 
 @compiled
 def held_for(memory, blocks, layout, run, tip, phase, source, length):
-    """What all forces do over *length* from *phase* on, and the maximum of the first striker's."""
+    """Impulses and works of all forces over *length* from *phase* on, and the maximum of the first striker's force."""
     size, q, damping, omega = layout.size, run.spare, memory[layout.damping], tip.drive.omega
     p, c = q + size, memory[layout.contact]
     impulse, work, gross, dissipated, peak = 0.0, 0.0, 0.0, 0.0, 0.0

@@ -23,7 +23,6 @@ from snapbeam.solver.simd import WIDTH, dot, fma, load, store
 from snapbeam.solver.terms.interface import operation
 
 __all__ = [
-    "CONTACT_NUMBERS",
     "DAMPING",
     "ELASTIC",
     "IMPULSE_IN_KICK",
@@ -107,8 +106,7 @@ def damping_forces_of_state(memory: Any, size: int, terms: Any, q: int, v: int, 
 
 
 ELASTIC, DAMPING, VELOCITY, IMPULSE_IN_KICK, LOST_IN_KICK = range(5)
-"""Numbers of a contact: F, N; C, N s/m; _V, m/s; of a kick the impulse, N s, and the energy lost, J."""
-CONTACT_NUMBERS = 5
+"""Numbers of a contact: F, N; C, N s/m; V, m/s; of a kick the impulse, N s, and the energy lost, J."""
 
 
 class ContactDamping(NamedTuple):
