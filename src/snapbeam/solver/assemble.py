@@ -324,6 +324,8 @@ _RESOLVED = 24.0
 """Flight steps, at least, in a period of a base's or an axial load's fastest part."""
 _TAPPED = {"standard": 0.35, "reference": 0.1}
 """Longest step over the reciprocal of the angular frequency or rate of what is in the kicks beside tension and contacts."""
+_GENERAL = 0.45
+"""Step with the general composition of order 6 over that with the one for forces of position alone, for an equal error."""
 _DECAY = 3.0
 """Decay of the state of a circuit in a step, lam h, at most."""
 
@@ -494,6 +496,8 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     ]
     if further:
         plans = [_serving(each) for each in zip(plans, *further, strict=True)]
+    if integration.step is None and plans[0].order == 6 and _depends_on_velocity(system):
+        plans = [each._replace(step=_GENERAL * each.step) for each in plans]
     if integration.step is None and any(_is_around(section) for section, _ in system.moving):
         fastest = fastest_of(system, columns, len(plans))
         plans = [
@@ -519,6 +523,15 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
         )
         for each in plans
     ]
+
+
+def _depends_on_velocity(system: System) -> bool:
+    """True if a force depends on velocities, so that the kicks need the general composition of order 6."""
+    return (
+        any(each.law.rate_dependent for each in system.contacts)
+        or any(each.dissipative for each in system.local_forces)
+        or any(each.inertia == 0.0 for each in system.harvesters)
+    )
 
 
 def _longest_with_local_forces(system: System, accuracy: str) -> float:
