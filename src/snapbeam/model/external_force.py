@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Drive, Scale, Timed
+from snapbeam.model.drive.base import Drive, Scale, Timed, sincos
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, check_label, quantity
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.validation import InputError, InputTypeError, finite_array, shown
@@ -106,13 +106,14 @@ class HarmonicForce(ForceHistory):
     @staticmethod
     def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
         """Force and its rate."""
-        varying = drive.amplitude * math.sin(argument)
-        return drive.mean + varying, drive.amplitude * drive.omega * math.cos(argument)
+        sine, cosine = sincos(argument)
+        return drive.mean + drive.amplitude * sine, drive.amplitude * drive.omega * cosine
 
     @staticmethod
     def acceleration(drive: Any, memory: Any, argument: float) -> float:
         """The force."""
-        return drive.mean + drive.amplitude * math.sin(argument)
+        sine, _ = sincos(argument)
+        return drive.mean + drive.amplitude * sine
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,6 +195,7 @@ class RecordedForce(ForceHistory, Timed):
     record: NDArray[np.float64] = quantity("N", "force, sampled", kind=object)
     sampling_frequency: float = quantity("Hz", "samples per second of the force", low=0.0)
     name = "recorded_force"
+    recorded = True
     number_names = ("omega", "fastest", "table", "samples", "interval")
     amplitudes = ()
 

@@ -206,8 +206,9 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
         numbers = drive.numbers(own, scale)
         kinds[part] = drive.integrated_as or type(drive)
         found |= {f"{part}_{name}": numbers[name] for name in drive.number_names}
-        if "table" in drive.number_names:
-            found[f"{part}_table"] = np.full(runs, float(sum(each.size for each in tables)))
+        for name in drive.number_names:
+            if name.split("_")[-1] == "table":
+                found[f"{part}_{name}"] += sum(each.size for each in tables)
         tables.append(_samples(system, section, drive))
         found[f"{part}_phase"] = columns.get(f"{section}.phase", np.zeros(runs))
         fastest = np.maximum(fastest, numbers["fastest" if "fastest" in numbers else "omega"])
@@ -231,9 +232,9 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
 
 
 def _samples(system: System, section: str, drive: Drive) -> _Array:
-    """Samples of a recorded motion; that of a striker, recorded in space, is positive as the striker pushes."""
+    """Samples of a motion; a record of a striker's, made in space, is positive as the striker pushes."""
     kind, number = numbered(section)
-    above = kind == "drive" and system.contacts[number - 1].striker.side == "above"
+    above = drive.recorded and kind == "drive" and system.contacts[number - 1].striker.side == "above"
     return drive.samples() * (-1.0 if above else 1.0)
 
 
@@ -421,7 +422,7 @@ def make_ensemble(
 
 def _require_record(system: System, table: NDArray[Any], driven: Driven) -> None:
     """Refuse runs that last longer than the shortest record."""
-    records: list[Any] = [each for _, each in system.moving if each.samples().size]
+    records: list[Any] = [each for _, each in system.moving if each.recorded]
     if not records:
         return
     record = min(records, key=lambda each: each.duration)

@@ -9,10 +9,13 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload
 
+from snapbeam.model.drive.base import sincos as drive_sincos
 from snapbeam.model.drive.combined import parts_of
-from snapbeam.solver.compilation import INLINE, inlined, overloaded
+from snapbeam.model.drive.noise import LINES, sums_of_sines
+from snapbeam.solver.compilation import INLINE, INLINE_HERE, called, inlined, overloaded
 from snapbeam.solver.contact_force import scalar_function
 from snapbeam.solver.physics import shaker_motion, sincos
+from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, splat
 
 __all__ = [
     "Tip",
@@ -363,6 +366,28 @@ def _turned_motion(drive, memory, argument, sine, cosine):
         return lambda drive, memory, argument, sine, cosine: joined_motion(drive, memory, argument)
     motion = kind_motion(drive.instance_class.owner)
     return lambda drive, memory, argument, sine, cosine: motion(drive, memory, argument)
+
+
+@called
+def _sums_in_registers(memory, table, t, low, width):
+    displacement, velocity, acceleration = splat(0.0), splat(0.0), splat(0.0)
+    for row in range(table, table + LINES, WIDTH):
+        rate = fma(width, load(memory, row), splat(low))
+        sine, cosine = sincos(fma(t, rate, load(memory, row + LINES)))
+        displacement = displacement + sine / rate
+        velocity = velocity + cosine
+        acceleration = acceleration - sine * rate
+    return lanes_sum(displacement), lanes_sum(velocity), lanes_sum(acceleration)
+
+
+@overload(drive_sincos, jit_options=INLINE_HERE)
+def _sincos(angle):
+    return lambda angle: sincos(angle)
+
+
+@overload(sums_of_sines, jit_options=INLINE_HERE)
+def _sums_of_sines(memory, table, t, low, width):
+    return lambda memory, table, t, low, width: _sums_in_registers(memory, table, t, low, width)
 
 
 def drive_rate(drive: Any) -> float:

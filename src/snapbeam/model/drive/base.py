@@ -17,7 +17,7 @@ from snapbeam.util.validation import NamedTable
 if TYPE_CHECKING:
     from snapbeam.model.reduced_model import ReducedModel
 
-__all__ = ["DRIVES", "HORIZON", "Drive", "Scale", "Timed"]
+__all__ = ["DRIVES", "HORIZON", "Drive", "Scale", "Timed", "sincos"]
 
 
 _Array = NDArray[np.float64]
@@ -42,6 +42,11 @@ class Scale(NamedTuple):
     """Angular frequency that Omega and V are normalised by, rad/s."""
 
 
+def sincos(angle: float) -> tuple[float, float]:
+    """Sine and cosine of an angle, rad; kernels have their own, :func:`snapbeam.solver.physics.sincos`."""
+    return math.sin(angle), math.cos(angle)
+
+
 class Drive:
     """A prescribed motion of the striker's tip about its mid-position: a frozen dataclass in a file of its own.
 
@@ -63,6 +68,8 @@ class Drive:
     """Whether it is the sine that engines know by themselves."""
     is_periodic: ClassVar[bool] = True
     """Whether the motion repeats after a turn of its argument; if not, that turn is longer than any run."""
+    recorded: ClassVar[bool] = False
+    """True for a record of a certain ``duration``."""
     integrated_as: ClassVar[type[Drive] | None] = None
     """The drive whose kernels integrate it, if they are those of another drive."""
     number_names: ClassVar[tuple[str, ...]] = ("omega",)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.drive.base import Scale, Timed, sincos
 from snapbeam.model.quantity import RUN, check_fields, quantity
 from snapbeam.util.validation import InputError
 
@@ -133,7 +133,7 @@ class Burst(Timed):
             e = x * x * x * (10.0 + x * (6.0 * x - 15.0))
             slope = -30.0 * x * x * (1.0 - x) * (1.0 - x) * per / drive.ramp_down_cycles
         turn = 6.283185307179586 * (cycles - math.floor(cycles))
-        sine, cosine = math.sin(turn), math.cos(turn)
+        sine, cosine = sincos(turn)
         a, away, speed = drive.amplitude, 0.0, 0.0
         if cycles > drive.duration_cycles:
             x = min(cycles - drive.duration_cycles, 1.0)
@@ -163,7 +163,7 @@ class Burst(Timed):
             slope = turned * 30.0 * x * x * (1.0 - x) * (1.0 - x) * per / over
             bend = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) * per * per / (over * over)
         turn = 6.283185307179586 * (cycles - math.floor(cycles))
-        sine, cosine, rate = math.sin(turn), math.cos(turn), drive.rate
+        (sine, cosine), rate = sincos(turn), drive.rate
         away = 0.0
         if drive.duration_cycles < cycles < drive.duration_cycles + 1.0:
             y = cycles - drive.duration_cycles

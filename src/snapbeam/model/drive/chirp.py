@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.drive.base import Scale, Timed, sincos
 from snapbeam.model.quantity import RUN, STRUCTURE, quantity
 
 __all__ = ["Chirp"]
@@ -113,7 +113,7 @@ class Chirp(Timed):
         if t >= length:
             now, change = drive.last, 0.0
         a = drive.speed / now
-        sine, cosine = math.sin(angle), math.cos(angle)
+        sine, cosine = sincos(angle)
         return a * sine, drive.speed * cosine - a * change / now * sine
 
     @staticmethod
@@ -136,5 +136,5 @@ class Chirp(Timed):
         a = drive.speed / now
         falls = -a * change / now
         curves = a * (2.0 * change * change / (now * now) - bend / now)
-        sine, cosine = math.sin(angle), math.cos(angle)
+        sine, cosine = sincos(angle)
         return curves * sine + 2.0 * falls * now * cosine + a * change * cosine - a * now * now * sine

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.drive.base import Scale, Timed, sincos
 from snapbeam.model.quantity import RUN, quantity
 
 __all__ = ["HalfSine"]
@@ -78,9 +78,8 @@ class HalfSine(Timed):
         t = argument / drive.omega
         if t >= drive.duration:
             return 0.0, 0.0
-        return drive.amplitude * math.sin(drive.fastest * t), drive.amplitude * drive.fastest * math.cos(
-            drive.fastest * t
-        )
+        sine, cosine = sincos(drive.fastest * t)
+        return drive.amplitude * sine, drive.amplitude * drive.fastest * cosine
 
     @staticmethod
     def acceleration(drive: Any, memory: Any, argument: float) -> float:
@@ -88,4 +87,5 @@ class HalfSine(Timed):
         t = argument / drive.omega
         if t >= drive.duration:
             return 0.0
-        return -drive.amplitude * drive.fastest * drive.fastest * math.sin(drive.fastest * t)
+        sine, _ = sincos(drive.fastest * t)
+        return -drive.amplitude * drive.fastest * drive.fastest * sine

@@ -14,12 +14,13 @@ from snapbeam.model.drive.base import Scale, Timed
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
 from snapbeam.util.validation import InputError
 
-__all__ = ["BandLimitedNoise"]
+__all__ = ["LINES", "BandLimitedNoise", "sums_of_sines"]
 
 
 _Array = NDArray[np.float64]
 LINES = 32
 """Sines that the noise is made of, one in each equal part of the band, at a random place in it."""
+_LOW_BITS = np.uint64(0xFFFFFFFF)
 _STEEPEST = 1.875
 _SHARPEST = 5.7736
 """Greatest curvature of x^3 (10 - 15 x + 6 x^2) on [0, 1], 10/sqrt(3)."""
@@ -82,7 +83,7 @@ class BandLimitedNoise(Timed):
     ramp_up_cycles: float = quantity("1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN)
 
     name = "band_limited_noise"
-    number_names = ("omega", "fastest", "low", "high", "strength", "ramp_up_cycles", "seed")
+    number_names = ("omega", "fastest", "low", "high", "strength", "ramp_up_cycles", "table")
     amplitudes = ("strength",)
 
     def __post_init__(self) -> None:
@@ -105,7 +106,7 @@ class BandLimitedNoise(Timed):
             "high": high,
             "strength": columns["velocity_rms"] * scale.length * scale.omega * math.sqrt(2.0 / LINES),
             "ramp_up_cycles": columns["ramp_up_cycles"] * self.cycle(columns, scale),
-            "seed": np.full(low.size, float(self.seed)),
+            "table": np.zeros(low.size),
         }
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
@@ -127,24 +128,25 @@ class BandLimitedNoise(Timed):
             own + rising + _SHARPEST * self.bounds(columns, scale)[0] / found["ramp_up_cycles"] ** 2
         )
 
+    def samples(self) -> _Array:
+        """Place of each sine in the band, in units of its part, then the phases."""
+        counter = np.arange(2 * LINES, dtype=np.uint64)
+        # a 32-bit integer mixed with its neighbours: every bit of seed and counter touches every bit of it
+        mixed: NDArray[Any] = (
+            np.uint64(self.seed * 2654435769) + counter * 2246822519 + 374761393
+        ) & _LOW_BITS
+        mixed = ((mixed ^ (mixed >> 16)) * 2146121005) & _LOW_BITS
+        mixed = ((mixed ^ (mixed >> 15)) * 2221713035) & _LOW_BITS
+        shares = (mixed ^ (mixed >> 16)) / 4294967296.0
+        return np.concatenate((np.arange(LINES) + shares[::2], 2.0 * math.pi * shares[1::2]))
+
     @staticmethod
     def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
         """The sum under the envelope, and its derivative."""
         t = argument / drive.omega
-        moved, speed, width, seed = 0.0, 0.0, (drive.high - drive.low) / LINES, int(drive.seed)
-        for j in range(2 * LINES):
-            # a 32-bit integer mixed with its neighbours: every bit of seed and counter touches every bit of it
-            x = (seed * 2654435769 + j * 2246822519 + 374761393) & 0xFFFFFFFF
-            x = ((x ^ (x >> 16)) * 2146121005) & 0xFFFFFFFF
-            x = ((x ^ (x >> 15)) * 2221713035) & 0xFFFFFFFF
-            x = x ^ (x >> 16)
-            share = x / 4294967296.0
-            if j % 2 == 0:
-                rate = drive.low + (j // 2 + share) * width
-            else:
-                angle = rate * t + 6.283185307179586 * share
-                moved += math.sin(angle) / rate
-                speed += math.cos(angle)
+        moved, speed, _ = sums_of_sines(
+            memory, int(drive.table), t, drive.low, (drive.high - drive.low) / LINES
+        )
         moved, speed = moved * drive.strength, speed * drive.strength
         if t >= drive.ramp_up_cycles:
             return moved, speed
@@ -156,21 +158,9 @@ class BandLimitedNoise(Timed):
     def acceleration(drive: Any, memory: Any, argument: float) -> float:
         """The second derivative."""
         t = argument / drive.omega
-        moved, speed, bent = 0.0, 0.0, 0.0
-        width, seed = (drive.high - drive.low) / LINES, int(drive.seed)
-        for j in range(2 * LINES):
-            x = (seed * 2654435769 + j * 2246822519 + 374761393) & 0xFFFFFFFF
-            x = ((x ^ (x >> 16)) * 2146121005) & 0xFFFFFFFF
-            x = ((x ^ (x >> 15)) * 2221713035) & 0xFFFFFFFF
-            x = x ^ (x >> 16)
-            share = x / 4294967296.0
-            if j % 2 == 0:
-                rate = drive.low + (j // 2 + share) * width
-            else:
-                angle = rate * t + 6.283185307179586 * share
-                moved += math.sin(angle) / rate
-                speed += math.cos(angle)
-                bent -= math.sin(angle) * rate
+        moved, speed, bent = sums_of_sines(
+            memory, int(drive.table), t, drive.low, (drive.high - drive.low) / LINES
+        )
         moved, speed, bent = moved * drive.strength, speed * drive.strength, bent * drive.strength
         if t >= drive.ramp_up_cycles:
             return bent
@@ -179,3 +169,14 @@ class BandLimitedNoise(Timed):
         first = 30.0 * s * s * (1.0 - s) * (1.0 - s) / drive.ramp_up_cycles
         second = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (drive.ramp_up_cycles * drive.ramp_up_cycles)
         return e * bent + 2.0 * first * speed + second * moved
+
+
+def sums_of_sines(memory: Any, table: int, t: float, low: float, width: float) -> tuple[float, float, float]:
+    """Sums over the sines of sin/omega_j, of its derivative cos and of -omega_j sin, at time *t*.
+
+    Kernels have a version in registers: :mod:`snapbeam.solver.excitation`.
+    """
+    rates = low + width * memory[table : table + LINES]
+    angles = rates * t + memory[table + LINES : table + 2 * LINES]
+    sines = np.sin(angles)
+    return float(np.sum(sines / rates)), float(np.sum(np.cos(angles))), -float(np.sum(sines * rates))

@@ -67,6 +67,7 @@ class RecordedAcceleration(Timed):
     sampling_frequency: float = quantity("Hz", "samples per second", low=0.0)
 
     name = "recorded_acceleration"
+    recorded = True
     number_names = ("omega", "fastest", "table", "samples", "interval")
     amplitudes = ()
 

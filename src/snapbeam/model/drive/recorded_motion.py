@@ -61,6 +61,7 @@ class RecordedMotion(Drive):
     frequency: float = quantity("Hz", "nominal frequency of the excitation", low=0.0, short="drive_frequency")
 
     name = "recorded_motion"
+    recorded = True
     number_names = ("omega", "table", "samples", "interval")
     amplitudes = ()
 

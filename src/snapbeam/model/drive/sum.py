@@ -61,7 +61,7 @@ class SumDrive(Timed):
         for drive in drives:
             if not isinstance(drive, Drive):
                 raise InputTypeError(f"drive = {shown(drive)}: must be a drive, such as Sine(...)")
-            if drive.samples().size:
+            if drive.recorded:
                 raise InputError(
                     f"drive = {drive.name!r} in a sum: a recording has its own time axis; add the records instead"
                 )
@@ -114,14 +114,21 @@ class SumDrive(Timed):
     def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """The numbers of every term, its phase and where it begins."""
         found: dict[str, _Array] = {}
-        fastest = np.zeros(next(iter(columns.values())).size)
+        fastest, table = np.zeros(next(iter(columns.values())).size), 0
         for i, drive, own in self._each(columns):
             numbers = drive.numbers(own, scale)
+            if "table" in numbers:
+                numbers["table"] = numbers["table"] + table
+            table += drive.samples().size
             found |= {f"t{i}_{name}": values for name, values in numbers.items()}
             found[f"t{i}_phase"] = own.get("phase", np.zeros(fastest.size))
             found[f"t{i}_start"] = self._begun(drive, own, scale)
             fastest = np.maximum(fastest, numbers["fastest" if "fastest" in numbers else "omega"])
         return found | {"fastest": fastest}
+
+    def samples(self) -> _Array:
+        """Those of every term, in their order."""
+        return np.concatenate([drive.samples() for drive in self.parts_of_sum])
 
     def frequencies(self, columns: Mapping[str, _Array], scale: Scale) -> list[_Array] | None:
         """Those of every term; None if one of them does not repeat."""
@@ -186,7 +193,7 @@ def mixture(kinds: tuple[type[Drive], ...]) -> type[SumDrive]:
     if not 2 <= len(kinds) <= MOST_TERMS:
         raise InputError(f"{words or 'no drive'}: a sum has 2 to {MOST_TERMS} terms")
     for kind in kinds:
-        if kind.name in ("recorded_motion", "fixed") or DRIVES.get(kind.name) is not kind:
+        if kind.recorded or kind.name == "fixed" or DRIVES.get(kind.name) is not kind:
             raise InputError(
                 f"{words}: {kind.name!r} cannot be a term of a sum; a recording has its own time axis, and a stop adds nothing"
             )

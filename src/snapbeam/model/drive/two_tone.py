@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.drive.base import Scale, Timed, sincos
 from snapbeam.model.quantity import RUN, quantity
 
 __all__ = ["TwoTone"]
@@ -115,13 +115,16 @@ class TwoTone(Timed):
         t = argument / drive.omega
         one, two = drive.rate * t, drive.second_rate * t + drive.second_phase
         a, b = drive.amplitude, drive.second_amplitude
-        moved = a * math.sin(one) + b * (math.sin(two) - math.sin(drive.second_phase))
-        return moved, a * drive.rate * math.cos(one) + b * drive.second_rate * math.cos(two)
+        (sine, cosine), (second_sine, second_cosine) = sincos(one), sincos(two)
+        start, _ = sincos(drive.second_phase)
+        moved = a * sine + b * (second_sine - start)
+        return moved, a * drive.rate * cosine + b * drive.second_rate * second_cosine
 
     @staticmethod
     def acceleration(drive: Any, memory: Any, argument: float) -> float:
         """The second derivative."""
         t = argument / drive.omega
         one, two = drive.rate * t, drive.second_rate * t + drive.second_phase
-        first = drive.amplitude * drive.rate * drive.rate * math.sin(one)
-        return -first - drive.second_amplitude * drive.second_rate * drive.second_rate * math.sin(two)
+        (sine, _), (second_sine, _) = sincos(one), sincos(two)
+        first = drive.amplitude * drive.rate * drive.rate * sine
+        return -first - drive.second_amplitude * drive.second_rate * drive.second_rate * second_sine
