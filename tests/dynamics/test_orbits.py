@@ -118,7 +118,8 @@ def test_determinant_of_a_bouncing_ball(restitution: float, stroke: float) -> No
     system = sb.System(
         ball, contacts=[sb.Contact(law, sb.Striker(drive=table))], forces=[weight], initial_state=above
     )
-    orbit = sb.dynamics.periodic_orbit(system, transient=30)
+    # steps in contact end at whole ticks, and the force jumps at the onset: the map is rough to some 3e-10
+    orbit = sb.dynamics.periodic_orbit(system, transient=30, tolerance=1e-9)
     pressed, later = contact_of_a_ball(law, stroke, orbit.flow.phase, orbit.coordinates)
     np.testing.assert_allclose(later, orbit.coordinates, rtol=0.0, atol=1e-9)
     determinant = math.exp(orbit.log_determinant)

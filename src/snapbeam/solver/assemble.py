@@ -325,7 +325,7 @@ _RESOLVED = 24.0
 """Flight steps, at least, in a period of a base's or an axial load's fastest part."""
 _TAPPED = {"standard": 0.35, "reference": 0.1}
 """Longest step over the reciprocal of the angular frequency or rate of what is in the kicks beside tension and contacts."""
-_GENERAL = 0.45
+_GENERAL = 0.4
 """Step with the general composition of order 6 over that with the one for forces of position alone, for an equal error."""
 _DECAY = 3.0
 """Decay of the state of a circuit in a step, lam h, at most."""
