@@ -37,10 +37,12 @@ from snapbeam.solver.cpu.terms.velocity_block import (
     IMPULSE_IN_KICK,
     LOST_IN_KICK,
     VELOCITY,
+    acts,
     add_impulses,
     add_velocity_dependent,
     enter_contact,
     open_first_contact,
+    rest_in_kick,
     solve_velocity_block,
 )
 from snapbeam.solver.excitation import tip_motion, turned_motion
@@ -394,16 +396,23 @@ def _first_contact_of_block(memory, first, weight, contact):
 def _exchange(data, velocity_block, stage, weight, along_g, along_r, contact, work):
     memory, layout, step = data.memory, data.layout, data.step
     size, p = layout.size, step.p if stage == 0 else step.p1
-    kick = kick_row(layout)
-    _whole_acceleration(memory, layout, step, stage, along_g, along_r, contact.force, kick)
+    kick, active = kick_row(layout), False
     if velocity_block is not None:
-        solve_velocity_block(memory, size, velocity_block, weight, kick, p)
+        active = acts(memory, velocity_block.channels, False)
+    if active or does_work(layout.terms):
+        _whole_acceleration(memory, layout, step, stage, along_g, along_r, contact.force, kick)
+    if velocity_block is not None:
+        if active:
+            solve_velocity_block(memory, size, velocity_block, weight, kick, p)
+        else:
+            rest_in_kick(memory, velocity_block)
     if does_work(layout.terms):
         if stage == 0 and needs_tension_product(layout.terms):
             tension_rows(memory, data.blocks, layout, step.q, step.r)
         work = add_work(memory, size, layout.terms, weight, layout.g, step.r, kick, p, work)
     if velocity_block is not None:
-        add_impulses(memory, size, velocity_block, p, step.p1)
+        if active or stage == 0:
+            add_impulses(memory, size, velocity_block, p, step.p1)
         accumulate_damped_contacts(memory, layout.others, weight)
         contact = _first_contact_of_block(memory, velocity_block.first, weight, contact)
     return contact, work

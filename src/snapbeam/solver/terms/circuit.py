@@ -259,9 +259,21 @@ class CircuitDamping(NamedTuple):
 
     @staticmethod
     @inlined
+    def acts(memory, term, active):
+        """True, at every kick."""
+        return True
+
+    @staticmethod
+    @inlined
     def damping_forces(memory, term, v, d):
         """-rate v."""
         memory[d + term.unknown] = -memory[term.state + _RATE] * memory[v + term.unknown]
+
+    @staticmethod
+    @inlined
+    def damping_coefficient(memory, term, coefficient):
+        """The rate."""
+        return memory[term.state + _RATE]
 
     @staticmethod
     @inlined

@@ -170,6 +170,12 @@ class LocalDamping(NamedTuple):
 
     @staticmethod
     @inlined
+    def acts(memory, term, active):
+        """True, at every kick."""
+        return True
+
+    @staticmethod
+    @inlined
     def damping_forces(memory, term, v, d):
         """D(u, v)."""
         velocity = memory[v + term.unknown]

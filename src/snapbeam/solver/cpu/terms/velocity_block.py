@@ -9,6 +9,7 @@ the velocities along the rows obey an equation for themselves alone,
     v' = a + M D(v),    a_i = r_i.K,    M_ij = r_i.r_j.
 
 The classical Runge-Kutta method, in parts that resolve D, gives the impulses, integrals of D_i, which act along the rows.
+One force alone that is linear in v is integrated exactly.
 One after the other, such forces would leave an error of first order in the length of the step.
 
 A *channel* is a named tuple with ``unknown``, the number of its first row, and the operations below as static methods.
@@ -16,6 +17,7 @@ A *channel* is a named tuple with ``unknown``, the number of its first row, and 
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from snapbeam.solver.compilation import called, inlined
@@ -30,6 +32,7 @@ __all__ = [
     "VELOCITY",
     "ContactDamping",
     "VelocityBlock",
+    "acts",
     "add_impulses",
     "add_velocity_dependent",
     "enter_contact",
@@ -37,6 +40,7 @@ __all__ = [
     "numbers_of_block",
     "open_first_contact",
     "prepare_velocity_block",
+    "rest_in_kick",
     "solve_velocity_block",
 ]
 
@@ -47,6 +51,11 @@ _PARTS_PER_DECAY = 8.0
 _V, _PUSH, _STAGE, _FORCE, _SUM, _POWER, _IMPULSE, _TWICE, _WORK, _PATH = range(10)
 """Arrays of one number for each row: v, a, v and D of a part, their sums; then integrals over the kick: of D, of that
 integral, of D v and of v."""
+
+
+_LINEAR = 1e-9
+"""Relative deviation of a force from linear within a kick, at most."""
+_FACTORIALS = tuple(1.0 / math.factorial(k + 3) for k in range(15, -1, -1))
 
 
 class VelocityBlock(NamedTuple):
@@ -89,6 +98,18 @@ def add_damping_rate(
     raise TypeError("operations of channels run in compiled code only")
 
 
+@operation()
+def acts(memory: Any, terms: Any, active: bool) -> Any:
+    """True if the channel has a force at the kick at hand, else *active*."""
+    raise TypeError("operations of channels run in compiled code only")
+
+
+@operation()
+def damping_coefficient(memory: Any, terms: Any, coefficient: float) -> Any:
+    """C, N s/m, of a channel whose force is linear within a kick: D = D_0 - C (v - v_0)."""
+    raise TypeError("operations of channels run in compiled code only")
+
+
 @operation(threaded=0)
 def end_kick(memory: Any, terms: Any, v: int, impulse: int, work: int, path: int, weight: float) -> Any:
     """Keep the results of a kick: arrays of the velocity at its end and of the integrals of D, D v and v."""
@@ -117,11 +138,23 @@ class ContactDamping(NamedTuple):
 
     @staticmethod
     @inlined
+    def acts(memory, term, active):
+        """True if the contact is closed."""
+        return active or memory[term.numbers + ELASTIC] != 0.0 or memory[term.numbers + DAMPING] != 0.0
+
+    @staticmethod
+    @inlined
     def damping_forces(memory, term, v, d):
         """The force of the contact, N."""
         at = term.numbers
         rate = memory[at + VELOCITY] - memory[v + term.unknown]
         memory[d + term.unknown] = max(0.0, memory[at + ELASTIC] + memory[at + DAMPING] * rate)
+
+    @staticmethod
+    @inlined
+    def damping_coefficient(memory, term, coefficient):
+        """C; while the contact pushes."""
+        return memory[term.numbers + DAMPING]
 
     @staticmethod
     @inlined
@@ -203,6 +236,48 @@ def _advance(memory, count, mobility, v, change, force, weight, result):
         memory[result + i] = memory[v + i] + weight * total
 
 
+@inlined
+def _third_phi(x):
+    """Sum of (-x)^k / (k + 3)!, to the last digit for |x| <= 1."""
+    total = 0.0
+    for factor in _FACTORIALS:
+        total = fma(-x, total, factor)
+    return total
+
+
+@inlined
+def _integrate_exactly(memory, block, weight):
+    """Integrate a single force that is linear in v; False if it is not, or faster than the kick.
+
+    With x = C M w:  D' = -C (a + M D),  I = integral of D = w D_0 phi_1 - w^2 C a phi_2,  and the integral of
+    (w - t) D = w^2 D_0 phi_2 - w^3 C a phi_3,  where  phi_1 = 1 - x phi_2,  phi_2 = 1/2 - x phi_3.
+    """
+    v, change, force = _array(block, _V), _array(block, _PUSH), _array(block, _FORCE)
+    damping, mobility = damping_coefficient(memory, block.channels, math.nan), memory[block.numbers]
+    x = damping * mobility * weight
+    if not abs(x) <= 1.0:
+        return False
+    damping_forces(memory, block.channels, v, force)
+    v0, a, d0 = memory[v], memory[change], memory[force]
+    phi3 = _third_phi(x)
+    phi2 = 0.5 - x * phi3
+    push = weight * damping * a
+    impulse = weight * (d0 * (1.0 - x * phi2) - push * phi2)
+    twice = weight * weight * (d0 * phi2 - push * phi3)
+    end = v0 + weight * a + mobility * impulse
+    memory[v] = end
+    damping_forces(memory, block.channels, v, force)
+    if not abs(memory[force] - d0 + damping * (end - v0)) <= _LINEAR * (abs(d0) + damping * abs(end - v0)):
+        memory[v] = v0
+        return False
+    memory[_array(block, _IMPULSE)], memory[_array(block, _TWICE)] = impulse, twice
+    memory[_array(block, _PATH)] = v0 * weight + 0.5 * a * weight * weight + mobility * twice
+    memory[_array(block, _WORK)] = (
+        v0 * impulse + a * (weight * impulse - twice) + 0.5 * mobility * impulse * impulse
+    )
+    return True
+
+
 @called
 def _integrate(memory, block, weight):
     """Integrate the velocities over a kick of *weight* seconds, and D, D v and v."""
@@ -217,6 +292,9 @@ def _integrate(memory, block, weight):
     impulse, twice, work, path = (
         _array(block, _IMPULSE), _array(block, _TWICE), _array(block, _WORK), _array(block, _PATH)
     )  # fmt: skip
+    if count == 1 and _integrate_exactly(memory, block, weight):
+        end_kick(memory, channels, v, impulse, work, path, weight)
+        return
     for i in range(count):
         memory[impulse + i], memory[twice + i], memory[work + i] = 0.0, 0.0, 0.0
         # of v without D; D is added at the end
@@ -258,7 +336,7 @@ def _integrate(memory, block, weight):
 
 @inlined
 def solve_velocity_block(memory, size, block, weight, kick, p):
-    """Compute the impulses of a kick of *weight* seconds.
+    """Compute the impulses of a kick of *weight* seconds in which a channel acts.
 
     The row *kick* is the acceleration by all other forces.  It receives what makes half of it times the weight the mean of the
     effect of D on p.
@@ -277,6 +355,17 @@ def solve_velocity_block(memory, size, block, weight, kick, p):
 def _add_row(memory, size, factor, row, to):
     for at in range(0, size, WIDTH):
         store(memory, to + at, fma(factor, load(memory, row + at), load(memory, to + at)))
+
+
+@inlined
+def rest_in_kick(memory, block):
+    """The results of a kick in which no channel acts."""
+    v, impulse, work, path = (
+        _array(block, _V), _array(block, _IMPULSE), _array(block, _WORK), _array(block, _PATH)
+    )  # fmt: skip
+    for i in range(len(block.rows)):
+        memory[impulse + i], memory[work + i], memory[path + i] = 0.0, 0.0, 0.0
+    end_kick(memory, block.channels, v, impulse, work, path, 0.0)
 
 
 @inlined
