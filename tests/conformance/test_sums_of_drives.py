@@ -59,6 +59,39 @@ def test_kept_and_told() -> None:
 
 
 @pytest.mark.slow
+def test_terms_that_have_samples() -> None:
+    """Two noises with a sine between them, on a base that shakes by a third: as the record of their sum."""
+
+    def noise(seed: int) -> sb.BandLimitedNoise:
+        return sb.BandLimitedNoise(low_ratio=0.6, high_ratio=2.2, velocity_rms=0.05, seed=seed)
+
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
+    base, total = sb.BaseExcitation(motion=noise(3)), noise(1) + SINE + noise(2)
+
+    def struck_by(drive: sb.Drive) -> sb.System:
+        contact = sb.Contact(default_values.CONTACT, sb.Striker(drive=drive))
+        return sb.System(model, contacts=[contact], base_excitation=base)
+
+    scale = struck_by(total).scale
+    numbers, samples = numbers_of(total, scale), total.samples()
+    cycle = 2.0 * math.pi / (1.4 * scale.omega)
+    instants = np.arange(0.0, 5.0 * cycle, 1e-5)
+    rows = np.array([tip_motion(numbers, samples, numbers.omega * t) for t in instants])
+    record = sb.RecordedMotion(
+        displacement=rows[:, 0], velocity=rows[:, 1], sampling_frequency=1e5, frequency=1.0 / cycle
+    )
+    times = np.linspace(0.0, 4.0 * cycle, 101) * (1.0 - 1e-13)
+    one, other = (
+        sb.simulate(struck_by(drive), sb.Integration(cycles=4, accuracy="reference"), sample_times=times)
+        for drive in (total, record)
+    )
+    assert one.summary.impacts > 1
+    np.testing.assert_allclose(
+        one.dataset.displacement_at_striker, other.dataset.displacement_at_striker, rtol=0.0, atol=1e-6
+    )
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("modes", "cycles"), [(1, 4), (3, 2)])
 def test_against_an_independent_solution(modes: int, cycles: int) -> None:
     """A sine and a burst over it: 1e-3 b at level *standard*, 1e-7 b at level *reference*."""
