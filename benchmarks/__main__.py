@@ -23,33 +23,13 @@ _PARTS = {
 }
 
 
-def _regressions(folder: Path, quick: bool) -> int:
-    """The quick times that pytest-benchmark keeps and compares."""
-    try:
-        import pytest
-        import pytest_benchmark  # noqa: F401
-    except ImportError as error:
-        print(f"regressions left out: {error}")
-        return 0
-    here = str(Path(__file__).with_name("regressions.py"))
-    storage = f"--benchmark-storage=file://{folder / 'regressions'}"
-    options = ["--benchmark-autosave", "--benchmark-compare-fail=min:25%", storage]
-    if any((folder / "regressions").glob("*/*.json")):
-        options.append("--benchmark-compare")
-    else:
-        del options[1]
-    if quick:
-        options = ["--benchmark-disable"]
-    return int(pytest.main([here, "-q", "-p", "no:cacheprovider", "-o", "addopts=", *options]))
-
-
-def main() -> int:
+def main() -> None:
     """Run the parts asked for."""
-    parts = [*_PARTS, "peers", "regressions"]
+    parts = [*_PARTS, "peers"]
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks", description="snapbeam beside other integrators"
     )
-    parser.add_argument("part", nargs="*", help=f"any of {', '.join(parts)}; by default all but the last two")
+    parser.add_argument("part", nargs="*", help=f"any of {', '.join(parts)}; by default all but the last")
     parser.add_argument("--quick", action="store_true", help="few repeats, short runs: does everything work")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/bench"), metavar="FOLDER")
     arguments = parser.parse_args()
@@ -57,18 +37,14 @@ def main() -> int:
     if unknown:
         parser.error(f"part = {unknown[0]!r}: must be one of {', '.join(parts)}")
     arguments.output.mkdir(parents=True, exist_ok=True)
-    status = 0
     for part in arguments.part or _PARTS:
         if part == "peers":
             for peer in PEERS:
                 found = methods(peer)
                 print(found if isinstance(found, str) else f"{peer}: {', '.join(m.name for m in found)}")
-        elif part == "regressions":
-            status = _regressions(arguments.output, arguments.quick) or status
         else:
             import_module(f"benchmarks.{_PARTS[part]}").run(arguments.output, arguments.quick)
-    return status
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    main()
