@@ -38,8 +38,8 @@ def sampled(drive: sb.Drive, count: int = 40001, cycles: float = 10.0):
     numbers = drive.numbers(columns, SCALE)
     row = drive.numbers_type()(*(float(numbers[name][0]) for name in drive.number_names))
     times = np.linspace(0.0, cycles * float(drive.cycle(columns, SCALE)[0]), count)
-    motion = np.array([drive.motion(row, None, row.omega * t) for t in times])
-    bent = np.array([drive.acceleration(row, None, row.omega * t) for t in times])
+    motion = np.array([drive.motion(row, drive.samples(), row.omega * t) for t in times])
+    bent = np.array([drive.acceleration(row, drive.samples(), row.omega * t) for t in times])
     bounds = [float(each[0]) for each in drive.bounds(columns, SCALE)]
     return times, motion[:, 0], motion[:, 1], bent, bounds
 

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 from numba import njit
 from scipy.integrate import solve_ivp
 
-import snapbeam as sb
-from snapbeam.model.drive.base import Scale
-from snapbeam.model.drive.noise import sums_of_sines
 from snapbeam.solver.cpu.terms.velocity_block import (
     DAMPING,
     ELASTIC,
@@ -59,20 +54,3 @@ def test_one_contact(elastic, damping, weight, within):
         :, -1
     ]
     assert kick(elastic, damping, weight) == pytest.approx(tuple(exact), rel=within, abs=1e-16)
-
-
-@pytest.mark.parametrize("seed", [0, 7, 2**31 - 1])
-def test_sines_of_noise_in_registers(seed):
-    """The kernel's sums are those of NumPy, and their rates are each other's derivatives."""
-    drive = sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2, seed=seed)
-    samples, (low, width) = drive.samples(), (300.0, 28.0)
-    in_kernel = njit(lambda memory, t: sums_of_sines(memory, 0, t, low, width))
-    for t in (0.0, 0.013, 7.1):
-        expected = sums_of_sines(samples, 0, t, low, width)
-        assert in_kernel(samples, t) == pytest.approx(expected, rel=1e-11, abs=1e-12)
-    step = 1e-5
-    ahead, behind = (in_kernel(samples, 0.5 + sign * step)[0] for sign in (1.0, -1.0))
-    assert (ahead - behind) / (2.0 * step) == pytest.approx(in_kernel(samples, 0.5)[1], rel=1e-3, abs=1e-3)
-    own = {name: np.array([value]) for name, value in drive.values().items()}
-    lowest = drive.numbers(own, Scale(1.0, 600.0))["low"][0]
-    assert math.isclose(lowest, 300.0)
