@@ -91,6 +91,7 @@ def test_runs(tmp_path) -> None:
     check(sb.perturbation_growth(SYSTEM, sb.Integration(cycles=1)))
 
 
+@pytest.mark.slow
 def test_a_run_of_several_strikers(tmp_path) -> None:
     """What is told of each striker has units too, as it stands and as it comes back from the file."""
     stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=2e-5)

@@ -28,10 +28,10 @@ Array = NDArray[np.float64]
 Rng = np.random.Generator
 DRIVES = (
     "sine", "sine", "displacement_sine", "two_tone", "chirp", "burst", "half_sine", "fixed", "sum", "constant_velocity",
-    "recorded_motion",
+    "recorded_motion", "noise",
 )  # fmt: skip
 BASES = (
-    "acceleration_sine", "displacement_sine", "two_tone", "chirp", "burst", "shock", "recorded_acceleration"
+    "acceleration_sine", "displacement_sine", "two_tone", "chirp", "burst", "shock", "recorded_acceleration", "noise",
 )  # fmt: skip
 FORCES = ("harmonic_force", "constant_force", "recorded_force")
 LOADS = ("sine", "ramp")
@@ -214,6 +214,30 @@ def chirp(first: float, last: float, speed: float, length: float, log: bool) -> 
     return motion, [length]
 
 
+def noise(seed: int, low: float, high: float, rms: float, rise: float) -> Motion:
+    """32 sines of equal velocity amplitude, one in each part of the band, under a rise."""
+    x = (
+        seed * 2654435769 + np.arange(64, dtype=np.uint64) * np.uint64(2246822519) + np.uint64(374761393)
+    ) % np.uint64(2**32)
+    for shift, factor in ((16, 2146121005), (15, 2221713035)):
+        x = ((x ^ (x >> np.uint64(shift))) * np.uint64(factor)) % np.uint64(2**32)
+    shares = (x ^ (x >> np.uint64(16))) / 2.0**32
+    rates = low + (high - low) / 32.0 * (np.arange(32) + shares[::2])
+    phases, speed = 2.0 * math.pi * shares[1::2], rms * math.sqrt(2.0 / 32.0)
+
+    def motion(t: float) -> tuple[float, float, float]:
+        angles, s = rates * t + phases, min(t / rise, 1.0)
+        w, v, a = (
+            speed * float(np.sum(each))
+            for each in (np.sin(angles) / rates, np.cos(angles), -rates * np.sin(angles))
+        )
+        e, e1 = s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * (s * (1.0 - s)) ** 2 / rise
+        e2 = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / rise**2
+        return e * w, e * v + e1 * w, e * a + 2.0 * e1 * v + e2 * w
+
+    return motion
+
+
 def moving(kind: str, number: Numbers, side: float = 1.0) -> tuple[sb.Drive, Motion, list[float]]:
     """A drive, its motion as it is written in the documentation, and times at which it is not smooth."""
     unit, first = number.unit, number.first
@@ -256,6 +280,17 @@ def moving(kind: str, number: Numbers, side: float = 1.0) -> tuple[sb.Drive, Mot
             ramp_up_cycles=up, ramp_down_cycles=down,
         )  # fmt: skip
         return drive, *burst(rate, reach, up + flat + down, up, down)
+    if kind == "noise":
+        wide, ramp, seed = number(0.2, 1.5), number(0.3, 1.0), int(number(0.0, 2e9))
+        drive = sb.BandLimitedNoise(
+            low_ratio=ratio,
+            high_ratio=ratio + wide,
+            velocity_rms=0.5 * velocity,
+            seed=seed,
+            ramp_up_cycles=ramp,
+        )
+        rise = ramp * 4.0 * math.pi / ((2.0 * ratio + wide) * first)
+        return drive, noise(seed, rate, rate + wide * first, 0.5 * speed, rise), [rise]
     if kind == "half_sine":
         length, height = number(0.3, 0.8), number(0.1, 0.4)
         end, top = length * cycle, height * unit

@@ -275,10 +275,13 @@ def points(composition: Composition, how: sb.Integration, run: sb.Run) -> list[s
     return found
 
 
-@pytest.mark.parametrize("kind", range(len(QUICK)))
-def test_ten_systems_of_the_same_parts(kind: int) -> None:
-    """The numbers of ten seeds."""
-    judge([checked(seed, QUICK[kind]) for seed in range(10)])
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=[pytest.mark.slow] if kind % 2 else []) for kind in range(len(QUICK))],
+)
+def test_twenty_systems_of_the_same_parts(kind: int) -> None:
+    """The numbers of twenty seeds."""
+    judge([checked(seed, QUICK[kind]) for seed in range(20)])
 
 
 @pytest.mark.parametrize(

@@ -86,6 +86,7 @@ def test_moving_base():
     held_against(system, -MASS @ BASE, lambda t: -0.3 * w * w * math.sin(0.8 * w * t), 1e-5)
 
 
+@pytest.mark.slow
 def test_forces_along_different_rows_beside_a_moving_base():
     """Each has its own frequency and phase, and a record its own samples."""
     reduced = model(base_shape=BASE)

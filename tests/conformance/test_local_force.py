@@ -151,7 +151,7 @@ def cycle_of(system):
 @pytest.mark.parametrize(
     "names",
     [
-        ("spring", "magnet", "drag"),
+        pytest.param(("spring", "magnet", "drag"), marks=SLOW),
         *(pytest.param((name,), marks=SLOW) for name in ("drag", "spring", "friction")),
     ],
 )

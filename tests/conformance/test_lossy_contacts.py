@@ -138,6 +138,7 @@ def test_trajectory(name, modes, cycles, at_standard, at_reference) -> None:
         )
 
 
+@pytest.mark.slow
 def test_the_force_at_the_onset_counts_as_the_maximum() -> None:
     """A damper alone stops a free mass: its force c v is maximum at the onset, and falls from there."""
     law = sb.KelvinVoigt(1.0, 2.0)

@@ -247,6 +247,7 @@ def held(names: str, e: float) -> None:
     assert found["ledger"] < 1e-6
 
 
+@pytest.mark.slow
 def test_sticking_to_a_tip_on_a_moving_base() -> None:
     """Measured 5e-14 b, and 2e-11 of the gross work."""
     held("base", 0.0)

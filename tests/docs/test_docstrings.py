@@ -9,7 +9,9 @@ import snapbeam as sb
 
 
 @pytest.mark.parametrize(
-    "space", [sb, sb.dynamics, sb.uncertainty, sb.plot], ids=lambda space: space.__name__
+    "space",
+    [sb, *(pytest.param(each, marks=pytest.mark.slow) for each in (sb.dynamics, sb.uncertainty, sb.plot))],
+    ids=lambda space: space.__name__,
 )
 def test_examples(space, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)

@@ -93,6 +93,7 @@ def struck(ratio: float, velocity: float) -> sb.System:
     return sb.System(model, contacts=[sb.Contact(default_values.CONTACT, drive)])
 
 
+@pytest.mark.slow
 def test_folds_of_the_beam_are_those_of_its_branches() -> None:
     """At another frequency, continued along the velocity, the fold is where the curve says."""
     options = {"transient": 100}

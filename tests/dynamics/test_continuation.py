@@ -178,7 +178,12 @@ FOLD = 0.40663746
 
 @pytest.mark.parametrize(
     ("velocity", "which", "direction"),
-    [(0.44, 0, "down"), (0.43, 1, "down"), (0.42495795, 0, "down"), (0.415, 0, "up")],
+    [
+        pytest.param(0.44, 0, "down", marks=pytest.mark.slow),
+        (0.43, 1, "down"),
+        (0.42495795, 0, "down"),
+        (0.415, 0, "up"),
+    ],
 )
 def test_an_impact_at_the_phase_of_observation_is_no_bifurcation(
     velocity: float, which: int, direction: str

@@ -49,6 +49,7 @@ def exact_orbit(ratio: float, restitution: float, periods: int) -> tuple[float, 
 KELVIN_VOIGT = sb.KelvinVoigt(1e6, 5.0)
 
 
+@pytest.mark.slow
 def test_the_map_of_a_force_that_begins_with_a_jump_is_smooth() -> None:
     """The onset falls between two ticks: without its part of a tick the period map has steps of 2e-9."""
     system = system_of(1, 1.6, 0.03).replace(**{"contact.law": KELVIN_VOIGT})
@@ -104,7 +105,9 @@ def contact_of_a_ball(
         t, y = t + 1e-9, y + 1e-9 * np.array(falling(t, y))
 
 
-@pytest.mark.parametrize(("restitution", "stroke"), [(0.5, 1.2), (0.3, 1.8)])
+@pytest.mark.parametrize(
+    ("restitution", "stroke"), [pytest.param(0.5, 1.2, marks=pytest.mark.slow), (0.3, 1.8)]
+)
 def test_determinant_of_a_bouncing_ball(restitution: float, stroke: float) -> None:
     """Phase volume shrinks by exp(-c/m times the time with a force) in a period; k = 1e7."""
     ball = sb.ReducedModel.from_matrices(
@@ -126,7 +129,8 @@ def test_determinant_of_a_bouncing_ball(restitution: float, stroke: float) -> No
     assert determinant == pytest.approx(math.exp(-law.linear_damping * pressed), rel=1e-5)
 
 
-@pytest.mark.parametrize("with_striker", [pytest.param(True, marks=pytest.mark.slow), False])
+@pytest.mark.slow
+@pytest.mark.parametrize("with_striker", [True, False])
 def test_a_constant_force_repeats_after_any_time(with_striker: bool) -> None:
     """The orbit under a constant load closes, and runs from it return to it; a load alone leaves the equilibrium."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, 1, damping_ratio=0.02)

@@ -91,6 +91,7 @@ def test_what_does_not_repeat_is_refused(system, words):
         sb.dynamics.lyapunov_spectrum(system, periods=20, transient=5)
 
 
+@pytest.mark.slow
 def test_a_map_at_a_phase_of_the_base():
     """It is the map of the base that begins at this phase, also beside a stop."""
     flow = Stroboscope(SHAKEN["base"], phase=1.0)

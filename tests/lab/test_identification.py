@@ -156,6 +156,7 @@ def test_several_modes():
         identify_decay(signal, modes=5)
 
 
+@pytest.mark.slow
 def test_a_simulated_beam():
     """A free decay of the paper's beam, eight modes, 0.1 b about a well, shows its first mode."""
     model = sb.ReducedModel.from_beam(BEAM, modes=8)

@@ -62,6 +62,7 @@ def test_pull_in_at_a_third_of_the_gap():
         print(sb.System(model, forces=[sb.MagneticForce(strength=1.1 * critical, gap=gap)]).start_state)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_pull_in_voltage_of_an_electrode(side):
     """V^2 = 8 k g^3/(27 eps_0 A), on either side; a run beyond it ends, and one below it comes to rest."""
@@ -274,8 +275,8 @@ def test_a_force_that_leaves_one_well_has_a_diagnostic():
 
 
 @pytest.mark.parametrize("modes", [1, 4])
-@pytest.mark.parametrize("rise", [0.0, 2e-6])
-@pytest.mark.parametrize("side", ["below", "above"])
+@pytest.mark.parametrize("rise", [0.0, pytest.param(2e-6, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("side", [pytest.param("below", marks=pytest.mark.slow), "above"])
 def test_classes_count_crossings_of_the_saddle_of_the_system(modes, rise, side):
     """Released at rest on either side of the saddle that a magnet shifts: the well, and no crossing."""
     shape = sb.Imperfection(midspan_amplitude=rise) if rise else None

@@ -187,6 +187,7 @@ def test_a_drive_with_a_start_up_transient():
     assert np.abs(drive.velocity[-128:]).max() == pytest.approx(steady, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_repeated_impact_is_that_of_the_run(results):
     """Going on from the state at the instant of touch gives the impulse that the run itself has."""
     table = results["disturbances"]["impacts"]

@@ -174,7 +174,13 @@ for folder, _, names in os.walk(os.environ["NUMBA_CACHE_DIR"]):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no access bits")
-@pytest.mark.parametrize("fault", ["foreign", "writable", "writable above", "group"])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "foreign",
+        *(pytest.param(each, marks=pytest.mark.slow) for each in ("writable", "writable above", "group")),
+    ],
+)
 def test_code_that_others_planted_is_not_executed(tmp_path, tried, fault):
     """In a folder that NUMBA_CACHE_DIR names, whoever named it."""
     place, temporary, proof = tmp_path / "cache", tmp_path / "temporary", tmp_path / "executed"

@@ -133,6 +133,7 @@ def test_a_statistic_from_the_command_line(tmp_path, monkeypatch, synthetic_map)
 # ---------------------------------------------------------------------- structures given by matrices
 
 
+@pytest.mark.slow
 def test_bistable_piezoelectric_oscillator_of_the_literature() -> None:
     """x'' + .02 x' - .5 x + .5 x^3 - chi v = .115 cos .8 t, v' + lambda v + kappa x' = 0; chi = .05, kappa = .5, lambda = .05.
 

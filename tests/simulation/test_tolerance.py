@@ -229,7 +229,7 @@ MOTIONS: dict[str, sb.Drive] = {
 def moved(system: sb.System, size: float | None, times: np.ndarray) -> np.ndarray:
     """Displacements of the tip, its drive changed by a relative *size*."""
     ensemble = make_ensemble(system, sb.Integration(cycles=1))
-    ensemble = ensemble if size is None else _perturbed(ensemble, size)
+    ensemble = ensemble if size is None else _perturbed(ensemble, system, size)
     numbers = ensemble.drive.numbers_type()(*map(float, ensemble.drive_numbers[0]))
     phase, omega = float(ensemble.runs["phase"][0]), numbers.omega
     return np.array([tip_motion(numbers, ensemble.samples, phase + omega * t)[0] for t in times])
@@ -258,11 +258,11 @@ def test_all_that_drives_is_changed() -> None:
         "axial_load": sb.AxialLoadModulation(motion=sb.LoadRamp(change=2.0, duration=3.0)),
     }
     second = sb.Striker(drive=MOTIONS["noise"], location=0.3, gap=1e-4)
-    ensemble = make_ensemble(
-        sb.System(model_of(1), contacts=[sb.Contact(CONTACT, stop), sb.Contact(CONTACT, second)], **around),
-        sb.Integration(cycles=1),
-    )
-    names, changed = ensemble.drive.number_names, _perturbed(ensemble, 0.5)
+    contacts = [sb.Contact(CONTACT, stop), sb.Contact(CONTACT, second)]
+    system = sb.System(model_of(1), contacts=contacts, **around)
+    ensemble = make_ensemble(system, sb.Integration(cycles=1))
+    names, changed = ensemble.drive.number_names, _perturbed(ensemble, system, 0.5)
+    np.testing.assert_array_equal(changed.samples, ensemble.samples)
     told = {
         name
         for name, a, b in zip(names, ensemble.drive_numbers[0], changed.drive_numbers[0], strict=True)
@@ -275,11 +275,9 @@ def test_all_that_drives_is_changed() -> None:
 def test_what_drives_nothing_changes_the_start() -> None:
     stop = sb.Striker(drive=sb.FixedStop(), gap=1e-4)
     start = sb.State(amplitude=[-1e-4])
-    ensemble = make_ensemble(
-        sb.System(model_of(1), contacts=[sb.Contact(CONTACT, stop)], initial_state=start),
-        sb.Integration(cycles=1),
-    )
-    np.testing.assert_array_equal(_perturbed(ensemble, 0.5).starts, 1.5 * ensemble.starts)
+    system = sb.System(model_of(1), contacts=[sb.Contact(CONTACT, stop)], initial_state=start)
+    ensemble = make_ensemble(system, sb.Integration(cycles=1))
+    np.testing.assert_array_equal(_perturbed(ensemble, system, 0.5).starts, 1.5 * ensemble.starts)
 
 
 def test_a_drive_that_does_not_say_what_it_scales_with_is_refused(monkeypatch) -> None:
@@ -290,4 +288,4 @@ def test_a_drive_that_does_not_say_what_it_scales_with_is_refused(monkeypatch) -
     ensemble = make_ensemble(system, sb.Integration(cycles=1))
     monkeypatch.setattr(sb.HalfSine, "amplitudes", ())
     with pytest.raises(sb.InputError, match="drive = 'half_sine': must name the numbers"):
-        _perturbed(ensemble, 0.5)
+        _perturbed(ensemble, system, 0.5)

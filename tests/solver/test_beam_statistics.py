@@ -47,7 +47,8 @@ def assert_of_beam(run: sb.Run) -> None:
         assert getattr(outcome, f"rms_{part}velocity") == pytest.approx(math.sqrt(np.mean(v * v)), rel=2e-2)
 
 
-@pytest.mark.parametrize("name", ["suspended", pytest.param("two strikers", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["suspended", "two strikers"])
 def test_statistics_are_those_of_the_recorded_beam(name) -> None:
     run = recorded(
         sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, each) for each in STRUCK[name]]),

@@ -72,6 +72,7 @@ def test_who_is_not_there_is_refused() -> None:
         sb.uncertainty.sensitivity(between_two(), "peak_force_contact_0", SPREAD, integration=HOW)
 
 
+@pytest.mark.slow
 def test_they_are_told_in_words() -> None:
     """Wherever a statistic is shown, the second striker's has its unit and its words."""
     found = sb.simulate(between_two(), HOW).summary

@@ -141,7 +141,9 @@ def perturbation_growth(
     plan = plans_of(system, integration, run_columns(system, {}))[0]
     ensemble = make_ensemble(system, integration, plan=plan)
     times = _instants(system, ensemble)
-    separation = _apart(_watch(system, ensemble, times), _watch(system, _perturbed(ensemble, size), times))
+    separation = _apart(
+        _watch(system, ensemble, times), _watch(system, _perturbed(ensemble, system, size), times)
+    )
     attrs = {
         "title": "perturbation growth of a run",
         "perturbation": size,
@@ -185,7 +187,7 @@ def steps_for(system: System, integration: Integration) -> tuple[Plan, ErrorEsti
     for plan in levels[1:]:
         ensemble = make_ensemble(system, whole, plan=plan)
         fine = _watch(system, ensemble, times)
-        response = _apart(fine, _watch(system, _perturbed(ensemble, PERTURBATION), times))
+        response = _apart(fine, _watch(system, _perturbed(ensemble, system, PERTURBATION), times))
         bound = _BETWEEN * _apart(coarse, fine) + response
         last = _last_within(response, _SHARE * limit)
         reached = bool(bound[last] <= limit)
@@ -218,20 +220,25 @@ def _instants(system: System, ensemble: Ensemble) -> _Array:
     return np.linspace(0.0, end, min(count, _MOST_SAMPLES) + 1)
 
 
-def _perturbed(ensemble: Ensemble, size: float) -> Ensemble:
+def _perturbed(ensemble: Ensemble, system: System, size: float) -> Ensemble:
     """Return the run with its drives, or its initial state if nothing drives it, changed by a relative *size*."""
     factor, numbers = 1.0 + size, ensemble.drive_numbers.copy()
     names = ensemble.drive.number_names
     scaled = [names.index(name) for name in ensemble.drive.amplitudes if name in names]
     numbers[:, scaled] *= factor
-    driven = bool(numbers[:, scaled].any() or ensemble.samples.any())
+    # other samples are no values of the motion, such as the frequencies of noise
+    recorded = [np.full(drive.samples().size, drive.recorded) for _, drive in system.moving]
+    samples = np.where(
+        np.concatenate([np.empty(0, dtype=bool), *recorded]), ensemble.samples * factor, ensemble.samples
+    )
+    driven = bool(numbers[:, scaled].any() or (samples != ensemble.samples).any())
     if not driven and (ensemble.runs["tip_speed"] != 0.0).any():
         raise InputError(
             f"drive = {ensemble.drive.name!r}: must name the numbers that its motion is proportional to in its "
             "amplitudes; otherwise the perturbation growth is unknown"
         )
     starts = ensemble.starts if driven else ensemble.starts * factor
-    return replace(ensemble, drive_numbers=numbers, starts=starts, samples=ensemble.samples * factor)
+    return replace(ensemble, drive_numbers=numbers, starts=starts, samples=samples)
 
 
 def _watch(system: System, ensemble: Ensemble, times: _Array) -> _Array:

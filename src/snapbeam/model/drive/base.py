@@ -80,7 +80,7 @@ class Drive:
     amplitudes: ClassVar[tuple[str, ...]] = ("amplitude",)
     """Numbers that the motion is proportional to, all together."""
     discontinuities: ClassVar[tuple[str, ...]] = ()
-    """Numbers that are times at which the velocity jumps, s since the drive began: steps end there."""
+    """Numbers that are times at which the velocity or one of its derivatives jumps, s since the drive began: steps end there."""
     registry: ClassVar[dict[str, type[Drive]]] = DRIVES
     """Where it is entered by its name."""
 

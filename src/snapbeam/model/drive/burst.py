@@ -70,15 +70,9 @@ class Burst(Timed):
 
     name = "burst"
     number_names = (
-        "omega",
-        "fastest",
-        "rate",
-        "amplitude",
-        "duration_cycles",
-        "ramp_up_cycles",
-        "ramp_down_cycles",
-        "retraction",
-    )
+        "omega", "fastest", "rate", "amplitude", "retraction", "risen", "falling", "ended", "retracted"
+    )  # fmt: skip
+    discontinuities = ("risen", "falling", "ended", "retracted")
     amplitudes = ("amplitude", "retraction")
 
     def __post_init__(self) -> None:
@@ -93,79 +87,82 @@ class Burst(Timed):
         return np.asarray(2.0 * math.pi / (columns["frequency_ratio"] * scale.omega))
 
     def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
-        """Rates in rad/s, lengths in m, times in cycles."""
+        """Rates in rad/s, lengths in m, ends of the ramps and of the retraction in s."""
         rate = columns["frequency_ratio"] * scale.omega
         amplitude = columns["velocity_amplitude"] * scale.length * scale.omega / rate
-        shape = {name: columns[name] for name in ("duration_cycles", "ramp_up_cycles", "ramp_down_cycles")}
+        cycle, ended = self.cycle(columns, scale), columns["duration_cycles"]
+        times = {
+            "risen": columns["ramp_up_cycles"], "falling": ended - columns["ramp_down_cycles"], "ended": ended,
+            "retracted": ended + 1.0,
+        }  # fmt: skip
         retreat = columns["retraction"] * scale.length
-        return {"fastest": rate, "rate": rate, "amplitude": amplitude, "retraction": retreat} | shape
+        return {"fastest": rate, "rate": rate, "amplitude": amplitude, "retraction": retreat} | {
+            name: value * cycle for name, value in times.items()
+        }
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
         """The amplitude, and the speed with the steepest envelope."""
         found = self.shape_numbers(columns, scale)
-        steep = _STEEPEST * found["rate"] / (2.0 * math.pi)
-        shortest = np.minimum(found["ramp_up_cycles"], found["ramp_down_cycles"])
-        speed = found["amplitude"] * (found["rate"] + steep / shortest) + found["retraction"] * steep
+        steepest = _STEEPEST / np.minimum(found["risen"], found["ended"] - found["falling"])
+        speed = found["amplitude"] * (found["rate"] + steepest)
+        speed = speed + found["retraction"] * _STEEPEST / (found["retracted"] - found["ended"])
         return found["amplitude"], speed
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """That of the sine with the steepest and the sharpest envelope, and that of the retreat."""
         found = self.shape_numbers(columns, scale)
-        per, rate = found["rate"] / (2.0 * math.pi), found["rate"]
-        shortest = np.minimum(found["ramp_up_cycles"], found["ramp_down_cycles"])
-        shape = rate**2 + 2.0 * rate * _STEEPEST * per / shortest + _SHARPEST * (per / shortest) ** 2
-        return np.asarray(found["amplitude"] * shape + found["retraction"] * _SHARPEST * per**2)
+        rate, shortest = found["rate"], np.minimum(found["risen"], found["ended"] - found["falling"])
+        shape = rate**2 + 2.0 * rate * _STEEPEST / shortest + _SHARPEST / shortest**2
+        retreat = found["retraction"] * _SHARPEST / (found["retracted"] - found["ended"]) ** 2
+        return np.asarray(found["amplitude"] * shape + retreat)
 
     @staticmethod
     def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
         """E w and its derivative."""
-        per = drive.rate / 6.283185307179586
-        cycles = argument / drive.omega * per
+        t = argument / drive.omega
         e, slope = 1.0, 0.0
-        if cycles < drive.ramp_up_cycles:
-            x = cycles / drive.ramp_up_cycles
+        if t < drive.risen:
+            x = t / drive.risen
             e = x * x * x * (10.0 + x * (6.0 * x - 15.0))
-            slope = 30.0 * x * x * (1.0 - x) * (1.0 - x) * per / drive.ramp_up_cycles
-        elif cycles >= drive.duration_cycles:
+            slope = 30.0 * x * x * (1.0 - x) * (1.0 - x) / drive.risen
+        elif t >= drive.ended:
             e = 0.0
-        elif cycles > drive.duration_cycles - drive.ramp_down_cycles:
-            x = (drive.duration_cycles - cycles) / drive.ramp_down_cycles
+        elif t > drive.falling:
+            x = (drive.ended - t) / (drive.ended - drive.falling)
             e = x * x * x * (10.0 + x * (6.0 * x - 15.0))
-            slope = -30.0 * x * x * (1.0 - x) * (1.0 - x) * per / drive.ramp_down_cycles
-        turn = 6.283185307179586 * (cycles - math.floor(cycles))
-        sine, cosine = sincos(turn)
+            slope = -30.0 * x * x * (1.0 - x) * (1.0 - x) / (drive.ended - drive.falling)
+        cycles = t * drive.rate / 6.283185307179586
+        sine, cosine = sincos(6.283185307179586 * (cycles - math.floor(cycles)))
         a, away, speed = drive.amplitude, 0.0, 0.0
-        if cycles > drive.duration_cycles:
-            x = min(cycles - drive.duration_cycles, 1.0)
+        if t > drive.ended:
+            over = drive.retracted - drive.ended
+            x = min((t - drive.ended) / over, 1.0)
             away = drive.retraction * x * x * x * (10.0 + x * (6.0 * x - 15.0))
-            speed = drive.retraction * 30.0 * x * x * (1.0 - x) * (1.0 - x) * per
+            speed = drive.retraction * 30.0 * x * x * (1.0 - x) * (1.0 - x) / over
         return a * e * sine - away, a * (slope * sine + e * drive.rate * cosine) - speed
 
     @staticmethod
     def acceleration(drive: Any, memory: Any, argument: float) -> float:
         """The second derivative."""
-        per = drive.rate / 6.283185307179586
-        cycles = argument / drive.omega * per
+        t = argument / drive.omega
         e, slope, bend = 1.0, 0.0, 0.0
         x, over, turned = -1.0, 1.0, 1.0
-        if cycles < drive.ramp_up_cycles:
-            x, over = cycles / drive.ramp_up_cycles, drive.ramp_up_cycles
-        elif cycles >= drive.duration_cycles:
+        if t < drive.risen:
+            x, over = t / drive.risen, drive.risen
+        elif t >= drive.ended:
             e = 0.0
-        elif cycles > drive.duration_cycles - drive.ramp_down_cycles:
-            x, over, turned = (
-                (drive.duration_cycles - cycles) / drive.ramp_down_cycles,
-                drive.ramp_down_cycles,
-                -1.0,
-            )
+        elif t > drive.falling:
+            over, turned = drive.ended - drive.falling, -1.0
+            x = (drive.ended - t) / over
         if x >= 0.0:
             e = x * x * x * (10.0 + x * (6.0 * x - 15.0))
-            slope = turned * 30.0 * x * x * (1.0 - x) * (1.0 - x) * per / over
-            bend = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) * per * per / (over * over)
-        turn = 6.283185307179586 * (cycles - math.floor(cycles))
-        (sine, cosine), rate = sincos(turn), drive.rate
+            slope = turned * 30.0 * x * x * (1.0 - x) * (1.0 - x) / over
+            bend = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) / (over * over)
+        cycles, rate = t * drive.rate / 6.283185307179586, drive.rate
+        sine, cosine = sincos(6.283185307179586 * (cycles - math.floor(cycles)))
         away = 0.0
-        if drive.duration_cycles < cycles < drive.duration_cycles + 1.0:
-            y = cycles - drive.duration_cycles
-            away = drive.retraction * 60.0 * y * (1.0 - y) * (1.0 - 2.0 * y) * per * per
+        if drive.ended < t < drive.retracted:
+            over = drive.retracted - drive.ended
+            y = (t - drive.ended) / over
+            away = drive.retraction * 60.0 * y * (1.0 - y) * (1.0 - 2.0 * y) / (over * over)
         return drive.amplitude * ((bend - e * rate * rate) * sine + 2.0 * slope * rate * cosine) - away

@@ -83,7 +83,8 @@ class BandLimitedNoise(Timed):
     ramp_up_cycles: float = quantity("1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN)
 
     name = "band_limited_noise"
-    number_names = ("omega", "fastest", "low", "high", "strength", "ramp_up_cycles", "table")
+    number_names = ("omega", "fastest", "low", "high", "strength", "risen", "table")
+    discontinuities = ("risen",)
     amplitudes = ("strength",)
 
     def __post_init__(self) -> None:
@@ -105,7 +106,7 @@ class BandLimitedNoise(Timed):
             "low": low,
             "high": high,
             "strength": columns["velocity_rms"] * scale.length * scale.omega * math.sqrt(2.0 / LINES),
-            "ramp_up_cycles": columns["ramp_up_cycles"] * self.cycle(columns, scale),
+            "risen": columns["ramp_up_cycles"] * self.cycle(columns, scale),
             "table": np.zeros(low.size),
         }
 
@@ -115,7 +116,7 @@ class BandLimitedNoise(Timed):
         parts = (np.arange(LINES) / LINES)[:, None]
         lowest = found["low"] + parts * (found["high"] - found["low"])
         highest = found["strength"] * np.sum(1.0 / lowest, axis=0)
-        return highest, LINES * found["strength"] + highest * _STEEPEST / found["ramp_up_cycles"]
+        return highest, LINES * found["strength"] + highest * _STEEPEST / found["risen"]
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """All sines at their hardest at once, with what the envelope adds."""
@@ -123,10 +124,8 @@ class BandLimitedNoise(Timed):
         parts = ((np.arange(LINES) + 1) / LINES)[:, None]
         fastest = found["low"] + parts * (found["high"] - found["low"])
         own = found["strength"] * np.sum(fastest, axis=0)
-        rising = 2.0 * _STEEPEST * LINES * found["strength"] / found["ramp_up_cycles"]
-        return np.asarray(
-            own + rising + _SHARPEST * self.bounds(columns, scale)[0] / found["ramp_up_cycles"] ** 2
-        )
+        rising = 2.0 * _STEEPEST * LINES * found["strength"] / found["risen"]
+        return np.asarray(own + rising + _SHARPEST * self.bounds(columns, scale)[0] / found["risen"] ** 2)
 
     def samples(self) -> _Array:
         """Place of each sine in the band, in units of its part, then the phases."""
@@ -148,11 +147,11 @@ class BandLimitedNoise(Timed):
             memory, int(drive.table), t, drive.low, (drive.high - drive.low) / LINES
         )
         moved, speed = moved * drive.strength, speed * drive.strength
-        if t >= drive.ramp_up_cycles:
+        if t >= drive.risen:
             return moved, speed
-        s = t / drive.ramp_up_cycles
+        s = t / drive.risen
         e = s * s * s * (10.0 + s * (6.0 * s - 15.0))
-        return e * moved, e * speed + 30.0 * s * s * (1.0 - s) * (1.0 - s) / drive.ramp_up_cycles * moved
+        return e * moved, e * speed + 30.0 * s * s * (1.0 - s) * (1.0 - s) / drive.risen * moved
 
     @staticmethod
     def acceleration(drive: Any, memory: Any, argument: float) -> float:
@@ -162,12 +161,12 @@ class BandLimitedNoise(Timed):
             memory, int(drive.table), t, drive.low, (drive.high - drive.low) / LINES
         )
         moved, speed, bent = moved * drive.strength, speed * drive.strength, bent * drive.strength
-        if t >= drive.ramp_up_cycles:
+        if t >= drive.risen:
             return bent
-        s = t / drive.ramp_up_cycles
+        s = t / drive.risen
         e = s * s * s * (10.0 + s * (6.0 * s - 15.0))
-        first = 30.0 * s * s * (1.0 - s) * (1.0 - s) / drive.ramp_up_cycles
-        second = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (drive.ramp_up_cycles * drive.ramp_up_cycles)
+        first = 30.0 * s * s * (1.0 - s) * (1.0 - s) / drive.risen
+        second = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (drive.risen * drive.risen)
         return e * bent + 2.0 * first * speed + second * moved
 
 

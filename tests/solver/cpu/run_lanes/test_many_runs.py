@@ -63,6 +63,7 @@ def assert_marched(runs, told, accumulators_of_runs):
     assert all(before[0] <= after[0] for before, after in pairwise(told))
 
 
+@pytest.mark.slow
 def test_memory_of_a_run_does_not_depend_on_their_number():
     marched(100)  # what is compiled and measured once
     few, _, _ = marched(10_000)
