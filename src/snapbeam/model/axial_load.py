@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Drive, Scale, Timed
+from snapbeam.model.drive.base import Drive, Scale, Timed, smooth_rise
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.validation import InputTypeError, shown
 
@@ -149,10 +149,8 @@ class LoadRamp(LoadMotion, Timed):
         way = 1.0
         if t > drive.duration + drive.hold_periods:
             t, way = 2.0 * drive.duration + drive.hold_periods - t, -1.0
-        x = min(max(t / drive.duration, 0.0), 1.0)
-        share = x * x * x * (10.0 + x * (6.0 * x - 15.0))
-        rate = 30.0 * x * x * (1.0 - x) * (1.0 - x) / drive.duration
-        return drive.change * share, way * drive.change * rate
+        share, rate, _ = smooth_rise(min(max(t / drive.duration, 0.0), 1.0))
+        return drive.change * share, way * drive.change * rate / drive.duration
 
     @staticmethod
     def acceleration(drive: Any, memory: Any, argument: float) -> float:

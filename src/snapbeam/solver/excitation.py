@@ -9,6 +9,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload
 
+from snapbeam.model.drive.base import SCALAR
 from snapbeam.model.drive.base import sincos as drive_sincos
 from snapbeam.model.drive.combined import parts_of
 from snapbeam.model.drive.noise import LINES, sums_of_sines
@@ -378,6 +379,10 @@ def _sums_in_registers(memory, table, t, low, width):
         velocity = velocity + cosine
         acceleration = acceleration - sine * rate
     return lanes_sum(displacement), lanes_sum(velocity), lanes_sum(acceleration)
+
+
+for _each in SCALAR:
+    overload(_each, jit_options=INLINE_HERE, strict=False)(lambda *types, own=_each: own)
 
 
 @overload(drive_sincos, jit_options=INLINE_HERE)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,11 @@ from snapbeam.util.validation import NamedTable
 if TYPE_CHECKING:
     from snapbeam.model.reduced_model import ReducedModel
 
-__all__ = ["DRIVES", "HORIZON", "Drive", "Scale", "Timed", "sincos"]
+__all__ = ["DRIVES", "HORIZON", "SCALAR", "Drive", "Scale", "Timed", "scalar", "sincos", "smooth_rise"]
 
 
 _Array = NDArray[np.float64]
+_Scalar = TypeVar("_Scalar", bound=Callable[..., Any])
 
 
 def _sum_named(name: str) -> type[Drive] | None:
@@ -40,6 +41,26 @@ class Scale(NamedTuple):
     """Length that normalises displacements, m: the buckling level b."""
     omega: float
     """Angular frequency that Omega and V are normalised by, rad/s."""
+
+
+SCALAR: list[Callable[..., Any]] = []
+"""Functions of numbers that motions share; kernels compile them as they stand."""
+
+
+def scalar(function: _Scalar) -> _Scalar:
+    """Have kernels compile a function that motions call."""
+    SCALAR.append(function)
+    return function
+
+
+@scalar
+def smooth_rise(x: float) -> tuple[float, float, float]:
+    """x^3 (10 - 15 x + 6 x^2), from 0 to 1 with x, and its first two derivatives."""
+    return (
+        x * x * x * (10.0 + x * (6.0 * x - 15.0)),
+        30.0 * x * x * (1.0 - x) * (1.0 - x),
+        60.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
+    )
 
 
 def sincos(angle: float) -> tuple[float, float]:

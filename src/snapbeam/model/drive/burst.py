@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed, sincos
+from snapbeam.model.drive.base import Scale, Timed, scalar, sincos, smooth_rise
 from snapbeam.model.quantity import RUN, check_fields, quantity
 from snapbeam.util.validation import InputError
 
@@ -120,49 +120,50 @@ class Burst(Timed):
     def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
         """E w and its derivative."""
         t = argument / drive.omega
-        e, slope = 1.0, 0.0
-        if t < drive.risen:
-            x = t / drive.risen
-            e = x * x * x * (10.0 + x * (6.0 * x - 15.0))
-            slope = 30.0 * x * x * (1.0 - x) * (1.0 - x) / drive.risen
-        elif t >= drive.ended:
-            e = 0.0
-        elif t > drive.falling:
-            x = (drive.ended - t) / (drive.ended - drive.falling)
-            e = x * x * x * (10.0 + x * (6.0 * x - 15.0))
-            slope = -30.0 * x * x * (1.0 - x) * (1.0 - x) / (drive.ended - drive.falling)
-        cycles = t * drive.rate / 6.283185307179586
-        sine, cosine = sincos(6.283185307179586 * (cycles - math.floor(cycles)))
-        a, away, speed = drive.amplitude, 0.0, 0.0
-        if t > drive.ended:
-            over = drive.retracted - drive.ended
-            x = min((t - drive.ended) / over, 1.0)
-            away = drive.retraction * x * x * x * (10.0 + x * (6.0 * x - 15.0))
-            speed = drive.retraction * 30.0 * x * x * (1.0 - x) * (1.0 - x) / over
-        return a * e * sine - away, a * (slope * sine + e * drive.rate * cosine) - speed
+        e, slope, _ = _envelope(drive, t)
+        away, speed, _ = _retreat(drive, t)
+        sine, cosine = _turn(drive, t)
+        return drive.amplitude * e * sine - away, drive.amplitude * (
+            slope * sine + e * drive.rate * cosine
+        ) - speed
 
     @staticmethod
     def acceleration(drive: Any, memory: Any, argument: float) -> float:
         """The second derivative."""
-        t = argument / drive.omega
-        e, slope, bend = 1.0, 0.0, 0.0
-        x, over, turned = -1.0, 1.0, 1.0
-        if t < drive.risen:
-            x, over = t / drive.risen, drive.risen
-        elif t >= drive.ended:
-            e = 0.0
-        elif t > drive.falling:
-            over, turned = drive.ended - drive.falling, -1.0
-            x = (drive.ended - t) / over
-        if x >= 0.0:
-            e = x * x * x * (10.0 + x * (6.0 * x - 15.0))
-            slope = turned * 30.0 * x * x * (1.0 - x) * (1.0 - x) / over
-            bend = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) / (over * over)
-        cycles, rate = t * drive.rate / 6.283185307179586, drive.rate
-        sine, cosine = sincos(6.283185307179586 * (cycles - math.floor(cycles)))
-        away = 0.0
-        if drive.ended < t < drive.retracted:
-            over = drive.retracted - drive.ended
-            y = (t - drive.ended) / over
-            away = drive.retraction * 60.0 * y * (1.0 - y) * (1.0 - 2.0 * y) / (over * over)
+        t, rate = argument / drive.omega, drive.rate
+        e, slope, bend = _envelope(drive, t)
+        _, _, away = _retreat(drive, t)
+        sine, cosine = _turn(drive, t)
         return drive.amplitude * ((bend - e * rate * rate) * sine + 2.0 * slope * rate * cosine) - away
+
+
+@scalar
+def _envelope(drive: Any, t: float) -> tuple[float, float, float]:
+    """E and its first two derivatives."""
+    if t < drive.risen:
+        e, slope, bend = smooth_rise(t / drive.risen)
+        return e, slope / drive.risen, bend / (drive.risen * drive.risen)
+    if t >= drive.ended:
+        return 0.0, 0.0, 0.0
+    if t > drive.falling:
+        over = drive.ended - drive.falling
+        e, slope, bend = smooth_rise((drive.ended - t) / over)
+        return e, -slope / over, bend / (over * over)
+    return 1.0, 0.0, 0.0
+
+
+@scalar
+def _retreat(drive: Any, t: float) -> tuple[float, float, float]:
+    """Distance by which the tip has withdrawn and its first two derivatives."""
+    if t <= drive.ended:
+        return 0.0, 0.0, 0.0
+    over = drive.retracted - drive.ended
+    e, slope, bend = smooth_rise(min((t - drive.ended) / over, 1.0))
+    return drive.retraction * e, drive.retraction * slope / over, drive.retraction * bend / (over * over)
+
+
+@scalar
+def _turn(drive: Any, t: float) -> tuple[float, float]:
+    """Sine and cosine of the phase, of which whole turns are left out."""
+    cycles = t * drive.rate / 6.283185307179586
+    return sincos(6.283185307179586 * (cycles - math.floor(cycles)))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.drive.base import Scale, Timed, smooth_rise
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
 from snapbeam.util.validation import InputError
 
@@ -143,31 +143,20 @@ class BandLimitedNoise(Timed):
     def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
         """The sum under the envelope, and its derivative."""
         t = argument / drive.omega
-        moved, speed, _ = sums_of_sines(
-            memory, int(drive.table), t, drive.low, (drive.high - drive.low) / LINES
-        )
-        moved, speed = moved * drive.strength, speed * drive.strength
-        if t >= drive.risen:
-            return moved, speed
-        s = t / drive.risen
-        e = s * s * s * (10.0 + s * (6.0 * s - 15.0))
-        return e * moved, e * speed + 30.0 * s * s * (1.0 - s) * (1.0 - s) / drive.risen * moved
+        width = (drive.high - drive.low) / LINES
+        moved, speed, _ = sums_of_sines(memory, int(drive.table), t, drive.low, width)
+        e, slope, _ = smooth_rise(min(t / drive.risen, 1.0))
+        return e * drive.strength * moved, drive.strength * (e * speed + slope / drive.risen * moved)
 
     @staticmethod
     def acceleration(drive: Any, memory: Any, argument: float) -> float:
         """The second derivative."""
         t = argument / drive.omega
-        moved, speed, bent = sums_of_sines(
-            memory, int(drive.table), t, drive.low, (drive.high - drive.low) / LINES
-        )
-        moved, speed, bent = moved * drive.strength, speed * drive.strength, bent * drive.strength
-        if t >= drive.risen:
-            return bent
-        s = t / drive.risen
-        e = s * s * s * (10.0 + s * (6.0 * s - 15.0))
-        first = 30.0 * s * s * (1.0 - s) * (1.0 - s) / drive.risen
-        second = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (drive.risen * drive.risen)
-        return e * bent + 2.0 * first * speed + second * moved
+        width = (drive.high - drive.low) / LINES
+        moved, speed, bent = sums_of_sines(memory, int(drive.table), t, drive.low, width)
+        e, slope, bend = smooth_rise(min(t / drive.risen, 1.0))
+        first, second = slope / drive.risen, bend / (drive.risen * drive.risen)
+        return drive.strength * (e * bent + 2.0 * first * speed + second * moved)
 
 
 def sums_of_sines(memory: Any, table: int, t: float, low: float, width: float) -> tuple[float, float, float]:
