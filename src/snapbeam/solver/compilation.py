@@ -525,6 +525,21 @@ class _Telling(event.Listener):
         """Nothing to say."""
 
 
+def is_compiled(march: Any, *arguments: Any) -> bool:
+    """True if a kernel for such arguments is in memory or on the disk."""
+    signature = tuple(typeof(value) for value in arguments)
+    if signature in getattr(march, "overloads", ()):
+        return True
+    cache = getattr(march, "_cache", None)
+    if not isinstance(cache, _KeptCode):
+        return False
+    try:
+        return cache._index_key(signature, march.targetctx.codegen()) in cache._cache_file._load_index()
+    except Exception as error:  # whatever became of the file
+        _LOG.debug("the index of compiled code could not be read: %s", error)
+        return False
+
+
 def ready(march: Any, *arguments: Any) -> None:
     """Compile a kernel for such arguments, or fetch it from the disk, before anything is timed; says so in the log."""
     collecting = gc.isenabled()

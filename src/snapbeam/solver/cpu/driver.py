@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.solver.compilation import kernel, ready
+from snapbeam.solver.compilation import is_compiled, kernel, ready
 from snapbeam.solver.cpu.integrate import KernelOutput, integrate_ensemble, integrate_recorded
 from snapbeam.solver.cpu.memory import Memory, Packed, lay_out, pack
 from snapbeam.solver.cpu.recording import MARKS, REALS, VALUES, Outputs
@@ -43,6 +43,8 @@ FEW_MODES = 12
 FEWEST_STEPS = 5e6
 """Flight steps asked for, of one kind of ensembles, from which on what they save pays for another kernel."""
 _WORK: dict[tuple[Any, ...], float] = {}
+_KEPT: dict[tuple[Any, ...], bool] = {}
+"""Kinds of ensembles, and whether their kernel of eight runs in a register was compiled before the process began."""
 _ASKING = Lock()
 _POLL = 0.2
 """Seconds after which an interrupt is heard."""
@@ -184,7 +186,7 @@ def _march(
     output_states: int,
 ) -> OutputStates:
     packed = _packed(ensemble)
-    if output_states == 0 and _few_modes_pay(ensemble, packed):
+    if output_states == 0 and (_few_modes_pay(ensemble, packed) or _few_modes_kept(ensemble, packed)):
         return _spread_over(
             ensemble, packed, *_side_by_side(ensemble, packed), threads, progress, output_states
         )
@@ -218,6 +220,29 @@ def _few_modes_pay(ensemble: Ensemble, packed: Packed) -> bool:
     with _ASKING:
         _WORK[kind] = _WORK.get(kind, 0.0) + float(ensemble.work.sum())
         return _WORK[kind] >= FEWEST_STEPS
+
+
+def _few_modes_kept(ensemble: Ensemble, packed: Packed) -> bool:
+    """True if the kernel of eight runs in a register is faster and was compiled before."""
+    if ensemble.size < WIDTH or not suits(ensemble, packed, FEW_MODES):
+        return False
+    kind = (packed.members, ensemble.order, ensemble.law, ensemble.drive)
+    if kind not in _KEPT:
+        march, arguments = _side_by_side(ensemble, packed)
+        _KEPT[kind] = is_compiled(
+            march, *arguments(np.zeros(1, dtype=np.int64), _empty_output(ensemble, packed, 1, 0))
+        )
+    return _KEPT[kind]
+
+
+def _empty_output(ensemble: Ensemble, packed: Packed, runs: int, output_states: int) -> KernelOutput:
+    """Room for the results of some runs."""
+    return KernelOutput(
+        empty_accumulators(runs, _beside(ensemble), len(ensemble.circuits)),
+        np.empty((runs, output_states, 2 * packed.layout.size)),
+        np.empty((runs, output_states, 2 + _beside(ensemble)), dtype=np.int64),
+        np.zeros(1, dtype=np.int64),
+    )
 
 
 def _side_by_side(
@@ -258,13 +283,7 @@ def _spread_over(
     output_states: int,
 ) -> OutputStates:
     """Hand the runs to threads, in chunks; *arguments* are those of *integrate*, whose memory is a thread's own."""
-    size = packed.layout.size
-    kernel_output = KernelOutput(
-        empty_accumulators(ensemble.size, _beside(ensemble), len(ensemble.circuits)),
-        np.empty((ensemble.size, output_states, 2 * size)),
-        np.empty((ensemble.size, output_states, 2 + _beside(ensemble)), dtype=np.int64),
-        np.zeros(1, dtype=np.int64),
-    )
+    size, kernel_output = packed.layout.size, _empty_output(ensemble, packed, ensemble.size, output_states)
     threads = threads or usable_cores()
     ready(march, *arguments(np.zeros(1, dtype=np.int64), kernel_output))
     if progress is not None:

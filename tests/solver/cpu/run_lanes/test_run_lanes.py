@@ -172,3 +172,10 @@ def test_small_work_is_not_worth_another_kernel(monkeypatch):
     monkeypatch.setattr(driver, "_WORK", {})
     monkeypatch.setattr(driver, "FEWEST_STEPS", 2.5 * made.work.sum())
     assert [driver._few_modes_pay(made, packed) for _ in range(4)] == [False, False, True, True]
+    monkeypatch.setattr(driver, "_KEPT", {})
+    kernel = driver._kernel(driver.integrate_run_lanes, made)
+    driver.run_ensemble(made, 1)
+    assert driver._few_modes_kept(made, packed), "what is compiled serves from the first run on"
+    monkeypatch.setattr(kernel, "overloads", {})
+    monkeypatch.setattr(driver, "_KEPT", {})
+    assert driver._few_modes_kept(made, packed), "so does what is on the disk"
