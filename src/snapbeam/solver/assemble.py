@@ -28,6 +28,7 @@ from snapbeam.solver.further_contacts import LAW, NUMBERS, OFFSET, REST, SIGN, S
 from snapbeam.solver.restrictions import check_integrable
 from snapbeam.solver.step_size import Clocked, Plan, choose_base_step, clocked, most_steps
 from snapbeam.solver.structure import Structure, structure_of
+from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.validation import InputError, shown
 
 __all__ = [
@@ -485,6 +486,14 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
     return columns
 
 
+_NOTABLE = 10.0
+"""Shortening of the steps by circuits that is worth a diagnostic."""
+_FAST_CIRCUIT = (
+    "harvester: the circuit makes steps up to {:g} times as short as the beam needs, and runs as many times as "
+    "long, since its time constant is short or its coupling strong"
+)
+
+
 def plans_of(system: System, integration: Integration, columns: Mapping[str, _Array]) -> list[Plan]:
     """The steps of each run: they follow from the structure and from the run's own contact.
 
@@ -507,6 +516,11 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
         ]
     if integration.step is None and system.harvesters:
         allowed = _longest_with_circuits(system, columns, len(plans), integration.accuracy)
+        longer = max(each.step / own for each, own in zip(plans, allowed.tolist(), strict=True))
+        if longer > _NOTABLE:
+            tell(
+                [Diagnostic("fast-circuit", _FAST_CIRCUIT.format(float(f"{longer:.1g}")), {"longer": longer})]
+            )
         plans = [
             each._replace(step=min(each.step, own)) for each, own in zip(plans, allowed.tolist(), strict=True)
         ]
