@@ -82,8 +82,20 @@ def _reader(part: str, kind: Any, alone: bool) -> Any:
     return inlined(made["read"])
 
 
+_registered: set[Any] = set()
+
+
+def _register_shared() -> None:
+    """Have Numba compile the functions that motions share, those of drives that came later included."""
+    for each in SCALAR:
+        if each not in _registered:
+            _registered.add(each)
+            overload(each, jit_options=INLINE_HERE, strict=False)(lambda *types, own=each: own)
+
+
 def _of_kind(kind: Any, what: str) -> Any:
     """The motion or the acceleration of a kind of drive, as a function of its numbers, memory and its argument."""
+    _register_shared()
     if kind.terms:
         return _summed(kind, what, len(kind.terms))
     if kind.harmonic:
@@ -379,10 +391,6 @@ def _sums_in_registers(memory, table, t, low, width):
         velocity = velocity + cosine
         acceleration = acceleration - sine * rate
     return lanes_sum(displacement), lanes_sum(velocity), lanes_sum(acceleration)
-
-
-for _each in SCALAR:
-    overload(_each, jit_options=INLINE_HERE, strict=False)(lambda *types, own=_each: own)
 
 
 @overload(drive_sincos, jit_options=INLINE_HERE)
