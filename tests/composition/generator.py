@@ -32,6 +32,7 @@ DRIVES = (
 )  # fmt: skip
 BASES = (
     "acceleration_sine", "displacement_sine", "two_tone", "chirp", "burst", "shock", "recorded_acceleration", "noise",
+    "sum",
 )  # fmt: skip
 FORCES = ("harmonic_force", "constant_force", "recorded_force")
 LOADS = ("sine", "ramp")
@@ -342,6 +343,9 @@ def shaken(kind: str, number: Numbers) -> tuple[sb.Drive, Motion, list[float]]:
         spline = CubicSpline(times, record)
         made = sb.RecordedAcceleration(record=record, sampling_frequency=1.0 / times[1])
         return made, lambda t: (0.0, 0.0, float(spline(t))), []
+    if kind == "sum":
+        one, two = moving("noise", number), moving("burst", number)
+        return one[0] + two[0], added(one[1], two[1]), one[2] + two[2]
     return moving(kind, number)
 
 
