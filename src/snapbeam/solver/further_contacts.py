@@ -142,73 +142,46 @@ def _by_law(laws: tuple[Any, ...], function: Any) -> Any:
     return chosen
 
 
-def count_of(kinds: Any) -> int:
-    """How many strikers there are beside the first."""
-    return len(type(kinds).owner.laws)
+def _of_laws(value: Callable[[Any], Any]) -> Any:
+    """A function f(kinds): *value* of the tuple of laws; known when a kernel is compiled."""
 
-
-@overload(count_of, jit_options=INLINE_HERE)
-def _count_of(kinds):
-    count = len(kinds.instance_class.owner.laws)
-    return lambda kinds: count
-
-
-def _any_law(predicate: Callable[[Any], bool]) -> Any:
-    """A function f(kinds): True if a law among them has a property; known when a kernel is compiled."""
-
-    def stub(kinds: Any) -> bool:
-        raise TypeError("laws of further contacts run in compiled code only")
+    def stub(kinds: Any) -> Any:
+        return value(type(kinds).owner.laws)
 
     @overload(stub, jit_options=INLINE_HERE)
     def chosen(kinds):
-        found = any(predicate(law) for law in kinds.instance_class.owner.laws)
+        found = value(kinds.instance_class.owner.laws)
         return lambda kinds: found
 
     return stub
 
 
-any_damped = _any_law(lambda law: law.rate_dependent)
-any_jumps = _any_law(begins_with_jump)
+def _of_each_law(value: Callable[[Any], Any]) -> Any:
+    """A function f(kinds, j): *value* of the law of striker *j* beside the first; a constant if it is the same of all."""
+
+    def stub(kinds: Any, j: int) -> Any:
+        return value(type(kinds).owner.laws[j])
+
+    @overload(stub, jit_options=INLINE_HERE)
+    def chosen(kinds, j):
+        values = tuple(value(law) for law in kinds.instance_class.owner.laws)
+        if len(set(values)) > 1:
+            return lambda kinds, j: values[j]
+        common = values[0]
+        return lambda kinds, j: common
+
+    return stub
 
 
-def damped_at(kinds: Any, j: int) -> bool:
-    """True if the law of striker *j* beside the first loses energy."""
-    return type(kinds).owner.laws[j].rate_dependent
-
-
-@overload(damped_at, jit_options=INLINE_HERE)
-def _damped_at(kinds, j):
-    damped = tuple(bool(law.rate_dependent) for law in kinds.instance_class.owner.laws)
-    if not any(damped):
-        return lambda kinds, j: False
-    return lambda kinds, j: damped[j]
-
-
-def breaks_at(kinds: Any, j: int) -> bool:
-    """True if the force of striker *j* beside the first is not smooth within a contact (:func:`force_break`)."""
-    law = type(kinds).owner.laws[j]
-    return bool(law.rate_dependent or law.memory)
-
-
-@overload(breaks_at, jit_options=INLINE_HERE)
-def _breaks_at(kinds, j):
-    breaks = tuple(bool(law.rate_dependent or law.memory) for law in kinds.instance_class.owner.laws)
-    if not any(breaks):
-        return lambda kinds, j: False
-    return lambda kinds, j: breaks[j]
-
-
-def memory_place(kinds: Any, j: int) -> int:
-    """Place of the residual indentation among the numbers of striker *j* beside the first, or -1."""
-    law = type(kinds).owner.laws[j]
-    return LAW + len(law.numbers_type()._fields) - 1 if law.memory else -1
-
-
-@overload(memory_place, jit_options=INLINE_HERE)
-def _memory_place(kinds, j):
-    laws = kinds.instance_class.owner.laws
-    places = tuple(LAW + len(law.numbers_type()._fields) - 1 if law.memory else -1 for law in laws)
-    return lambda kinds, j: places[j]
+count_of = _of_laws(len)
+any_damped = _of_laws(lambda laws: any(law.rate_dependent for law in laws))
+any_jumps = _of_laws(lambda laws: any(begins_with_jump(law) for law in laws))
+damped_at = _of_each_law(lambda law: bool(law.rate_dependent))
+"""Whether the law of a striker loses energy."""
+breaks_at = _of_each_law(lambda law: bool(law.rate_dependent or law.memory))
+"""Whether its force is not smooth within a contact (:func:`force_break`)."""
+memory_place = _of_each_law(lambda law: LAW + len(law.numbers_type()._fields) - 1 if law.memory else -1)
+"""Place of the residual indentation among the numbers of a striker, or -1."""
 
 
 def _function_of_contact(function: Any) -> Any:
