@@ -176,10 +176,11 @@ def damped_orbits(ratio: float, velocity: float, phase: float) -> list[np.ndarra
 FOLD = 0.40663746
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("velocity", "which", "direction"),
     [
-        pytest.param(0.44, 0, "down", marks=pytest.mark.slow),
+        (0.44, 0, "down"),
         (0.43, 1, "down"),
         (0.42495795, 0, "down"),
         (0.415, 0, "up"),

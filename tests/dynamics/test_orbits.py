@@ -65,6 +65,7 @@ def test_the_map_of_a_force_that_begins_with_a_jump_is_smooth() -> None:
     assert np.sqrt(np.mean(residual**2)) < 1e-10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transient", range(60, 165, 7))
 def test_orbits_of_a_force_that_begins_with_a_jump(transient: int) -> None:
     """At the default tolerance, from 15 states."""
@@ -105,9 +106,8 @@ def contact_of_a_ball(
         t, y = t + 1e-9, y + 1e-9 * np.array(falling(t, y))
 
 
-@pytest.mark.parametrize(
-    ("restitution", "stroke"), [pytest.param(0.5, 1.2, marks=pytest.mark.slow), (0.3, 1.8)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("restitution", "stroke"), [(0.5, 1.2), (0.3, 1.8)])
 def test_determinant_of_a_bouncing_ball(restitution: float, stroke: float) -> None:
     """Phase volume shrinks by exp(-c/m times the time with a force) in a period; k = 1e7."""
     ball = sb.ReducedModel.from_matrices(

@@ -109,6 +109,7 @@ def test_onsets_of_isolated_impacts_of_a_simulated_run_within_one_frame(tmp_path
     assert checked >= 4
 
 
+@pytest.mark.slow
 def test_a_run_without_its_length_scale_is_refused():
     run = sb.simulate(
         sb.System(

@@ -158,6 +158,7 @@ def test_bistable_piezoelectric_oscillator_of_the_literature() -> None:
         assert power / 0.1 == pytest.approx(0.017855962, rel=3e-6)
 
 
+@pytest.mark.slow
 def test_layers_on_the_matrices_of_a_beam(shaken: sb.System) -> None:
     """The coupling row of the beam's own layers, given with the beam's matrices, gives the beam's run."""
     beam, layers = shaken.model, shaken.harvester
