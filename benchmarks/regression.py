@@ -69,9 +69,10 @@ def _timed(tree: Path, case: str, size: tuple[int, int, int]) -> dict[str, float
         env=environment, cwd=tree, capture_output=True, text=True, check=False,
     )  # fmt: skip
     if done.returncode:
-        if "KeyError" in done.stderr:
+        reason = done.stderr.strip().splitlines()[-1]
+        if reason == f"KeyError: {case!r}":
             return None
-        raise RuntimeError(f"{case}: {done.stderr.strip().splitlines()[-1]}")
+        raise RuntimeError(f"{case}: {reason}")
     found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
     return found
 

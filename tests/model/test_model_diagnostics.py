@@ -203,7 +203,7 @@ def test_a_circuit_that_shortens_the_steps_is_said():
         struck = sb.System(sb.ReducedModel.from_beam(beam, 4), contacts=contacts, harvesters=[layers])
         return plans_of(struck, sb.Integration(cycles=1), run_columns(struck, {}))[0].step
 
-    with pytest.warns(sb.DiagnosticWarning, match="steps up to 200 times as short"):
+    with pytest.warns(sb.DiagnosticWarning, match="steps up to 200 times shorter"):
         short = steps(1.0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

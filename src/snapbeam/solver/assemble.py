@@ -489,8 +489,8 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
 _NOTABLE = 10.0
 """Shortening of the steps by circuits that is worth a diagnostic."""
 _FAST_CIRCUIT = (
-    "harvester: the circuit makes steps up to {:g} times as short as the beam needs, and runs as many times as "
-    "long, since its time constant is short or its coupling strong"
+    "harvester: the circuit makes steps up to {0:g} times shorter than the beam needs, so that runs take up to {0:g} "
+    "times as long; its time constant is short or its coupling strong"
 )
 
 

@@ -44,7 +44,7 @@ FEWEST_STEPS = 5e6
 """Flight steps asked for, of one kind of ensembles, from which on what they save pays for another kernel."""
 _WORK: dict[tuple[Any, ...], float] = {}
 _KEPT: dict[tuple[Any, ...], bool] = {}
-"""Kinds of ensembles, and whether their kernel of eight runs in a register was compiled before the process began."""
+"""Kinds of ensembles, and whether their kernel of eight runs in a register was compiled when first asked for."""
 _ASKING = Lock()
 _POLL = 0.2
 """Seconds after which an interrupt is heard."""

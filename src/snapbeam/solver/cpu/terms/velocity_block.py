@@ -56,6 +56,7 @@ integral, of D v and of v."""
 _LINEAR = 1e-9
 """Relative deviation of a force from linear within a kick, at most."""
 _FACTORIALS = tuple(1.0 / math.factorial(k + 3) for k in range(15, -1, -1))
+"""1 / (k + 3)! from k = 15 down."""
 
 
 class VelocityBlock(NamedTuple):
@@ -153,7 +154,7 @@ class ContactDamping(NamedTuple):
     @staticmethod
     @inlined
     def damping_coefficient(memory, term, coefficient):
-        """C; while the contact pushes."""
+        """C, while the contact pushes."""
         return memory[term.numbers + DAMPING]
 
     @staticmethod
