@@ -20,6 +20,7 @@ _PARTS = {
     "explorer": "explorer",
     "dynamics": "dynamics",
     "systems": "systems",
+    "fixed-steps": "fixed_steps",
 }
 
 

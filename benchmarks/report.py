@@ -29,7 +29,7 @@ def describe(facts: dict[str, Any], quick: bool) -> str:
     )
     busy = f"; load before the run {facts['load_before']}" if "load_before" in facts else ""
     note = " Quick run: few repeats, short runs." if quick else ""
-    return f"{facts['processor']}, {facts['cores']} cores{busy}; {versions}.{note}\n"
+    return f"{facts['processor']} ({facts['vectors']}), {facts['cores']} cores{busy}; {versions}.{note}\n"
 
 
 def save(folder: Path, name: str, quick: bool, data: dict[str, Any], text: str) -> None:

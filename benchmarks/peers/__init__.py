@@ -34,7 +34,7 @@ class Method(NamedTuple):
     """Many cases at once, if it can: times and ends then have a row, or an entry, for each."""
 
 
-PEERS = ("scipy", "numbalsoda", "boost", "heyoka", "diffrax")
+PEERS = ("fixed_steps", "scipy", "numbalsoda", "boost", "heyoka", "diffrax")
 
 
 def methods(peer: str) -> tuple[Method, ...] | str:

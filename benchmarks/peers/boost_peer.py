@@ -3,11 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import os
-import re
-import shutil
-import subprocess
 from functools import partial
 from pathlib import Path
 
@@ -17,38 +12,16 @@ from numpy.typing import NDArray
 
 from benchmarks.cases import Case
 from benchmarks.peers import Method, Solver
+from benchmarks.peers.compiled import library
 from benchmarks.rhs import compiled_system
-from snapbeam.solver.compilation import private_folder
 
 __all__ = ["METHODS"]
 
 _Array = NDArray[np.float64]
-_SOURCE = Path(__file__).with_suffix(".cpp")
-_OPTIONS = ("-std=c++14", "-O3", "-march=native", "-DNDEBUG", "-shared", "-fPIC")
 _SIGNATURE = types.void(types.double, *3 * (types.CPointer(types.double),))
 
 
-def _library() -> ctypes.CDLL:
-    compiler = os.environ.get("CXX") or shutil.which("g++") or shutil.which("c++")
-    if compiler is None:
-        raise ImportError("no C++ compiler", name="boost")
-    text = _SOURCE.read_bytes() + " ".join((compiler, *_OPTIONS)).encode()
-    folder = Path(private_folder())  # code is loaded from here: nobody else may write there
-    name = f"boost-{hashlib.sha256(text).hexdigest()[:12]}"
-    built = folder / f"{name}.so"
-    if not built.exists():
-        made = folder / f"{name}-{os.getpid()}.so"
-        done = subprocess.run(
-            [compiler, *_OPTIONS, str(_SOURCE), "-o", str(made)], capture_output=True, text=True
-        )
-        if done.returncode != 0:
-            why = (re.findall(r"error: .*", done.stderr) or ["it does not compile"])[0]
-            raise ImportError(why, name="boost")
-        made.replace(built)
-    return ctypes.CDLL(str(built))
-
-
-_LIBRARY = _library()
+_LIBRARY = library(Path(__file__).with_suffix(".cpp"), "-std=c++14")
 _LIBRARY.version.restype = ctypes.c_char_p
 _VERSION = _LIBRARY.version().decode().replace("_", ".")
 _SOLVE = _LIBRARY.solve

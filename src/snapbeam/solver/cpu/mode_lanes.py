@@ -105,128 +105,97 @@ class Layout(NamedTuple):
 
 
 @inlined
-def _close_rows(memory, g, q, r, row, product, total_g, total_r):
-    """Keep eight rows of G q; add their part to g.q and q.Gq."""
-    store(memory, r + row, product)
-    q_row = load(memory, q + row)
-    return fma(load(memory, g + row), q_row, total_g), fma(product, q_row, total_r)
+def _rows_of_product(memory, at, stride, step, q, columns):
+    """Sum over the columns *step* apart, and their right neighbours, of eight rows of G times q."""
+    even, odd = splat(0.0), splat(0.0)
+    last = q + columns
+    while q < last:
+        even = fma(load(memory, at), broadcast_load(memory, q), even)
+        odd = fma(load(memory, at + stride), broadcast_load(memory, q + 1), odd)
+        at += step * stride
+        q += step
+    return even + odd
+
+
+@inlined
+def _rows_of_two_products(memory, at, stride, step, a, b, columns):
+    """:func:`_rows_of_product` of two states, with G read only once."""
+    even_a, odd_a, even_b, odd_b = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+    last = a + columns
+    while a < last:
+        even, odd = load(memory, at), load(memory, at + stride)
+        even_a = fma(even, broadcast_load(memory, a), even_a)
+        even_b = fma(even, broadcast_load(memory, b), even_b)
+        odd_a = fma(odd, broadcast_load(memory, a + 1), odd_a)
+        odd_b = fma(odd, broadcast_load(memory, b + 1), odd_b)
+        at += step * stride
+        a += step
+        b += step
+    return even_a + odd_a, even_b + odd_b
+
+
+@inlined
+def _products_of_rows(memory, size, g, q, r):
+    """g.q and q.r."""
+    along_g, along_r = splat(0.0), splat(0.0)
+    for row in range(0, size, WIDTH):
+        q_row = load(memory, q + row)
+        along_g = fma(load(memory, g + row), q_row, along_g)
+        along_r = fma(load(memory, r + row), q_row, along_r)
+    return lanes_sum(along_g), lanes_sum(along_r)
 
 
 @inlined
 def tension_rows(memory, blocks, layout, q, r):
     """r = G q; returns g.q and q.r.
 
-    *blocks* holds, for each block, its first row, the row after its last, and its columns.
+    *blocks* holds, for each block, its first row, the row after its last, and its columns.  Eight rows and two sums at a
+    time fit the registers of a processor with vectors of four numbers; more would be kept in memory.
     """
-    g, at = layout.g, layout.tension
-    total_g, total_r = splat(0.0), splat(0.0)
+    at = layout.tension
     for block in range(0, blocks.size, 3):
         row, stop, columns = blocks[block], blocks[block + 1], blocks[block + 2]
         column = q + row
-        last = column + columns
-        while row + 2 * WIDTH <= stop:
-            low0, high0, low1, high1 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
-            low2, high2, low3, high3 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
-            here = column
-            while here < last:
-                q0, q1 = broadcast_load(memory, here), broadcast_load(memory, here + 1)
-                q2, q3 = broadcast_load(memory, here + 2), broadcast_load(memory, here + 3)
-                low0 = fma(load(memory, at), q0, low0)
-                high0 = fma(load(memory, at + WIDTH), q0, high0)
-                low1 = fma(load(memory, at + 2 * WIDTH), q1, low1)
-                high1 = fma(load(memory, at + 3 * WIDTH), q1, high1)
-                low2 = fma(load(memory, at + 4 * WIDTH), q2, low2)
-                high2 = fma(load(memory, at + 5 * WIDTH), q2, high2)
-                low3 = fma(load(memory, at + 6 * WIDTH), q3, low3)
-                high3 = fma(load(memory, at + 7 * WIDTH), q3, high3)
-                at += 8 * WIDTH
-                here += 4
-            low, high = (low0 + low1) + (low2 + low3), (high0 + high1) + (high2 + high3)
-            total_g, total_r = _close_rows(memory, g, q, r, row, low, total_g, total_r)
-            total_g, total_r = _close_rows(memory, g, q, r, row + WIDTH, high, total_g, total_r)
-            row += 2 * WIDTH
-        if row < stop:
-            even_sum, odd_sum = splat(0.0), splat(0.0)
-            here = column
-            while here < last:
-                even_sum = fma(load(memory, at), broadcast_load(memory, here), even_sum)
-                odd_sum = fma(load(memory, at + WIDTH), broadcast_load(memory, here + 1), odd_sum)
-                at += 2 * WIDTH
-                here += 2
-            total_g, total_r = _close_rows(memory, g, q, r, row, even_sum + odd_sum, total_g, total_r)
-    return lanes_sum(total_g), lanes_sum(total_r)
+        while row < stop:
+            pairs = 2 if row + 2 * WIDTH <= stop else 1
+            stride = pairs * WIDTH
+            for i in range(pairs):
+                product = _rows_of_product(memory, at, stride, 2 * pairs, column, columns)
+                if pairs == 2:
+                    more = _rows_of_product(memory, at + 2 * stride, stride, 4, column + 2, columns - 2)
+                    product = product + more
+                store(memory, r + row, product)
+                at += WIDTH
+                row += WIDTH
+            at += (columns - 1) * stride
+    return _products_of_rows(memory, layout.size, layout.g, q, r)
 
 
 @inlined
 def tension_rows_twice(memory, blocks, layout_a, q_a, r_a, layout_b, q_b, r_b):
     """:func:`tension_rows` for two states at once, bit for bit, with G read only once."""
     at = layout_a.tension
-    g_a, g_b, ar, br = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
     for block in range(0, blocks.size, 3):
         row, stop, columns = blocks[block], blocks[block + 1], blocks[block + 2]
-        first, last = row, row + columns
-        while row + 2 * WIDTH <= stop:
-            al0, ah0, al1, ah1 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
-            al2, ah2, al3, ah3 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
-            bl0, bh0, bl1, bh1 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
-            bl2, bh2, bl3, bh3 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
-            column = first
-            while column < last:
-                a0, a1 = broadcast_load(memory, q_a + column), broadcast_load(memory, q_a + column + 1)
-                b0, b1 = broadcast_load(memory, q_b + column), broadcast_load(memory, q_b + column + 1)
-                low, high = load(memory, at), load(memory, at + WIDTH)
-                al0, ah0, bl0, bh0 = (
-                    fma(low, a0, al0),
-                    fma(high, a0, ah0),
-                    fma(low, b0, bl0),
-                    fma(high, b0, bh0),
-                )
-                low, high = load(memory, at + 2 * WIDTH), load(memory, at + 3 * WIDTH)
-                al1, ah1, bl1, bh1 = (
-                    fma(low, a1, al1),
-                    fma(high, a1, ah1),
-                    fma(low, b1, bl1),
-                    fma(high, b1, bh1),
-                )
-                a2, a3 = broadcast_load(memory, q_a + column + 2), broadcast_load(memory, q_a + column + 3)
-                b2, b3 = broadcast_load(memory, q_b + column + 2), broadcast_load(memory, q_b + column + 3)
-                low, high = load(memory, at + 4 * WIDTH), load(memory, at + 5 * WIDTH)
-                al2, ah2, bl2, bh2 = (
-                    fma(low, a2, al2),
-                    fma(high, a2, ah2),
-                    fma(low, b2, bl2),
-                    fma(high, b2, bh2),
-                )
-                low, high = load(memory, at + 6 * WIDTH), load(memory, at + 7 * WIDTH)
-                al3, ah3, bl3, bh3 = (
-                    fma(low, a3, al3),
-                    fma(high, a3, ah3),
-                    fma(low, b3, bl3),
-                    fma(high, b3, bh3),
-                )
-                at += 8 * WIDTH
-                column += 4
-            low, high = (al0 + al1) + (al2 + al3), (ah0 + ah1) + (ah2 + ah3)
-            g_a, ar = _close_rows(memory, layout_a.g, q_a, r_a, row, low, g_a, ar)
-            g_a, ar = _close_rows(memory, layout_a.g, q_a, r_a, row + WIDTH, high, g_a, ar)
-            low, high = (bl0 + bl1) + (bl2 + bl3), (bh0 + bh1) + (bh2 + bh3)
-            g_b, br = _close_rows(memory, layout_b.g, q_b, r_b, row, low, g_b, br)
-            g_b, br = _close_rows(memory, layout_b.g, q_b, r_b, row + WIDTH, high, g_b, br)
-            row += 2 * WIDTH
-        if row < stop:
-            a_even, a_odd, b_even, b_odd = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
-            column = first
-            while column < last:
-                even, odd = load(memory, at), load(memory, at + WIDTH)
-                a_even = fma(even, broadcast_load(memory, q_a + column), a_even)
-                b_even = fma(even, broadcast_load(memory, q_b + column), b_even)
-                a_odd = fma(odd, broadcast_load(memory, q_a + column + 1), a_odd)
-                b_odd = fma(odd, broadcast_load(memory, q_b + column + 1), b_odd)
-                at += 2 * WIDTH
-                column += 2
-            g_a, ar = _close_rows(memory, layout_a.g, q_a, r_a, row, a_even + a_odd, g_a, ar)
-            g_b, br = _close_rows(memory, layout_b.g, q_b, r_b, row, b_even + b_odd, g_b, br)
-    return lanes_sum(g_a), lanes_sum(ar), lanes_sum(g_b), lanes_sum(br)
+        a, b = q_a + row, q_b + row
+        while row < stop:
+            pairs = 2 if row + 2 * WIDTH <= stop else 1
+            stride = pairs * WIDTH
+            for i in range(pairs):
+                of_a, of_b = _rows_of_two_products(memory, at, stride, 2 * pairs, a, b, columns)
+                if pairs == 2:
+                    more_a, more_b = _rows_of_two_products(
+                        memory, at + 2 * stride, stride, 4, a + 2, b + 2, columns - 2
+                    )
+                    of_a, of_b = of_a + more_a, of_b + more_b
+                store(memory, r_a + row, of_a)
+                store(memory, r_b + row, of_b)
+                at += WIDTH
+                row += WIDTH
+            at += (columns - 1) * stride
+    gq_a, qr_a = _products_of_rows(memory, layout_a.size, layout_a.g, q_a, r_a)
+    gq_b, qr_b = _products_of_rows(memory, layout_b.size, layout_b.g, q_b, r_b)
+    return gq_a, qr_a, gq_b, qr_b
 
 
 @inlined

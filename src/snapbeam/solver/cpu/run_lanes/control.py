@@ -18,6 +18,7 @@ from snapbeam.solver.cpu.run_lanes.state import (
 )
 from snapbeam.solver.cpu.run_lanes.step import (
     bounds,
+    cubic_errors,
     load_prepared_step,
     modal_energy,
     modes_of,
@@ -223,6 +224,26 @@ def _update_safe_intervals(m, shape, late, early_center):
 
 
 @inlined
+def _exclude_by_cubics(m, shape, observed, after, late, early):
+    """Lanes in which the gap may close within the step, and the centre may cross, after all.
+
+    The cubics through both ends of the step bound the motion inside it, at a fraction of the price of samples.  Where they
+    exclude an event, the step is safe.
+    """
+    length = load(m, at.LENGTH)
+    gap_error, center_error = cubic_errors(m, shape, length)
+    reach = vmax(load(m, at.D), observed.d) + hermite_overshoot_bound(load(m, at.DV), observed.dv, length)
+    apart = bits(less(reach + gap_error, 0.0)) & late
+    rest = load(m, at.WELL_SIGN) * load(m, at.REST_CENTER)
+    c0, c1 = load(m, at.C), observed.c + rest
+    swell = hermite_overshoot_bound(load(m, at.CV), observed.cv, length) + center_error
+    clear = bits(less(swell, vmin(vabs(c0), vabs(c1)))) & bits(less(0.0, c0 * c1)) & early
+    store(m, at.SAFE_GAP, pick(mask_of(apart), after, load(m, at.SAFE_GAP)))
+    store(m, at.SAFE_CENTER, pick(mask_of(clear), after, load(m, at.SAFE_CENTER)))
+    return late & ~apart, early & ~clear
+
+
+@inlined
 def _sample_inside_steps(m, shape, lane_settings, sampled, with_center):
     """Sample the free steps of some lanes inside; returns where the penetration may have been positive."""
     which, ticks, step = mask_of(sampled), load(m, at.TICKS), load(m, at.STEP)
@@ -324,6 +345,8 @@ def detect_contact_events(m, n, shape, lane_settings, observed, whole, inner_sam
             _update_safe_intervals(m, shape, late & free, early & free)
             late = bits(less(load(m, at.SAFE_GAP), after)) & free
             early = bits(less(load(m, at.SAFE_CENTER), after)) & free
+            if late | early:
+                late, early = _exclude_by_cubics(m, shape, observed, after, late, early)
             if late | early:
                 rising = _sample_inside_steps(m, shape, lane_settings, late | early, early != 0) & late
                 if rising:

@@ -49,6 +49,7 @@ __all__ = [
     "beam_energies",
     "beam_signals",
     "bounds",
+    "cubic_errors",
     "groups_of",
     "load_prepared_step",
     "made",
@@ -360,6 +361,26 @@ def _bounds(modes: Modes) -> list[str]:
     return [*lines, f"    return {', '.join(found)}"]
 
 
+def _cubic_errors(modes: Modes) -> list[str]:
+    """Bounds of the distance of contact point and centre from the cubics through both ends of a free step of length h.
+
+    A cubic through the values and the rates at both ends is off by at most h^4 / 384 times the fourth derivative.  With
+    q'' = -w^2 q + k that is w^2 (w^2 q - k), and the amplitude of q at most |q| + |p| / w + 2 |k| / w^2.  The last
+    term is for the subintervals, in which the samples take the acceleration as kicks.
+    """
+    lines = ["def cubic_errors(m, shape, length):"]
+    for i in modes.each():
+        omega, squared = modes.number(i, at.OMEGA_I), modes.number(i, at.OMEGA_SQUARED)
+        lines += [f"    k{i} = vabs({modes.row(i, at.K)}) + vabs({modes.row(i, at.K1)})"]
+        lines += [f"    u{i} = {squared} * vabs({modes.row(i, at.Q)}) + {omega} * vabs({modes.row(i, at.P)}) + 3.0 * k{i}"]
+        lines += [f"    u{i} = fma(factor, {squared} * u{i}, kicks * k{i})"]
+        lines += [f"    c{i}, e{i} = vabs({modes.row(i, at.CONTACT)}), vabs({modes.number(i, at.CENTER)})"]
+    lines[1:1] = ["    kicks = 0.02 * (length * length)", f"    factor = {1.1 / 384.0} * (length * length) * (length * length)"]
+    found = [modes.total(lambda i: ("c" + str(i), f"u{i}")), modes.total(lambda i: ("e" + str(i), f"u{i}"))]
+    lines += [f"    turn = load(m, {at.OMEGA}) * load(m, {at.OMEGA})"]
+    return [*lines, f"    return fma(factor * (turn * turn), vabs(load(m, {at.AMPLITUDE})), {found[0]}), {found[1]}"]
+
+
 def _energies(modes: Modes) -> list[str]:
     """Quadratic part of the energy."""
     lines = ["def modal_energy(m, shape, q, p):"]
@@ -474,6 +495,7 @@ def _load_prepared_step(modes: Modes) -> list[str]:
 TEXTS = {
     "load_prepared_step": _load_prepared_step, "begin": _begin, "form_products": _form_products, "kick_and_flow": _kick_and_flow,
     "store_end": _store_end, "signals": _signals, "tension": _tension_at, "bounds": _bounds,
+    "cubic_errors": _cubic_errors,
     "modal_energy": _energies, "modal_energies": _energies_and_powers, "glide": _free_propagation,
 }  # fmt: skip
 
@@ -573,6 +595,17 @@ def bounds(m: Any, shape: Any) -> Any:
 def _bounds_of(m, shape):
     written = _function("bounds", shape.instance_class)
     return lambda m, shape: written(m, shape)
+
+
+def cubic_errors(m: Any, shape: Any, length: Any) -> Any:
+    """How far contact point and centre can be from the cubics through both ends of a free step."""
+    raise TypeError("cubic_errors runs in compiled code only")
+
+
+@overload(cubic_errors, jit_options=INLINE_HERE)
+def _cubic_errors_of(m, shape, length):
+    written = _function("cubic_errors", shape.instance_class)
+    return lambda m, shape, length: written(m, shape, length)
 
 
 def modal_energy(m: Any, shape: Any, q: int, p: int) -> Any:
