@@ -71,7 +71,9 @@ def machine() -> dict[str, str | int | float]:
     facts: dict[str, str | int | float] = {
         "processor": _processor(),
         "cores": os.cpu_count() or 1,
-        "vectors": next((name for name in ("avx512f", "avx2", "neon") if get_host_cpu_features().get(name)), "none"),
+        "vectors": next(
+            (name for name in ("avx512f", "avx2", "neon") if get_host_cpu_features().get(name)), "none"
+        ),
         "python": platform.python_version(),
     }
     facts |= {package: _installed(package) for package in _PACKAGES}

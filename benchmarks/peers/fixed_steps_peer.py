@@ -56,7 +56,9 @@ class Program:
             structure.well[order],
             contact[order],
         )
-        self.beam = _Beam(*(each.ctypes.data for each in self._arrays), structure.nonlinear_stiffness, CONTACT.stiffness)
+        self.beam = _Beam(
+            *(each.ctypes.data for each in self._arrays), structure.nonlinear_stiffness, CONTACT.stiffness
+        )
         self.modes, self.scale = case.modes, case.model.length_scale
         self.runs = [
             _Run(0.0, equations_of(each).amplitude, equations_of(each).drive, each.period) for each in cases

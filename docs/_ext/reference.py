@@ -278,7 +278,8 @@ def _questions() -> dict[str, Any]:
     import snapbeam as sb
     from snapbeam.dynamics.flow import Stroboscope
     from snapbeam.dynamics.lifetimes import require_excitation
-    from snapbeam.simulation.advance import require_tangent
+    from snapbeam.dynamics.periodic_orbits import require_isolated_orbits
+    from snapbeam.simulation.advance import tangent_obstacle
     from snapbeam.solver.assemble import make_ensemble
     from snapbeam.solver.registry import resolve
 
@@ -287,6 +288,12 @@ def _questions() -> dict[str, Any]:
 
     def map_of(system: Any) -> None:
         Stroboscope(system)
+
+    def orbits(system: Any) -> None:
+        require_isolated_orbits(Stroboscope(system))
+
+    def tangents(system: Any) -> str:
+        return "flow" if tangent_obstacle(system) is None else "differences"
 
     def ends_early(system: Any) -> str:
         how = sb.Integration(cycles=1, early_termination=True)
@@ -308,8 +315,9 @@ def _questions() -> dict[str, Any]:
 
     return {
         "`advance`": advance,
-        "tangents, all exponents": require_tangent,
-        "orbits, sections, attractors, basins": map_of,
+        "tangents": tangents,
+        "orbits, branches": orbits,
+        "sections, exponents, attractors, basins": map_of,
         "lifetimes": require_excitation,
         "early termination": ends_early,
         "CUDA": on_cuda,

@@ -319,7 +319,8 @@ def spread_states(flow: Stroboscope, count: int, seed: int = 0) -> _Array:
         reach = 0.2 * size / np.sqrt((model.linear_modes**2).sum(axis=0))
         modal = q * reach * np.stack([model.omega[0] / model.omega, np.full(model.modes, model.omega[0])])
         alpha, velocity = modal @ model.linear_modes.T
-        row = rest + np.concatenate([alpha, velocity]) / flow.scales
+        row = rest.copy()
+        row[: 2 * model.modes] += np.concatenate([alpha, velocity]) / flow.scales[: 2 * model.modes]
         row[0] += draw.uniform(-1.4, 1.4)
         row[model.modes] += draw.uniform(-0.6, 0.6)
         rows[s] = row
@@ -542,7 +543,7 @@ def _chaotic(
     orbits: list[PeriodicOrbit],
 ) -> tuple[list[Attractor], list[NDArray[np.int64]]]:
     """Groups of runs that never repeat, those of them that last and diverge."""
-    if not which.size or not flow.smooth:
+    if not which.size or not (flow.smooth or isinstance(flow, Stroboscope)):
         return [], []
     later = flow.advance(flow.advance(seen.states[which], lasts), 2 * most + 62, every=True)
     assert later.every is not None

@@ -236,7 +236,7 @@ class _Diagram:
             words = "mid-span" if part.startswith("midspan") else "contact point's"
             of = {
                 "displacement": (full[..., :modes], scale.length),
-                "velocity": (full[..., modes:], scale.length * scale.omega),
+                "velocity": (full[..., modes : 2 * modes], scale.length * scale.omega),
             }
             for what, (values, unit) in of.items():
                 over = "b" if what == "displacement" else "b omega_1"

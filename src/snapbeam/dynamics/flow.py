@@ -21,8 +21,9 @@ from snapbeam.model.drive.base import HORIZON, Drive
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import split_name
-from snapbeam.model.state import State, amplitude_scale
+from snapbeam.model.state import FIELDS, OWN_FIELDS, State, amplitude_scale
 from snapbeam.model.system import System
+from snapbeam.simulation.advance import advance, differences, tangent_obstacle
 from snapbeam.simulation.request import cycle_of
 from snapbeam.simulation.states import states_of
 from snapbeam.solver.assemble import cycles_of, make_ensemble, phases_of, plans_of, run_columns
@@ -44,7 +45,6 @@ __all__ = [
     "frequencies_of",
     "held_in_space",
     "leaving",
-    "require_map",
     "settling_periods",
     "starts_of",
 ]
@@ -195,30 +195,6 @@ def held_in_space(system: System) -> System:
     return held.replace(initial_state=replace(start, striker_position=none, contact_time=none))
 
 
-def require_map(system: System) -> None:
-    """Refuse a system whose state is not that of the beam alone.
-
-    Raises
-    ------
-    InputError
-    """
-    if system.harvester is not None:
-        raise InputError(
-            "harvester: has a state of its own, which the dynamics tools do not include; sweep a parameter of "
-            "such a system by sb.dynamics.hysteresis, or integrate it by sb.advance(system, save_every_period=True)"
-        )
-    if masses := [each.striker.mass for each in system.contacts if each.striker.mass is not None]:
-        raise InputError(
-            f"contact.mass = {masses[0]:g}: a striker with a mass has a state of its own, which the dynamics "
-            "tools do not include; integrate such a system by sb.advance(system, save_every_period=True)"
-        )
-    if kept := [each.law for each in system.contacts if each.law.memory]:
-        raise InputError(
-            f"contact = {kept[0]!r}: leaves an indentation, a state of its own, which the dynamics tools do not include; "
-            "integrate such a system by sb.advance(system, save_every_period=True)"
-        )
-
-
 _MOST_CYCLES = 100
 """Cycles of the primary excitation in a common period, at most."""
 _SAME_RATIO = 1e-12
@@ -359,7 +335,8 @@ class Stroboscope:
     """The map of a system over the common period of its motions, the tips' mid-positions fixed in space.
 
     A state is amplitude over that of the well for each buckling mode, then velocity over the same times omega_1: the
-    coordinates ``amplitude[i]`` and ``velocity[i]``.
+    coordinates ``amplitude[i]`` and ``velocity[i]``.  States of strikers and circuits follow, each in a unit of the same size:
+    ``striker_shift[i]`` and ``striker_rate[i]`` of a striker with mass at contact i, its ``indentation[i]``, ``circuit[i]`` of harvester i.
 
     Parameters
     ----------
@@ -383,7 +360,6 @@ class Stroboscope:
             raise InputError(
                 f"tolerance = {self.integration.tolerance:g}: is for one run; give steps, or accuracy = 'reference'"
             )
-        require_map(self.system)
         self.cycles_per_period  # noqa: B018  refuses motions without a common period
         object.__setattr__(self, "system", held_in_space(self.system))
 
@@ -394,8 +370,42 @@ class Stroboscope:
 
     @property
     def dimension(self) -> int:
-        """2 N."""
-        return 2 * self.modes
+        """2 N, and one for each state of strikers and circuits."""
+        return 2 * self.modes + len(self._own)
+
+    @cached_property
+    def _own(self) -> tuple[tuple[str, int, float], ...]:
+        """States beside the beam's: array of :class:`State`, place in it, and unit."""
+        ensemble = make_ensemble(self.system, self.integration)
+        structure, model = ensemble.structure, self.system.model
+        size, omega = amplitude_scale(model), 2.0 * math.pi * model.reference_frequency
+        length = size * float(np.abs(model.midspan_shape).max())
+        units = {"striker_shift": length, "striker_rate": length * omega}
+        return (
+            *((name, body.contact, unit) for name, unit in units.items() for body in structure.bodies),
+            *(("indentation", contact, length) for contact in structure.indentations),
+            *(
+                ("circuit", i, size * float(np.linalg.norm(circuit.row)) * ensemble.circuits[i].unit)
+                for i, circuit in enumerate(structure.circuits)
+                if circuit.mode is not None
+            ),
+        )
+
+    @property
+    def has_memory(self) -> bool:
+        """True if a contact leaves an indentation."""
+        return any(name == "indentation" for name, _, _ in self._own)
+
+    def _own_arrays(self, rows: _Array) -> dict[str, Any]:
+        """The arrays of a state that hold the last coordinates of *rows*, in SI units, shape (..., d)."""
+        places = {"circuit": len(self.system.harvesters)}
+        found = {
+            name: np.full((*rows.shape[:-1], max(1, places.get(name, len(self.system.contacts)))), np.nan)
+            for name in OWN_FIELDS
+        }
+        for column, (name, place, _) in enumerate(self._own, 2 * self.modes):
+            found[name][..., place] = rows[..., column]
+        return {name: values if values.shape[-1] > 1 else values[..., 0] for name, values in found.items()}
 
     @cached_property
     def cycles_per_period(self) -> int:
@@ -415,9 +425,8 @@ class Stroboscope:
 
     @property
     def smooth(self) -> bool:
-        """Whether tangents exist: no local force, and contact forces without a jump that depend on the penetration only."""
-        laws = [each.law.properties for each in self.system.contacts]
-        return not self.system.local_forces and all(law.smooth and law.tangent for law in laws)
+        """True if the tangent flow of the steps contains the system; its tangents are differences otherwise."""
+        return tangent_obstacle(self.system) is None
 
     @property
     def refined(self) -> Stroboscope:
@@ -448,14 +457,15 @@ class Stroboscope:
     def names(self) -> tuple[str, ...]:
         """Of the coordinates."""
         modes = range(1, self.modes + 1)
-        return (*(f"amplitude[{i}]" for i in modes), *(f"velocity[{i}]" for i in modes))
+        own = (f"{name}[{place + 1}]" for name, place, _ in self._own)
+        return (*(f"amplitude[{i}]" for i in modes), *(f"velocity[{i}]" for i in modes), *own)
 
     @cached_property
     def scales(self) -> _Array:
-        """What the coordinates are counted in, m^0.5 and m^0.5/s, shape (d,)."""
+        """Units of the coordinates, m^0.5 and m^0.5/s of the beam, shape (d,)."""
         size = amplitude_scale(self.system.model)
         speed = size * 2.0 * math.pi * self.system.model.reference_frequency
-        return np.repeat([size, speed], self.modes)
+        return np.append(np.repeat([size, speed], self.modes), [unit for _, _, unit in self._own])
 
     @property
     def given_phase(self) -> float:
@@ -518,8 +528,14 @@ class Stroboscope:
             self._require_phase(state)
         if state.modes != self.modes:
             raise InputError(f"state of {state.modes} modes: must have the {self.modes} modes of the model")
-        flat = state.flat()
-        return np.concatenate([flat.amplitude, flat.velocity], axis=1) / self.scales
+        return self._coordinates_of(state.flat())
+
+    def _coordinates_of(self, flat: State) -> _Array:
+        parts = [flat.amplitude, flat.velocity]
+        for name, place, _ in self._own:
+            given = getattr(flat, name).reshape(flat.batch[0], -1)
+            parts.append(np.nan_to_num(given[:, [min(place, given.shape[1] - 1)]]))
+        return np.concatenate(parts, axis=1) / self.scales
 
     def _require_phase(self, state: State) -> None:
         """Refuse a state at another phase of the motions than the one at which the map takes states."""
@@ -536,9 +552,10 @@ class Stroboscope:
         full = np.asarray(coordinates, dtype=np.float64) * self.scales
         return State(
             amplitude=full[..., : self.modes],
-            velocity=full[..., self.modes :],
+            velocity=full[..., self.modes : 2 * self.modes],
             phase=np.array(self._clock_phase),
             striker_position=np.array(self.striker_position),
+            **self._own_arrays(full),
         )
 
     @cached_property
@@ -549,15 +566,11 @@ class Stroboscope:
 
     def carried(self, coordinates: _Array, phase: float) -> _Array:
         """A state that the map takes, at the next instant at which the primary excitation has *phase*, rad."""
-        from snapbeam.simulation.simulate import simulate
-
-        time = (phase - self.striker_phase) % (2.0 * math.pi) / (2.0 * math.pi) * cycle_of(self.system)
-        if time == 0.0:
+        part = (phase - self.striker_phase) % (2.0 * math.pi) / (2.0 * math.pi)
+        if part == 0.0:
             return coordinates
-        integration = self.integration.replace(cycles=1, early_termination=False)
-        run = simulate(self.starting(self.state(coordinates)), integration, sample_times=[0.0, time])
-        last = run.dataset.isel(time=-1)
-        return np.concatenate([last["modal_amplitude"].values, last["modal_velocity"].values]) / self.scales
+        begun = self.state(coordinates)
+        return self._coordinates_of(advance(self.system, begun, part, integration=self.integration).flat())[0]
 
     def phase_between_contacts(self, coordinates: _Array, periods: int) -> float | None:
         """Phase of the primary excitation, rad, at which a periodic motion is farthest from its contacts.
@@ -606,6 +619,8 @@ class Stroboscope:
         points: Mapping[str, _Array] | None = None,
     ) -> AdvancedStates:
         """As :meth:`Flow.advance`; a run does not depend on the runs that are integrated with it."""
+        if tangents is not None and not self.smooth:
+            return self._advance_with_differences(states, periods, tangents, every, points)
         begun = states.hidden if isinstance(states, AdvancedStates) else self._begun(states)
         count, size = begun.batch[0], 2 * 8 * (self.modes + 16)
         share = max(1, _BYTES // (size * periods * self.cycles_per_period))
@@ -622,6 +637,31 @@ class Stroboscope:
         ]
         return found[0] if len(found) == 1 else _joined(found)
 
+    def _advance_with_differences(
+        self,
+        states: ArrayLike | AdvancedStates,
+        periods: int,
+        tangents: _Array,
+        every: bool,
+        points: Mapping[str, _Array] | None,
+    ) -> AdvancedStates:
+        """As :meth:`advance`, with tangents by differences between neighbours, a period at a time."""
+        came = self.advance(states, periods, every=True, points=points)
+        assert came.every is not None
+        begun = states.states if isinstance(states, AdvancedStates) else _rows(states)
+        for x in (begun, *came.every.transpose(1, 0, 2)[:-1]):
+
+            def advance_rows(rows: _Array, runs: NDArray[np.intp]) -> tuple[_Array, _Array | None]:
+                own = None if points is None else {name: values[runs] for name, values in points.items()}
+                beside = self.advance(rows, points=own)
+                return beside.states, beside.statistics["impacts"]
+
+            tangents, _ = differences(advance_rows, x, tangents)
+        tangents[~np.isfinite(came.states).all(axis=1)] = np.nan
+        if not every:
+            came = replace(came, every=None, hidden_every=None)
+        return replace(came, tangents=tangents)
+
     def _begun(self, states: ArrayLike) -> State:
         rows = _rows(states)
         if rows.ndim != 2 or rows.shape[1] != self.dimension:
@@ -634,9 +674,10 @@ class Stroboscope:
         }
         return State(
             amplitude=full[:, : self.modes],
-            velocity=full[:, self.modes :],
+            velocity=full[:, self.modes : 2 * self.modes],
             phase=np.array(self.given_phase),
             statistics=passed,
+            **self._own_arrays(full),
         )
 
     def _advance_part(
@@ -732,11 +773,21 @@ class Stroboscope:
         """States in coordinates, one by one, so that none depends on the others; shape (runs, periods, d)."""
         structure = ensemble.structure
         first = np.where((well_sign < 0)[..., None], q + structure.shift, q)
-        modes = self.system.model.linear_modes.T
-        amplitude = structure.equilibrium + (first[..., None, :] @ modes)[..., 0, :]
-        velocity = (p[..., None, :] @ modes)[..., 0, :]
-        rows: _Array = np.concatenate([amplitude, velocity], axis=-1) / self.scales
-        return rows
+        modes, beam = self.system.model.linear_modes.T, slice(self.modes)
+        amplitude = structure.equilibrium + (first[..., None, beam] @ modes)[..., 0, :]
+        velocity = (p[..., None, beam] @ modes)[..., 0, :]
+        found = {
+            "striker_shift": structure.bodies_of(q),
+            "striker_rate": structure.bodies_of(p),
+            "indentation": structure.indentations_of(q),
+            "circuit": structure.circuits_of(q),
+        }
+        own = [found[name].reshape(*q.shape[:2], -1)[..., place, None] for name, place, _ in self._own]
+        rows: _Array = np.concatenate([amplitude, velocity, *own], axis=-1)
+        for column, (name, place, _) in enumerate(self._own, 2 * self.modes):
+            if name == "circuit":
+                rows[..., column] *= ensemble.circuits[place].unit
+        return rows / self.scales
 
 
 def _joined(parts: list[AdvancedStates]) -> AdvancedStates:
@@ -764,9 +815,8 @@ def _joined(parts: list[AdvancedStates]) -> AdvancedStates:
 def _joined_states(states: list[State]) -> State:
     from snapbeam.model.state import ModalState
 
-    names = ("amplitude", "velocity", "phase", "striker_position", "contact_time")
     arrays: dict[str, Any] = {
-        name: np.concatenate([getattr(each, name) for each in states]) for name in names
+        name: np.concatenate([getattr(each, name) for each in states]) for name in FIELDS
     }
     modals = [each.modal for each in states]
     first = modals[0]

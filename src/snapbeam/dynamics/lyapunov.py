@@ -64,7 +64,8 @@ def lyapunov_spectrum(
     """The largest Lyapunov exponents, by the tangent flow with a QR factorisation at every whole period.
 
     The linearised time steps of the run advance k small changes, which are orthonormalised once a period (Benettin,
-    Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9).  The exponents are the logarithms of their growth, divided
+    Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9).  Where the tangent flow does not contain the system (strikers with mass, local forces,
+    harvesters, contact forces that jump or depend on the velocity), differences of order six between neighbouring states replace it.  The exponents are the logarithms of their growth, divided
     by the time.  A run that snaps and then settles has two kinds: those of the transient, and those of the settled
     motion.  Set ``transient=0`` to obtain both: the default transient is usually longer than the snap-through.
 
@@ -98,7 +99,7 @@ def lyapunov_spectrum(
     Raises
     ------
     InputError
-        For bad input, and for a contact law whose force jumps or depends on the velocity: see :func:`largest_lyapunov`.
+        For bad input, and for a flow of your own without tangents: see :func:`largest_lyapunov`.
 
     Examples
     --------
@@ -115,10 +116,9 @@ def lyapunov_spectrum(
     count = integer("k", k, 1, flow.dimension)
     total = integer("periods", periods, _BLOCKS, 10**7)
     before, rule = _transient(flow, transient, 0)
-    if not flow.smooth:
+    if not (flow.smooth or isinstance(flow, Stroboscope)):
         raise InputError(
-            "system: has no tangent flow, since its contact force jumps or depends on the velocity, or since it has a local "
-            "force; use largest_lyapunov for the largest exponent"
+            "system: the flow advances no tangents; use largest_lyapunov for the largest exponent"
         )
     begun, points, columns = _runs(flow, states, axes)
     advanced = (
@@ -312,7 +312,7 @@ def largest_lyapunov(
 ) -> xr.Dataset:
     """The largest exponent from two trajectories, brought back to a small distance at every whole period.
 
-    An independent check of :func:`lyapunov_spectrum`, and the only estimate under a contact law that loses energy.
+    An independent check of :func:`lyapunov_spectrum`.
 
     Parameters
     ----------

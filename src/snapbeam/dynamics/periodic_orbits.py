@@ -15,6 +15,7 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State
 from snapbeam.model.system import System
+from snapbeam.simulation.advance import differences
 from snapbeam.simulation.simulate import simulate
 from snapbeam.solver.cpu.driver import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, tell, to_json
@@ -49,6 +50,7 @@ __all__ = [
     "orbit_tolerance",
     "passage_of",
     "periodic_orbit",
+    "require_isolated_orbits",
     "shoot",
 ]
 
@@ -57,11 +59,8 @@ __all__ = [
 # Newton shooting: states that a flow brings back, and the derivative of the flow there.
 
 
-_STENCIL = ((1, 3.0 / 4.0), (2, -3.0 / 20.0), (3, 1.0 / 60.0))
-_STEP = 2e-4
-"""Of the differences of order six that stand for the tangent flow where the force jumps."""
-_SHRINKINGS = 7
-"""Times that it is quartered where states beside each other meet the tip unequally often."""
+_LARGEST_ERROR = 1e-3
+"""Of a derivative by differences, beyond which it counts as unknown."""
 _SPLIT = 16
 """Tangents from which on they are shared among threads."""
 _LONGEST = 0.25
@@ -161,6 +160,8 @@ class Return(NamedTuple):
 def jacobian(family: Family, x: _Array, periods: int, value: float | None = None) -> Return:
     """One state some periods on, with the derivative of where it comes to."""
     size = x.size
+    if isinstance(family.flow, Stroboscope):
+        require_isolated_orbits(family.flow)
     if not family.flow.smooth:
         return _by_differences(family, x, periods, value)
     shares = min(usable_cores(), max(1, size // _SPLIT))
@@ -171,25 +172,35 @@ def jacobian(family: Family, x: _Array, periods: int, value: float | None = None
     return Return(advanced.states[0], advanced.tangents.reshape(size, size).T, _impacts(advanced))
 
 
+def require_isolated_orbits(flow: Stroboscope) -> None:
+    """Refuse a system whose periodic orbits form a continuum.
+
+    Raises
+    ------
+    InputError
+    """
+    if flow.has_memory:
+        raise InputError(
+            "contact: an orbit keeps any indentation that its impacts do not deepen, so that periodic orbits are not isolated; "
+            "follow the motion by sb.dynamics.poincare_section or sb.advance"
+        )
+
+
 def _by_differences(family: Family, x: _Array, periods: int, value: float | None) -> Return:
     """As :func:`jacobian`, from states beside it that meet the tip as often as it does."""
-    size, step = x.size, _STEP
-    weights = np.array([weight for _, weight in _STENCIL])
-    for _ in range(_SHRINKINGS):
-        moves = np.concatenate([sign * k * step * np.eye(size) for k, _ in _STENCIL for sign in (1.0, -1.0)])
-        advanced = family.advance(np.concatenate([x[None], x + moves]), periods, value)
-        impacts = advanced.statistics.get("impacts")
-        if impacts is None or (impacts == impacts[0]).all():
-            break
-        step *= 0.25
-    else:
+
+    def advance_rows(rows: _Array, runs: NDArray[np.intp]) -> tuple[_Array, _Array | None]:
+        beside = family.advance(rows, periods, value)
+        return beside.states, beside.statistics.get("impacts")
+
+    advanced = family.advance(x[None], periods, value)
+    slopes, error = differences(advance_rows, x[None], np.eye(x.size)[None])
+    if error[0] > _LARGEST_ERROR:
         raise OrbitNotFoundError(
             "states beside the orbit have another number of impacts, so that its derivative is not known: an impact grazes, "
             "or is at the phase of observation; take another phase"
         )
-    table = advanced.states[1:].reshape(len(_STENCIL), 2, size, size)
-    slopes = np.einsum("k,kij->ij", weights, table[:, 0] - table[:, 1]) / step
-    return Return(advanced.states[0], slopes.T, _impacts(advanced))
+    return Return(advanced.states[0], slopes[0].T, _impacts(advanced))
 
 
 def _impacts(advanced: AdvancedStates) -> int:

@@ -15,11 +15,24 @@ from snapbeam.model.striker import Striker
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, finite_array, integer, mapping, shown
 
-__all__ = ["START_NAME", "ModalState", "State", "amplitude_scale", "rest_state", "started"]
+__all__ = [
+    "FIELDS",
+    "OWN_FIELDS",
+    "START_NAME",
+    "ModalState",
+    "State",
+    "amplitude_scale",
+    "rest_state",
+    "started",
+]
 
 
 _Array = NDArray[np.float64]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
+OWN_FIELDS = ("striker_shift", "striker_rate", "indentation", "circuit")
+"""Arrays of a state that belong to strikers and circuits."""
+FIELDS = ("amplitude", "velocity", "phase", "striker_position", "contact_time", *OWN_FIELDS)
+"""Arrays of a state."""
 
 
 class ModalState(NamedTuple):
@@ -117,7 +130,7 @@ class State:
         position = np.nan if self.striker_position is None else self.striker_position
         found["striker_position"] = _maybe("state striker_position", position, batch)
         found["contact_time"] = _contact_times(self.contact_time, batch)
-        for name in ("striker_shift", "striker_rate", "indentation", "circuit"):
+        for name in OWN_FIELDS:
             found[name] = _of_parts(f"state {name}", getattr(self, name), batch)
         for name, array in found.items():
             array.setflags(write=False)
@@ -169,15 +182,7 @@ class State:
             parts = (modal.q[index], modal.p[index], modal.well_sign[index], modal.offset[index])
             modal = ModalState(*parts, modal.structure)
         return State(
-            amplitude=self.amplitude[index],
-            velocity=self.velocity[index],
-            phase=self.phase[index],
-            striker_position=self.striker_position[index],
-            contact_time=self.contact_time[index],
-            striker_shift=self.striker_shift[index],
-            striker_rate=self.striker_rate[index],
-            indentation=self.indentation[index],
-            circuit=self.circuit[index],
+            **{name: getattr(self, name)[index] for name in FIELDS},
             tangent=tangent,
             statistics=passed,
             modal=modal,
@@ -199,7 +204,7 @@ class State:
             contact_time=self.contact_time.reshape(count, -1),
             **{
                 name: getattr(self, name).reshape(count, *getattr(self, name).shape[len(self.batch) :])
-                for name in ("striker_shift", "striker_rate", "indentation", "circuit")
+                for name in OWN_FIELDS
             },
             modal=modal,
         )

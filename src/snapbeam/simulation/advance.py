@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.integration import Integration
-from snapbeam.model.state import ModalState, State
+from snapbeam.model.state import FIELDS, ModalState, State, amplitude_scale
 from snapbeam.model.system import System
 from snapbeam.simulation.request import require_motion
 from snapbeam.simulation.states import states_of
@@ -22,7 +22,7 @@ from snapbeam.util.diagnostics import counting
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, finite_array, flag, instance, positive, shown
 
-__all__ = ["advance", "require_tangent"]
+__all__ = ["advance", "differences", "tangent_obstacle"]
 
 
 _Array = NDArray[np.float64]
@@ -60,8 +60,10 @@ def advance(
         Periods of the excitation, greater than 0: of the first striker that moves, or else of the base or the axial load;
         without an excitation, periods of the first mode.
     tangent : array_like of shape (..., k, 2, N), optional
-        Small changes of amplitudes (m^0.5) and velocities (m^0.5/s), which the tangent flow of the same steps
-        advances: k of them for each state, or the same k for all.
+        Small changes of amplitudes (m^0.5) and velocities (m^0.5/s): k of them for each state, or the same k for all.  The
+        tangent flow of the same steps advances them if the forces depend on displacements alone and are continuous, and central
+        differences of order six between neighbouring states otherwise.  Strikers with mass, indentations and circuits
+        begin unchanged, and their own changes are not returned.
     integration : Integration, optional
         Solver settings.  The CPU advances the states for *periods*, without early termination.
     save_every_period : bool
@@ -80,7 +82,7 @@ def advance(
     Raises
     ------
     InputError
-        For bad input; for tangents with a contact law whose force jumps; for more periods than a recorded motion has.
+        For bad input; for more periods than a recorded motion has.
 
     Examples
     --------
@@ -125,11 +127,16 @@ def advance(
     if tangent is None:
         ends = engine.integrate_with_output_states(ensemble, integration.threads, report)
     else:
-        given = _checked_tangent(system, tangent, flat)
-        back = system.model.linear_modes.T @ system.model.mass
-        ends, moved = engine.integrate_tangents(ensemble, given @ back.T, integration.threads, report)
+        given = _checked_tangent(tangent, flat)
+        if tangent_obstacle(system) is None:
+            back = system.model.linear_modes.T @ system.model.mass
+            ends, moved = engine.integrate_tangents(ensemble, given @ back.T, integration.threads, report)
+            moved = moved @ system.model.linear_modes.T
+        else:
+            ends = engine.integrate_with_output_states(ensemble, integration.threads, report)
+            moved = _by_differences(system, flat, span, given, integration)
         moved[~np.isin(ends.accumulators_of_runs["status"], _REACHED)] = np.nan
-        vectors = (moved @ system.model.linear_modes.T).reshape((*state.batch, *moved.shape[1:]))
+        vectors = moved.reshape((*state.batch, *moved.shape[1:]))
     found = _states(ensemble, ends, save_every_period)
     passed = statistics_of(ensemble, ends.accumulators_of_runs)
     return _shaped(
@@ -137,40 +144,97 @@ def advance(
     )
 
 
-def require_tangent(system: System) -> None:
-    """Refuse a system whose tangent flow is not that of the beam alone.
-
-    Raises
-    ------
-    InputError
-    """
-    laws = [each.law for each in system.contacts]
-    if jumping := [law for law in laws if not law.properties.smooth]:
-        raise InputError(
-            f"tangent with contact = {shown(jumping[0])}: its force jumps, and so does the tangent flow; give no tangent"
-        )
-    if masses := [each.striker.mass for each in system.contacts if each.striker.mass is not None]:
-        raise InputError(
-            f"tangent with contact.mass = {masses[0]:g} kg: the tangent flow does not contain the body "
-            "of the striker; give no tangent, or no mass"
-        )
+def tangent_obstacle(system: System) -> str | None:
+    """The part that the tangent flow of the steps does not contain; None if it contains the whole system."""
+    if any(not (each.law.properties.smooth and each.law.properties.tangent) for each in system.contacts):
+        return "a contact force that jumps, depends on the velocity or has a memory"
+    if any(each.striker.mass is not None for each in system.contacts):
+        return "a striker with a mass"
     if system.local_forces:
-        raise InputError(
-            "tangent with a local force: the tangent flow does not contain it; give no tangent, or no local force"
-        )
-    if system.harvester is not None:
-        raise InputError(
-            "tangent with a harvester: the tangent flow does not contain its circuit; give no tangent, or no harvester"
-        )
-    if damped := [law for law in laws if not law.properties.tangent]:
-        raise InputError(
-            f"tangent with contact = {damped[0]!r}: the tangent flow exists for laws whose force depends on the "
-            "penetration only, such as HertzContact(stiffness); give no tangent"
-        )
+        return "a local force"
+    return "a harvester" if system.harvesters else None
 
 
-def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
-    require_tangent(system)
+_STENCIL = np.array(((3.0 / 4.0, -3.0 / 20.0, 1.0 / 60.0), (2.0 / 3.0, -1.0 / 12.0, 0.0)))
+"""Weights of central differences of order six and four, over one, two and three steps."""
+_STEP = 2e-4
+"""Their step at first, in units of the well's amplitude."""
+_SHRINKINGS = 7
+"""Times that it is quartered at most."""
+_CLOSE = 1e-8
+"""Difference of the two orders, over the derivative, with which a step is short enough."""
+
+
+def differences(
+    advance_rows: Callable[[_Array, NDArray[np.intp]], tuple[_Array, _Array | None]],
+    x: _Array,
+    directions: _Array,
+) -> tuple[_Array, _Array]:
+    """Directional derivatives of a map by central differences of order six.
+
+    Parameters
+    ----------
+    advance_rows : callable
+        Takes states of shape (n, d) and the run that each belongs to; returns their images and their numbers of impacts.
+    x : array of shape (runs, d)
+        States.
+    directions : array of shape (runs, k, d)
+
+    Returns
+    -------
+    derivatives : array of shape (runs, k, d)
+    error : array of shape (runs,)
+        Estimated error over the norm of the derivative; infinite where neighbours at any distance have other numbers of impacts.
+    """
+    length = np.linalg.norm(directions, axis=-1, keepdims=True)
+    unit = np.divide(directions, length, out=np.zeros_like(directions), where=length > 0.0)
+    runs, count, size = directions.shape
+    found, error = np.full(directions.shape, np.nan), np.full(runs, np.inf)
+    left, step = np.arange(runs), _STEP
+    for _ in range(_SHRINKINGS):
+        moves = np.stack([sign * k * step * unit[left] for k in (1, 2, 3) for sign in (1.0, -1.0)], axis=1)
+        rows = (x[left, None, None] + moves).reshape(-1, size)
+        images, impacts = advance_rows(rows, np.repeat(left, 6 * count))
+        table = images.reshape(left.size, 3, 2, count, size)
+        six, four = np.einsum("os,rskd->orkd", _STENCIL, table[:, :, 0] - table[:, :, 1]) / step
+        apart = np.linalg.norm(six - four, axis=-1) / np.maximum(np.linalg.norm(six, axis=-1), 1e-300)
+        doubt = apart.max(axis=1)
+        if impacts is not None:
+            hits = impacts.reshape(left.size, -1)
+            doubt = np.where((hits == hits[:, :1]).all(axis=1), doubt, np.inf)
+        better = (doubt < error[left]) | np.isnan(found[left]).all(axis=(1, 2))
+        found[left[better]], error[left[better]] = six[better], doubt[better]
+        left, step = left[error[left] > _CLOSE], 0.25 * step
+        if not left.size:
+            break
+    return found * length, error
+
+
+def _by_differences(
+    system: System, begun: State, periods: float, tangents: _Array, integration: Integration
+) -> _Array:
+    """Tangents of shape (runs, k, 2, N) some periods on, between neighbours of the states *begun*."""
+    size = amplitude_scale(system.model)
+    scales = np.array([size, size * 2.0 * np.pi * system.model.reference_frequency])[:, None]
+
+    def advance_rows(rows: _Array, runs: NDArray[np.intp]) -> tuple[_Array, _Array | None]:
+        alpha, velocity = np.moveaxis(rows.reshape(len(rows), 2, begun.modes) * scales, 1, 0)
+        beside = replace(
+            begun[runs], amplitude=alpha, velocity=velocity, contact_time=np.array(np.nan),
+            tangent=None, statistics=None, modal=None,
+        )  # fmt: skip
+        end = advance(system, beside, periods, integration=integration)
+        assert end.statistics is not None
+        return (np.stack((end.amplitude, end.velocity), axis=1) / scales).reshape(rows.shape), end.statistics[
+            "impacts"
+        ]
+
+    x = (np.stack((begun.amplitude, begun.velocity), axis=1) / scales).reshape(begun.batch[0], -1)
+    moved, _ = differences(advance_rows, x, (tangents / scales).reshape(*tangents.shape[:2], -1))
+    return moved.reshape(tangents.shape) * scales
+
+
+def _checked_tangent(tangent: ArrayLike, flat: State) -> _Array:
     given = finite_array("tangent", tangent)
     shape = (2, flat.modes)
     if given.ndim < 3 or given.shape[-2:] != shape:
@@ -211,20 +275,9 @@ def _shaped(
     tangent: _Array | None,
 ) -> State:
     """Return states as one batch of the requested shape."""
-    names = (
-        "amplitude",
-        "velocity",
-        "phase",
-        "striker_position",
-        "contact_time",
-        "striker_shift",
-        "striker_rate",
-        "indentation",
-        "circuit",
-    )
     shape = (len(found), *batch) if every else batch
     arrays = {}
-    for name in names:
+    for name in FIELDS:
         stacked = np.stack([getattr(state, name) for state in found])
         arrays[name] = stacked.reshape((*shape, *stacked.shape[2:]))
     modal = None

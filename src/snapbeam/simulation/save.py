@@ -10,7 +10,7 @@ import numpy as np
 
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import quantities
-from snapbeam.model.state import State
+from snapbeam.model.state import FIELDS, State
 from snapbeam.model.system import System
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.simulation.run import Run
@@ -30,10 +30,6 @@ __all__ = ["compressed", "description", "load", "save_run", "summary_dataset"]
 
 _FORMAT = "snapbeam run 3"
 _GROUPS = ("impacts", "summary")
-_END = (
-    "amplitude", "velocity", "phase", "striker_position", "contact_time", "striker_shift", "striker_rate",
-    "indentation", "circuit",
-)  # fmt: skip
 _COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 
 
@@ -61,7 +57,7 @@ def description(
     if accuracy is not None:
         described["snapbeam_accuracy"] = _json(vars(accuracy))
     if end is not None:
-        described["snapbeam_final_state"] = _json({name: getattr(end, name) for name in _END})
+        described["snapbeam_final_state"] = _json({name: getattr(end, name) for name in FIELDS})
     return described
 
 

@@ -265,7 +265,8 @@ def _late_voltage(reading: Reading) -> Values:
     first = reading.ensemble.circuits[0]
     per_square = 1.0 / first.rate if reading.ensemble.structure.circuits[0].mode is None else first.rate
     lost = np.where(reading.good, reading.accumulators["circuits"][:, 0, CIRCUIT_LATE_LOSS], np.nan)
-    return np.sqrt(lost / _late_duration(reading) / per_square) * np.abs(first.volts)
+    # a circuit at rest has lost an energy of the size of rounding, of either sign
+    return np.sqrt(np.maximum(lost, 0.0) / _late_duration(reading) / per_square) * np.abs(first.volts)
 
 
 def _peak_voltage(reading: Reading) -> Values:

@@ -159,7 +159,7 @@ def tension_rows(memory, blocks, layout, q, r):
         while row < stop:
             pairs = 2 if row + 2 * WIDTH <= stop else 1
             stride = pairs * WIDTH
-            for i in range(pairs):
+            for _i in range(pairs):
                 product = _rows_of_product(memory, at, stride, 2 * pairs, column, columns)
                 if pairs == 2:
                     more = _rows_of_product(memory, at + 2 * stride, stride, 4, column + 2, columns - 2)
@@ -181,7 +181,7 @@ def tension_rows_twice(memory, blocks, layout_a, q_a, r_a, layout_b, q_b, r_b):
         while row < stop:
             pairs = 2 if row + 2 * WIDTH <= stop else 1
             stride = pairs * WIDTH
-            for i in range(pairs):
+            for _i in range(pairs):
                 of_a, of_b = _rows_of_two_products(memory, at, stride, 2 * pairs, a, b, columns)
                 if pairs == 2:
                     more_a, more_b = _rows_of_two_products(

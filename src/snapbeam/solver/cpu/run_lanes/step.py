@@ -372,13 +372,21 @@ def _cubic_errors(modes: Modes) -> list[str]:
     for i in modes.each():
         omega, squared = modes.number(i, at.OMEGA_I), modes.number(i, at.OMEGA_SQUARED)
         lines += [f"    k{i} = vabs({modes.row(i, at.K)}) + vabs({modes.row(i, at.K1)})"]
-        lines += [f"    u{i} = {squared} * vabs({modes.row(i, at.Q)}) + {omega} * vabs({modes.row(i, at.P)}) + 3.0 * k{i}"]
+        lines += [
+            f"    u{i} = {squared} * vabs({modes.row(i, at.Q)}) + {omega} * vabs({modes.row(i, at.P)}) + 3.0 * k{i}"
+        ]
         lines += [f"    u{i} = fma(factor, {squared} * u{i}, kicks * k{i})"]
         lines += [f"    c{i}, e{i} = vabs({modes.row(i, at.CONTACT)}), vabs({modes.number(i, at.CENTER)})"]
-    lines[1:1] = ["    kicks = 0.02 * (length * length)", f"    factor = {1.1 / 384.0} * (length * length) * (length * length)"]
+    lines[1:1] = [
+        "    kicks = 0.02 * (length * length)",
+        f"    factor = {1.1 / 384.0} * (length * length) * (length * length)",
+    ]
     found = [modes.total(lambda i: ("c" + str(i), f"u{i}")), modes.total(lambda i: ("e" + str(i), f"u{i}"))]
     lines += [f"    turn = load(m, {at.OMEGA}) * load(m, {at.OMEGA})"]
-    return [*lines, f"    return fma(factor * (turn * turn), vabs(load(m, {at.AMPLITUDE})), {found[0]}), {found[1]}"]
+    return [
+        *lines,
+        f"    return fma(factor * (turn * turn), vabs(load(m, {at.AMPLITUDE})), {found[0]}), {found[1]}",
+    ]
 
 
 def _energies(modes: Modes) -> list[str]:

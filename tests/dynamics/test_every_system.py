@@ -1,0 +1,205 @@
+"""Maps and tangents of systems whose state is more than the beam's, or whose forces the tangent flow does not contain."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam.dynamics.flow import Stroboscope
+from snapbeam.dynamics.periodic_orbits import Family, OrbitNotFoundError, jacobian
+from snapbeam.model import default_values as paper
+from snapbeam.simulation.advance import _by_differences
+
+PRECISE = sb.Integration(accuracy="reference")
+SINE = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.05)
+BODY = {"mass": 0.02, "suspension_stiffness": 700.0, "suspension_damping": 0.7}
+PIEZO = sb.PiezoelectricHarvester.from_material(
+    stress_constant=-16.6, permittivity=25.55e-9, layer_thickness=1e-4, layer_width=paper.BEAM.width, beam=paper.BEAM,
+    resistance=1e4, patch_end=0.25, wiring="parallel",
+)  # fmt: skip
+COIL = sb.ElectromagneticHarvester(
+    force_factor=1.5, resistance=30.0, coil_resistance=10.0, inductance=0.05, location=0.4
+)
+SPRING = sb.LocalSpring(stiffness=50.0, location=0.3)
+
+
+def system_of(
+    modes: int = 2,
+    law: Any = paper.CONTACT,
+    drive: Any = SINE,
+    damping: float = 0.02,
+    striker: Any = None,
+    **parts: Any,
+) -> sb.System:
+    """The paper's beam with further parts."""
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes, damping_ratio=damping)
+    return sb.System(model, contacts=[sb.Contact(law, sb.Striker(drive=drive, **(striker or {})))], **parts)
+
+
+WHOLE = {"striker": BODY, "harvesters": [PIEZO, COIL], "forces": [SPRING]}
+
+
+def contraction(system: sb.System) -> float:
+    """Rate at which volumes of the state space shrink, 1/s: the sum of all linear rates of loss."""
+    rate = float(np.sum(2.0 * system.model.damping_ratio * system.model.omega))
+    for contact in system.contacts:
+        if contact.striker.mass is not None:
+            rate += (contact.striker.suspension_damping or 0.0) / contact.striker.mass
+    for each in system.harvesters:
+        if isinstance(each, sb.PiezoelectricHarvester):
+            rate += 1.0 / (each.resistance * each.capacitance)
+        elif each.inductance > 0.0:
+            rate += (each.resistance + each.coil_resistance) / each.inductance
+    return rate
+
+
+def settled(flow: Stroboscope, periods: int = 7) -> np.ndarray:
+    """A state on the way."""
+    return flow.advance(flow.coordinates(), periods).states[0]
+
+
+def random_system(seed: int) -> sb.System:
+    """Conservative forces, a body or none, circuits."""
+    rng = np.random.default_rng(seed)
+    striker = (
+        {"mass": rng.uniform(0.005, 0.03), "suspension_stiffness": rng.uniform(300.0, 900.0), "suspension_damping": rng.uniform(0.1, 1.0)}
+        if rng.random() < 0.6
+        else {"gap": rng.uniform(0.0, 1e-4)}
+    )  # fmt: skip
+    circuits = [each for each in (PIEZO, COIL) if rng.random() < 0.5]
+    springs = (
+        [sb.LocalSpring(stiffness=rng.uniform(0.0, 100.0), location=rng.uniform(0.2, 0.8))]
+        if rng.random() < 0.5
+        else []
+    )
+    drive = sb.Sine(frequency_ratio=rng.uniform(0.8, 3.0), velocity_amplitude=rng.uniform(0.02, 0.2))
+    return system_of(
+        2, drive=drive, damping=rng.uniform(0.005, 0.04), striker=striker, harvesters=circuits, forces=springs
+    )
+
+
+def check_volume(system: sb.System) -> bool:
+    """The determinant of the map's derivative at a state; False where an impact grazes."""
+    flow = Stroboscope(system, PRECISE)
+    try:
+        came = jacobian(Family(flow), settled(flow), 1)
+    except OrbitNotFoundError:
+        return False
+    _, volume = np.linalg.slogdet(came.jacobian)
+    assert volume == pytest.approx(-contraction(system) * flow.period, abs=1e-7)
+    return True
+
+
+def test_volumes_shrink_by_the_losses_of_beam_body_and_circuits() -> None:
+    assert check_volume(system_of(**WHOLE))
+
+
+@pytest.mark.slow
+def test_volumes_of_a_hundred_random_systems() -> None:
+    assert sum(check_volume(random_system(seed)) for seed in range(100)) >= 90
+
+
+def test_coordinates_hold_the_whole_state() -> None:
+    system = system_of(**WHOLE)
+    flow = Stroboscope(system, PRECISE)
+    assert flow.names[4:] == ("striker_shift[1]", "striker_rate[1]", "circuit[1]", "circuit[2]")
+    x = settled(flow)
+    assert np.abs(x[4:]).min() > 1e-6
+    assert flow.coordinates(flow.state(x)) == pytest.approx(x[None], abs=1e-15)
+    run = sb.simulate(flow.starting(flow.state(x)), PRECISE.replace(cycles=1, early_termination=False))
+    ended = flow._coordinates_of(run.final_state.flat())[0]
+    assert flow.advance(x[None]).states[0] == pytest.approx(ended, abs=1e-8)
+    once, twice = flow.advance(x[None]), flow.advance(x[None], 2)
+    assert flow.advance(once.states).states == pytest.approx(twice.states, abs=1e-11)
+
+
+def test_orbit_of_a_system_with_all_parts() -> None:
+    flow = Stroboscope(system_of(**WHOLE), PRECISE)
+    orbit = sb.dynamics.periodic_orbit(flow, flow.advance(flow.coordinates(), 200).states[0])
+    assert orbit.residual < 1e-9
+    assert math.log(abs(np.prod(orbit.multipliers))) == pytest.approx(
+        -contraction(flow.system) * flow.period, abs=1e-7
+    )
+    apart = orbit.coordinates + 1e-3 * np.random.default_rng(1).normal(size=flow.dimension)
+    back = flow.advance(apart[None], 200).states[0]
+    assert orbit.is_stable
+    assert back == pytest.approx(orbit.coordinates, abs=1e-8)
+
+
+def test_all_exponents_add_up_to_the_losses() -> None:
+    system = system_of(**WHOLE)
+    flow = Stroboscope(system, PRECISE)
+    found = sb.dynamics.lyapunov_spectrum(flow, flow.dimension, 20, transient=5)
+    assert float(found["exponent"].sum()) == pytest.approx(-contraction(system), rel=1e-5)
+
+
+def test_differences_agree_with_the_tangent_flow() -> None:
+    system = system_of()
+    begun = sb.advance(system, periods=7, integration=PRECISE).flat()
+    tangents = np.random.default_rng(2).normal(size=(1, 3, 2, 2)) * np.array([[1.0], [500.0]])
+    moved = sb.advance(system, begun, tangent=tangents, integration=PRECISE).tangent
+    found = _by_differences(system, begun, 1.0, tangents, PRECISE)
+    scale = np.abs(moved).max(axis=(0, 1, 3))[:, None]
+    assert found / scale == pytest.approx(moved / scale, abs=1e-6)
+
+
+def test_tangents_of_a_state_with_a_damped_force() -> None:
+    """Of quadratic damping alone at a point: a change of the velocity as between two runs."""
+    system = system_of(1, forces=[sb.QuadraticDamping(coefficient=0.3, location=0.4)])
+    begun = sb.advance(system, periods=3, integration=PRECISE)
+    size = 1e-4 * float(np.abs(begun.velocity).max())
+    moved = sb.advance(system, begun, 1, [[[0.0], [1.0]]], integration=PRECISE).tangent
+    assert moved is not None
+    ends = [
+        sb.advance(system, sb.State(amplitude=begun.amplitude, velocity=begun.velocity + sign * size, phase=begun.phase,
+                                    striker_position=begun.striker_position), integration=PRECISE)
+        for sign in (1.0, -1.0)
+    ]  # fmt: skip
+    expected = (ends[0].amplitude - ends[1].amplitude) / (2.0 * size)
+    assert moved[0, 0] == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("restitution", [0.6, 0.9])
+def test_exponents_under_newtons_law_are_those_of_the_orbit(restitution: float) -> None:
+    law, drive = (
+        sb.Restitution(coefficient=restitution),
+        sb.Sine(frequency_ratio=1.6, velocity_amplitude=0.03),
+    )
+    flow = Stroboscope(system_of(1, law, drive, damping=0.05, striker={"gap": 2e-5}), PRECISE)
+    orbit = sb.dynamics.periodic_orbit(flow, flow.advance(flow.coordinates(), 400).states[0])
+    found = sb.dynamics.lyapunov_spectrum(flow, 2, 20, transient=0, states=orbit.coordinates)
+    rates = np.sort(np.log(np.abs(orbit.multipliers)) / (orbit.period * flow.period))[::-1]
+    exponents = found["exponent"].values[0]
+    # two complex multipliers turn the frame, so that each exponent alone converges with the number of periods
+    assert exponents.sum() == pytest.approx(rates.sum(), rel=1e-5)
+    assert exponents == pytest.approx(rates, rel=1e-2)
+
+
+@pytest.mark.slow
+def test_tools_take_systems_with_states_of_their_own() -> None:
+    system = system_of(1, damping=0.05, striker=BODY, harvesters=[PIEZO])
+    found = sb.dynamics.find_attractors(system, 12)
+    assert found.attractors[0].points.shape[1] == 5
+    basins = sb.dynamics.basins_of_attraction(
+        found, {"striker_shift[1]": np.linspace(-0.3, 0.3, 3), "velocity[1]": np.linspace(-0.3, 0.3, 3)}
+    )
+    assert basins.sizes["striker_shift[1]"] == 3
+
+
+@pytest.mark.slow
+def test_an_indentation_is_a_coordinate_but_orbits_are_not_isolated() -> None:
+    system = system_of(1, sb.ElasticPlasticContact(4e5, 8e5), damping=0.05)
+    flow = Stroboscope(system, PRECISE)
+    assert flow.names[-1] == "indentation[1]"
+    path = flow.advance(flow.coordinates(), 20, every=True).every
+    assert path is not None
+    assert (np.diff(path[0, :, -1]) >= 0.0).all()
+    assert path[0, -1, -1] > 0.0
+    assert sb.dynamics.poincare_section(system, periods=5, transient=5).sizes["point"] == 6
+    with pytest.raises(sb.InputError, match="not isolated"):
+        sb.dynamics.periodic_orbit(system)
