@@ -195,7 +195,7 @@ def _by_differences(family: Family, x: _Array, periods: int, value: float | None
 
     advanced = family.advance(x[None], periods, value)
     slopes, error = differences(advance_rows, x[None], np.eye(x.size)[None])
-    if error[0] > _LARGEST_ERROR:
+    if error.max() > _LARGEST_ERROR:
         raise OrbitNotFoundError(
             "states beside the orbit have another number of impacts, so that its derivative is not known: an impact grazes, "
             "or is at the phase of observation; take another phase"

@@ -8,6 +8,7 @@ from .distributions import Normal as Normal
 from .distributions import ParameterUncertainty as ParameterUncertainty
 from .distributions import UniformRange as UniformRange
 from .distributions import UniformTolerance as UniformTolerance
+from .gradients import gradient as gradient
 from .measured_classes import score_measurements as score_measurements
 from .optimization import Constraint as Constraint
 from .optimization import Objective as Objective

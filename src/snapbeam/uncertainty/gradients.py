@@ -1,0 +1,204 @@
+"""Gradients of smooth quantities by the parameters of a system."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.integration import Integration
+from snapbeam.model.parameters import lookup
+from snapbeam.model.system import System
+from snapbeam.simulation.advance import differences
+from snapbeam.solver.statistics import STATISTICS
+from snapbeam.sweeps.points import PointList
+from snapbeam.sweeps.sweep import sweep
+from snapbeam.util.diagnostics import Diagnostic, tell, to_json
+from snapbeam.util.provenance import canonical_json
+from snapbeam.util.validation import InputError, checked, finite, instance, shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["gradient"]
+
+
+_Array = NDArray[np.float64]
+_DOUBTFUL = 1e-4
+"""Relative error of a derivative that is reported."""
+_NOT_SMOOTH = {
+    "last_zero_crossing": "jumps where a crossing appears or vanishes",
+    "early_stop_time": "is the time of an event that a criterion chooses",
+}
+
+
+@checked
+def gradient(
+    system: System,
+    quantity: str | Callable[[System], float],
+    parameters: str | Sequence[str],
+    *,
+    integration: Integration | None = None,
+) -> xr.Dataset:
+    """Derivatives of a smooth quantity by parameters of the system, with error estimates.
+
+    Central differences of order six between neighbouring systems, whose step is shortened until orders six and four agree and
+    all runs have the same number of impacts.
+
+    Parameters
+    ----------
+    system : System
+    quantity : str or callable
+        A statistic of a run by its name, such as ``"peak_force"`` or ``"energy_harvested"``, or a function of a system that returns a
+        number, such as a natural frequency or the amplitude of an orbit.
+    parameters : str or sequence of str
+        Numbers of the system that are not zero, by dotted or short name.
+    integration : Integration, optional
+        Of the runs; early termination is off.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``parameter``: ``derivative`` (per unit of the parameter), ``elasticity`` (relative change of the quantity per relative
+        change of the parameter) and ``relative_error``, infinite where neighbouring runs have other numbers of impacts at any
+        distance.  The attributes have the ``quantity``, its ``value`` and its ``units``.
+
+    Raises
+    ------
+    InputError
+        For a parameter that is zero or not a number, a quantity without a derivative (a class, a count), or a quantity that is not finite.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> system = sb.System(model)
+    >>> first = lambda system: float(system.model.natural_frequencies[0])
+    >>> found = sb.uncertainty.gradient(system, first, ["beam.young_modulus", "beam.density"])
+    >>> found["elasticity"].values.round(6).tolist()
+    [0.5, -0.5]
+    """
+    instance("system", system, System, "a System")
+    how = instance(
+        "integration", Integration() if integration is None else integration, Integration, "an Integration"
+    ).replace(early_termination=False)
+    names = [lookup(name).name for name in ([parameters] if isinstance(parameters, str) else parameters)]
+    if not names or len(set(names)) < len(names):
+        raise InputError(f"parameters = {shown(parameters)}: must be different names, at least one")
+    here = np.array([_value(system, name) for name in names])
+    if isinstance(quantity, str):
+        label, units, evaluate = quantity, _unit(quantity), _by_runs(system, quantity, names, how)
+    else:
+        label, units = getattr(quantity, "__name__", "quantity"), "1"
+        evaluate = _by_systems(system, quantity, names)
+    value = float(evaluate(here[None])[0][0])
+    if not np.isfinite(value):
+        raise InputError(f"quantity = {label}: is {value} for the system itself; it must be finite")
+
+    def advance_rows(rows: _Array, runs: NDArray[np.intp]) -> tuple[_Array, _Array | None]:
+        found, impacts = evaluate(rows * here)
+        return found[:, None], impacts
+
+    moved, error = differences(advance_rows, np.ones((1, here.size)), np.eye(here.size)[None])
+    return _dataset(system, names, here, moved[0, :, 0], error[0], label, value, units)
+
+
+def _value(system: System, name: str) -> float:
+    """A parameter that may be changed in proportion."""
+    row = lookup(name)
+    given = system.get(name)
+    if row.quantity.kind is not float or given is None:
+        raise InputError(f"{name} = {shown(given)}: must be a number, for a derivative by it")
+    found = finite(name, given)
+    if found == 0.0:
+        raise InputError(f"{name} = 0: must not be 0, since its step is in proportion to it")
+    return found
+
+
+def _unit(quantity: str) -> str:
+    """Unit of a statistic that has a derivative."""
+    if quantity not in STATISTICS:
+        smooth = [
+            name for name, row in STATISTICS.items() if row.dtype == "float64" and name not in _NOT_SMOOTH
+        ]
+        raise InputError(
+            f"quantity = {shown(quantity)}: must be one of {', '.join(smooth)}, or a function of a system"
+        )
+    row = STATISTICS[quantity]
+    if row.dtype != "float64" or quantity in _NOT_SMOOTH:
+        why = _NOT_SMOOTH.get(quantity, "is a class or a count, which changes by jumps")
+        raise InputError(f"quantity = {quantity!r}: {why}, so that it has no derivative")
+    return row.unit
+
+
+_Evaluation = Callable[[_Array], tuple[_Array, _Array | None]]
+
+
+def _by_runs(system: System, quantity: str, names: list[str], how: Integration) -> _Evaluation:
+    """Evaluate a statistic at rows of parameters by runs."""
+
+    def evaluate(rows: _Array) -> tuple[_Array, _Array | None]:
+        different, back = np.unique(rows, axis=0, return_inverse=True)
+        points = PointList({name: different[:, i] for i, name in enumerate(names)})
+        found = sweep(system, points, how)
+        values = np.asarray(found[quantity].values, dtype=np.float64)
+        return values[back.ravel()], np.asarray(found["impacts"].values)[back.ravel()]
+
+    return evaluate
+
+
+def _by_systems(system: System, quantity: Callable[[System], float], names: list[str]) -> _Evaluation:
+    """Evaluate a function at rows of parameters."""
+
+    def evaluate(rows: _Array) -> tuple[_Array, _Array | None]:
+        found = [
+            float(quantity(system.replace(**dict(zip(names, row.tolist(), strict=True))))) for row in rows
+        ]
+        return np.array(found), None
+
+    return evaluate
+
+
+def _dataset(
+    system: System,
+    names: list[str],
+    here: _Array,
+    moved: _Array,
+    error: _Array,
+    label: str,
+    value: float,
+    units: str,
+) -> xr.Dataset:
+    from snapbeam.util.datasets import xr
+
+    told = tuple(
+        Diagnostic(
+            "gradient.doubtful",
+            f"{name}: the derivative of {label} has an estimated relative error of {each:.1g}: an impact grazes, or begins or ends "
+            "with the run; change the parameter a little, or take accuracy = 'reference'",
+            {"relative_error": float(each)},
+        )
+        for name, each in zip(names, error, strict=True)
+        if not each <= _DOUBTFUL
+    )
+    tell(told)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        elasticity = moved / value
+    text = {"units": "1", "long_name": "relative change of the quantity per relative change of the parameter"}
+    return xr.Dataset(
+        {
+            "derivative": ("parameter", moved / here, {"long_name": f"derivative of {label} by the parameter"}),
+            "elasticity": ("parameter", elasticity, text),
+            "relative_error": ("parameter", error, {"units": "1", "long_name": "estimated error of the derivative"}),
+            "unit": ("parameter", [lookup(name).quantity.unit for name in names], {"long_name": "unit of the parameter"}),
+            "nominal_value": ("parameter", here, {"long_name": "value of the parameter"}),
+        },
+        {"parameter": names},
+        {
+            "title": "gradient", "quantity": label, "value": value, "units": units, "system_hash": system.hash,
+            "snapbeam_system": canonical_json(system.to_mapping()), "diagnostics": to_json(told),
+        },
+    )  # fmt: skip
