@@ -195,11 +195,6 @@ def test_refusals() -> None:
             moment_per_volt=1e-3, capacitance=1e-9, resistance=1e4, patch_start=0.5, patch_end=0.4
         )
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1)
-    with pytest.raises(InputError, match="tangent with a harvester"):
-        sb.advance(
-            sb.System(model(1), contacts=[sb.Contact(default_values.CONTACT, shaker)], harvesters=[PIEZO]),
-            tangent=np.zeros((1, 2, 1)),
-        )
     system = sb.System(model(1), contacts=[sb.Contact(default_values.CONTACT, shaker)], harvesters=[PIEZO])
     assert sb.System.from_mapping(system.to_mapping()) == system
     assert system.replace(**{"harvester.resistance": 5e3}).get("harvester.resistance") == 5e3

@@ -222,13 +222,6 @@ def test_refusals(force, more, words):
         sb.simulate(sb.System(MODEL, forces=[force], initial_state=start, **more))
 
 
-def test_tangents_are_refused():
-    system = sb.System(MODEL, forces=[FORCES["spring"]])
-    start = sb.State(amplitude=MODEL.well_amplitude, velocity=np.zeros(MODEL.modes))
-    with pytest.raises(InputError, match="tangent with a local force"):
-        sb.advance(system, start, tangent=np.zeros((1, 2, MODEL.modes)))
-
-
 @pytest.mark.slow
 def test_coulomb_friction_of_an_oscillator():
     """Every cycle takes 4 F_c/k of the amplitude, until the smoothing is felt; and the same by DOP853."""

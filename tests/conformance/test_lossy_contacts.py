@@ -183,11 +183,3 @@ def test_refusals() -> None:
         InputError, match="'hunt_crossley', which loses energy, is integrated by the CPU engine alone"
     ):
         resolve("cuda", law=type(law))
-    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
-    system = sb.System(
-        model, contacts=[sb.Contact(law, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1))]
-    )
-    with pytest.raises(
-        InputError, match="the tangent flow exists for laws whose force depends on the penetra"
-    ):
-        sb.advance(system, periods=1, tangent=np.zeros((1, 2, 2)))

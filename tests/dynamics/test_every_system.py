@@ -147,6 +147,7 @@ def test_differences_agree_with_the_tangent_flow() -> None:
     assert found / scale == pytest.approx(moved / scale, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_tangents_of_a_state_with_a_damped_force() -> None:
     """Of quadratic damping alone at a point: a change of the velocity as between two runs."""
     system = system_of(1, forces=[sb.QuadraticDamping(coefficient=0.3, location=0.4)])

@@ -344,8 +344,7 @@ def find_attractors(
 
     A periodic attractor is verified if shooting converges from the last state of a run and every multiplier is inside
     the unit circle, at accuracy level "reference" too.  A chaotic attractor is verified if its largest exponent exceeds
-    0 by three standard errors and none of its states leaves it in *check_periods* more periods.  Under a contact law
-    that loses energy no tangent flow exists: chaotic attractors are not verified and their states stay undecided.
+    0 by three standard errors and none of its states leaves it in *check_periods* more periods.
 
     If *states* is a number, the sampled region is the following, in the dimensionless coordinates of the flow:
     ``amplitude[1]`` is uniform in [-1.4, 1.4] and ``velocity[1]`` in [-0.6, 0.6]; to this a random vibration of each
