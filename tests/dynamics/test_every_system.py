@@ -134,6 +134,7 @@ def test_all_exponents_add_up_to_the_losses() -> None:
     system = system_of(**WHOLE)
     flow = Stroboscope(system, PRECISE)
     found = sb.dynamics.lyapunov_spectrum(flow, flow.dimension, 20, transient=5)
+    assert found.attrs["diagnostics"] == "[]"
     assert float(found["exponent"].sum()) == pytest.approx(-contraction(system), rel=1e-5)
 
 
@@ -142,7 +143,8 @@ def test_differences_agree_with_the_tangent_flow() -> None:
     begun = sb.advance(system, periods=7, integration=PRECISE).flat()
     tangents = np.random.default_rng(2).normal(size=(1, 3, 2, 2)) * np.array([[1.0], [500.0]])
     moved = sb.advance(system, begun, tangent=tangents, integration=PRECISE).tangent
-    found = _by_differences(system, begun, 1.0, tangents, PRECISE)
+    found, error = _by_differences(system, begun, 1.0, tangents, PRECISE)
+    assert error.max() < 1e-6
     scale = np.abs(moved).max(axis=(0, 1, 3))[:, None]
     assert found / scale == pytest.approx(moved / scale, abs=1e-6)
 

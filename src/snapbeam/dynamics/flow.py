@@ -376,6 +376,11 @@ class Stroboscope:
     @cached_property
     def _own(self) -> tuple[tuple[str, int, float], ...]:
         """States beside the beam's: array of :class:`State`, place in it, and unit."""
+        parts = self.system.contacts
+        if not self.system.harvesters and all(
+            each.striker.mass is None and not each.law.memory for each in parts
+        ):
+            return ()
         ensemble = make_ensemble(self.system, self.integration)
         structure, model = ensemble.structure, self.system.model
         size, omega = amplitude_scale(model), 2.0 * math.pi * model.reference_frequency
@@ -649,6 +654,7 @@ class Stroboscope:
         came = self.advance(states, periods, every=True, points=points)
         assert came.every is not None
         begun = states.states if isinstance(states, AdvancedStates) else _rows(states)
+        error = np.zeros(len(begun))
         for x in (begun, *came.every.transpose(1, 0, 2)[:-1]):
 
             def advance_rows(rows: _Array, runs: NDArray[np.intp]) -> tuple[_Array, _Array | None]:
@@ -656,11 +662,12 @@ class Stroboscope:
                 beside = self.advance(rows, points=own)
                 return beside.states, beside.statistics["impacts"]
 
-            tangents, _ = differences(advance_rows, x, tangents)
+            tangents, doubt = differences(advance_rows, x, tangents)
+            error = np.maximum(error, doubt.max(axis=1))
         tangents[~np.isfinite(came.states).all(axis=1)] = np.nan
         if not every:
             came = replace(came, every=None, hidden_every=None)
-        return replace(came, tangents=tangents)
+        return replace(came, tangents=tangents, statistics={**came.statistics, "tangent_error": error})
 
     def _begun(self, states: ArrayLike) -> State:
         rows = _rows(states)

@@ -41,6 +41,10 @@ __all__ = ["largest_lyapunov", "lyapunov_spectrum"]
 
 
 _Array = NDArray[np.float64]
+_DOUBTFUL = 1e-3
+"""Relative error of tangents by differences beyond which their growth in a period is in doubt."""
+_RARE = 0.01
+"""Share of such periods that is not reported."""
 _BLOCKS = 20
 """Means of as many stretches tell the standard error."""
 _TOGETHER = 64
@@ -127,6 +131,7 @@ def lyapunov_spectrum(
     runs = advanced.states.shape[0]
     frame = np.tile(np.eye(flow.dimension)[:count], (runs, 1, 1))
     growth, crossed = np.empty((total, runs, count)), np.zeros((total, runs), dtype=bool)
+    doubtful = np.zeros((total, runs), dtype=bool)
     report = counting(progress, "Lyapunov spectrum", "periods")
     together = max(1, _TOGETHER // runs)
     done = 0
@@ -135,17 +140,20 @@ def lyapunov_spectrum(
         if some == 1:
             advanced = flow.advance(advanced, 1, tangents=frame, points=columns)
             frame, growth[done] = _orthogonal(advanced.tangents)
-            crossed[done] = _crossed(advanced)
+            crossed[done], doubtful[done] = _crossed(advanced), _doubtful(advanced)
         else:
             ahead = flow.advance(advanced, some, every=True, points=columns)
             for i, found in enumerate(_derivatives(flow, advanced.beginnings(ahead), columns, some), done):
                 frame, growth[i] = _orthogonal(frame @ np.asarray(found.tangents))
-                crossed[i] = _crossed(found)
+                crossed[i], doubtful[i] = _crossed(found), _doubtful(found)
             advanced = ahead
         done += some
         if report is not None:
             report(done, total)
     dataset = _dataset(flow, growth, crossed, points, before)
+    told = _grazing(float(doubtful.mean()))
+    tell(told)
+    dataset.attrs["diagnostics"] = to_json(told)
     dataset.attrs["termination_reason"] = _stopped(total, before, rule)
     return dataset
 
@@ -201,6 +209,22 @@ def _derivatives(
         )
         for part in parts
     ]
+
+
+def _doubtful(advanced: AdvancedStates) -> NDArray[np.bool_] | bool:
+    """Whether the tangents of the period are differences across a grazing impact."""
+    found = advanced.statistics.get("tangent_error")
+    return False if found is None else found > _DOUBTFUL
+
+
+def _grazing(share: float) -> tuple[Diagnostic, ...]:
+    if share <= _RARE:
+        return ()
+    message = (
+        f"impacts graze in {100.0 * share:.1f} % of the periods, where differences between neighbouring states are not derivatives; "
+        "check the largest exponent by largest_lyapunov"
+    )
+    return (Diagnostic("dynamics.grazing_periods", message, {"share": share}),)
 
 
 def _crossed(advanced: AdvancedStates) -> NDArray[np.bool_] | bool:

@@ -76,7 +76,8 @@ def advance(
     -------
     State
         The advanced state, with its ``statistics``, in the shape of the batch, and its ``tangent`` if *tangent* was
-        given.  A contact that has not ended does not count as an impact.  If a state could not be reached,
+        given; of differences ``statistics["tangent_error"]`` is the relative error, infinite where neighbouring runs have other
+        numbers of impacts.  A contact that has not ended does not count as an impact.  If a state could not be reached,
         ``statistics["status"]`` gives the reason, and its numbers are NaN.
 
     Raises
@@ -123,7 +124,7 @@ def advance(
         )
     ensemble = make_ensemble(system, integration.replace(early_termination=False), start=flat, periods=span)
     _, engine = resolve("cpu")
-    vectors = None
+    vectors, doubt = None, {}
     if tangent is None:
         ends = engine.integrate_with_output_states(ensemble, integration.threads, report)
     else:
@@ -134,14 +135,14 @@ def advance(
             moved = moved @ system.model.linear_modes.T
         else:
             ends = engine.integrate_with_output_states(ensemble, integration.threads, report)
-            moved = _by_differences(system, flat, span, given, integration)
+            moved, error = _by_differences(system, flat, span, given, integration)
+            doubt["tangent_error"] = error.max(axis=1)
         moved[~np.isin(ends.accumulators_of_runs["status"], _REACHED)] = np.nan
         vectors = moved.reshape((*state.batch, *moved.shape[1:]))
     found = _states(ensemble, ends, save_every_period)
     passed = statistics_of(ensemble, ends.accumulators_of_runs)
-    return _shaped(
-        found, state.batch, save_every_period, {name: passed[name] for name in _STATISTICS}, vectors
-    )
+    kept = {name: passed[name] for name in _STATISTICS} | doubt
+    return _shaped(found, state.batch, save_every_period, kept, vectors)
 
 
 def tangent_obstacle(system: System) -> str | None:
@@ -215,8 +216,8 @@ def differences(
 
 def _by_differences(
     system: System, begun: State, periods: float, tangents: _Array, integration: Integration
-) -> _Array:
-    """Tangents of shape (runs, k, 2, N) some periods on, between neighbours of the states *begun*."""
+) -> tuple[_Array, _Array]:
+    """Tangents of shape (runs, k, 2, N) some periods on, between neighbours of the states *begun*, and their errors."""
     size = amplitude_scale(system.model)
     scales = np.array([size, size * 2.0 * np.pi * system.model.reference_frequency])[:, None]
 
@@ -233,8 +234,8 @@ def _by_differences(
         ]
 
     x = (np.stack((begun.amplitude, begun.velocity), axis=1) / scales).reshape(begun.batch[0], -1)
-    moved, _ = differences(advance_rows, x, (tangents / scales).reshape(*tangents.shape[:2], -1))
-    return moved.reshape(tangents.shape) * scales
+    moved, error = differences(advance_rows, x, (tangents / scales).reshape(*tangents.shape[:2], -1))
+    return moved.reshape(tangents.shape) * scales, error
 
 
 def _checked_tangent(tangent: ArrayLike, flat: State) -> _Array:
