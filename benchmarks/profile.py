@@ -7,8 +7,10 @@ the functions that were inlined at each address.  Linux only; needs both program
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -66,8 +68,6 @@ print(json.dumps({"places": places, "step": (time.process_time() - begun) / step
 
 def _sampled(folder: Path, arguments: list[str]) -> tuple[Counter[int], float]:
     """How often each place in the kernel was met, and seconds a step."""
-    import json
-
     environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache"), "NUMBA_NUM_THREADS": "1"}
     command = ["perf", "record", "-q", "-F", "5000", "-e", "cpu-clock", "-o", str(folder / "samples")]
     done = subprocess.run(
@@ -130,6 +130,8 @@ def main() -> None:
     parser.add_argument("--runs", default="48")
     parser.add_argument("--cycles", default="120")
     arguments = parser.parse_args()
+    if missing := [name for name in ("perf", "nm", "addr2line") if shutil.which(name) is None]:
+        parser.error(f"{', '.join(missing)}: not installed; the profile needs Linux's perf and GNU binutils")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         count, step = _sampled(folder, [arguments.modes, arguments.runs, arguments.cycles])

@@ -316,8 +316,8 @@ def _questions() -> dict[str, Any]:
     return {
         "`advance`": advance,
         "tangents": tangents,
-        "orbits, branches": orbits,
-        "sections, exponents, attractors, basins": map_of,
+        "orbits, branches, attractors, basins": orbits,
+        "sections, exponents": map_of,
         "lifetimes": require_excitation,
         "early termination": ends_early,
         "CUDA": on_cuda,

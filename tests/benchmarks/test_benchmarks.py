@@ -12,7 +12,18 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-NEEDS = {"boost", "diffrax", "equinox", "heyoka", "holoviews", "jax", "numbalsoda", "panel", "playwright"}
+NEEDS = {
+    "boost_peer",
+    "fixed_steps",
+    "diffrax",
+    "equinox",
+    "heyoka",
+    "holoviews",
+    "jax",
+    "numbalsoda",
+    "panel",
+    "playwright",
+}
 """Packages that single benchmarks need, and a C++ compiler with Boost; without them that one is left out."""
 _IMPORT = """
 import importlib, sys

@@ -204,5 +204,6 @@ def test_an_indentation_is_a_coordinate_but_orbits_are_not_isolated() -> None:
     assert (np.diff(path[0, :, -1]) >= 0.0).all()
     assert path[0, -1, -1] > 0.0
     assert sb.dynamics.poincare_section(system, periods=5, transient=5).sizes["point"] == 6
-    with pytest.raises(sb.InputError, match="not isolated"):
-        sb.dynamics.periodic_orbit(system)
+    for tool in (sb.dynamics.periodic_orbit, sb.dynamics.find_attractors):
+        with pytest.raises(sb.InputError, match="orbits and attractors are not isolated"):
+            tool(system)

@@ -23,7 +23,13 @@ from snapbeam.dynamics.flow import (
     settling_periods,
 )
 from snapbeam.dynamics.lyapunov import lyapunov_spectrum
-from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, orbit_tolerance, shoot
+from snapbeam.dynamics.periodic_orbits import (
+    OrbitNotFoundError,
+    PeriodicOrbit,
+    orbit_tolerance,
+    require_isolated_orbits,
+    shoot,
+)
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.util.diagnostics import counting
@@ -389,6 +395,7 @@ def find_attractors(
     '0.22'
     """
     flow = flow_of(system, integration)
+    require_isolated_orbits(flow)
     leave, rule = (
         settling_periods(flow, least=_TRANSIENT)
         if transient is None

@@ -11,7 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.dynamics.bifurcation import minimal_period
 from snapbeam.dynamics.flow import Flow, Stroboscope, fixed_parameters, flow_of
-from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, shoot
+from snapbeam.dynamics.periodic_orbits import (
+    OrbitNotFoundError,
+    PeriodicOrbit,
+    require_isolated_orbits,
+    shoot,
+)
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
@@ -315,6 +320,7 @@ def _settled(flow: Flow, path: _Array) -> tuple[PeriodicOrbit | None, str]:
             "fewer; increase periods"
         )
     try:
+        require_isolated_orbits(flow)
         return shoot(flow, tail[-1], period, 1e-10, 40), f"it settled on an orbit of period {period}"
-    except OrbitNotFoundError as error:
+    except (InputError, OrbitNotFoundError) as error:
         return None, f"no orbit of period {period}: {error}"

@@ -68,10 +68,11 @@ def lyapunov_spectrum(
     """The largest Lyapunov exponents, by the tangent flow with a QR factorisation at every whole period.
 
     The linearised time steps of the run advance k small changes, which are orthonormalised once a period (Benettin,
-    Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9).  Where the tangent flow does not contain the system (strikers with mass, local forces,
-    harvesters, contact forces that jump or depend on the velocity), differences of order six between neighbouring states replace it.  The exponents are the logarithms of their growth, divided
-    by the time.  A run that snaps and then settles has two kinds: those of the transient, and those of the settled
-    motion.  Set ``transient=0`` to obtain both: the default transient is usually longer than the snap-through.
+    Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9).  Differences of order six between neighbouring states replace
+    them for strikers with mass, local forces, harvesters, and contact forces that jump or depend on the velocity.  The
+    exponents are the logarithms of the growth, divided by the time.  A run that snaps and then settles has two kinds: those
+    of the transient, and those of the settled motion.  Set ``transient=0`` to obtain both: the default transient is
+    usually longer than the snap-through.
 
     Parameters
     ----------
@@ -151,9 +152,9 @@ def lyapunov_spectrum(
         if report is not None:
             report(done, total)
     dataset = _dataset(flow, growth, crossed, points, before)
-    told = _grazing(float(doubtful.mean()))
-    tell(told)
-    dataset.attrs["diagnostics"] = to_json(told)
+    diagnostics = _grazing(float(doubtful.mean()))
+    tell(diagnostics)
+    dataset.attrs["diagnostics"] = to_json(diagnostics)
     dataset.attrs["termination_reason"] = _stopped(total, before, rule)
     return dataset
 
@@ -212,17 +213,17 @@ def _derivatives(
 
 
 def _doubtful(advanced: AdvancedStates) -> NDArray[np.bool_] | bool:
-    """Whether the tangents of the period are differences across a grazing impact."""
+    """True where the tangents of the period are differences across a grazing impact; a lost run has none."""
     found = advanced.statistics.get("tangent_error")
-    return False if found is None else found > _DOUBTFUL
+    return False if found is None else (found > _DOUBTFUL) & np.isfinite(advanced.states).all(axis=1)
 
 
 def _grazing(share: float) -> tuple[Diagnostic, ...]:
     if share <= _RARE:
         return ()
     message = (
-        f"impacts graze in {100.0 * share:.1f} % of the periods, where differences between neighbouring states are not derivatives; "
-        "check the largest exponent by largest_lyapunov"
+        f"impacts graze in {100.0 * share:.1f} % of the periods, in which the derivative of the map is not known; compare the "
+        "largest exponent with largest_lyapunov"
     )
     return (Diagnostic("dynamics.grazing_periods", message, {"share": share}),)
 

@@ -160,8 +160,6 @@ class Return(NamedTuple):
 def jacobian(family: Family, x: _Array, periods: int, value: float | None = None) -> Return:
     """One state some periods on, with the derivative of where it comes to."""
     size = x.size
-    if isinstance(family.flow, Stroboscope):
-        require_isolated_orbits(family.flow)
     if not family.flow.smooth:
         return _by_differences(family, x, periods, value)
     shares = min(usable_cores(), max(1, size // _SPLIT))
@@ -172,17 +170,17 @@ def jacobian(family: Family, x: _Array, periods: int, value: float | None = None
     return Return(advanced.states[0], advanced.tangents.reshape(size, size).T, _impacts(advanced))
 
 
-def require_isolated_orbits(flow: Stroboscope) -> None:
+def require_isolated_orbits(flow: Flow) -> None:
     """Refuse a system whose periodic orbits form a continuum.
 
     Raises
     ------
     InputError
     """
-    if flow.has_memory:
+    if isinstance(flow, Stroboscope) and flow.has_memory:
         raise InputError(
-            "contact: an orbit keeps any indentation that its impacts do not deepen, so that periodic orbits are not isolated; "
-            "follow the motion by sb.dynamics.poincare_section or sb.advance"
+            "contact: a periodic motion keeps any indentation that its impacts do not deepen, so that orbits and attractors are not "
+            "isolated; follow the motion by sb.dynamics.poincare_section or sb.advance"
         )
 
 
@@ -195,10 +193,11 @@ def _by_differences(family: Family, x: _Array, periods: int, value: float | None
 
     advanced = family.advance(x[None], periods, value)
     slopes, error = differences(advance_rows, x[None], np.eye(x.size)[None])
-    if error.max() > _LARGEST_ERROR:
+    # of a failed run there is nothing but NaN, which Newton's method reports
+    if error.max() > _LARGEST_ERROR and np.isfinite(slopes).all():
         raise OrbitNotFoundError(
-            "states beside the orbit have another number of impacts, so that its derivative is not known: an impact grazes, "
-            "or is at the phase of observation; take another phase"
+            "the derivative of the map is not known beside the orbit: an impact grazes, or is at the phase of observation; take "
+            "another phase"
         )
     return Return(advanced.states[0], slopes[0].T, _impacts(advanced))
 
@@ -637,6 +636,7 @@ def periodic_orbit(
     (1, True)
     """
     flow = flow_of(system, integration, "reference")
+    require_isolated_orbits(flow)
     if isinstance(flow, Stroboscope):
         if flow.system.primary_excitation is None:
             raise InputError("contacts = []: a beam without excitation has no orbit except its equilibrium")

@@ -63,7 +63,7 @@ def gradient(
     xarray.Dataset
         Over ``parameter``: ``derivative`` (per unit of the parameter), ``elasticity`` (relative change of the quantity per relative
         change of the parameter) and ``relative_error``, infinite where neighbouring runs have other numbers of impacts at any
-        distance.  The attributes have the ``quantity``, its ``value`` and its ``units``.
+        distance.  The elasticity is NaN where the quantity is zero.  The attributes have the ``quantity``, its ``value`` and its ``units``.
 
     Raises
     ------
@@ -174,19 +174,18 @@ def _dataset(
 ) -> xr.Dataset:
     from snapbeam.util.datasets import xr
 
-    told = tuple(
+    diagnostics = tuple(
         Diagnostic(
             "gradient.doubtful",
             f"{name}: the derivative of {label} has an estimated relative error of {each:.1g}: an impact grazes, or begins or ends "
-            "with the run; change the parameter a little, or take accuracy = 'reference'",
+            "with the run; change the parameter a little or the number of cycles",
             {"relative_error": float(each)},
         )
         for name, each in zip(names, error, strict=True)
         if not each <= _DOUBTFUL
     )
-    tell(told)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        elasticity = moved / value
+    tell(diagnostics)
+    elasticity = moved / value if value != 0.0 else np.full_like(moved, np.nan)
     text = {"units": "1", "long_name": "relative change of the quantity per relative change of the parameter"}
     return xr.Dataset(
         {
@@ -199,6 +198,6 @@ def _dataset(
         {"parameter": names},
         {
             "title": "gradient", "quantity": label, "value": value, "units": units, "system_hash": system.hash,
-            "snapbeam_system": canonical_json(system.to_mapping()), "diagnostics": to_json(told),
+            "snapbeam_system": canonical_json(system.to_mapping()), "diagnostics": to_json(diagnostics),
         },
     )  # fmt: skip

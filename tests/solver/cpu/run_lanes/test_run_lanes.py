@@ -6,13 +6,17 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
+from scipy.linalg import expm
 
 import snapbeam as sb
 from snapbeam.model.default_values import BEAM, CONTACT
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.cpu import driver
 from snapbeam.solver.cpu.memory import pack
+from snapbeam.solver.cpu.run_lanes import layout as at
 from snapbeam.solver.cpu.run_lanes.memory import suits
+from snapbeam.solver.cpu.run_lanes.step import TEXTS, Modes
 from snapbeam.solver.statistics import Statistic, register_statistic, statistics_of, unregister_statistic
 from snapbeam.util.status_codes import RunStatus
 
@@ -106,6 +110,45 @@ def test_a_striker_with_mass(monkeypatch):
         ).dataset.displacement_at_striker
         assert found["min_displacement"][i] == pytest.approx(float(w.min()), abs=1e-3)
         assert found["max_displacement"][i] == pytest.approx(float(w.max()), abs=1e-3)
+
+
+def test_a_striker_whose_suspension_is_nearly_critically_damped(monkeypatch):
+    mass, stiffness = 0.02, 700.0
+    critical = 2.0 * np.sqrt(stiffness * mass)
+    body = {"mass": mass, "suspension_stiffness": stiffness, "suspension_damping": 0.95 * critical}
+    found = assert_same(monkeypatch, ensemble(1, striker=body))
+    assert found["impacts"].sum() > 0
+
+
+@pytest.mark.parametrize("damping_ratio", [0.0, 0.02, 0.3, 0.7, 0.95])
+def test_cubics_through_the_ends_of_a_step_are_as_near_as_their_bound(damping_ratio):
+    """Of an oscillator under an acceleration that changes linearly, for steps from a hundredth of a period to half of one."""
+    generator, written = np.random.default_rng(7), {
+        "vabs": abs, "fma": lambda a, b, c: a * b + c, "load": lambda m, i: m[i], "broadcast_load": lambda m, i: m[i],
+    }  # fmt: skip
+    modes = Modes((1,), 6)
+    exec("\n".join(TEXTS["cubic_errors"](modes)), written)
+    for _ in range(200):
+        omega, length = generator.uniform(50.0, 500.0), generator.uniform(0.05, 3.0)
+        length /= omega
+        q, p = generator.normal(), omega * generator.normal()
+        k = omega**2 * generator.normal(size=2) * generator.choice([0.0, 0.1, 1.0])
+        rates = np.zeros((4, 4))  # of q, p, the acceleration and its constant rate
+        rates[0, 1] = rates[1, 2] = rates[2, 3] = 1.0
+        rates[1, :2] = -(omega**2), -2.0 * damping_ratio * omega
+        parts = np.linspace(0.0, 1.0, 41)
+        state = np.array([expm(rates * s * length) @ [q, p, k[0], (k[1] - k[0]) / length] for s in parts])
+        cubic = CubicHermiteSpline([0.0, length], state[[0, -1], 0], state[[0, -1], 1])(parts * length)
+        memory = np.zeros(modes.place(0, at.MODE_ROWS))
+        for field, value in (
+            (at.OMEGA_I, omega), (at.OMEGA_SQUARED, omega**2), (at.DAMPING, damping_ratio * omega), (at.CENTER, -0.5),
+            (at.CONTACT, 2.0), (at.Q, q), (at.P, p), (at.K, k[0]), (at.K1, k[1]),
+        ):  # fmt: skip
+            memory[modes.place(0, field)] = value
+        contact, center = written["cubic_errors"](memory, None, length)
+        away = np.abs(cubic - state[:, 0]).max()
+        assert away <= 1.0001 * 0.5 * contact + 1e-14
+        assert center == pytest.approx(0.25 * contact)
 
 
 def test_neighbours_order_and_threads_do_not_matter(monkeypatch):

@@ -364,18 +364,19 @@ def _bounds(modes: Modes) -> list[str]:
 def _cubic_errors(modes: Modes) -> list[str]:
     """Bounds of the distance of contact point and centre from the cubics through both ends of a free step of length h.
 
-    A cubic through the values and the rates at both ends is off by at most h^4 / 384 times the fourth derivative.  With
-    q'' = -w^2 q + k that is w^2 (w^2 q - k), and the amplitude of q at most |q| + |p| / w + 2 |k| / w^2.  The last
-    term is for the subintervals, in which the samples take the acceleration as kicks.
+    A cubic through the values and the rates at both ends is off by at most h^4 / 384 times the fourth derivative.  Of
+    q'' = -2 zeta w p - w^2 q + k that is at most (1 + 4 zeta^2) w^2 (w^2 |q| + w |p| + 3 |k|), with q and p at the beginning.  The
+    kicks add at most 0.02 h^2 |k|, since samples take the acceleration as impulses at the ends of subintervals.
     """
     lines = ["def cubic_errors(m, shape, length):"]
     for i in modes.each():
         omega, squared = modes.number(i, at.OMEGA_I), modes.number(i, at.OMEGA_SQUARED)
+        damping = modes.number(i, at.DAMPING)
         lines += [f"    k{i} = vabs({modes.row(i, at.K)}) + vabs({modes.row(i, at.K1)})"]
         lines += [
             f"    u{i} = {squared} * vabs({modes.row(i, at.Q)}) + {omega} * vabs({modes.row(i, at.P)}) + 3.0 * k{i}"
         ]
-        lines += [f"    u{i} = fma(factor, {squared} * u{i}, kicks * k{i})"]
+        lines += [f"    u{i} = fma(factor, ({squared} + 4.0 * {damping} * {damping}) * u{i}, kicks * k{i})"]
         lines += [f"    c{i}, e{i} = vabs({modes.row(i, at.CONTACT)}), vabs({modes.number(i, at.CENTER)})"]
     lines[1:1] = [
         "    kicks = 0.02 * (length * length)",
@@ -606,7 +607,7 @@ def _bounds_of(m, shape):
 
 
 def cubic_errors(m: Any, shape: Any, length: Any) -> Any:
-    """How far contact point and centre can be from the cubics through both ends of a free step."""
+    """Bounds of the distances of contact point and centre from the cubics through both ends of a free step."""
     raise TypeError("cubic_errors runs in compiled code only")
 
 
