@@ -571,11 +571,20 @@ class Stroboscope:
 
     def carried(self, coordinates: _Array, phase: float) -> _Array:
         """A state that the map takes, at the next instant at which the primary excitation has *phase*, rad."""
+        from snapbeam.simulation.simulate import simulate
+
         part = (phase - self.striker_phase) % (2.0 * math.pi) / (2.0 * math.pi)
         if part == 0.0:
             return coordinates
         begun = self.state(coordinates)
-        return self._coordinates_of(advance(self.system, begun, part, integration=self.integration).flat())[0]
+        if self._own:  # to a tick of the clock
+            return self._coordinates_of(
+                advance(self.system, begun, part, integration=self.integration).flat()
+            )[0]
+        integration = self.integration.replace(cycles=1, early_termination=False)
+        times = [0.0, part * cycle_of(self.system)]
+        last = simulate(self.starting(begun), integration, sample_times=times).dataset.isel(time=-1)
+        return np.concatenate([last["modal_amplitude"].values, last["modal_velocity"].values]) / self.scales
 
     def phase_between_contacts(self, coordinates: _Array, periods: int) -> float | None:
         """Phase of the primary excitation, rad, at which a periodic motion is farthest from its contacts.
