@@ -462,7 +462,9 @@ def bifurcation_curve(
     ] = "0.5:3",
     number: Annotated[
         int | None,
-        opt.count_option("Number of the fold, flip or Neimark-Sacker point of the branch (1).", _OWN),
+        opt.count_option(
+            "Number of the fold, flip, Neimark-Sacker point or grazing of the branch (1).", _OWN
+        ),
     ] = None,
     period: Annotated[
         int | None, opt.count_option("Period of the orbit in periods of the drive (1).", _OWN)
@@ -476,7 +478,7 @@ def bifurcation_curve(
     output: Output = Path("bifurcation_curve.nc"),
     plot: opt.Plot = None,
 ) -> None:
-    """Continue a fold, flip or Neimark-Sacker point in two parameters, and locate cusps and fold-flips.
+    """Continue a fold, flip, Neimark-Sacker point or grazing in two parameters, and locate points of codimension two.
 
     A periodic orbit is continued along the first parameter until the point with this number is found.
 

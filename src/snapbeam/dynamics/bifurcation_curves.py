@@ -1,4 +1,4 @@
-"""Bifurcation curves: folds, flips and Neimark-Sacker points of periodic orbits continued in two parameters.
+"""Bifurcation curves: folds, flips, Neimark-Sacker points and grazing of periodic orbits continued in two parameters.
 
 With the return map P^m(x; lambda, mu) and its derivative J, a curve solves P^m(x) = x and g(x, lambda, mu) = 0.  At a
 fold (flip) J - I (J + I) is singular; g then is the last unknown of the system bordered by two vectors b and c,
@@ -7,12 +7,20 @@ fold (flip) J - I (J + I) is singular; g then is the last unknown of the system 
     [  c^T    0] [g] = [1],
 
 which is zero where the matrix is singular, and smooth (Govaerts, Numerical Methods for Bifurcations of Dynamical
-Equilibria, SIAM, 2000).  At a Neimark-Sacker point g = |mu|^2 - 1 of the pair nearest to the unit circle.
+Equilibria, SIAM, 2000).  At a Neimark-Sacker point g = |mu|^2 - 1 of the pair nearest to the unit circle.  A grazing orbit
+touches a tip at zero relative velocity: g is the gap at that turning point (di Bernardo, Budd, Champneys and Kowalczyk,
+Piecewise-smooth Dynamical Systems, Springer, 2008).
+
+At points of codimension two, with the critical vectors J v = sigma v and w J = sigma w, w v = 1, and the derivatives B and C of
+the map (Kuznetsov, Elements of Applied Bifurcation Theory, Springer, 2004): w v = 0 before that scaling at the resonances 1:1 (of
+a fold) and 1:2 (of a flip); w C(v, v, v)/6 + w B(v, (I - J)^-1 B(v, v))/2 = 0 at a generalized flip; the angle of the pair is
+2 pi/3 and pi/2 at the resonances 1:3 and 1:4 of a Neimark-Sacker curve.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -27,8 +35,12 @@ from snapbeam.dynamics.periodic_orbits import (
     jacobian,
     newton,
     orbit_tolerance,
+    penetrations,
+    turning_points,
 )
+from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.parameters import lookup
+from snapbeam.model.quantity import split_name
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.validation import InputError, checked, instance, integer, interval, shown, within
 
@@ -38,7 +50,7 @@ if TYPE_CHECKING:
 __all__ = ["CURVES", "bifurcation_curve"]
 
 _Array = NDArray[np.float64]
-CURVES = ("fold", "flip", "Neimark-Sacker")
+CURVES = ("fold", "flip", "Neimark-Sacker", "grazing")
 _TOLERANCE = 1e-9
 _SHORTEST, _LONGEST = 1e-6, 1.0
 _DIFFERENCE = 1e-5
@@ -50,6 +62,12 @@ _EASY, _HARD = 5, 10
 _HALVINGS = 40
 _FINE = 1e-5
 """Relative error of tangents at level "reference"."""
+_NORMAL_FORM = 1e-3
+"""Step of the differences of second and third order, in units of the well's amplitude."""
+_WITHOUT_FORCE = 1e-30
+"""Stiffness, N/m^1.5, of a contact that is only recorded."""
+_ROOM = 1e-6
+"""Gap of a grazing orbit with other impacts under Newton's law, over b: beyond the tip there is no such orbit."""
 
 
 class _Plane(Family):
@@ -87,7 +105,14 @@ class _Curve:
     def __init__(self, plane: _Plane, kind: str, period: int, spans: _Array, tolerance: float) -> None:
         self.plane, self.kind, self.period = plane, kind, period
         self.spans, self.tolerance = spans, tolerance
+        flow = plane.flow
+        rigid = isinstance(flow, Stroboscope) and any(each.law.impulsive for each in flow.system.contacts)
+        self.room = _ROOM if kind == "grazing" and rigid else 0.0
+        # no difference may reach across the gap that is kept
+        self.difference = 0.1 * _ROOM if self.room else _DIFFERENCE
         self.borders: tuple[_Array, _Array] | None = None
+        self._approaches: dict[bytes, tuple[float, int, float]] = {}
+        """The last one, by its point."""
 
     def came(self, y: _Array) -> Return:
         """The return map and its derivative by the state."""
@@ -95,7 +120,7 @@ class _Curve:
 
     def border(self, came: Return) -> None:
         """Take the singular vectors at a point of the curve as borders: the bordered matrix is regular nearby."""
-        if self.kind != "Neimark-Sacker":
+        if self.kind in ("fold", "flip"):
             left, _, right = np.linalg.svd(self._singular(came))
             self.borders = left[:, -1], right[-1]
 
@@ -104,33 +129,73 @@ class _Curve:
         table: _Array = came.jacobian - sign * np.eye(len(came.x))
         return table
 
-    def test(self, came: Return) -> float:
-        """What is zero on the curve."""
-        if self.kind == "Neimark-Sacker":
-            return _pair(came)
+    def null_vectors(self, came: Return) -> tuple[_Array, _Array, float]:
+        """Right and left vector of the bordered systems, which are critical ones on the curve, and g."""
         assert self.borders is not None
         size = len(came.x)
         table = np.zeros((size + 1, size + 1))
         table[:size, :size], table[:size, size], table[size, :size] = self._singular(came), *self.borders
-        return float(np.linalg.solve(table, np.append(np.zeros(size), 1.0))[-1])
+        one = np.append(np.zeros(size), 1.0)
+        right, left = np.linalg.solve(table, one), np.linalg.solve(table.T, one)
+        return right[:-1], left[:-1], float(right[-1])
+
+    def test(self, y: _Array, came: Return) -> float:
+        """The function that is zero on the curve."""
+        if self.kind == "grazing":
+            return self._approach(y)[2]
+        return _pair(came)[0] if self.kind == "Neimark-Sacker" else self.null_vectors(came)[2]
+
+    def _approach(self, y: _Array) -> tuple[float, int, float]:
+        """Instant (s), contact and gap over b, less the room to keep, of the turning point nearest to contact."""
+        known = self._approaches.get(y.tobytes())
+        if known is not None:
+            return known
+        turns = turning_points(self._stroboscope(y), y[:-2], self.period)
+        if not turns.depth.size or not np.isfinite(turns.depth).all():
+            raise OrbitNotFoundError("no gap turns back")
+        at = int(np.argmin(np.abs(turns.depth)))
+        found = float(turns.time[at]), int(turns.contact[at]), -float(turns.depth[at]) - self.room
+        self._approaches = {y.tobytes(): found}
+        return found
+
+    def _slope_of_test(self, y: _Array, moves: _Array, beside: list[Return]) -> _Array:
+        """Derivative of the test function by state and parameters, from the return map at y + moves and y - moves."""
+        if self.kind != "grazing":
+            tests = [
+                self.test(*each) for each in zip(np.concatenate([y + moves, y - moves]), beside, strict=True)
+            ]
+        else:
+            # the instant of a turning point changes the gap in second order only
+            time, contact, _ = self._approach(y)
+            tests = [
+                -penetrations(self._stroboscope(each), each[:-2], self.period, np.array([time]))[0, contact]
+                for each in np.concatenate([y + moves, y - moves])
+            ]
+        above, below = np.array(tests).reshape(2, -1)
+        slope: _Array = (above - below) / (2.0 * self.difference)
+        return slope
+
+    def _stroboscope(self, y: _Array) -> Stroboscope:
+        flow = self.at(y)
+        assert isinstance(flow, Stroboscope)
+        return flow
 
     def equations(self, y: _Array) -> tuple[_Array, Return]:
         """Residual of the orbit and of the condition, shape (d + 1,)."""
         came = self.came(y)
-        return np.append(came.x - y[:-2], self.test(came)), came
+        return np.append(came.x - y[:-2], self.test(y, came)), came
 
     def derivative(self, y: _Array) -> tuple[_Array, Return, _Array]:
         """Residual, return map and the derivative of the residual, shape (d + 1, d + 2)."""
         size = y.size - 2
-        moves = _DIFFERENCE * np.eye(size + 2)
+        moves = self.difference * np.eye(size + 2)
         came, *beside = self._all(np.concatenate([y[None], y + moves, y - moves]))
         table = np.empty((size + 1, size + 2))
         table[:size, :size] = came.jacobian - np.eye(size)
-        for k, (above, below) in enumerate(zip(beside[: size + 2], beside[size + 2 :], strict=True)):
-            table[size, k] = (self.test(above) - self.test(below)) / (2.0 * _DIFFERENCE)
-            if k >= size:
-                table[:size, k] = (above.x - below.x) / (2.0 * _DIFFERENCE)
-        return np.append(came.x - y[:-2], self.test(came)), came, table
+        for k in (size, size + 1):
+            table[:size, k] = (beside[k].x - beside[k + size + 2].x) / (2.0 * self.difference)
+        table[size] = self._slope_of_test(y, moves, beside)
+        return np.append(came.x - y[:-2], self.test(y, came)), came, table
 
     def _all(self, y: _Array) -> list[Return]:
         """The return map and its derivative at several states and values at once."""
@@ -176,18 +241,21 @@ class _Curve:
             raise OrbitNotFoundError("a run beside the orbit failed")
         return _Point(shot.x, _tangent(table, before), came, table, shot.iterations, shot.residual)
 
-    def at(self, point: _Point) -> Flow:
+    def at(self, y: _Array) -> Flow:
         """The flow at the parameters of a point."""
+        values = dict(zip(self.plane.names, (y[-2:] * self.spans).tolist(), strict=True))
         flow: Flow = self.plane.flow
-        for name, value in zip(self.plane.names, point.y[-2:] * self.spans, strict=True):
-            flow = flow.neighbour(name, float(value))
+        if isinstance(flow, Stroboscope):
+            return flow.changed(values)
+        for name, value in values.items():
+            flow = flow.neighbour(name, value)
         return flow
 
     def state(self, point: _Point, flow: Flow) -> _Array:
         """The state of a point at the phase at which another flow takes states."""
         if not isinstance(flow, Stroboscope) or flow is self.plane.flow:
             return point.y[:-2]
-        here = self.at(point)
+        here = self.at(point.y)
         assert isinstance(here, Stroboscope)
         return here.carried(point.y[:-2], flow.striker_phase)
 
@@ -205,7 +273,7 @@ class _Curve:
             or any(lookup(name).name.endswith(".phase") for name in names)
         ):
             return self, point
-        here = self.at(point)
+        here = self.at(point.y)
         assert isinstance(here, Stroboscope)
         phase = here.phase_between_contacts(point.y[:-2], self.period)
         if phase is None:
@@ -222,21 +290,50 @@ class _Curve:
         """By how much the parameters may be off for the residual and the error of the map's derivative."""
         size = point.y.size - 2
         steep = float(np.abs(point.came.jacobian).sum())
-        off = np.append(np.full(size, point.residual), relative * steep + point.residual)
+        # a gap follows from the run itself, a multiplier from the derivative of the map
+        off = np.append(
+            np.full(size, point.residual), (self.kind != "grazing") * relative * steep + point.residual
+        )
         inverse = np.linalg.pinv(point.table)[size:]
         return np.asarray(np.abs(inverse) @ off * self.spans)
+
+
+def _without_contact_force(grazing: SpecialPoint, names: tuple[str, str]) -> Flow:
+    """The flow of a grazing orbit, with contacts that exert no force where the orbit has no other impact.
+
+    Such an orbit is the one without contact on both sides of the curve, and the curve the same under every law.
+    """
+    orbit = grazing.orbit
+    flow = orbit.flow
+    if not isinstance(flow, Stroboscope):
+        raise InputError(
+            f"special_point = {grazing!r}: must be of a System, since the gap of a map is not known"
+        )
+    depth = turning_points(flow, orbit.coordinates, orbit.period).depth
+    if not depth.size or orbit.contact_summary.impacts > int(depth[np.argmin(np.abs(depth))] > 0.0):
+        return flow
+    for name in names:
+        section, field = split_name(lookup(name).name)
+        if section == "contact" and field in flow.system.contacts[0].law.numbers_type()._fields:
+            raise InputError(
+                f"names = {shown(names)}: {name} does not change where an orbit without other impacts grazes; choose another parameter"
+            )
+    recorded = [replace(each, law=HertzContact(_WITHOUT_FORCE)) for each in flow.system.contacts]
+    return Stroboscope(flow.system.replace(contacts=recorded), flow.integration, flow.phase)
 
 
 _Seen = tuple[_Curve, _Point]
 """A point, and the curve at whose phase of observation it is seen."""
 
 
-def _pair(came: Return) -> float:
+def _pair(came: Return) -> tuple[float, float]:
+    """|mu|^2 - 1 of the complex pair nearest to the unit circle, and the cosine of its angle."""
     values = np.linalg.eigvals(came.jacobian)
-    pairs = np.abs(values[np.abs(values.imag) > 1e-9])
+    pairs = values[values.imag > 1e-9]
     if not pairs.size:
-        raise OrbitNotFoundError("the pair of multipliers has become real")
-    return float(pairs[np.argmin(np.abs(pairs - 1.0))] ** 2 - 1.0)
+        raise OrbitNotFoundError("the pair of multipliers has become real, as at the resonances 1:1 and 1:2")
+    pair = pairs[np.argmin(np.abs(np.abs(pairs) - 1.0))]
+    return float(np.abs(pair) ** 2 - 1.0), float(pair.real / np.abs(pair))
 
 
 def _tangent(table: _Array, before: _Array) -> _Array:
@@ -250,18 +347,60 @@ def _tangent(table: _Array, before: _Array) -> _Array:
 
 
 def _monitors(curve: _Curve, one: _Point, point: _Point) -> dict[str, float]:
-    """What changes its sign at points of codimension two, from the point *one* on."""
-    found = {}
-    eye = np.eye(len(point.came.x))
+    """Functions that change their sign at points of codimension two, from the point *one* on."""
+    found, came = dict[str, float](), point.came
+    signs = {
+        kind: float(np.linalg.slogdet(came.jacobian - sign * np.eye(len(came.x)))[0])
+        for kind, sign in _SIGNS.items()
+    }
+    if curve.kind == "grazing":
+        return {f"grazing {kind}": sign for kind, sign in signs.items()}
+    if curve.kind == "Neimark-Sacker":
+        cosine = _pair(came)[1]
+        found |= {"resonance 1:3": cosine + 0.5, "resonance 1:4": cosine}
+    else:
+        right, left, _ = curve.null_vectors(came)
+        found["resonance 1:1" if curve.kind == "fold" else "resonance 1:2"] = float(left @ right)
+        found["fold-flip"] = signs["flip" if curve.kind == "fold" else "fold"]
     if curve.kind == "fold":
         # at a cusp the curve goes on in the states and turns back in the plane of the parameters
         found["cusp"] = float(point.tangent[-2:] @ one.tangent[-2:])
-        found["fold-flip"] = float(np.linalg.slogdet(point.came.jacobian + eye)[0])
     elif curve.kind == "flip":
-        found["fold-flip"] = float(np.linalg.slogdet(point.came.jacobian - eye)[0])
-    if point.came.impacts >= 0:
-        found[f"grazing {curve.kind}"] = 1.0 if point.came.impacts == one.came.impacts else -1.0
+        found["generalized flip"] = _flip_coefficient(curve, point)
+    if came.impacts >= 0:
+        found[f"grazing {curve.kind}"] = 1.0 if came.impacts == one.came.impacts else -1.0
     return found
+
+
+_SIGNS = {"fold": 1.0, "flip": -1.0}
+"""Critical multipliers."""
+
+
+def _flip_coefficient(curve: _Curve, point: _Point) -> float:
+    """The cubic coefficient of the normal form of a flip; NaN where the states beside the orbit have other impacts.
+
+    A doubled orbit is stable if it is positive.
+    """
+    right, left, _ = curve.null_vectors(point.came)
+    x, v, w = point.y[:-2], right / np.linalg.norm(right), left * np.linalg.norm(right) / (left @ right)
+
+    def images(directions: _Array) -> _Array:
+        values = np.broadcast_to(point.y[-2:] * curve.spans, (len(directions), 2))
+        came = curve.plane.advance(x + _NORMAL_FORM * directions, curve.period, values)
+        same = np.asarray(came.statistics.get("impacts", np.zeros(1))).max(initial=0) == max(
+            point.came.impacts, 0
+        )
+        return came.states if same else np.full_like(came.states, np.nan)
+
+    twice, above, below, beyond = images(np.array([2.0, 1.0, -1.0, -2.0])[:, None] * v)
+    here = images(np.zeros((1, x.size)))[0]
+    bend = (above - 2.0 * here + below) / _NORMAL_FORM**2
+    third = (twice - 2.0 * above + 2.0 * below - beyond) / (2.0 * _NORMAL_FORM**3)
+    h = np.linalg.solve(np.eye(x.size) - point.came.jacobian, bend)
+    size = max(float(np.linalg.norm(h)), 1e-300)
+    both = images(np.array([v + h / size, -v - h / size, v - h / size, h / size - v]))
+    mixed = size * (both[0] + both[1] - both[2] - both[3]) / (4.0 * _NORMAL_FORM**2)
+    return float(w @ third / 6.0 + w @ mixed / 2.0)
 
 
 def _between(curve: _Curve, one: _Point, other: _Point) -> list[tuple[str, _Point]]:
@@ -305,10 +444,12 @@ def bifurcation_curve(
     tolerance: float = _TOLERANCE,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
-    """Follow a fold, flip or Neimark-Sacker point of periodic orbits in two parameters, to both sides.
+    """Follow a fold, flip, Neimark-Sacker point or grazing of periodic orbits in two parameters, to both sides.
 
-    Located on the way are cusps, orbits with multipliers +1 and -1 (fold-flip), and grazing, where the number of impacts
-    changes.  Other points of codimension two (resonances, generalized flips) are not sought.
+    Points of codimension two are located on the way: cusps, fold-flips (multipliers +1 and -1), generalized flips, the
+    resonances 1:1 to 1:4, and grazing at a bifurcation.  Where the grazing approach is the only contact, its force is left out on
+    the grazing curve, so that the orbit is defined on both sides of it.  With other impacts under Newton's law, the orbit on a
+    grazing curve keeps a gap of 1e-6 b.
 
     Parameters
     ----------
@@ -363,6 +504,8 @@ def bifurcation_curve(
     if special_point.kind not in CURVES:
         raise InputError(f"special_point = {special_point!r}: must be one of {', '.join(CURVES)}")
     flow = special_point.orbit.flow
+    if special_point.kind == "grazing":
+        flow = _without_contact_force(special_point, names)
     for name in names:
         if isinstance(flow, Stroboscope) and not lookup(name).is_run:
             raise InputError(f"names = {shown(names)}: {name} cannot differ between runs")

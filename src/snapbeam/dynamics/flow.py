@@ -506,8 +506,14 @@ class Stroboscope:
 
     def neighbour(self, name: str, value: float) -> Stroboscope:
         """The flow of the system with one parameter changed, by dotted name or the name in datasets."""
-        self._require_free(name)
-        return Stroboscope(self.system.replace(**{lookup(name).name: value}), self.integration, self.phase)
+        return self.changed({name: value})
+
+    def changed(self, values: Mapping[str, float]) -> Stroboscope:
+        """The flow of the system with parameters changed, by dotted names or the names in datasets."""
+        for name in values:
+            self._require_free(name)
+        changes: dict[str, Any] = {lookup(name).name: value for name, value in values.items()}
+        return Stroboscope(self.system.replace(**changes), self.integration, self.phase)
 
     def _require_free(self, name: str) -> None:
         """Refuse to change a phase that another value would override."""

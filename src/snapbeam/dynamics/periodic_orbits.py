@@ -16,6 +16,7 @@ from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.simulation.advance import differences
+from snapbeam.simulation.run import Run
 from snapbeam.simulation.simulate import simulate
 from snapbeam.solver.cpu.driver import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, tell, to_json
@@ -49,9 +50,11 @@ __all__ = [
     "orbit_at",
     "orbit_tolerance",
     "passage_of",
+    "penetrations",
     "periodic_orbit",
     "require_isolated_orbits",
     "shoot",
+    "turning_points",
 ]
 
 
@@ -338,61 +341,95 @@ class Passage(NamedTuple):
 
 def passage_of(flow: Stroboscope, coordinates: _Array, periods: int) -> Passage:
     """Follow one state for some periods and look at every approach."""
-    system = flow.starting(flow.state(coordinates))
-    cycles = periods * flow.cycles_per_period
-    integration = flow.integration.replace(cycles=cycles, early_termination=False)
-    run = simulate(
-        system, integration, sample_times=np.linspace(0.0, periods * flow.period, _SAMPLES * periods + 1)
-    )
-    data = run.dataset
-    time = data["time"].values
-    depths = data["penetration_normalised"].values[:, None]
-    onset, duration = run.impacts["onset"].values, run.impacts["duration"].values
-    striker = np.zeros(onset.size, dtype=np.int64)
-    if system.contacts[1:]:
-        depths, striker = data["striker_penetrations"].values, run.impacts["striker"].values.astype(int) - 1
-    held, spacing = np.zeros(depths.shape, dtype=bool), 1.000001 * (time[1] - time[0])
-    lightest = least = np.nan
+    run, depths, impacts = _followed(flow, coordinates, periods)
+    time = run.dataset["time"].values
+    # a turning point within a contact, or as near to one as a sample, is part of it
+    turns, spacing = turning_points(flow, coordinates, periods), 1.000001 * (time[1] - time[0])
+    free = np.isfinite(turns.depth)
     deepest = []
-    for begun, lasted, at in zip(onset, duration, striker, strict=True):
-        held[:, at] |= (time >= begun - spacing) & (time <= begun + lasted + spacing)
-        inside = depths[(time >= begun) & (time <= begun + lasted), at]
+    for onset, duration, contact in impacts:
+        within_contact = (turns.time >= onset - spacing) & (turns.time <= onset + duration + spacing)
+        free &= ~(within_contact & (turns.contact == contact))
+        inside = depths[(time >= onset) & (time <= onset + duration), contact]
         deepest.append(float(inside.max(initial=0.0)))
-    if onset.size:
-        lightest = min(deepest)
-        least = float(run.impacts["impulse"].values.min())
-    clearance = [_turn_back(time, depth, touched) for depth, touched in zip(depths.T, held.T, strict=True)]
     return Passage(
-        int(onset.size), float(np.fmin.reduce(clearance)), lightest, least,
-        float(np.abs(data["displacement_at_striker"].values).max()),
-        int(run.summary.zero_crossings),
-    )  # fmt: skip
+        impacts=len(impacts),
+        # beyond the tip by less than a contact that a step sees: as far off
+        clearance=float(np.abs(turns.depth[free]).min()) if free.any() else np.nan,
+        min_penetration=min(deepest, default=np.nan),
+        min_impulse=float(run.impacts["impulse"].values.min()) if impacts else np.nan,
+        peak_displacement=float(np.abs(run.dataset["displacement_at_striker"].values).max()),
+        crossings=int(run.summary.zero_crossings),
+    )
 
 
-def _turn_back(time: _Array, depth: _Array, held: NDArray[np.bool_]) -> float:
-    """Least gap at a turning point of the gap apart from contact, by the quartic through five samples.
+class TurningPoints(NamedTuple):
+    """Maxima of the penetrations of a periodic motion."""
 
-    Where contact is nearer, by the parabola through three.
+    time: _Array
+    """s."""
+    depth: _Array
+    """Penetration over b; negative for a gap."""
+    contact: NDArray[np.intp]
+
+
+def _followed(
+    flow: Stroboscope, coordinates: _Array, periods: int, times: _Array | None = None
+) -> tuple[Run, _Array, list[tuple[float, float, int]]]:
+    """A run, its penetrations over b, shape (times, contacts), and onset (s), duration (s) and contact of its impacts."""
+    if times is None:
+        times = np.linspace(0.0, periods * flow.period, _SAMPLES * periods + 1)
+    integration = flow.integration.replace(cycles=periods * flow.cycles_per_period, early_termination=False)
+    run = simulate(flow.starting(flow.state(coordinates)), integration, sample_times=times)
+    several = len(run.system.contacts) > 1
+    depths = run.dataset["striker_penetrations" if several else "penetration_normalised"].values
+    table = run.impacts
+    contacts = table["striker"].values.astype(int) - 1 if several else [0] * table.sizes["impact"]
+    impacts = zip(table["onset"].values.tolist(), table["duration"].values.tolist(), contacts, strict=True)
+    return run, depths.reshape(times.size, -1), list(impacts)
+
+
+def penetrations(flow: Stroboscope, coordinates: _Array, periods: int, times: _Array) -> _Array:
+    """Penetrations over b at instants of a motion (s, increasing), shape (times, contacts); gaps are negative."""
+    return _followed(flow, coordinates, periods, times)[1]
+
+
+def turning_points(flow: Stroboscope, coordinates: _Array, periods: int) -> TurningPoints:
+    """Turning points of the gaps of a periodic motion, by the quartic through the five nearest samples, sampled once more there.
+
+    An impact that lasts no time is none: the velocity jumps.
     """
-    best = np.nan
-    inner = np.arange(1, time.size - 1)
-    free = ~(held[inner - 1] | held[inner] | held[inner + 1])
-    turns = inner[free & (depth[inner] >= depth[inner - 1]) & (depth[inner] > depth[inner + 1])]
-    for i in turns:
-        before, here, after = depth[i - 1], depth[i], depth[i + 1]
-        bend = before - 2.0 * here + after
-        top = here if bend == 0.0 else here - (after - before) ** 2 / (8.0 * bend)
-        if 2 <= i < time.size - 2 and not held[i - 2 : i + 3].any() and bend != 0.0:
-            curve = np.polynomial.Polynomial.fit(np.arange(-2.0, 3.0), depth[i - 2 : i + 3], 4).convert()
-            slope, place = curve.deriv(), 0.5 * (before - after) / bend
-            for _ in range(4):
-                place -= slope(place) / slope.deriv()(place)
-            if abs(place) <= 1.0:
-                top = float(curve(place))
-        best = np.nanmin(
-            [best, abs(top)]
-        )  # beyond the tip by less than a contact that a step sees: as far off
-    return float(best)
+    end, count = periods * flow.period, _SAMPLES * periods
+    _, depth, impacts = _followed(flow, coordinates, periods)
+    depth, spacing = depth[:-1], end / count
+    at, contact = np.nonzero((depth >= np.roll(depth, 1, axis=0)) & (depth > np.roll(depth, -1, axis=0)))
+    for onset, duration, touched in impacts:
+        if duration == 0.0:
+            apart = np.abs((spacing * at - onset + 0.5 * end) % end - 0.5 * end)
+            at, contact = (each[(contact != touched) | (apart > 2.0 * spacing)] for each in (at, contact))
+    if not at.size:
+        return TurningPoints(np.empty(0), np.empty(0), contact)
+    nearest = np.arange(-2, 3)
+    place, _ = _maximum(depth[(at[:, None] + nearest) % count, contact[:, None]])
+    finer = spacing / _SAMPLES
+    time = spacing * (at + place)
+    times, back = np.unique((time[:, None] + finer * nearest) % end, return_inverse=True)
+    depth = penetrations(flow, coordinates, periods, times)
+    place, top = _maximum(depth[back.reshape(at.size, 5), contact[:, None]])
+    return TurningPoints((time + finer * place) % end, top, contact)
+
+
+def _maximum(values: _Array) -> tuple[_Array, _Array]:
+    """Place, in units of the spacing, and height of the maximum of the quartics through rows of five samples."""
+    place, top = np.zeros(len(values)), values[:, 2].copy()
+    for i, row in enumerate(values):
+        curve = np.polynomial.Polynomial.fit(np.arange(-2.0, 3.0), row - row[2], 4).convert()
+        roots = curve.deriv().roots()
+        inner = roots.real[(np.abs(roots.imag) < 1e-9) & (np.abs(roots.real) <= 2.0)]
+        if inner.size:
+            place[i] = inner[np.argmax(curve(inner))]
+            top[i] += curve(place[i])
+    return place, top
 
 
 # ----------------------------------------------------------------------------------------------------

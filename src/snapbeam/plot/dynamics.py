@@ -600,8 +600,11 @@ def plot_backbone(
     return ax
 
 
-_CURVE_LINES = {"fold": "-", "flip": "--", "Neimark-Sacker": ":"}
-_CURVE_MARKS = {"cusp": "*", "fold-flip": "D"}
+_CURVE_LINES = {"fold": "-", "flip": "--", "Neimark-Sacker": ":", "grazing": "-."}
+_CURVE_MARKS = {
+    "cusp": "*", "fold-flip": "D", "generalized flip": "X",
+    "resonance 1:1": "$1$", "resonance 1:2": "$2$", "resonance 1:3": "$3$", "resonance 1:4": "$4$",
+}  # fmt: skip
 
 
 @checked
@@ -611,9 +614,10 @@ def plot_bifurcation_curve(
     *,
     labels: Sequence[str] | None = None,
 ) -> Axes:
-    """Draw bifurcation curves over their two parameters, on a response map too: fold -, flip --, Neimark-Sacker dots.
+    """Draw bifurcation curves over their two parameters, on a response map too.
 
-    Points of codimension two are marked: cusps by stars, fold-flips by diamonds, grazing by circles.
+    Folds are solid lines, flips dashed, Neimark-Sacker points dotted, grazing dash-dotted.  Points of codimension two are marked:
+    cusps by stars, fold-flips by diamonds, generalized flips by crosses, resonances 1:n by n, grazing by circles.
 
     Parameters
     ----------
