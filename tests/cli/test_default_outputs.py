@@ -32,6 +32,7 @@ COMMANDS = {
     "poincare_section.nc": "dynamics poincare-section",
     "branch.nc": "dynamics branch",
     "bifurcation_curve.nc": "dynamics bifurcation-curve",
+    "manifold.nc": "dynamics manifold",
     "basins.nc": "dynamics basins",
     "edge.nc": "dynamics edge",
     "design.nc": "design question.toml",

@@ -207,7 +207,9 @@ def test_the_grazing_curve_of_orbits_with_an_impact() -> None:
     names, bounds = ("frequency_ratio", "contact.coefficient"), ((2.001, 3.61), (0.75, 0.85))
     curve = sb.dynamics.bifurcation_curve(branch.special_points[-1], names, bounds, max_points=4, step=1e-3)
     assert curve.sizes["point"] > 4
-    for ratio, restitution in zip(curve["frequency_ratio"].values, curve["restitution"].values, strict=True):
+    for ratio, restitution in zip(
+        curve["frequency_ratio"].values, curve["restitution_coefficient"].values, strict=True
+    ):
         assert ratio == pytest.approx(grazes_at(float(restitution), 2, 3.6), abs=1e-4)
 
 

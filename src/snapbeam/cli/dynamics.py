@@ -445,6 +445,52 @@ def branch(
     _finish(found.to_dataset(), output, plot, lines)
 
 
+@dynamics.command("manifold", cls=ShortHelpCommand)
+@cli_command
+@with_parameters(*_ALL)
+def manifold(
+    given: Any,
+    stability: Annotated[
+        str, typer.Option(help="Manifold: unstable or stable.", rich_help_panel=_OWN, metavar="KIND")
+    ] = "unstable",
+    period: Annotated[
+        int | None, opt.count_option("Period of the saddle in periods of the drive (1).", _OWN)
+    ] = None,
+    max_arclength: Annotated[
+        float | None, opt.number_option("Length of each branch, in units of the well's amplitude (10).", _OWN)
+    ] = None,
+    output: Output = Path("manifold.nc"),
+    plot: opt.Plot = None,
+) -> None:
+    """Compute the one-dimensional unstable or stable manifold of the saddle orbit near the straight beam.
+
+    Example: snapbeam dynamics manifold --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --plot manifold.png
+    """
+    from snapbeam.dynamics.manifolds import invariant_manifold
+    from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, periodic_orbit
+    from snapbeam.util.validation import InputError
+
+    settings = configured(given)
+    _checked(output, plot)
+    begun = time.monotonic()
+    options = None if given.get("integration.accuracy") is None else settings.integration
+    straight = np.zeros(2 * settings.system.model.modes)
+    try:
+        saddle = periodic_orbit(
+            settings.system, straight, 1 if period is None else period, integration=options
+        )
+    except OrbitNotFoundError as error:
+        raise InputError(f"no saddle near the straight beam: {error}") from None
+    curve = invariant_manifold(
+        saddle, stability, max_arclength=10.0 if max_arclength is None else max_arclength
+    )
+    lines = [
+        _plain(saddle),
+        f"{curve.sizes['point']} points in {duration(time.monotonic() - begun)}",
+    ]
+    _finish(curve, output, plot, lines)
+
+
 @dynamics.command("bifurcation-curve", cls=ShortHelpCommand)
 @cli_command
 @with_parameters(*_ALL)

@@ -21,6 +21,9 @@ from .lifetimes import LifetimeSettings as LifetimeSettings
 from .lifetimes import lifetime_map as lifetime_map
 from .lyapunov import largest_lyapunov as largest_lyapunov
 from .lyapunov import lyapunov_spectrum as lyapunov_spectrum
+from .manifolds import homoclinic_points as homoclinic_points
+from .manifolds import homoclinic_tangency as homoclinic_tangency
+from .manifolds import invariant_manifold as invariant_manifold
 from .periodic_orbits import OrbitNotFoundError as OrbitNotFoundError
 from .periodic_orbits import PeriodicOrbit as PeriodicOrbit
 from .periodic_orbits import periodic_orbit as periodic_orbit

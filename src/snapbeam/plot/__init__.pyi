@@ -8,6 +8,7 @@ from .dynamics import plot_bifurcation_curve as plot_bifurcation_curve
 from .dynamics import plot_diagram as plot_diagram
 from .dynamics import plot_exponents as plot_exponents
 from .dynamics import plot_lifetimes as plot_lifetimes
+from .dynamics import plot_manifold as plot_manifold
 from .dynamics import plot_multipliers as plot_multipliers
 from .dynamics import plot_section as plot_section
 from .dynamics import plot_survival as plot_survival

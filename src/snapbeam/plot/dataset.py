@@ -15,6 +15,7 @@ from snapbeam.plot.dynamics import (
     plot_edge,
     plot_exponents,
     plot_lifetimes,
+    plot_manifold,
     plot_multipliers,
     plot_section,
     plot_survival,
@@ -145,6 +146,7 @@ _KINDS = (
     _Kind(
         "backbone curve", {"participation", "initial_amplitude"}, {"point"}, lambda _: {"frequency_ratio": plot_backbone}
     ),
+    _Kind("manifold", {"saddle", "age"}, {"point"}, lambda _: {"state": plot_manifold}),
     _Kind("attractors", {"points", "share"}, {"attractor"}, lambda _: {"points": plot_attractors}),
     _Kind("Lyapunov exponents", {"exponent"}, set(), lambda _: {"exponent": plot_exponents}),
     _Kind("basins of attraction", {"basin"}, set(), lambda _: {"basin": plot_basins}),

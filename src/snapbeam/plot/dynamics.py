@@ -29,6 +29,7 @@ __all__ = [
     "plot_edge",
     "plot_exponents",
     "plot_lifetimes",
+    "plot_manifold",
     "plot_multipliers",
     "plot_section",
     "plot_survival",
@@ -864,6 +865,54 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             )  # fmt: skip
             handles.append(dots)
         figure.legend(handles=handles, loc="outside lower center", ncols=3)
+        fix_ticks(ax)
+    return ax
+
+
+@checked
+def plot_manifold(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw an invariant manifold in its first displacement and velocity, over basins of attraction too.
+
+    Unstable manifolds are solid, stable ones dashed; the saddle is a cross.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`snapbeam.dynamics.invariant_manifold`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw, such as basins or another manifold; a new figure one column wide by default.
+
+    Raises
+    ------
+    InputError
+        If the dataset has no manifold.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
+    >>> ax = sb.plot.plot_manifold(sb.dynamics.invariant_manifold(saddle, max_arclength=1.0))
+    """
+    if "age" not in dataset or "saddle" not in dataset:
+        raise InputError(f"no manifold among {list(map(str, dataset.variables))}")
+    names = [str(name) for name in dataset["coordinate"].values]
+    at = (0, next((i for i, name in enumerate(names) if name.startswith("velocity")), 1 % len(names)))
+    stability, new = str(dataset.attrs["stability"]), ax is None
+    line, color = ("-", _CHAOS) if stability == "unstable" else ("--", cm.batlow(0.15))
+    with figure_style():
+        ax = axes_or_new(ax, dataset, height=84.0)
+        for side in np.unique(dataset["side"].values):
+            points = dataset["state"].values[dataset["side"].values == side]
+            label = f"{stability} manifold" if side > 0 else None
+            ax.plot(*points[:, at].T, line, color=color, linewidth=0.7, label=label)
+        ax.plot(*dataset["saddle"].values[list(at)], "x", color="black", markersize=5.0)
+        if new:
+            ax.set(xlabel=_coordinate(names[at[0]]), ylabel=_coordinate(names[at[1]]))
+        ax.legend(loc="best")
         fix_ticks(ax)
     return ax
 

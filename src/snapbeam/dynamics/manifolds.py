@@ -1,0 +1,445 @@
+"""Invariant manifolds of saddle orbits in the stroboscopic section, and the points where a stable and an unstable one cross.
+
+A branch of the one-dimensional manifold of a saddle x* with the multiplier sigma and its eigenvector v is covered by the images of
+one fundamental segment, x* + delta sigma^s v with 0 <= s < 1: the point of age k + s is P^k of it.  Points are inserted into
+the segment wherever neighbours at that age are too far apart, or the curve turns too much between them (Hobson, J. Comput.
+Phys. 104 (1993) 14).  The stable manifold is that of the inverse map, whose points are found by Newton's method along the curve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.dynamics.flow import Flow, fixed_parameters
+from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, periodic_orbit
+from snapbeam.util.diagnostics import counting
+from snapbeam.util.validation import InputError, checked, choice, instance, integer, interval, shown, within
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["homoclinic_points", "homoclinic_tangency", "invariant_manifold"]
+
+
+_Array = NDArray[np.float64]
+_BEGUN = 5
+"""Points of a fundamental segment at first."""
+_NEAR_SADDLE = 1e-5
+"""Distance from the saddle at which the segment begins, in units of the well's amplitude: the curve bends with its square."""
+_NEWTON = 10
+_LONGEST = 0.25
+"""Longest first step of Newton's method, in units of the well's amplitude."""
+_SAME = 1e-11
+"""Distance, in units of the well's amplitude, at which the image of an inverse image counts as met."""
+_CLOSEST = 1e-3
+"""Distance of neighbours, over the maximum one, below which the curve may turn by any angle."""
+_FINEST = 1e-12
+"""Difference of ages below which no point is inserted."""
+_SHARE = 2**22
+"""Pairs of segments that are compared at once."""
+
+
+class _Segment(NamedTuple):
+    """The fundamental segment of one branch."""
+
+    flow: Flow
+    periods: int
+    """Periods of the map that keeps the branch: twice those of the orbit for a negative multiplier."""
+    saddle: _Array
+    vector: _Array
+    factor: float
+    """Growth of the distance from the saddle per application of the map or of its inverse."""
+    inverse: bool
+
+    def begin(self, ages: _Array) -> _Array:
+        """Points of the segment, at ages from 0 to 1."""
+        return self.saddle + self.factor ** ages[:, None] * self.vector
+
+    def image(self, states: _Array, near: _Array) -> _Array:
+        """Images of states; under the inverse map they are sought from *near*, and NaN where Newton's method fails.
+
+        The map of a flow is one to one, so that whatever is found is the inverse image.
+        """
+        if not self.inverse:
+            return self.flow.advance(states, self.periods).states
+        x, left = near.copy(), np.arange(len(states))
+        found = np.full_like(x, np.nan)
+        for count in range(_NEWTON):
+            different, same = np.unique(x[left], axis=0, return_inverse=True)
+            eye = np.tile(np.eye(x.shape[1]), (len(different), 1, 1))
+            came = self.flow.advance(different, self.periods, tangents=eye)
+            assert came.tangents is not None
+            apart, slopes = states[left] - came.states[same], came.tangents[same].transpose(0, 2, 1)
+            met = np.asarray(np.abs(apart).max(axis=1) < _SAME)
+            found[left[met]] = x[left[met]]
+            going = ~met & np.isfinite(slopes).all(axis=(1, 2))
+            going[going] = np.linalg.matrix_rank(slopes[going]) == x.shape[1]
+            left, step = left[going], np.linalg.solve(slopes[going], apart[going][..., None])[..., 0]
+            if not count:
+                # by the linear map; the others are sought later from nearer states
+                near_enough = np.linalg.norm(step, axis=1) < _LONGEST
+                left, step = left[near_enough], step[near_enough]
+            if not left.size:
+                break
+            x[left] += step
+        return found
+
+
+def _grow(
+    segment: _Segment, max_arclength: float, max_distance: float, max_turn: float, max_points: int
+) -> tuple[_Array, _Array, str]:
+    """Age and state of the points of a branch, and the reason for its end."""
+    ages = np.linspace(0.0, 1.0, _BEGUN)
+    levels = [(ages, segment.begin(ages))]
+    while True:
+        found = _next_level(segment, levels, max_distance, max_turn, max_points)
+        if not isinstance(found, str):
+            levels.append(found)
+        last = float(len(levels) - 1)
+        age = np.concatenate([*(k + own[:-1] for k, (own, _) in enumerate(levels)), [last + 1.0]])
+        states = np.concatenate([*(known[:-1] for _, known in levels), levels[-1][1][-1:]])
+        length = np.linalg.norm(np.diff(states, axis=0), axis=1).cumsum()
+        end = 1 + int(np.searchsorted(length, max_arclength))
+        if isinstance(found, str) or end < len(states):
+            return age[: end + 1], states[: end + 1], "max_arclength" if end < len(states) else str(found)
+
+
+_Levels = list[tuple[_Array, _Array]]
+"""Ages within the segment and states of its images."""
+
+
+def _next_level(
+    segment: _Segment, levels: _Levels, max_distance: float, max_turn: float, max_points: int
+) -> tuple[_Array, _Array] | str:
+    """Ages and states of the image of the last level, with points inserted, or the reason why there is none."""
+    room = max_points - sum(len(own) for own, _ in levels)
+    ages, before = levels[-1]
+    # the segments join: the inverse image of the first point is next to the last one
+    states = segment.image(before, np.repeat(before[-1:], len(before), axis=0))
+    while ages.size <= room:
+        lost = np.asarray(np.isnan(states).any(axis=1))
+        if lost.any() and not segment.inverse:
+            return "a run failed"
+        if lost.any():
+            known, sought = np.flatnonzero(~lost), np.flatnonzero(lost)
+            if not known.size:
+                return "the inverse map does not converge"
+            nearest = known[np.abs(sought[:, None] - known).argmin(axis=1)]
+            states[sought] = segment.image(before[sought], states[nearest])
+            if np.isfinite(states[sought]).all(axis=1).any():
+                continue
+            places = np.flatnonzero(lost[1:] != lost[:-1])
+            if (np.diff(ages)[places] < _FINEST).any():
+                return "the inverse map does not converge"
+        else:
+            places = _gaps(ages, states, max_distance, max_turn)
+            if not places.size:
+                return ages, states
+        between = 0.5 * (ages[places] + ages[places + 1])
+        inserted = segment.begin(between)
+        for own, images in levels[1:]:
+            inserted = segment.image(inserted, images[np.searchsorted(own, between) - 1])
+        near = np.where(lost[places, None], states[places + 1], states[places])
+        ages = np.insert(ages, places + 1, between)
+        before = np.insert(before, places + 1, inserted, axis=0)
+        states = np.insert(states, places + 1, segment.image(inserted, near), axis=0)
+    return "max_points"
+
+
+def _gaps(ages: _Array, states: _Array, max_distance: float, max_turn: float) -> NDArray[np.intp]:
+    """Places behind which a point is missing."""
+    chords = np.diff(states, axis=0)
+    size = np.linalg.norm(chords, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cosine = np.sum(chords[1:] * chords[:-1], axis=1) / (size[1:] * size[:-1])
+        sharp = ~(cosine >= np.cos(max_turn)) & (size[1:] + size[:-1] > _CLOSEST * max_distance)
+    missing = size > max_distance
+    longer = size[1:] > size[:-1]
+    missing[1:] |= sharp & longer
+    missing[:-1] |= sharp & ~longer
+    return np.flatnonzero(missing & (np.diff(ages) > _FINEST) & np.isfinite(size))
+
+
+@checked
+def invariant_manifold(
+    orbit: PeriodicOrbit,
+    stability: str = "unstable",
+    *,
+    max_arclength: float = 10.0,
+    max_distance: float = 0.05,
+    max_turn: float = 0.2,
+    max_points: int = 20_000,
+) -> xr.Dataset:
+    """One-dimensional stable or unstable manifold of a saddle orbit, in the stroboscopic section.
+
+    Points are so close that neighbours are at most *max_distance* apart and the curve turns by at most *max_turn* between them;
+    between two points it is then off the chord by about max_distance max_turn/8.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+        With one multiplier outside the unit circle for the unstable manifold, with one inside for the stable one.
+    stability : {"unstable", "stable"}
+    max_arclength : float
+        Length of each of the two branches, in units of the well's amplitude (velocities over omega_1 times it).
+    max_distance : float
+        Distance of neighbours, in these units; between 1e-6 and 1.
+    max_turn : float
+        Angle between successive chords, rad; between 0.001 and 1.
+    max_points : int
+        Of each branch.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``point``: ``state`` over ``coordinate``, ``side`` (-1 or 1: the branch), ``arclength`` along the branch and ``age``
+        (applications of the map, or its inverse, since the fundamental segment).  The attributes have the multiplier, the bound of the
+        distance from the chord, ``chord_error``, and for each branch the reason for its end.
+
+    Raises
+    ------
+    InputError
+        If the manifold does not have one dimension.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
+    >>> curve = sb.dynamics.invariant_manifold(saddle, max_arclength=1.0)
+    >>> curve.sizes["coordinate"], bool(curve["arclength"].max() <= 1.05)
+    (2, True)
+    """
+    instance("orbit", orbit, PeriodicOrbit, "an orbit, as periodic_orbit gives")
+    inverse = choice("stability", stability, ("unstable", "stable")) == "stable"
+    length = within("max_arclength", max_arclength, 0.0, 1e4, closed="right")
+    distance = within("max_distance", max_distance, 1e-6, 1.0, closed="both")
+    turn = within("max_turn", max_turn, 1e-3, 1.0, closed="both")
+    most = integer("max_points", max_points, 10, 10**6)
+    values, vectors = np.linalg.eig(orbit.jacobian)
+    size = np.abs(values)
+    which = np.flatnonzero(size < 1.0 if inverse else size > 1.0)
+    if which.size != 1:
+        place = "inside" if inverse else "outside"
+        raise InputError(
+            f"orbit: the {stability} manifold has {which.size} dimensions, one for each multiplier {place} the unit circle; it "
+            f"must have one (multipliers {shown([complex(round(v.real, 6), round(v.imag, 6)) for v in values])})"
+        )
+    value, vector = float(values[which[0]].real), np.ascontiguousarray(vectors[:, which[0]].real)
+    twice = 2 if value < 0.0 else 1
+    factor = abs(value) ** (-twice if inverse else twice)
+    branches = []
+    for side in (1, -1):
+        begun = side * _NEAR_SADDLE * vector / np.linalg.norm(vector)
+        segment = _Segment(orbit.flow, twice * orbit.period, orbit.coordinates, begun, factor, inverse)
+        branches.append((side, *_grow(segment, length, distance, turn, most)))
+    return _dataset(orbit, stability, value, branches, distance * turn / 8.0)
+
+
+def _dataset(
+    orbit: PeriodicOrbit,
+    stability: str,
+    multiplier: float,
+    branches: list[tuple[int, _Array, _Array, str]],
+    error: float,
+) -> xr.Dataset:
+    from snapbeam.util.datasets import xr
+
+    def joined(of: Callable[[int, _Array, _Array], _Array]) -> _Array:
+        return np.concatenate([of(side, age, states) for side, age, states, _ in branches])
+
+    def length(side: int, age: _Array, states: _Array) -> _Array:
+        return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(states, axis=0), axis=1)))
+
+    names = getattr(orbit.flow, "names", tuple(f"x[{i + 1}]" for i in range(orbit.coordinates.size)))
+    variables: dict[str, Any] = {
+        "state": (("point", "coordinate"), joined(lambda side, age, states: states), _labels("state")),
+        "side": ("point", joined(lambda side, age, states: np.full(age.size, side, np.int8)), _labels("branch")),
+        "arclength": ("point", joined(length), _labels("length of the branch")),
+        "age": (
+            "point", joined(lambda side, age, states: age), _labels("applications of the map since the fundamental segment")
+        ),
+        "saddle": ("coordinate", orbit.coordinates, _labels("state of the orbit")),
+    }  # fmt: skip
+    attrs = {
+        **fixed_parameters(orbit.flow), "title": f"{stability} manifold of a periodic orbit", "stability": stability,
+        "multiplier": multiplier, "period": orbit.period, "chord_error": error,
+        "termination_reason": "; ".join(reason for *_, reason in branches),
+    }  # fmt: skip
+    return xr.Dataset(variables, {"coordinate": list(names)}, attrs)
+
+
+def _labels(words: str) -> dict[str, str]:
+    return {"units": "1", "long_name": words}
+
+
+@checked
+def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
+    """Points in which an unstable and a stable manifold cross, both in a plane.
+
+    Parameters
+    ----------
+    unstable, stable : xarray.Dataset
+        Of :func:`invariant_manifold`, with two coordinates; of two saddles the points are heteroclinic.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``point``, along the unstable manifold: ``state``, known to the attribute ``chord_error``, and the ``arclength`` of both.
+
+    Raises
+    ------
+    InputError
+        For manifolds that are not in a plane, or are not one unstable and one stable.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
+    >>> both = [
+    ...     sb.dynamics.invariant_manifold(saddle, kind, max_arclength=1.0) for kind in ("unstable", "stable")
+    ... ]
+    >>> sb.dynamics.homoclinic_points(*both).sizes["point"]
+    0
+    """
+    from snapbeam.util.datasets import xr
+
+    for name, given in (("unstable", unstable), ("stable", stable)):
+        instance(name, given, xr.Dataset, "a dataset of invariant_manifold")
+        if given.attrs.get("stability") != name or given.sizes.get("coordinate") != 2:
+            raise InputError(f"{name}: must be the {name} manifold of an orbit of a map of the plane")
+    u, s = (_chords(each) for each in (unstable, stable))
+    found = []
+    share = max(1, _SHARE // max(len(s[0]), 1))
+    for at in range(0, len(u[0]), share):
+        begin, way, length = (each[at : at + share, None] for each in u)
+        apart = s[0][None] - begin
+        # begin + a way = s + b chord, by Cramer's rule
+        cross = way[..., 0] * s[1][None, :, 1] - way[..., 1] * s[1][None, :, 0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            a = (apart[..., 0] * s[1][None, :, 1] - apart[..., 1] * s[1][None, :, 0]) / cross
+            b = (apart[..., 0] * way[..., 1] - apart[..., 1] * way[..., 0]) / cross
+            i, j = np.nonzero((a >= 0.0) & (a < 1.0) & (b >= 0.0) & (b < 1.0))
+        for one, other in zip(i.tolist(), j.tolist(), strict=True):
+            part = float(a[one, other])
+            along = float(length[one, 0] + part * np.linalg.norm(way[one, 0]))
+            along_stable = float(s[2][other] + b[one, other] * np.linalg.norm(s[1][other]))
+            found.append((along, along_stable, *(begin[one, 0] + part * way[one, 0])))
+    table = np.array(sorted(found)).reshape(-1, 4)
+    return xr.Dataset(
+        {
+            "state": (("point", "coordinate"), table[:, 2:], _labels("state")),
+            "arclength": ("point", table[:, 0], _labels("length of the unstable manifold")),
+            "stable_arclength": ("point", table[:, 1], _labels("length of the stable manifold")),
+        },
+        {"coordinate": unstable["coordinate"].values},
+        {
+            "title": "homoclinic points",
+            "chord_error": unstable.attrs["chord_error"] + stable.attrs["chord_error"],
+        },
+    )
+
+
+def _chords(manifold: xr.Dataset) -> tuple[_Array, _Array, _Array]:
+    """Begin, direction and arclength of the chords of a manifold."""
+    states, side = manifold["state"].values, manifold["side"].values
+    same = side[1:] == side[:-1]
+    return states[:-1][same], np.diff(states, axis=0)[same], manifold["arclength"].values[:-1][same]
+
+
+@checked
+def homoclinic_tangency(
+    orbit: PeriodicOrbit,
+    name: str,
+    bounds: tuple[float, float],
+    *,
+    max_arclength: float = 6.0,
+    max_distance: float = 0.02,
+    max_turn: float = 0.1,
+    tolerance: float = 1e-3,
+    progress: Callable[[int, int], object] | bool | None = None,
+) -> tuple[float, float]:
+    """Bracket of the value of a parameter at which the manifolds of a saddle begin to cross.
+
+    Up to *max_arclength* the stable and the unstable manifold cross at one end of the bracket and do not at the other; it is halved
+    until its width is *tolerance* times that of *bounds*.  A homoclinic tangency is where chaotic transients and fractal basin
+    boundaries begin (Guckenheimer and Holmes, Nonlinear Oscillations, Springer, 1983, section 4.5).
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+        A saddle of a map of the plane, which is followed to each value.
+    name : str
+        Parameter, by dotted name or the name in datasets.
+    bounds : pair of float
+        Values with and without crossing, in either order of size.
+    max_arclength, max_distance, max_turn : float
+        As in :func:`invariant_manifold`.
+    tolerance : float
+        Between 1e-9 and 0.5.
+    progress : callable, optional
+        Called as ``progress(done, total)`` with values; True writes a line to standard error.
+
+    Returns
+    -------
+    (float, float)
+        The value without and the value with crossing.
+
+    Raises
+    ------
+    InputError
+        If the manifolds cross at both ends of *bounds*, or at none.
+    OrbitNotFoundError
+        If the saddle is not found at a value.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
+    >>> try:
+    ...     sb.dynamics.homoclinic_tangency(saddle, "velocity_amplitude", (0.02, 0.03), max_arclength=0.5)
+    ... except sb.InputError as error:
+    ...     print(str(error)[:46])
+    bounds = (0.02, 0.03): the manifolds cross at
+    """
+    instance("orbit", orbit, PeriodicOrbit, "an orbit, as periodic_orbit gives")
+    low, high = interval("bounds", bounds)
+    width = within("tolerance", tolerance, 1e-9, 0.5, closed="both") * (high - low)
+
+    def crosses(value: float) -> bool:
+        flow = orbit.flow.neighbour(name, value)
+        saddle = periodic_orbit(flow, orbit.coordinates, orbit.period)
+        limits = {"max_arclength": max_arclength, "max_distance": max_distance, "max_turn": max_turn}
+        both = (invariant_manifold(saddle, kind, **limits) for kind in ("unstable", "stable"))  # type: ignore[arg-type]
+        return homoclinic_points(*both).sizes["point"] > 0
+
+    report = counting(progress, "homoclinic tangency", "values")
+    total, done = 2 + int(np.ceil(np.log2((high - low) / width))), 2
+    at_low, at_high = crosses(low), crosses(high)
+    if at_low == at_high:
+        where = "both values" if at_low else "neither value"
+        raise InputError(
+            f"bounds = {shown(bounds)}: the manifolds cross at {where}; give one with and one without crossing"
+        )
+    while high - low > width:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if crosses(middle) == at_low else (low, middle)
+        done += 1
+        if report is not None:
+            report(done, total)
+    return (high, low) if at_low else (low, high)

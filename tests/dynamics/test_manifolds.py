@@ -1,0 +1,110 @@
+"""Invariant manifolds: exact ones of maps, invariance under the map, and Melnikov's threshold of a twin-well oscillator."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from doubles import KnownMap, henon, table
+
+import snapbeam as sb
+from snapbeam.model import default_values
+from snapbeam.model.state import amplitude_scale
+from snapbeam.util.validation import InputError
+
+
+def bent(expansion: float) -> KnownMap:
+    """(x, y) -> (s x, y/4 + x^2): the manifolds of the origin are y = x^2/(s^2 - 1/4) and x = 0."""
+    return KnownMap(
+        lambda x, of: np.stack([of["s"] * x[:, 0], 0.25 * x[:, 1] + x[:, 0] ** 2], axis=1),
+        lambda x, of: table([of["s"], 0.0], [2.0 * x[:, 0], 0.25]),
+        2, s=expansion,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("expansion", [2.0, -1.5, 60.0])
+def test_exact_manifolds(expansion: float) -> None:
+    """Both, also with a negative multiplier and with a large one, within the error of a chord."""
+    saddle = sb.dynamics.periodic_orbit(bent(expansion), [0.1, 0.1])
+    unstable = sb.dynamics.invariant_manifold(saddle, max_arclength=4.0)
+    x, y = unstable["state"].values.T
+    np.testing.assert_allclose(y, x**2 / (expansion**2 - 0.25), rtol=0.0, atol=1e-8)
+    assert x.min() < -0.9 and x.max() > 0.9
+    for side in (-1, 1):
+        points = unstable["state"].values[unstable["side"].values == side]
+        chords = np.diff(points, axis=0)
+        size = np.linalg.norm(chords, axis=1)
+        assert size.max() <= 0.05 and size.sum() >= 4.0
+        cosine = (chords[1:] * chords[:-1]).sum(axis=1) / (size[1:] * size[:-1])
+        assert np.arccos(np.minimum(cosine, 1.0)).max() <= 0.2
+    stable = sb.dynamics.invariant_manifold(saddle, "stable", max_arclength=3.0)
+    np.testing.assert_allclose(stable["state"].values[:, 0], 0.0, atol=1e-9)
+    assert stable["state"].values[:, 1].max() >= 3.0 - 1e-4
+    assert sb.dynamics.homoclinic_points(unstable, stable).sizes["point"] == 0
+
+
+def test_manifolds_of_the_henon_map() -> None:
+    """Points of the stable manifold come to the saddle; homoclinic points do so forwards, and lie on both."""
+    saddle = sb.dynamics.periodic_orbit(henon(1.4, 0.3), [0.6, 0.19])
+    unstable = sb.dynamics.invariant_manifold(saddle, max_arclength=10.0, max_distance=0.02)
+    stable = sb.dynamics.invariant_manifold(saddle, "stable", max_arclength=5.0)
+    assert stable.attrs["multiplier"] == pytest.approx(-0.3 / unstable.attrs["multiplier"])
+    early = stable["age"].values < 3.0
+    came = saddle.flow.advance(stable["state"].values[early], 12).states
+    assert np.abs(came - saddle.coordinates).max() < 1e-2
+    crossing = sb.dynamics.homoclinic_points(unstable, stable)
+    assert crossing.sizes["point"] > 5 and (np.diff(crossing["arclength"]) >= 0.0).all()
+    for point in crossing["state"].values:
+        near = np.linalg.norm(stable["state"].values - point, axis=1).min()
+        assert near <= 0.05 and np.linalg.norm(unstable["state"].values - point, axis=1).min() <= 0.02
+    ax = sb.plot.plot_manifold(unstable)
+    sb.plot.plot_manifold(stable, ax)
+    assert len(ax.lines) == 6
+
+
+def test_points_and_length_are_limited() -> None:
+    saddle = sb.dynamics.periodic_orbit(henon(1.4, 0.3), [0.6, 0.19])
+    short = sb.dynamics.invariant_manifold(saddle, max_arclength=100.0, max_points=200)
+    assert short.attrs["termination_reason"] == "max_points; max_points"
+    assert short.sizes["point"] <= 400 and short["arclength"].max() < 100.0
+
+
+def test_refusals() -> None:
+    sink = sb.dynamics.periodic_orbit(henon(0.2, 0.3), [0.7, 0.2])
+    with pytest.raises(InputError, match="unstable manifold has 0 dimensions"):
+        sb.dynamics.invariant_manifold(sink)
+    with pytest.raises(InputError, match="stable manifold has 2 dimensions"):
+        sb.dynamics.invariant_manifold(sink, "stable")
+    saddle = sb.dynamics.periodic_orbit(henon(1.4, 0.3), [0.6, 0.19])
+    unstable = sb.dynamics.invariant_manifold(saddle, max_arclength=1.0)
+    with pytest.raises(InputError, match="must be the stable manifold"):
+        sb.dynamics.homoclinic_points(unstable, unstable)
+    with pytest.raises(InputError, match="cross at both values"):
+        sb.dynamics.homoclinic_tangency(saddle, "a", (1.39, 1.41))
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:accuracy = 'standard'")
+def test_melnikovs_threshold() -> None:
+    """x'' + d x' - x + x^3 = g cos(w t): tangency at g/d = 4 cosh(pi w/2)/(3 sqrt(2) pi w), for light damping."""
+    damping_ratio, ratio = 0.01, 0.9
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=damping_ratio)
+    # in the time of the saddle the frequency of a well is sqrt(2)
+    w, d = ratio * math.sqrt(2.0), 2.0 * damping_ratio * math.sqrt(2.0)
+    threshold = d * 4.0 * math.cosh(0.5 * math.pi * w) / (3.0 * math.sqrt(2.0) * math.pi * w)
+    unit = 0.5 * (2.0 * math.pi * model.reference_frequency) ** 2 * amplitude_scale(model)
+    force = threshold * unit * model.mass[0, 0] / float(np.ravel(model.shape_at(0.5))[0])
+    history = sb.HarmonicForce(amplitude=force, frequency_ratio=ratio)
+    system = sb.System(model, forces=[sb.ExternalForce(location=0.5, history=history)])
+    saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0], integration=sb.Integration())
+    without, crossing = sb.dynamics.homoclinic_tangency(
+        saddle,
+        "force.amplitude",
+        (0.95 * force, 1.05 * force),
+        max_arclength=4.5,
+        max_distance=0.05,
+        tolerance=0.1,
+    )
+    assert without < crossing
+    assert without == pytest.approx(force, rel=0.031) and crossing == pytest.approx(force, rel=0.031)
