@@ -26,7 +26,7 @@ _STEEPEST = 1.875
 
 
 class LoadMotion(Drive):
-    """How the axial load differs from the one that the beam was reduced under, N: a drive whose *motion* is a force."""
+    """Change of the axial load about the value of the beam, N: a drive whose *motion* is a force."""
 
     registry: ClassVar[dict[str, type[Drive]]] = LOADS
 
@@ -183,7 +183,7 @@ class AxialLoadModulation:
     noun: ClassVar[str] = "a changing axial load"
     """In messages."""
     rate_dependent: ClassVar[bool] = False
-    """Whether its force depends on the velocity of the structure."""
+    """True if the force depends on the velocity of the structure."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.motion, LoadMotion):

@@ -70,7 +70,7 @@ class BaseExcitation:
     noun: ClassVar[str] = "a moving base"
     """In messages."""
     rate_dependent: ClassVar[bool] = False
-    """Whether its force depends on the velocity of the structure."""
+    """True if the force depends on the velocity of the structure."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.motion, Drive):

@@ -238,7 +238,7 @@ class Beam:
 
     @property
     def is_buckled(self) -> bool:
-        """Whether the axial load exceeds the critical load, so that the beam is bistable."""
+        """True if the axial load exceeds the critical load, so that the beam is bistable."""
         return self.buckling_level > 0.0
 
 

@@ -1,4 +1,4 @@
-"""How the ends of a beam are held: rotational springs and the axial stiffness of the supports."""
+"""Boundary conditions of a beam: rotational springs and the axial stiffness of the supports."""
 
 from __future__ import annotations
 
@@ -53,17 +53,17 @@ class BoundaryConditions:
 
     @property
     def is_elastic(self) -> bool:
-        """Whether an end can rotate, against a spring or freely."""
+        """True if an end can rotate, against a spring or freely."""
         return self.left_rotational_stiffness is not None or self.right_rotational_stiffness is not None
 
     @property
     def is_symmetric(self) -> bool:
-        """Whether both ends are held alike, so that modes are symmetric or antisymmetric."""
+        """True if both ends have the same rotational stiffness, so that modes are symmetric or antisymmetric."""
         return self.left_rotational_stiffness == self.right_rotational_stiffness
 
     @property
     def is_clamped(self) -> bool:
-        """Whether both ends are clamped and rigid."""
+        """True if both ends are clamped and rigid."""
         return not self.is_elastic and self.axial_support_stiffness is None
 
 

@@ -65,7 +65,7 @@ def wavenumbers(count: int, length: float) -> _Array:
 
 
 class _Evaluation(NamedTuple):
-    """What shape, slope and curvature are put together from; the modes lie along the first axis."""
+    """Terms of shape, slope and curvature; the modes are along the first axis."""
 
     xi: _Array
     k: _Array
@@ -171,7 +171,7 @@ def _mixed(stiffness: float) -> tuple[float, float]:
 
 
 def _conditions(z: float, left: float, right: float) -> _Array:
-    """What phi = a (cos z x - 1) + b sin z x + c x, x from 0 to 1, must fulfil: phi(1) = 0, and both end moments."""
+    """Matrix of the conditions on phi = a (cos z x - 1) + b sin z x + c x: phi(1) = 0, and both end moments."""
     (bent0, turned0), (bent1, turned1) = _mixed(left), _mixed(right)
     cosine, sine = math.cos(z), math.sin(z)
     return np.array(
@@ -332,7 +332,7 @@ _BALANCE = 1e-8  # largest residual force at an equilibrium, relative to its two
 
 @dataclass(frozen=True, kw_only=True)
 class StructureMatrices:
-    """What a user gives for a structure, as given; see ``ReducedModel.from_matrices``."""
+    """Matrices of a structure as the user gave them; see ``ReducedModel.from_matrices``."""
 
     mass: ArrayLike
     stiffness: ArrayLike

@@ -1,4 +1,4 @@
-"""When the future class of a run is certain: the energy a beam in the far well needs to leave it."""
+"""Energy criterion of early termination: the energy that a beam in the second well needs to leave it."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ class Equilibrium:
 
     @property
     def is_stable(self) -> bool:
-        """Whether it is a well."""
+        """True if the equilibrium is a well."""
         return self.unstable_directions == 0
 
     def __repr__(self) -> str:
@@ -158,7 +158,7 @@ def _roots(kappa: _Array, force: _Array, gamma: float) -> list[tuple[int, float,
 def _lowest(
     slope: Callable[[int, float], float], left: int, right: int, width: float
 ) -> tuple[int, float] | None:
-    """Where the convex function between two edges is least, from the nearer of them; None if at the left end."""
+    """Minimum of the convex function between two edges, from the nearer edge; None if it is at the left end."""
     if slope(left, 0.5 * width) > 0.0:
         if left < 0 and slope(left, 0.0) >= 0.0:
             return None
@@ -237,7 +237,7 @@ def _branches(kappa: _Array, force: _Array, gamma: float) -> list[tuple[_Array, 
 
 @dataclass(frozen=True, eq=False)
 class Landscape:
-    """Where a structure can rest."""
+    """Equilibria of a structure: wells and saddles."""
 
     equilibria: tuple[Equilibrium, ...]
     """By energy."""
@@ -254,7 +254,7 @@ class Landscape:
 
     @property
     def is_bistable(self) -> bool:
-        """Whether there are two wells."""
+        """True if there are two wells."""
         return self.saddle is not None
 
 

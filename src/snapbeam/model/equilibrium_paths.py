@@ -85,10 +85,10 @@ class EquilibriumPath:
     unstable: NDArray[np.int_]
     singular: tuple[Singular, ...]
     secondary: bool
-    """Whether it branches off from another one."""
+    """True if the path branches off from another one."""
     closed: bool
     complete: bool
-    """Whether it was followed to its ends: the range, another path, or the end of the range of a law."""
+    """True if the path was followed to its ends: the range, another path, or the end of the range of a law."""
 
 
 class _Point(NamedTuple):
@@ -223,7 +223,7 @@ class _Tracer:
     high: float
     paths: list[EquilibriumPath] = field(default_factory=list)
     lost: bool = False
-    """Whether the path that is being followed ended for want of steps."""
+    """True if the current path ended because the maximum number of steps was reached."""
 
     def __post_init__(self) -> None:
         value, first = self.family.first
@@ -331,7 +331,7 @@ class _Tracer:
         return np.asarray(potential.model.linear_modes @ axes[:, int(np.abs(values).argmin())])
 
     def is_known(self, y: _Array) -> bool:
-        """Whether a point lies on a path that was followed."""
+        """Return whether a point is on a path that was already followed."""
         for path in self.paths:
             points = np.column_stack((path.amplitude / self.length, (path.value - self.origin) / self.unit))
             begin, away = points[:-1], np.diff(points, axis=0)
@@ -393,7 +393,7 @@ class _Tracer:
         return points, singular, False
 
     def _is_at_end_of_a_law(self, y: _Array) -> bool:
-        """Whether a local force acts beside the end of the range of its law, which the path cannot pass."""
+        """Return whether a local force is next to the end of the range of its law, which the path cannot pass."""
         potential = self.potential(y)
         for row, law in zip(potential.rows, potential.local_forces, strict=True):
             u = float(row @ self.amplitude(y))

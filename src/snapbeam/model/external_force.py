@@ -320,7 +320,7 @@ class ExternalForce:
     noun: ClassVar[str] = "an external force"
     """In messages."""
     rate_dependent: ClassVar[bool] = False
-    """Whether its force depends on the velocity of the structure."""
+    """True if the force depends on the velocity of the structure."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.history, ForceHistory):

@@ -44,7 +44,7 @@ class Harvester:
     noun: ClassVar[str] = "a harvester"
     """In messages."""
     rate_dependent: ClassVar[bool] = True
-    """Whether its force depends on the velocity of the structure."""
+    """True if the force depends on the velocity of the structure."""
     resistance: float
     """Of the load, ohm."""
 

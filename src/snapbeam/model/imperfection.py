@@ -156,7 +156,7 @@ class Imperfection:
 
     @property
     def is_none(self) -> bool:
-        """Whether the beam is perfect after all."""
+        """True if the beam is perfect."""
         profile = self.profile is not None and bool(np.any(self.profile[1] != self.profile[1, 0]))
         loads = (
             self.midspan_amplitude,

@@ -1,4 +1,4 @@
-"""How a system is integrated: for how long, how finely, by which engine."""
+"""Solver settings of a run: duration, step or tolerance, engine."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CYCLES = 200
 
 @dataclass(frozen=True, kw_only=True)
 class Integration:
-    """How runs are integrated; what is studied is a :class:`~snapbeam.System`.
+    """Solver settings of a run: number of cycles, time step or tolerance, engine.
 
     Parameters
     ----------

@@ -110,7 +110,7 @@ class LocalForce:
     constant_part: ClassVar[float] = 0.0
     """Part of the force that does not depend on the motion, N."""
     dissipative: ClassVar[bool] = False
-    """Whether the force depends on the velocity too."""
+    """True if the force also depends on the velocity."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -174,17 +174,17 @@ class LocalForce:
 
     @classmethod
     def is_limited(cls) -> bool:
-        """Whether the law is valid for some displacements only."""
+        """Return whether the law is valid only in a range of displacements."""
         return cls.displacement_range is not LocalForce.displacement_range
 
     @property
     def rate_dependent(self) -> bool:
-        """Whether the force depends on the velocity of the structure."""
+        """True if the force depends on the velocity of the structure."""
         return self.dissipative
 
     @property
     def is_conservative(self) -> bool:
-        """Whether the law has a conservative part."""
+        """True if the law has a conservative part."""
         return type(self).force is not LocalForce.force
 
     @classmethod

@@ -298,7 +298,7 @@ def _negative(factors: Any) -> int:
 
 
 def is_positive_definite(matrix: Any) -> bool:
-    """Whether a symmetric matrix, dense or sparse, has positive eigenvalues only."""
+    """Return whether a symmetric matrix, dense or sparse, has only positive eigenvalues."""
     if sp.issparse(matrix):
         diagonal = matrix.diagonal()
         if not (diagonal > 0.0).all():

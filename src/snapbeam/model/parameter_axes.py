@@ -141,7 +141,7 @@ class Physical:
     words: str
 
     def unit_of(self, length: float, omega: float) -> float:
-        """What a ratio of 1 is, from the length scale (m) and omega_1 (rad/s); not of a location."""
+        """Value of a normalised parameter of 1, from the length scale (m) and omega_1 (rad/s); not for a location."""
         return {
             "frequency_ratio": omega / (2.0 * math.pi),
             "velocity_amplitude": length * omega,
@@ -167,7 +167,7 @@ PHYSICAL: dict[str, Physical] = {
         "base_excitation.acceleration_amplitude", "g", "acceleration amplitude of the base"
     ),
 }
-"""What may be given instead of a ratio, by dotted name; one unit for each ratio."""
+"""Physical quantities that can replace a normalised parameter, by dotted name; one unit for each."""
 
 
 def physical_name(name: str) -> str | None:
@@ -201,7 +201,7 @@ def parameter_of_axis(name: str) -> Parameter:
 
 
 def unit_of(system: System, name: str) -> float:
-    """What a ratio of 1 is in the physical unit of *name*."""
+    """Value of a normalised parameter of 1 in the physical unit of *name*."""
     scale, row = system.scale, PHYSICAL[name]
     if row.parameter != "contact.location":
         return row.unit_of(scale.length, scale.omega)

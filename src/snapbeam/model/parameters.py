@@ -72,12 +72,12 @@ class Parameter:
 
     @property
     def section(self) -> str:
-        """What it is a parameter of."""
+        """Section of the parameter."""
         return numbered(split_name(self.name)[0])[0]
 
     @property
     def is_run(self) -> bool:
-        """Whether it may differ between the runs of one ensemble."""
+        """True if the parameter can differ between the runs of one ensemble."""
         return self.quantity.scope == RUN
 
     @property
@@ -91,7 +91,7 @@ class Parameter:
 
     @property
     def limits(self) -> str:
-        """What is allowed, in words."""
+        """Allowed values, as text."""
         item = self.quantity
         if item.choices:
             return " or ".join(item.choices)

@@ -103,7 +103,7 @@ class Potential:
 
     @property
     def is_of_the_structure_alone(self) -> bool:
-        """Whether no force adds to that of the structure."""
+        """True if no force acts in addition to those of the structure."""
         return not self.local_forces and not self.constant.any()
 
     def energy(self, alpha: ArrayLike) -> _Array:
@@ -287,7 +287,7 @@ class Potential:
         return found
 
     def holds(self, alpha: _Array) -> bool:
-        """Whether the displacement of every local force is within the range of its law."""
+        """Return whether the displacement of every local force is within the range of its law."""
         for row, law in zip(self.rows, self.local_forces, strict=True):
             low, high = law.displacement_range(law.numbers)
             if not low < float(row @ alpha) < high:

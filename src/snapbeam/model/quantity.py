@@ -51,7 +51,7 @@ STRUCTURE = "structure"
 
 @dataclass(frozen=True)
 class ParameterField:
-    """What one field means.
+    """Description of one field: unit, long name, type, allowed range.
 
     Attributes
     ----------

@@ -215,7 +215,7 @@ def _read_only(omega: _Array, vectors: _Array, parity: NDArray[np.int_]) -> Line
 
 
 class Wells:
-    """What follows from the potential energy of a reduced model."""
+    """Potential energy of a reduced model: wells, stiffness, frequencies."""
 
     stiffness: _Array
     nonlinear_stiffness: float
@@ -324,7 +324,7 @@ class Wells:
 
     @property
     def is_bistable(self) -> bool:
-        """Whether the structure has two wells."""
+        """True if the structure has two wells."""
         if self.landscape is not None:
             return self.landscape.is_bistable
         return bool(np.any(self.well_amplitude != 0.0))
@@ -463,7 +463,7 @@ _HINT_STEPS = 81
 
 
 def _first_true(holds: Callable[[float], bool], outside: float, inside: float) -> float:
-    """Where *holds* begins, between a value outside and one inside, to 4 digits and inside."""
+    """Boundary of the range in which *holds* is true, between a value outside and one inside, to 4 digits."""
     while abs(inside - outside) > 5e-5 * abs(inside):
         middle = 0.5 * (outside + inside)
         outside, inside = (outside, middle) if holds(middle) else (middle, inside)
@@ -500,7 +500,7 @@ MODEL_QUANTITIES: dict[str, tuple[ParameterField, Any]] = {
         None,
     ),
 }  # fmt: skip
-"""What a reduction takes beside the beam, and its default."""
+"""Parameters of a reduction in addition to the beam, with their defaults."""
 
 _LEAST_COMPLIANCE = 1e-300
 """1/kg, below which the inverse is no number."""

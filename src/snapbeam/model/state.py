@@ -1,4 +1,4 @@
-"""Where a run stands: everything that its future depends on."""
+"""State of a run: all quantities that determine its future."""
 
 from __future__ import annotations
 

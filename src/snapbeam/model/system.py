@@ -226,7 +226,7 @@ class System:
 
     @property
     def moving(self) -> tuple[tuple[str, Drive], ...]:
-        """What moves as prescribed, by the section that its parameters stand in; the first one's cycle counts.
+        """Prescribed motions with the names of their sections; one cycle of the first is a cycle of excitation.
 
         A striker that stands still moves nothing where a base or an axial load does.
         """
@@ -280,7 +280,7 @@ class System:
 
     @property
     def primary_excitation(self) -> tuple[str, Drive] | None:
-        """That of which one cycle is a cycle of excitation, with its section; None where nothing moves."""
+        """Drive whose cycle is the cycle of excitation, with its section; None if nothing moves."""
         return self.moving[0] if self.moving else None
 
     @cached_property

@@ -1,4 +1,4 @@
-"""How sure the class of each point of a map is: paler where its repeats disagree."""
+"""Certainty of the response classes of a map: paler colours where replicates disagree."""
 
 from __future__ import annotations
 

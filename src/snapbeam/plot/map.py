@@ -476,14 +476,14 @@ def scaled_values(dataset: xr.Dataset, name: str) -> tuple[_Array, str]:
 
 
 def wants_powers(values: _Array) -> bool:
-    """Whether values span so much that colours go by powers of ten: none negative, more than two of them."""
+    """Return whether values need a logarithmic colour scale: none is negative, and they span over two decades."""
     good = values[np.isfinite(values)]
     positive = good[good > 0.0]
     return bool(positive.size and (good >= 0.0).all() and positive.max() > _DECADES * positive.min())
 
 
 def _label(dataset: xr.Dataset, name: str, values: np.ndarray) -> tuple[float, str]:
-    """What values are divided by, and what stands beside them."""
+    """Divisor of the values, and the label of the colour bar."""
     attrs = dataset[name].attrs
     row = STATISTICS.get(name)
     words = str(attrs.get("long_name", row.long_name if row else name))
@@ -650,7 +650,7 @@ def _along(dataset: xr.Dataset, across: str | None, upward: str | None) -> tuple
 
 
 def _place(axis: Axis, dataset: xr.Dataset, name: str) -> NDArray[np.float64]:
-    """Where the points stand along an axis, which is labelled; words stand side by side."""
+    """Coordinates of the points along an axis, which gets its label; words are equally spaced."""
     values = dataset[name].values
     axis.set_label_text(axis_label(dataset.drop_vars("point", errors="ignore"), name))
     if values.dtype.kind in "fiu":

@@ -413,7 +413,7 @@ def _alone(ax: Axes, part: xr.Dataset, x: np.ndarray, label: str) -> Axes:
 
 
 def _from(first: float, last: float) -> float:
-    """Where an axis begins: a little before the start of a run, so that an impact that begins at once is seen."""
+    """Lower limit of a time axis, slightly before the start of a run so that an immediate impact is visible."""
     return first if first > 0.0 else first - 0.01 * (last - first)
 
 

@@ -368,7 +368,7 @@ def _draw_striker(ax: Axes, system: System, striker: Striker, contact: ContactLa
 def _caption(
     ax: Axes, at: float, sign: float, contact: ContactLaw, striker: Striker, gap: float, number: int
 ) -> None:
-    """What the signs do not say, beside the striker and clear of the beam."""
+    """Write the contact law, gap and mass next to the striker, clear of the beam."""
     law = _LAWS.get(contact.name, contact.name)
     lines = [f"striker {number}: {law}" if number else f"contact: {law}"]
     if gap != 0.0:
@@ -392,7 +392,7 @@ def _rod(ax: Axes, x: float, one: float, other: float) -> None:
 
 
 def _block(ax: Axes, x: float, edge: float, sign: float, words: str, moves: bool = True) -> None:
-    """What moves as the drive says."""
+    """Draw a body with prescribed motion."""
     corner = (x - 0.34, min(edge, edge - sign * 0.22))
     ax.add_patch(Rectangle(corner, 0.68, 0.22, facecolor=SHAKER_COLOR, alpha=0.25, lw=0))
     if moves:

@@ -179,7 +179,7 @@ def _mark_no_threshold(ax: Axes, curves: list[xr.Dataset], x: _Array, edges: _Ar
 
 
 def _label(dataset: xr.Dataset, curve: xr.Dataset, others: list[str], raised: str) -> str:
-    """What one curve is called."""
+    """Legend label of a curve."""
     if others:
         value = curve[others[0]].item()
         text = str(value) if isinstance(value, (int, str)) else f"{value:.4g}"

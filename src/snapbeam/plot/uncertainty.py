@@ -418,7 +418,7 @@ def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
 
 
 def _name(data: xr.Dataset, at: int, local: bool) -> str:
-    """What stands beside a bar: the parameter and, locally, how much it is moved by, in its own unit."""
+    """Label of a bar: the parameter and, for a local analysis, its step with unit."""
     name = str(data["parameter"].values[at])
     row = lookup(name)
     section, text = split_name(name)

@@ -54,7 +54,7 @@ __all__ = [
 def others_of(
     system: System, structure: Structure, columns: Mapping[str, _Array], runs: int, since: _Array
 ) -> FurtherContactTable | None:
-    """Where they are and what they touch by; their motions are in the ensemble's drive.
+    """Rows, laws and numbers of the further strikers of each run; None if there is at most one striker.
 
     A striker stands where its tip touches the beam at rest in the first well, or its gap away from that.  *since* holds
     the contact time of every striker, shape (runs or 1, strikers).
@@ -90,7 +90,7 @@ def others_of(
 
 
 def _begun(drive: Drive, columns: Mapping[str, _Array], section: str, system: System, runs: int) -> _Array:
-    """How far the tip is from its mid-position at the start, m."""
+    """Displacement of the tip from its mid-position at the start, m, shape (runs,)."""
     own = _own(columns, section, runs)
     phase = columns.get(f"{section}.phase", np.zeros(runs))
     if not phase.any():
@@ -117,7 +117,7 @@ def _speed(drive: Drive, columns: Mapping[str, _Array], section: str, system: Sy
 
 
 class Driven(NamedTuple):
-    """What the drive is, for every run."""
+    """Drive of the first striker: its type, and its numbers for each run."""
 
     kind: type[Drive]
     numbers: _Array
@@ -296,7 +296,7 @@ def _motion_at(ensemble: Ensemble, system: System, section: str, drive: Drive, t
 
 
 def begun_at(driven: Driven, phase: _Array) -> _Array:
-    """How far the tip is from its mid-position at the start, m."""
+    """Displacement of the tip from its mid-position at the start, m, shape (runs,)."""
     if driven.kind.harmonic:
         amplitude = driven.numbers[:, driven.kind.number_names.index("amplitude")]
         return np.where(phase == 0.0, 0.0, amplitude * np.sin(phase))
@@ -316,7 +316,7 @@ _Integers = NDArray[np.int64]
 
 
 def _is_around(section: str) -> bool:
-    """Whether a section is of what acts on the structure itself."""
+    """Return whether the parameters of a section act on the structure itself: base, axial load or local force."""
     return section in ("base_excitation", "axial_load") or numbered(section)[0] == "force"
 
 
@@ -762,7 +762,7 @@ def _decisions(
     location: _Array,
     highest: _Array,
 ) -> None:
-    """When a run may end early."""
+    """Set the criteria of early termination of each run: crossings, energy and reach of the tip."""
     table["decide_crossings"], table["decide_energy"] = -1, -math.inf
     properties = system.contact_law is None or system.contact_law.properties.energy_bound
     if not integration.early_termination or not properties or len(system.contacts) > 1 or system.local_forces:

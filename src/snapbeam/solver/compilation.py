@@ -1,4 +1,4 @@
-"""How kernels are compiled, and how the compiled code is kept between runs.
+"""Compilation of kernels, and the cache of compiled code on disk.
 
 Functions are compiled into the kernel that calls them, across files and with the law of contact and the drive that
 it integrates; a kernel is what is kept on disk.  Numba alone would keep it until the file that it stands in changes.
@@ -281,7 +281,7 @@ class _KeptCode(FunctionCache):
     def __init__(self, function: Callable[..., Any], mark: str, alone: bool) -> None:
         super().__init__(function)
         self._alone = alone
-        """Whether the code calls nothing of Numba's runtime, so that it can be loaded by itself."""
+        """True if the code calls no function of the Numba runtime, so that it can be loaded without it."""
         self._cache_file = _CheckedFiles(
             cache_path=self._cache_path,
             filename_base=f"{self._impl.filename_base}-{mark}",
@@ -336,7 +336,7 @@ class _CheckedFiles(IndexDataCacheFile):
 
     @staticmethod
     def _read(path: str) -> bytes | None:
-        """What a file holds; None if it is not there or not what was written."""
+        """Content of a cache file; None if the file is missing or its check sum is wrong."""
         try:
             held = Path(path).read_bytes()
         except OSError:
@@ -404,7 +404,7 @@ def _marks_of_class(kind: type) -> Iterable[str]:
 
 
 def _is_names(value: Any) -> bool:
-    """Whether it is a tuple of names, as those of a drive's numbers and of the times of its jumps."""
+    """Return whether a value is a tuple of names, such as the numbers of a drive or the times of its jumps."""
     return isinstance(value, tuple) and all(isinstance(name, str) for name in value)
 
 

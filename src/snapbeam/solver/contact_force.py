@@ -108,7 +108,7 @@ def _peak_force(law, deepest):
 
 
 def is_impulsive(law: Any) -> bool:
-    """Whether impacts under the law last no time."""
+    """Return whether impacts under the law have zero duration."""
     return bool(type(law).owner.impulsive)
 
 

@@ -1,4 +1,4 @@
-"""What an engine is asked for: many runs of one structure, in no engine's layout."""
+"""Input of every solver: many runs of one structure, independent of the memory layout."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class FurtherContactTable:
 
     laws: tuple[type[ContactLaw], ...]
     numbers: _Array
-    """Where each is and what it touches by, shape (runs, strikers, 32), in the order of the engine's blocks."""
+    """Position and contact parameters, shape (runs, strikers, 32), in the order of the solver's blocks."""
     places: _Integers
     """Which row each has, shape (runs, strikers)."""
     rows: _Array
@@ -91,7 +91,7 @@ class Ensemble:
 
     @property
     def has_striker(self) -> bool:
-        """Whether there is a striker."""
+        """Return whether the ensemble has a striker."""
         return bool((self.runs["offset"] > FAR_AWAY).any())
 
     @property

@@ -30,7 +30,7 @@ Progress = Callable[[int, int], object]
 
 
 class Engine(Protocol):
-    """What every engine can do, or refuses by name."""
+    """Interface of a solver; unsupported operations raise an error with a reason."""
 
     def run_ensemble(
         self, ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None

@@ -30,7 +30,7 @@ class Stages(NamedTuple):
     flows: int
     """Flows of a step; there is one kick more."""
     flow: int
-    """Where the flow weights begin."""
+    """Memory offset of the flow weights."""
     kick: int
     elapsed: int
 

@@ -113,7 +113,7 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
 
 
 OTHER_IMPACTS, OTHER_PEAK, OTHER_IMPULSE, OTHER_WORK = range(4)
-"""What is kept of each striker beside the first."""
+"""Columns of the statistics of each striker after the first."""
 
 
 @dataclass(frozen=True)
@@ -502,7 +502,7 @@ _EACH = {
     "impulse": (OTHER_IMPULSE, "impulse on the beam, all impacts"),
     "striker_work": (OTHER_WORK, "work done"),
 }
-"""What each of several has: where the others' is kept, and words."""
+"""Statistics of each of several strikers: column of the further strikers, and long name."""
 
 
 def rows_for(strikers: int) -> dict[str, Statistic]:
@@ -556,12 +556,12 @@ class Reading:
 
     @property
     def length(self) -> float:
-        """What displacements are normalised by, m."""
+        """Length that normalises displacements, m."""
         return self.ensemble.scale.length
 
     @property
     def speed(self) -> float:
-        """What velocities are normalised by, m/s."""
+        """Speed that normalises velocities, m/s."""
         return self.ensemble.scale.length * self.ensemble.scale.omega
 
     @property
@@ -571,7 +571,7 @@ class Reading:
 
     @cached_property
     def status(self) -> NDArray[np.int64]:
-        """How each run ended; what ended with more energy than it was given is unbalanced.
+        """Status of each run; ENERGY_ERROR if a run gained more energy than the work done on it.
 
         Damping, and a contact with losses, only take energy.
         """
@@ -601,7 +601,7 @@ class Reading:
 
     @property
     def others(self) -> NDArray[np.float64]:
-        """What is kept of each striker beside the first, shape (runs, strikers, kinds)."""
+        """Statistics of each striker after the first, shape (runs, strikers, kinds)."""
         if self.ensemble.others is None:
             return np.zeros((self.accumulators.size, 0, 4))
         return np.asarray(self.accumulators["others"])
@@ -702,13 +702,13 @@ class OutputStates(NamedTuple):
     """Linear modes about the current well, shape (runs, output states, N)."""
     p: _Array
     well_sign: NDArray[np.int64]
-    """That well: +1 the first, -1 the other, shape (runs, output states)."""
+    """Current well: +1 first, -1 second, shape (runs, output states)."""
     contact_ticks: NDArray[np.int64]
     """Ticks since the present contact of each striker began, -1: apart, shape (runs, output states, strikers)."""
 
 
 class Last(NamedTuple):
-    """Where a recorded run stands at its end."""
+    """Final state of a recorded run."""
 
     q: _Array
     """Linear modes about the current well, shape (N,)."""
@@ -722,7 +722,7 @@ class Recorded(NamedTuple):
     """A piece of a recorded run."""
 
     times: _Array
-    """When each sample was taken, s, shape (samples,)."""
+    """Times of the samples, s, shape (samples,)."""
     q: _Array
     """Linear modes about the first well, shape (samples, N)."""
     p: _Array

@@ -1,4 +1,4 @@
-"""How finely to step: the default from the model and the contact, and what a user asks for instead."""
+"""Choice of the step size: the default from model and contact, or the user's request."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ after a strong impulse.  The first may ring for many cycles, so that steps of tw
 _SHORT_IMPACT = 1.0 / 150.0
 """Of the period of the first mode: impacts that are shorter excite higher modes, and the error allowed falls with them."""
 _STRUCK = 0.46
-"""Where, over the length of the beam: no mode has a node there that its neighbours do not have near it."""
+"""Relative location on the beam of a reference striker: no mode has an isolated node near it."""
 _PERIODS = 2.0
 _MOST_SLOPE = 1e5
 _NEIGHBOUR = 1e-9
@@ -259,7 +259,7 @@ def _march(counts, flows, kicks, columns, well, gamma, start, work, out):
 # Free flight: the error allowed a step, as it is measured on the structure, by level of accuracy.
 _LIMIT = {"standard": 2.5e-7, "reference": 2e-11}
 _LIMIT_OF_HITS = {"standard": 1e-9, "reference": 1e-13}
-"""Where impacts last no time: no contact steps share the error, and there is one mode only."""
+"""Error limit of impacts of zero duration: there are no contact steps to share the error, and only one mode."""
 _ORDER = {"standard": 4, "reference": 6}
 _FREE_TURN = 4.0
 """Of the fastest mode in a flight step of level "reference", rad."""
@@ -350,7 +350,7 @@ _FEWEST_CLOCK = 4.0
 
 
 class Clocked(NamedTuple):
-    """How long runs last."""
+    """Duration of runs and time grid."""
 
     cycles: float
 
@@ -458,7 +458,7 @@ def require_resolved(system: System, integration: Integration, cycle: _Array) ->
 
 
 def seconds_of(steps: float, modes: int) -> float:
-    """What so many steps take on one core, s, to a factor of two or three."""
+    """Estimated time of a number of steps on one core, s, within a factor of two or three."""
     return steps * (_STEP_COST + _MODE_COST * modes)
 
 

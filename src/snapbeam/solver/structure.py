@@ -27,7 +27,7 @@ _Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class UnequalWells:
-    """What unequal wells add: about the mirror image of the first well the beam is the same, but for a constant force.
+    """Terms of unequal wells: a constant force about the mirror image of the first well.
 
     With B the side force and a the first well, K0 a + gamma (a . a) a = B.  At alpha = -a + V q the same linear modes
     and the same tension terms, g negated, hold exactly, and 2 V^T B is left over: the origin of q on the far side is
@@ -156,7 +156,7 @@ class Structure:
 
     @property
     def wells_are_mirror_images(self) -> bool:
-        """Whether the two wells are; also of a structure with one."""
+        """True if the two wells are mirror images, or if there is only one."""
         return self.unequal_wells is None
 
     @property
@@ -339,7 +339,7 @@ def _local_force(model: ReducedModel, equilibrium: _Array, local_force: LocalFor
 
 
 def _uneven(model: ReducedModel, sign: float, dividing_height: float | None) -> UnequalWells | None:
-    """What unequal wells add, of a model that is positive as the striker pushes."""
+    """Terms of unequal wells for a model that is positive in the direction of the striker; None if there are none."""
     if not model.is_bistable:
         return None
     level = model.dividing_height if dividing_height is None else sign * dividing_height

@@ -44,7 +44,7 @@ class DiagnosticWarning(UserWarning):
 
 
 class Severity(StrEnum):
-    """How much a diagnostic takes from a result.
+    """Severity of a diagnostic.
 
     INFO: worth knowing, the numbers stand.  WARNING: the numbers may not be what was meant, or be off by more than
     their standard errors, which were widened where that could be told.  ERROR: the numbers contradict something
@@ -98,7 +98,7 @@ class Diagnostic:
 
     @property
     def is_warning(self) -> bool:
-        """Whether the result should not be used without a look: all but notes."""
+        """True if the result needs a check before use: every severity except INFO."""
         return self.severity is not Severity.INFO
 
     def plain(self) -> dict[str, Any]:
@@ -218,7 +218,7 @@ _Shares = Callable[[float], object]
 
 
 class _Line:
-    """What is said, at most five times a second, on standard error."""
+    """Progress line on standard error, updated at most five times per second."""
 
     def __init__(self, what: str) -> None:
         self.what = what
@@ -241,7 +241,7 @@ class _Line:
 
 
 def counting(progress: _Counts | bool | None, what: str, noun: str = "points") -> _Counts | None:
-    """What a computation reports ``(done, total)`` to; True stands for a line on standard error.
+    """Function to which a computation reports ``(done, total)``; True selects a line on standard error.
 
     Raises
     ------

@@ -43,7 +43,7 @@ __all__ = [
 VERSION = "snapbeam_version"
 """Name of the attribute of NetCDF files and of the key of JSON files."""
 MADE_BY = f"made by snapbeam {__version__}"
-"""What pictures and animations say of themselves."""
+"""Provenance text in pictures and animations."""
 _MARK = b"made by snapbeam "
 _LOOKED_AT = 1 << 16  # bytes, at each end
 
@@ -169,7 +169,7 @@ def refuse_foreign(target: Path, name: str, begin: str = "") -> None:
 
 
 def is_ours(path: str | os.PathLike[str], begin: str = "") -> bool:
-    """Whether a file says that snapbeam made it; an empty one may be anybody's.
+    """Return whether snapbeam made a file; True for an empty file.
 
     Parameters
     ----------
@@ -319,7 +319,7 @@ def _sweep(target: Path) -> None:
 
 
 def lives(process: int) -> bool:
-    """Whether a process of this machine is there."""
+    """Return whether a process exists on this machine."""
     if os.name == "nt":
         return True
     try:

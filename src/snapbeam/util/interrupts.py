@@ -39,7 +39,7 @@ class _State:
     number = 0
     """The signal that arrived."""
     in_command = False
-    """Whether a command runs, which closes its files and reports what is finished when it is interrupted."""
+    """True while a command runs, which closes its files and reports finished work when it is interrupted."""
     heard = threading.Event()
     held: _Held | None = None
 

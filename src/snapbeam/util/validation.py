@@ -347,7 +347,7 @@ class _Names(dict[str, Any]):
 
 
 def _kinds(function: Callable[..., Any]) -> dict[str, Any]:
-    """What each parameter may be, as far as its annotation can be read."""
+    """Allowed types of each parameter, as far as its annotation can be read."""
     found = {}
     package = ".".join(function.__module__.split(".")[:2])
     for each in inspect.signature(function).parameters.values():
@@ -371,7 +371,7 @@ def _members(annotation: Any) -> list[Any]:
 
 
 def _suits(value: Any, kind: Any) -> bool:
-    """If *value* may be of a kind; whatever cannot be told is left to the function."""
+    """Return whether *value* can be of a type; True where the type cannot be checked."""
     origin = typing.get_origin(kind) or kind
     if kind is Any or kind is object:
         return True

@@ -1,4 +1,4 @@
-"""How much a contact loses: restitution and damping, made into each other without shortcuts."""
+"""Energy loss of a contact: exact conversion between coefficient of restitution and damping factor."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _expanded(e: float, d: float) -> float:
 
 
 def restitution_of_loss(loss: float) -> float:
-    """What share of its speed a free mass keeps under a loss number D = chi v, exactly.
+    """Coefficient of restitution of a free mass with loss number D = chi v, exact.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a contact does to the materials: Hertz's pressure, the onset of yield, bending of the beam."""
+"""Contact stress: Hertzian pressure, onset of yield, bending of the beam."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _YIELD = 1.60
 
 @dataclass(frozen=True)
 class HertzStress:
-    """What a sphere does to a flat at a force.
+    """Stress state of a sphere pressed on a flat by a given force.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class HertzStress:
     force: float
 
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """That the elastic law is left, if it is."""
+        """Diagnostic if the force exceeds the elastic limit."""
         if self.yield_force is None or self.force <= self.yield_force:
             return ()
         return (

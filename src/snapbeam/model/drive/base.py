@@ -1,4 +1,4 @@
-"""What every drive says of itself, and the drives by name."""
+"""Base class of drives, and the drives by name."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ DRIVES: dict[str, type[Drive]] = NamedTable(_sum_named)
 
 
 class Scale(NamedTuple):
-    """What normalised quantities of a drive are multiplied by."""
+    """Scales of the normalised quantities of a drive."""
 
     length: float
     """Length that normalises displacements, m: the buckling level b."""
@@ -86,9 +86,9 @@ class Drive:
     name: ClassVar[str] = ""
     """In parameter files and attributes."""
     harmonic: ClassVar[bool] = False
-    """Whether it is the sine that engines know by themselves."""
+    """True for the sine, which is built into the solver."""
     is_periodic: ClassVar[bool] = True
-    """Whether the motion repeats after a turn of its argument; if not, that turn is longer than any run."""
+    """True if the motion repeats after one turn of its argument; otherwise one turn is longer than any run."""
     recorded: ClassVar[bool] = False
     """True for a record of a certain ``duration``."""
     integrated_as: ClassVar[type[Drive] | None] = None
@@ -103,7 +103,7 @@ class Drive:
     discontinuities: ClassVar[tuple[str, ...]] = ()
     """Numbers that are times at which the velocity or one of its derivatives jumps, s since the drive began: steps end there."""
     registry: ClassVar[dict[str, type[Drive]]] = DRIVES
-    """Where it is entered by its name."""
+    """Registry of the class, by name."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -152,7 +152,7 @@ class Drive:
 
     @classmethod
     def can_excite_base(cls) -> bool:
-        """Whether a base may move so: its acceleration has a known bound."""
+        """Return whether a base may have this motion: its acceleration has a known bound."""
         return cls.peak_acceleration is not Drive.peak_acceleration
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
@@ -160,7 +160,7 @@ class Drive:
         raise NotImplementedError
 
     def samples(self) -> _Array:
-        """What kernels look up, as one row; empty for a formula."""
+        """Table of samples for the kernels, one row; empty for a formula."""
         return np.empty(0)
 
     def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:

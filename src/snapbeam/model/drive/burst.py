@@ -109,7 +109,7 @@ class Burst(Timed):
         return found["amplitude"], speed
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """That of the sine with the steepest and the sharpest envelope, and that of the retreat."""
+        """Bound of the acceleration: the sine with the steepest envelope, plus the retraction."""
         found = self.shape_numbers(columns, scale)
         rate, shortest = found["rate"], np.minimum(found["risen"], found["ended"] - found["falling"])
         shape = rate**2 + 2.0 * rate * _STEEPEST / shortest + _SHARPEST / shortest**2

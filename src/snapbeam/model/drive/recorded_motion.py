@@ -143,14 +143,14 @@ class RecordedMotion(Drive):
         return
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """What was recorded, with a margin for what lies between the samples."""
+        """Bounds of the recorded displacement and velocity, with a margin for motion between the samples."""
         runs = next(iter(columns.values())).size
         speed = _SPEED_MARGIN * float(np.abs(self.velocity).max())
         highest = float((self.displacement - self.displacement[0]).max()) + speed / self.sampling_frequency
         return np.full(runs, highest), np.full(runs, speed)
 
     def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """What was recorded in the other direction."""
+        """Bound of the recorded displacement in the opposite direction."""
         runs = next(iter(columns.values())).size
         speed = _SPEED_MARGIN * float(np.abs(self.velocity).max())
         lowest = float((self.displacement - self.displacement[0]).min()) - speed / self.sampling_frequency

@@ -210,7 +210,7 @@ def _march(
 
 
 def _few_modes_pay(ensemble: Ensemble, packed: Packed) -> bool:
-    """Whether to integrate eight runs in a register: where that is faster and, once compiled, worth it.
+    """Return whether the run-lane layout is faster than the mode-lane layout, compile time included.
 
     Both layouts give the same bits, so that how much was asked for before may decide.
     """
@@ -328,7 +328,7 @@ def _last(
 
 
 class _Buffers(NamedTuple):
-    """How much a slice of a recorded run holds."""
+    """Capacity of the buffers of one slice of a recorded run."""
 
     samples: int
     impacts: int
@@ -345,7 +345,7 @@ def _buffers(ensemble: Ensemble, times: _Array, size: int) -> _Buffers:
 
 
 def _beside(ensemble: Ensemble) -> int:
-    """How many strikers there are beside the first."""
+    """Number of strikers in addition to the first."""
     return 0 if ensemble.others is None else len(ensemble.others.laws)
 
 

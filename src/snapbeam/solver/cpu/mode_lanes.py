@@ -60,7 +60,7 @@ WORK_ROWS = 11
 
 
 class Layout(NamedTuple):
-    """Where a structure's rows begin in memory, and the two numbers that are no rows."""
+    """Memory offsets of the rows of a structure, and its two scalars."""
 
     size: int
     """Length of a row."""

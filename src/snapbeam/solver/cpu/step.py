@@ -82,7 +82,7 @@ class Step(NamedTuple):
 
     ticks: int
     at: int
-    """Where what :func:`prepare` wrote for this length begins."""
+    """Memory offset of the coefficients that :func:`prepare` wrote for this length."""
     length: float
     """Seconds."""
     phase: float
@@ -124,7 +124,7 @@ def nothing_done(layout):
 
 @called
 def prepare(memory, layout, stages, drive, length, at):
-    """What a step of *length* needs, from *at* on: its distinct flows and the drive's turn at each kick."""
+    """Prepare a step of *length* at offset *at*: its distinct flows, and the rotation of the drive at each kick."""
     size = layout.size
     for i in range((stages.flows + 1) // 2):
         flow_coefficients(memory, layout, memory[stages.flow + i] * length, at)

@@ -33,7 +33,7 @@ __all__ = ["Functions", "Mode", "functions"]
 
 
 class Mode(NamedTuple):
-    """What a thread knows of its mode."""
+    """Coefficients of the mode of a thread."""
 
     omega: float
     omega_squared: float

@@ -87,7 +87,7 @@ class LocalForce(NamedTuple):
     row: int
     """r, a row."""
     state: int
-    """What a run keeps."""
+    """State that a run stores."""
     rest: float
     """u in the first well."""
     law: Any

@@ -67,7 +67,7 @@ def slot_size(modes: int, distinct: int) -> int:
 
 
 def sizes(modes: int, distinct: int, subintervals: int) -> tuple[int, int]:
-    """Where the rows of the samples begin, and the length of the memory, for so many *subintervals* of a step."""
+    """Offset of the sample rows, and memory length, for a number of *subintervals* of a step."""
     sampling = TABLES + WIDTH * (LEVELS + 1) * slot_size(modes, distinct)
     return sampling, sampling + 4 * WIDTH * (subintervals + 1)
 

@@ -191,7 +191,7 @@ class StepData(NamedTuple):
     gamma: float
     tip: Any
     in_contact: bool
-    """Whether any of the runs is."""
+    """True if any of the runs is in contact."""
     closed: Any
     """Mask of those that are."""
     length: Any
@@ -653,7 +653,7 @@ def _propagate_free_of(m, shape, sampling, which, with_center, most):
 
 
 def modes_of(shape: Any) -> int:
-    """How many modes there are."""
+    """Number of modes."""
     return sum(type(shape).blocks)
 
 

@@ -1,4 +1,4 @@
-"""Where the velocity of a drive jumps, as at the end of a shock: no step may go across, or it loses its order.
+"""Velocity jumps of a drive, such as the end of a shock: steps must not cross them, or they lose their order.
 
 A drive names the times of its jumps (:attr:`~snapbeam.model.drive.base.Drive.discontinuities`).  Of one that does not, as the
 paper's, nothing of this is compiled.  Steps end a few ticks before a jump and after it.  The step between is taken in
@@ -142,7 +142,7 @@ def _up_to_discontinuity(drive, phase, period, t, limit):
 
 
 def discontinuity_within(drive: Any, phase: float, period: int, t: int, ticks: float) -> float:
-    """How many ticks after tick *t* the drive jumps first, within less than *ticks*; -1 if it does not.
+    """Number of ticks after tick *t* to the first jump of the drive within *ticks*; -1 if there is none.
 
     Other parameters are those of :func:`up_to_discontinuity`.
     """
