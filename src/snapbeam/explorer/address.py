@@ -1,4 +1,4 @@
-"""What stands behind a page's address: what is shown, so that a link shows it again.
+"""Query string of the page's address: the displayed state, so that a link shows it again.
 
 Whatever comes from there is checked like any input, and counts for nothing where it is wrong.
 """

@@ -175,7 +175,7 @@ class WindowControl:
         )
 
     def _bounds(self) -> tuple[float, float, float, float] | None:
-        """What is seen, within what the axes may be."""
+        """Visible ranges of the axes, clipped to the allowed parameter values."""
         left, right, low, high = self.card.view.view
         found: list[float] = []
         for (a, b), name, axis in (
@@ -466,7 +466,7 @@ class MapCard:
 
     @property
     def plane_key(self) -> Any:
-        """What two windows must share to be drawn over one another."""
+        """Key that two windows must share to be drawn over one another."""
         assert self.system is not None
         fixed = tuple(sorted(self.plane.fixed_values().items()))
         return self.system.hash, self.integration, self.plane.names, fixed
@@ -478,7 +478,7 @@ class MapCard:
         return self.shared.windows(self.plane_key, self.own)
 
     def _units(self) -> dict[str, tuple[float, str]]:
-        """What a ratio of 1 is in Hz, mm/s or g along the axes of the map, where one structure is shown."""
+        """Physical value and unit of a ratio of 1 along each axis of the map (Hz, mm/s or g)."""
         names, fixed = self.plane.names, {} if self.source.is_list else self.plane.fixed_values()
         if self.system is None or any(name.startswith(CHANGES_UNITS) for name in names):
             return {}
@@ -643,7 +643,7 @@ class MapCard:
         return self.plane.at(*self.plane.index(x, y))
 
     def expected(self, point: Point) -> dict[str, Any]:
-        """What the map holds of a point; empty if it is none of the map's, or the system has changed."""
+        """Results of the map at a point; empty if the point is not on the map, or the system has changed."""
         if point.expected or self.changed or not self.source.skeleton.data_vars:
             return point.expected
         place = self.plane.find(point.values)
@@ -1109,7 +1109,7 @@ class TakeCard:
     def _job(
         self, name: str, suffix: str, write: Callable[[Any, Token], object], token: Token
     ) -> tuple[Any, Any]:
-        """What makes a file, and what is done with it."""
+        """Function that makes a file, and function that offers it for download."""
         page = self.page
         self.words.object = Markup('<p class="busy">making {}{}</p>').format(name, suffix)
 

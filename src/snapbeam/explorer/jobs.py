@@ -79,7 +79,7 @@ class Token:
 
     @property
     def cancelled(self) -> bool:
-        """Whether it was told to stop."""
+        """True if cancellation was requested."""
         return self.event.is_set()
 
     def check(self, *report: Any) -> None:
@@ -309,7 +309,7 @@ class Waiting:
         return mark
 
     def waits(self, which: int, mark: object) -> bool:
-        """Whether the wait that :meth:`begin` gave *mark* for goes on."""
+        """Return whether the wait that :meth:`begin` started for *mark* continues."""
         return self._asked.get(which) is mark
 
     def end(self, which: int, computed: bool = True) -> None:
@@ -416,7 +416,7 @@ class Downloads:
 
 
 def file_bytes(suffix: str, write: Callable[[Path], object]) -> bytes:
-    """What ``write(path)`` writes to a file of its own, which is gone afterwards."""
+    """Bytes that ``write(path)`` writes to a temporary file."""
     with tempfile.TemporaryDirectory(prefix="snapbeam-") as folder:
         path = Path(folder) / f"file{suffix}"
         write(path)

@@ -218,7 +218,7 @@ class MapView:
 
     @property
     def is_whole(self) -> bool:
-        """Whether all of the map is seen."""
+        """True if the complete map is visible."""
         left, right, low, high = self.view
         return bool(
             left <= self.x.span[0]

@@ -53,7 +53,7 @@ class Answer:
 
     run: Run
     words: str
-    """How it compares with what the map holds."""
+    """Result of the comparison with the map, as text."""
     same: bool
     chances: str
     """Probabilities and lifetime of the point, where the map holds them."""
@@ -117,7 +117,7 @@ _LONGEST = 1.0
 
 
 class Page:
-    """What one tab of a browser shows.
+    """Content of one tab of a browser.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ class Page:
         self.back = ColumnDataSource({"search": [""], "count": [0]}, name="back")
         self.back.on_change("data", lambda _, __, data: self._went(str(data["search"][0])))
         self._quiet = True
-        """Whether the address is left as it is: while the page is made, and while it shows what an address says."""
+        """True while the address must not change: during construction, and while the page applies an address."""
         self.cards: Any = None
         self.card_names: list[str] = []
         self.keys = ColumnDataSource({"key": [""], "count": [0]}, name="keys")
@@ -245,7 +245,7 @@ class Page:
             self.doc.add_timeout_callback(guarded, milliseconds)
 
     def _together(self) -> contextlib.AbstractContextManager[None]:
-        """What changes within is told to the browser at once, and drawn once."""
+        """Context that sends all changes to the browser at once."""
         held: contextlib.AbstractContextManager[None] = pn.io.hold(self.doc)
         return held
 
@@ -576,7 +576,7 @@ class Page:
             self._written = search
 
     def _search(self) -> str:
-        """What is shown, as an address says it."""
+        """Query string of the displayed state."""
         card = self.card
         at, b = ({} if point is None else point.values for point in self.points)
         view = None if card.view.is_whole else card.view.view

@@ -1,4 +1,4 @@
-"""What the pages of one server share: the map, the threads, the windows that were computed."""
+"""Objects that the pages of one server share: the map, the threads, the computed windows."""
 
 from __future__ import annotations
 

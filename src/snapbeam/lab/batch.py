@@ -348,7 +348,7 @@ class TestResult:
 
     @property
     def doubtful(self) -> bool:
-        """Whether any diagnostic is worse than information."""
+        """True if any diagnostic has a severity above INFO."""
         return any(severity != Severity.INFO.value for _, severity, _ in self.diagnostics)
 
 
@@ -557,7 +557,7 @@ def _files(test: Test) -> list[Path]:
 
 
 def _set(test: Test) -> str:
-    """What a table says of a test, for its fingerprint."""
+    """Values of a test as text, for its fingerprint."""
     values = (test.frequency, test.velocity, test.location)
     return (
         ""

@@ -184,7 +184,7 @@ def _region(value: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> 
 
 
 def _rate_diagnostics(source: FrameSource, given: float | None) -> tuple[Diagnostic, ...]:
-    """What to say of a frame rate that was given although the file says something."""
+    """Diagnostics for a given frame rate that differs from the file."""
     if given is None:
         return ()
     if source.frame_rate_question:

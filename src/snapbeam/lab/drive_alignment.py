@@ -33,7 +33,7 @@ _CERTAIN = 25.0  # chi-square by which the best cycle must beat the next
 
 @dataclass(frozen=True)
 class Alignment:
-    """How to bring a vibrometer record to the camera's clock: t_camera = t_vibrometer + delay.
+    """Time shift from the vibrometer's clock to the camera's: t_camera = t_vibrometer + delay.
 
     ``delay`` and ``delay_se`` in s; ``polarity`` is -1 if a motion that is positive for one is negative for
     the other; ``gain``, the camera's amplitude over the vibrometer's, is 1 if both are calibrated;
@@ -183,7 +183,7 @@ def align(
 
 @dataclass(frozen=True)
 class _Told:
-    """What the diagnostics of an alignment are drawn from; ``turned`` says that the start told the polarity."""
+    """Input of the diagnostics of an alignment; ``turned``: the onset determined the polarity."""
 
     polarity: int
     given: bool

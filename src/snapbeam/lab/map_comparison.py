@@ -244,7 +244,7 @@ def _units(
     measured: NDArray[np.int8],
     attrs: dict[str, Any],
 ) -> list[Diagnostic]:
-    """Whether the points fit the map far better with another unit or with the columns exchanged."""
+    """Diagnostics for points that fit the map far better in another unit or with exchanged columns."""
     count = int((measured != ResponseClass.UNKNOWN).sum())
     if count < _FEW:
         return []

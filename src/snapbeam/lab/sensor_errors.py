@@ -217,7 +217,7 @@ _G = 9.80665
 
 
 def beyond_shakers(fit: SineFit, units: str) -> list[Diagnostic]:
-    """Whether a sine is faster, harder or wider than electrodynamic shakers can move."""
+    """Diagnostics for a sine beyond the speed, acceleration or stroke of electrodynamic shakers."""
     omega = 2.0 * math.pi * fit.frequency
     speed = fit.amplitude if units == "m/s" else omega * fit.amplitude
     hard, far = speed * omega, speed / omega

@@ -90,7 +90,7 @@ _SECONDS = {
 
 
 class Told(NamedTuple):
-    """What a person says of a file: samples per second [Hz], and the columns of a table without a header."""
+    """User-given properties of a file: sampling frequency [Hz], and columns of a table without a header."""
 
     rate: float | None = None
     columns: str | None = None
@@ -102,7 +102,7 @@ def _key(name: str) -> str:
 
 
 def is_time(name: str) -> bool:
-    """Whether a channel's name is that of a time axis."""
+    """Return whether a channel name denotes a time axis."""
     return _key(name) in TIME_NAMES
 
 
@@ -491,7 +491,7 @@ def _stating(attributes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _is_axis(name: str, attributes: Mapping[str, Any]) -> bool:
-    """Whether a dimension scale holds times."""
+    """Return whether a dimension scale contains times."""
     stated = next((_text(attributes[key]) for key in UNIT_NAMES if key in attributes), "")
     try:
         return is_time(split_unit(name.rpartition("/")[2])[0]) or (
@@ -621,7 +621,7 @@ def _dialects(lines: list[str]) -> list[_Dialect]:
 
 
 def _is_short(cells: list[list[str]]) -> bool:
-    """Whether the last number has fewer digits behind its point than those above it, which all have as many."""
+    """Return whether the last number has fewer decimals than those above it, which all have equally many."""
     column = [re.search(r"[.,](\d*)$", row[-1].strip()) for row in cells[-_ABOVE:] if row]
     digits = {len(found[1]) for found in column[:-1] if found}
     if len(digits) != 1 or len(column) < _ABOVE:
@@ -1256,7 +1256,7 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
 
 
 def _is_time(word: str, unit: str | None) -> bool:
-    """Whether a column is the time: by its name, unless that is one of an axis with another unit."""
+    """Return whether a column is the time: by its name, unless an axis name has another unit."""
     if not is_time(word) or unit is None or _key(word) not in ("xaxis", "xvalue"):
         return is_time(word)
     return si_unit(f"column {word!r}", unit)[1] == "s"

@@ -350,7 +350,7 @@ class Clipping(NamedTuple):
 
     @property
     def found(self) -> bool:
-        """Whether any top is cut off."""
+        """True if any maximum or minimum is clipped."""
         return math.isfinite(self.low) or math.isfinite(self.high)
 
     def touches(self, values: _Array) -> NDArray[np.bool_]:

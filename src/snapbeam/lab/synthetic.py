@@ -999,7 +999,7 @@ def render_vibrometer(
     snr_db: float = 30.0,
     rng: int | np.random.Generator | None = 0,
 ) -> xr.DataArray:
-    """What a laser vibrometer would record of the shaker: rest, a start-up transient, a sine, and noise.
+    """Synthetic laser vibrometer signal of the shaker: rest, start-up transient, sine, and noise.
 
     From the onset t0 on the velocity is V [1 - s exp(-(t - t0)/T)] cos(omega (t - t0) + phase), with the
     share s and the time T of the start-up, and a second harmonic of relative size ``distortion``.

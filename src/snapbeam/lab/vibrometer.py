@@ -1,4 +1,4 @@
-"""What a laser vibrometer says about the shaker: steady sine, start-up transient, flaws of the record.
+"""Analysis of a laser vibrometer signal of the shaker: steady sine, start-up transient, signal errors.
 
 The paper accepts a test when the signal-to-noise ratio of the shaker's velocity exceeds 15 dB, and names the
 start-up transient as a cause of disagreement with simulations (sections 2 and 4.1).
@@ -184,7 +184,7 @@ def _pulling(times: _Array, cycles: NDArray[np.complex128]) -> float:
 
 
 def _counts(parts: _Array) -> float:
-    """How many of the parts of a record count for their mean: all, or one where they follow each other smoothly.
+    """Effective number of independent parts of a signal: all, or one if they vary smoothly.
 
     A slow change, as the beat of two lines too close to be parted, is no scatter that a mean evens out.
     """
@@ -298,7 +298,7 @@ def _design(time: _Array, frequencies: list[float]) -> _Array:
 
 
 def _left(part: SignalSamples, frequencies: list[float], sound: NDArray[np.bool_]) -> tuple[_Array, _Array]:
-    """What lines leave of a record, 0 where it is not sound, and their cosine and sine amplitudes."""
+    """Residual of a signal after subtraction of lines, 0 at invalid samples, and the amplitudes of the lines."""
     design = _design(part.time, frequencies)
     used = design[sound]
     gram = used.T @ used
@@ -416,7 +416,7 @@ def moving_part(samples: SignalSamples, frequency: float) -> tuple[int, int]:
 
 
 def moves_outside(samples: SignalSamples, frequency: float, first: int, last: int) -> float:
-    """How long [s] the record oscillates at *frequency* before *first* and after *last*, by a third as much."""
+    """Duration [s] of oscillation at *frequency* before *first* and after *last*, above 30 % of the level."""
     width = max(3, round(samples.sampling_frequency / frequency))
     if width >= samples.values.size:
         return 0.0
@@ -560,7 +560,7 @@ _STEADY = 0.03  # share by which the cycles of a steady motion may stray
 
 @dataclass(frozen=True)
 class StartUp:
-    """How the shaker started.
+    """Start-up transient of the shaker.
 
     ``onset`` [s] and its uncertainty; ``duration`` [s] and ``cycles`` until amplitude and phase stay within
     ``tolerance`` of the steady sine; ``overshoot``, the largest amplitude of a cycle over the steady one,
@@ -621,7 +621,7 @@ class DriveMeasurement:
 
     @property
     def accepted(self) -> bool:
-        """Whether the steady motion is near enough to a sine: noise and distortion below the limit."""
+        """True if the SINAD of the steady motion exceeds the limit."""
         return self.steady.sinad > self.snr_limit
 
     @property
@@ -631,7 +631,7 @@ class DriveMeasurement:
 
     @property
     def has_start(self) -> bool:
-        """Whether the start-up is in the record and sound."""
+        """True if the record contains a complete start-up without dropouts."""
         broken = KINDS_VIBROMETER["dropout_in_start"].code
         return self.startup is not None and all(one.code != broken for one in self.diagnostics)
 
@@ -938,7 +938,7 @@ _SAME_LINE = 0.02  # of the frequency by which the highest line may differ
 
 
 def _not_there(samples: SignalSamples, steady: SineFit, frequency: float | None) -> list[Diagnostic]:
-    """Whether the motion is at another frequency than the one that was set."""
+    """Diagnostic for a motion at another frequency than stated."""
     if frequency is None or steady.sinad > 0.0:
         return []
     found = spectral_peak(samples)

@@ -293,7 +293,7 @@ def compare_waveforms(
 def _diagnostics(
     columns: dict[str, _Array], grid: _Array, shift: float, ratio: float, started: bool
 ) -> list[Diagnostic]:
-    """What the two shakers say of the comparison; *started* says that their first cycle is known."""
+    """Diagnostics of a comparison from the two shaker motions; *started*: their first cycle is known."""
     told = []
     if not started:
         told.append(KINDS_COMPARISON["no_start"].found())
@@ -309,7 +309,7 @@ def _diagnostics(
 
 
 def _gaps(columns: dict[str, _Array]) -> list[Diagnostic]:
-    """Whether much of the measured displacement is missing."""
+    """Diagnostic for a large fraction of missing measured displacements."""
     missing = float(np.mean(~np.isfinite(columns["measured_displacement"])))
     return [KINDS_COMPARISON["gaps"].found(share_percent=100.0 * missing)] if missing > 0.1 else []
 

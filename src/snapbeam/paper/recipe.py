@@ -70,7 +70,7 @@ class Results:
 
     @property
     def is_full(self) -> bool:
-        """Whether the size is that of the paper."""
+        """True if the size is that of the paper."""
         return self.size == "full"
 
     def pick(self, quick: Any, full: Any) -> Any:
@@ -78,7 +78,7 @@ class Results:
         return full if self.is_full else quick
 
     def progress(self, what: str) -> Callable[[int, int], object]:
-        """What a map reports its progress to."""
+        """Progress function of a map."""
         return lambda done, total: self._progress(what, done, total) if self._progress is not None else None
 
     def __getitem__(self, name: str) -> dict[str, xr.Dataset]:
@@ -133,7 +133,7 @@ class Recipe:
     name: str
     about: str
     folder: str = "recipes"
-    """Where its module stands: ``recipes`` for a figure of the paper, ``studies`` for what claims need beside."""
+    """Subpackage of its module: ``recipes`` for figures of the paper, ``studies`` for further runs of the claims."""
 
     def __call__(
         self,

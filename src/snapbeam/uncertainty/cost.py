@@ -77,7 +77,7 @@ class CostEstimate:
 
     @property
     def is_long(self) -> bool:
-        """Whether it takes more than ten minutes."""
+        """True if the estimate exceeds ten minutes."""
         return self.seconds > LONG
 
     def __str__(self) -> str:

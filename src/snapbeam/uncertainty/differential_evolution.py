@@ -78,7 +78,7 @@ class DifferentialEvolution:
         return self._asked.copy()
 
     def tell(self, objectives: ArrayLike, violation: ArrayLike) -> None:
-        """What the designs last asked for are worth.
+        """Set the objectives and constraint violations of the last designs.
 
         Parameters
         ----------
@@ -143,7 +143,7 @@ class DifferentialEvolution:
 
 
 def dominates(one: _Array, other: _Array) -> bool:
-    """Whether objectives are nowhere worse and somewhere better."""
+    """Return whether objectives are nowhere worse and somewhere better (Pareto dominance)."""
     return bool((one <= other).all() and (one < other).any())
 
 

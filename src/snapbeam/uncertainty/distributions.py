@@ -352,12 +352,12 @@ class ParameterUncertainty:
 
     @property
     def is_empty(self) -> bool:
-        """Whether all samples are equal."""
+        """True if all samples are equal."""
         return not self.of and self.displacement == 0.0
 
     @property
     def moves_start(self) -> bool:
-        """Whether runs begin in another state or phase, so that the tip must be held in space."""
+        """True if runs have different initial states or phases, so that the tip must be fixed in space."""
         return self.displacement > 0.0 or "drive.phase" in self.of
 
     def normals(self, numbers: NDArray[np.int64]) -> _Array:

@@ -51,7 +51,7 @@ def score_measurements(
     samples: int = 10_000,
     rng: int | np.random.Generator | None = 0,
 ) -> xr.Dataset:
-    """How likely a probability map makes measured responses, one by one and all together.
+    """Likelihood of measured response classes under a probability map, for each and for all together.
 
     Parameters
     ----------

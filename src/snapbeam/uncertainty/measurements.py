@@ -1,4 +1,4 @@
-"""What a laboratory measures of its beam, and how it is written down: the input of a calibration."""
+"""Measurements of a beam, and their file format: the input of a calibration."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class ContactTest:
 
 @dataclass(frozen=True, kw_only=True)
 class Measurements:
-    """What was measured of one beam.
+    """Measurements of one beam: frequencies, damping, geometry and contact tests.
 
     Frequencies stand in the order of the modes.  A standard error may be one number or one for each; where
     none is given, half a percent is assumed and said.

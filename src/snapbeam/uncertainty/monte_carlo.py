@@ -205,7 +205,7 @@ class Trials:
         return np.asarray(1.0 / (ratio * self._units(columns, ["drive.frequency_hz"], size)[:, 0]))
 
     def _units(self, columns: Columns, names: list[str], size: int) -> NDArray[np.float64]:
-        """What a ratio of 1 is in physical units, for every run, of shape (runs, names)."""
+        """Physical value of a ratio of 1 for every run, shape (runs, names)."""
         units = np.empty((size, len(names)))
         for system, which in self._structures(columns, size):
             units[which] = [unit_of(system, name) for name in names]
@@ -378,7 +378,7 @@ OUTCOMES: dict[str, Event] = {
 
 
 def reached(found: Statistics) -> NDArray[np.bool_]:
-    """Whether runs came to an end that says their class."""
+    """Mask of the runs with a known response class."""
     return np.isin(found["status"], _REACHED)
 
 

@@ -195,7 +195,7 @@ class Objective:
 
     @property
     def _quantity(self) -> DesignQuantity:
-        """What it is of."""
+        """Quantity of interest."""
         return quantity_of(self.quantity)
 
     @property
@@ -206,7 +206,7 @@ class Objective:
 
     @property
     def long_name(self) -> str:
-        """What is made small or large."""
+        """Quantity that is minimised or maximised."""
         quantity = self._quantity
         if quantity.kind == "outcome":
             return f"probability that {quantity.long_name}"
@@ -291,7 +291,7 @@ class Constraint:
 
     @property
     def _quantity(self) -> DesignQuantity:
-        """What it is of."""
+        """Quantity of interest."""
         return quantity_of(self.quantity)
 
     @property
@@ -353,7 +353,7 @@ _SURE = 0.99
 
 
 class Worth(NamedTuple):
-    """What some designs are worth, by the runs that were made of them."""
+    """Objectives and constraint violations of designs, from their runs."""
 
     objectives: _Array
     """Of shape (designs, objectives), to be made small: maxima are negated; infinite where not known."""
@@ -363,7 +363,7 @@ class Worth(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """What one design is worth on independent validation samples, with intervals."""
+    """Estimate of one design from independent validation samples, with intervals."""
 
     objectives: _Array
     """Value, lower and upper limit, of shape (objectives, 3), in their own signs."""
@@ -399,7 +399,7 @@ class DesignProblem:
         return tuple(self.bounds)
 
     def evaluate(self, designs: ArrayLike) -> Worth:
-        """What designs are worth on the common samples 0, 1, ..., the same for each.
+        """Evaluate designs on common random samples 0, 1, ....
 
         A design that breaks a constraint by what it is itself is not run.  Of the others a quarter of the runs is made
         first, and the rest of those that may still keep every constraint.
@@ -442,7 +442,7 @@ class DesignProblem:
         return Worth(objectives, violation, runs)
 
     def estimate(self, design: ArrayLike, numbers: NDArray[np.int64], confidence: float = 0.95) -> Estimate:
-        """What one design is worth on the samples of the given numbers, with intervals."""
+        """Estimate the objectives and constraints of one design from the given samples, with intervals."""
         x = finite_array("design", design, 1)[None]
         found = self.runs_of(x, numbers)[0]
         good = reached(found)
@@ -630,7 +630,7 @@ SATISFIED = ("violated", "undecided", "satisfied")
 
 @dataclass(frozen=True, kw_only=True)
 class OptimizerSettings:
-    """How long a design is sought.
+    """Settings of the optimiser: generations, population, samples and validation.
 
     Parameters
     ----------
@@ -869,7 +869,7 @@ def optimize_design(
 
 
 def _improved(search: DifferentialEvolution, before: tuple[float, _Array]) -> bool:
-    """Whether a generation made progress: of one objective the best design, of several any of the population."""
+    """Return whether a generation improved: the best design (one objective), or any of the population (several)."""
     violation, objectives = before
     if search.violation[0] != violation:
         return True
@@ -880,7 +880,7 @@ def _improved(search: DifferentialEvolution, before: tuple[float, _Array]) -> bo
 
 
 def _early(objectives: Any, constraints: Any) -> bool:
-    """Whether runs may end once their class is certain: not where a statistic of theirs is asked for."""
+    """Return whether early termination is allowed: not if a statistic of the runs is requested."""
     listed = [*([objectives] if isinstance(objectives, (str, Objective)) else objectives)]
     listed += [constraints] if isinstance(constraints, Constraint) else list(constraints)
     made = [Objective(quantity=each) if isinstance(each, str) else each for each in listed]
@@ -928,7 +928,7 @@ def _refined(
     numbers = np.arange(CHECK, CHECK + effort.validation_samples)
 
     def check(design: _Array) -> tuple[bool, float, float]:
-        """Whether a design holds, its signed objective, and what its constraints lack."""
+        """Return whether a design satisfies the constraints, its signed objective, and the constraint deficit."""
         found = problem.estimate(design, numbers, effort.confidence)
         state, short = _holds(problem, found)
         return state == 2, sign * float(found.objectives[0, 0]), short
@@ -990,7 +990,7 @@ def _refined(
 
 
 def _holds(problem: DesignProblem, found: Estimate) -> tuple[int, float]:
-    """Whether constraints hold for certain (2), fail for certain (0) or neither (1), and by how much they may lack."""
+    """Status of the constraints: satisfied (2), violated (0) or undecided (1); and the largest possible deficit."""
     required = np.array([constraint.required for constraint in problem.constraints])
     own = np.array([constraint._quantity.kind == "design" for constraint in problem.constraints], dtype=bool)
     wanted = np.where(own, 1.0, required)

@@ -211,7 +211,7 @@ class Waveform:
     def from_dataset(
         cls, dataset: xr.Dataset, system: System, standard_error: float, *, at: str = "striker", **more: Any
     ) -> Waveform:
-        """That of a tracked or simulated run, whose displacements are over the system's own buckling level.
+        """Waveform from a tracked or simulated run with displacements over the buckling level of the system.
 
         *standard_error* is in m; *more* are other arguments.
         """
@@ -278,7 +278,7 @@ class Waveform:
 
 @contextmanager
 def _untold() -> Iterator[None]:
-    """What is doubtful of a system was said when it was made; not of each of its neighbours."""
+    """Suppress diagnostics of neighbouring systems; they were reported for the first one."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiagnosticWarning)
         yield
@@ -299,7 +299,7 @@ _BEAM = ("thickness", "young_modulus", "density", "length", "buckling_level")
 _STEP = 2e-5
 """Relative step of the logarithms by which runs are compared: beyond what steps in time make of them."""
 _BESIDE = {"damping_ratio": "model.damping_ratio", "contact_stiffness": "contact.stiffness"}
-"""What a waveform says of beside the beam."""
+"""Parameters in addition to the beam that a waveform determines."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,7 +344,7 @@ class Posterior:
 
     @property
     def is_doubtful(self) -> bool:
-        """Whether too few samples carry the weight for an interval to be trusted."""
+        """True if the effective sample size is too small for reliable intervals."""
         return self.effective_sample_size < _FEWEST
 
     def interval(self, confidence: float = 0.95) -> dict[str, tuple[float, float, float]]:
@@ -440,7 +440,7 @@ def estimate_posterior(
     rng: int | np.random.Generator | None = 0,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> Posterior:
-    """What measured frequencies, decays, collisions and waveforms say of a beam, beside what was known before.
+    """Posterior of beam parameters from frequencies, decays, collisions and waveforms, with a prior.
 
     Parameters
     ----------

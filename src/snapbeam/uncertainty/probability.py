@@ -40,7 +40,7 @@ Ask = Callable[[_Index, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]
 
 @dataclass(frozen=True, kw_only=True)
 class SamplingPlan:
-    """How runs are spent on the points of a probability map.
+    """Allocation of runs to the points of a probability map.
 
     Parameters
     ----------
@@ -98,12 +98,12 @@ class SamplingPlan:
 
 @dataclass
 class Counts:
-    """What happened at every point."""
+    """Counts of outcomes at every point."""
 
     hits: _Index
     """Of shape (outcomes, points)."""
     runs: _Index
-    """That came to an end."""
+    """Completed runs."""
     failed: _Index
     rounds: int = 0
     open: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
@@ -179,7 +179,7 @@ def _lacking(counts: Counts, allocation: SamplingPlan, watched: int) -> _Index:
 
 
 def _affordable(counts: Counts, wanted: _Index, allocation: SamplingPlan, made: int, watched: int) -> _Index:
-    """What of the runs wanted the total allows, the widest intervals first."""
+    """Runs within the total limit, points with the widest intervals first."""
     if allocation.total_runs is None or made + wanted.sum() <= allocation.total_runs:
         return wanted
     order = np.argsort(-_half_widths(counts, allocation, watched), kind="stable")
@@ -279,7 +279,7 @@ def probability_map(
 
 
 def allocation_of(runs: SamplingPlan | int | None) -> SamplingPlan:
-    """How runs are spent, from what was given.
+    """Sampling plan from the argument *runs*.
 
     Raises
     ------
@@ -322,7 +322,7 @@ def _counted(
 
 
 def _reason(counts: Counts, allocation: SamplingPlan) -> str:
-    """Why no further runs were made."""
+    """Reason why the sampling stopped."""
     still = int(counts.open.sum())
     if allocation.half_width is None:
         return f"{allocation.initial_runs} runs of every point, as given"

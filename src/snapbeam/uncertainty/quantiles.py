@@ -74,7 +74,7 @@ _TABLE = {
 
 
 class Crossing(NamedTuple):
-    """Where a probability passes a value."""
+    """Value at which a probability curve crosses a given probability."""
 
     value: float
     """Midway where the isotonic regression is less and where it is more; infinite where it never is."""
@@ -110,7 +110,7 @@ def critical(confidence: float) -> float:
 
 
 def crossing(values: ArrayLike, hits: ArrayLike, probability: float, confidence: float = 0.95) -> Crossing:
-    """Where the probability of a hit passes *probability*, if it does not fall along *values*.
+    """Value at which a nondecreasing hit probability crosses *probability*.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ _STEPS, _SMALL = 60, 1e-9
 def local_crossing(
     values: _Array, hits: NDArray[Any], probability: float, low: float, high: float, reach: float = 2.0
 ) -> float:
-    """Where a logistic curve, fitted to the runs about an interval, passes *probability*.
+    """Value at which a local logistic regression about an interval crosses *probability*.
 
     Runs count by the tricube of their distance from the middle of the interval over *reach* times its half width.
     The fit is Firth's (Biometrika 80 (1993) 27), whose bias is of second order and which is finite for separated
@@ -260,7 +260,7 @@ _SURE = 0.99
 
 @dataclass(frozen=True, kw_only=True)
 class QuantileSearchSettings:
-    """How quantile thresholds are sought.
+    """Settings of the adaptive search for threshold quantiles.
 
     Parameters
     ----------
@@ -306,7 +306,7 @@ class QuantileSearchSettings:
 
 @dataclass
 class Runs:
-    """What was run in one column."""
+    """Runs of one column."""
 
     values: _Array = field(default_factory=lambda: np.empty(0))
     hits: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
@@ -563,7 +563,7 @@ def _column(runs: Runs, options: QuantileSearchSettings, bounds: tuple[float, fl
 
 
 def _is_step(runs: Runs) -> bool:
-    """Whether every run that hit lies above every run that did not."""
+    """Return whether every hit is above every miss."""
     return bool(runs.values[~runs.hits].max(initial=-np.inf) < runs.values[runs.hits].min(initial=np.inf))
 
 

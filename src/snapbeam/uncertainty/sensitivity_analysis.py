@@ -334,7 +334,7 @@ class StatisticQoI:
 
     @property
     def long_name(self) -> str:
-        """What it is."""
+        """Long name of the quantity."""
         return STATISTICS[self.name].long_name if self.name in STATISTICS else OUTCOMES[self.name].long_name
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
@@ -390,7 +390,7 @@ class ThresholdQoI:
 
     @property
     def long_name(self) -> str:
-        """What it is."""
+        """Long name of the quantity."""
         return f"least {lookup(self.parameter).quantity.long_name} that snaps"
 
     @property
@@ -424,7 +424,7 @@ class ThresholdQoI:
 
 @dataclass(frozen=True, kw_only=True)
 class NotchQoI:
-    """Where the threshold is lowest along a parameter, or how low it is there.
+    """Position of the minimum of the threshold along a parameter, or its value there.
 
     Parameters
     ----------
@@ -459,7 +459,7 @@ class NotchQoI:
 
     @property
     def long_name(self) -> str:
-        """What it is."""
+        """Long name of the quantity."""
         place = lookup(self.parameter).quantity.long_name
         return f"lowest threshold over {place}" if self.depth else f"{place} at which the threshold is lowest"
 
@@ -499,7 +499,7 @@ def _vertex(x: _Array, y: _Array) -> tuple[float, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class LifetimeQoI:
-    """How long snapping lasts, from many starts of each sample, in cycles.
+    """Mean lifetime of snapping, from many initial conditions of each sample, in cycles.
 
     Parameters
     ----------
@@ -524,7 +524,7 @@ class LifetimeQoI:
 
     @property
     def long_name(self) -> str:
-        """What it is."""
+        """Long name of the quantity."""
         return "lifetime of snapping, in cycles"
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:

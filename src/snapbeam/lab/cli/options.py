@@ -1,4 +1,4 @@
-"""What the laboratory commands share: the options of a signal file, and diagnostics."""
+"""Common parts of the lab commands: options of signal files, and diagnostics."""
 
 from __future__ import annotations
 

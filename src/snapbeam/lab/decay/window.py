@@ -105,7 +105,7 @@ def find_release(samples: SignalSamples, frequency: float) -> int:
 
 
 def find_ceiling(samples: SignalSamples, frequency: float) -> Ceiling | None:
-    """Whether the first cycles of a decay are cut off, and until where.
+    """Detect clipping of the first cycles of a decay, and its end.
 
     Either the record hits its greatest or least value in runs of equal samples, or the maxima of at least four
     cycles stay level, and flat, where the later ones fall.
@@ -185,7 +185,7 @@ _LEVEL = 0.08  # of that by which the bottoms may change
 
 
 def one_sided(samples: SignalSamples, frequency: float) -> bool:
-    """Whether the tops of a decay fall towards bottoms that stay level, as of a rectified or squared signal."""
+    """Return whether only the maxima or only the minima decay, as in a rectified or squared signal."""
     width = round(_SPAN * samples.sampling_frequency / frequency)
     count = samples.values.size // width
     if count < 3:
@@ -519,7 +519,7 @@ def find_centres(decay: Decay, count: int, asked: list[float] | None) -> Centres
 
 
 def unexplained(residual: NDArray[np.float64], sampling_frequency: float) -> bool:
-    """Whether what a fit leaves still holds an oscillation that noise would not make."""
+    """Return whether a residual contains an oscillation that noise does not explain."""
     n = residual.size
     window = np.cos(0.5 * math.pi * np.arange(n) / n) ** 2
     power = np.abs(np.fft.rfft(residual * window)) ** 2
@@ -532,7 +532,7 @@ def unexplained(residual: NDArray[np.float64], sampling_frequency: float) -> boo
 
 
 def _is_mode(pole: Pole, span: float) -> bool:
-    """Whether a pole is a mode: above the noise, decaying, and seen for eight cycles."""
+    """Return whether a pole is a mode: above the noise, decaying, and eight or more cycles long."""
     return pole.energy > ENERGY and pole.damping_ratio > -1e-3 and pole.frequency * span >= 8.0
 
 

@@ -214,7 +214,7 @@ def distortion(
 
 
 def _lasting(miss: Floats) -> Floats:
-    """How far off the thickness is on average over any stretch that a frame is in, where that is no chance; else 0.
+    """Mean deviation of the thickness over the stretch around each frame, if it is significant; otherwise 0.
 
     What chance does is told by the steps from frame to frame: light that lasts over a good part of the recording
     widens the scatter of all frames together, but not these.
@@ -624,7 +624,7 @@ class TrackedRows:
     hollow: float = 0.0
 
     def flagged(self, flag: FrameFlag) -> int:
-        """How many frames carry a flag."""
+        """Number of frames with a flag."""
         return int(np.count_nonzero(self.flags & int(flag)))
 
 
@@ -754,7 +754,7 @@ class Follower:
         return (strip == before).all((1, 2))
 
     def _leaving(self, name: str, rows: Floats, height: int) -> NDArray[np.bool_]:
-        """Whether the last position before each frame was near the border of the region."""
+        """Mask of the frames whose preceding valid position was near the border of the region."""
         near = np.where(np.isfinite(rows), (rows < BORDER) | (rows > height - 1 - BORDER), False)
         known = np.isfinite(rows)
         last = np.maximum.accumulate(np.where(known, np.arange(rows.size), -1))
@@ -822,7 +822,7 @@ def seen_fields(
     rows: TrackedRows,
     along_rows: bool,
 ) -> VideoFields:
-    """What a tracked recording shows of fields; *along_rows* if the beam lies along the picture's rows.
+    """Signs of interlaced fields in a tracked recording; *along_rows*: the beam is along image rows.
 
     *prepare* turns frames as they were tracked.
     """

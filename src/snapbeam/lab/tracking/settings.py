@@ -1,4 +1,4 @@
-"""How a recording is to be tracked: every choice in one frozen value, checked when it is made."""
+"""Settings of the tracking, in one frozen and checked object."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def spread_columns(low: int, high: int, count: int) -> NDArray[np.intp]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrackingSettings:
-    """What a person knows of a recording, and how to look at it.
+    """Settings of the tracking of a recording: geometry of the scene, thresholds, reference frames.
 
     Attributes
     ----------
@@ -379,7 +379,7 @@ class ShakerView:
 
     @property
     def mark(self) -> str:
-        """What is followed: "sticker" or "tip"."""
+        """Tracked object: "sticker" or "tip"."""
         return "tip" if self.sticker is None else "sticker"
 
     @property
@@ -518,7 +518,7 @@ class FrameFlag(IntFlag):
 
     @property
     def advice(self) -> str:
-        """What happened and what to do about it, for each reason in turn."""
+        """Cause and remedy of each flag."""
         return "; ".join(text for flag, text in _ADVICE.items() if flag in self) or "measured"
 
 

@@ -26,7 +26,7 @@ BEGINS = {"claims.md": "**Of ", "claims.csv": "number,topic,says,paper,", "claim
 
 @dataclass(frozen=True)
 class Claim:
-    """What the paper says, what was measured by which rule, and whether they agree.
+    """Statement of the paper, the measured value with its rule, and the verdict.
 
     ``verdict``: ``holds``, ``in part``, ``fails``, or ``open`` for what the paper does not say and whose
     influence is measured instead.  ``close``: whether it would be another within the uncertainty.  ``size``:
@@ -54,7 +54,7 @@ class Claim:
 
 
 def summary(claims: Sequence[Claim]) -> str:
-    """How many statements hold, hold in part and fail, how many of these are close, how many questions are open."""
+    """Summary of the verdicts: numbers of statements that hold, hold in part, fail, are close or open."""
     counts = Counter(claim.verdict for claim in claims)
     close = sum(claim.close for claim in claims if claim.verdict != "open")
     total = len(claims) - counts["open"]

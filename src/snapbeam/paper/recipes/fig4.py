@@ -122,7 +122,7 @@ def _choose(searched: xr.Dataset, modes: int, cycles: int) -> dict[str, tuple[fl
 
 
 def _swings(modes: int, omega: float, drive: float) -> int:
-    """How often the beam changes wells within the cycles shown; 0 if it has not settled by four fifths of them.
+    """Number of snap-throughs within the cycles shown; 0 if the beam has not settled by 80 % of them.
 
     A well is reached half way from the straight beam, so that grazing zero is no snap-through.
     """
@@ -147,7 +147,7 @@ def _scatter(modes: int, omega: float, drive: float, cycles: int) -> float:
 
 
 def _recorded(run: xr.Dataset) -> xr.Dataset:
-    """What a camera would have recorded of a run, tracked."""
+    """Tracked synthetic camera recording of a run."""
     from snapbeam.lab.camera import open_recording
     from snapbeam.lab.synthetic import SyntheticCamera, render_run
     from snapbeam.lab.tracking.track import track

@@ -23,7 +23,7 @@ __all__ = ["LEVELS", "compute", "draw", "maxima"]
 LEVELS = (0.005, 0.02)
 """Low and moderate drive; the paper does not give its own.  Neither snaps through."""
 _FOOT = -1.01
-"""Where the frequencies of the lower drive's maxima stand, below all curves."""
+"""Ordinate of the markers of the maxima at the lower drive, below all curves."""
 _STYLES = (("#2E7EBB", "-"), ("#B03A27", "-"))
 
 

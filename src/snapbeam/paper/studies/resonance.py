@@ -1,4 +1,4 @@
-"""How the resonance of the intrawell response moves as the drive grows, up to the notch of the threshold.
+"""Resonance of the intrawell response against the drive, up to the notch of the threshold.
 
 The greatest displacement at the contact over frequency, as in Fig. B.10, at many drives: the frequency of its
 maximum falls with the drive (softening), and where it ends the beam snaps through.

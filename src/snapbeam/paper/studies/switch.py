@@ -30,7 +30,7 @@ OMEGA = 1.2
 _SHARES = (0.0, 0.3, 0.6, 0.8)
 """Bias over the load at which the lower well is gone."""
 _OFF = {"velocity_amplitude": 0.01, "frequency_ratio": 0.01, "location": 0.002}
-"""How well each is known: standard deviations, relative but for the place."""
+"""Standard deviations of the parameters, relative except for the location."""
 
 
 def _model(modes: int, load: float) -> sb.ReducedModel:

@@ -44,13 +44,13 @@ _FIRM, _STEPS, _STRIDE = 2e5, 5000, 0.03
 
 @dataclass(frozen=True)
 class Pushed:
-    """What became of a beam under tips that rise together."""
+    """Result of a beam under tips that rise together."""
 
     height: float
     """Of the tips over b when the beam snapped; NaN if it still rests on them when they reach
     the upper of the shapes that it has by itself."""
     tips: int
-    """How many of them still pressed just before; fewer than there are, if it had left the others before."""
+    """Number of tips in contact just before the snap; fewer than all if the beam had left the others."""
     amplitude: _Array
     """Modal amplitudes just before, over b."""
     path: _Array
@@ -93,7 +93,7 @@ class _Press:
         return float(values[0]), free @ vectors[:, 0]
 
     def settled(self, a: _Array, heights: _Array) -> _Array:
-        """Where the beam creeps to from a state, against tips that are nearly rigid and can only push.
+        """Equilibrium that the beam approaches from a state, against nearly rigid tips that can only push.
 
         Implicit Euler's steps down the gradient of the energy, so short that they leave a saddle as the flow does.
         """

@@ -110,7 +110,7 @@ def passages(alpha: _Array, time: _Array) -> _Array:
 
 
 def _shares(run: sb.Run, modes: int) -> tuple[dict[str, Any], _Array]:
-    """How long |alpha_1| is in each bin, how long the other modes exceed it there, and the peak of each mode."""
+    """Histograms of |alpha_1|, and of |alpha_1| where the other modes exceed it, and the peak of each mode."""
     rest = abs(float(paper_model(modes).well_amplitude[0]))
     alpha = run.dataset.modal_amplitude.values.astype(float) / rest
     first = np.abs(alpha[:, 0])
