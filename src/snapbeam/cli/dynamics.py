@@ -285,7 +285,9 @@ def backbone_curve(
         float | None,
         opt.number_option("Displacement of the centre, over b, where the curve ends (2.5).", _OWN),
     ] = None,
-    max_points: Annotated[int | None, opt.count_option("Most points of the curve (200).", _OWN)] = None,
+    max_points: Annotated[
+        int | None, opt.count_option("Maximum number of points of the curve (200).", _OWN)
+    ] = None,
     output: Output = Path("backbone_curve.nc"),
     plot: opt.Plot = None,
 ) -> None:

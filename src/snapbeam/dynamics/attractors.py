@@ -296,7 +296,7 @@ class Attractors:
                 "exponent_error": (
                     "attractor", [each.exponent_error for each in self.attractors], labels("standard error", unit)
                 ),
-                "share": ("attractor", self.shares, labels("share of the states that go there")),
+                "share": ("attractor", self.shares, labels("fraction of the states that converge to it")),
                 "points": (("attractor", "point", "coordinate"), points, labels("the attractor once a period")),
                 "label": ("state", self.labels, labels("attractor that a state goes to; -1: undecided")),
             },

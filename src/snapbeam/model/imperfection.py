@@ -128,7 +128,7 @@ class Imperfection:
         short="imperfection_shape",
     )
     antisymmetric_amplitude: float = quantity(
-        "m", "greatest height of the antisymmetric part of the initial shape", default=0.0,
+        "m", "maximum height of the antisymmetric part of the initial shape", default=0.0,
         short="imperfection_antisymmetric_amplitude", plausible=(0.0, 1.0, "mm"),
     )  # fmt: skip
     profile: _Array | None = quantity(
@@ -139,7 +139,7 @@ class Imperfection:
         "N", "constant force at a point", default=0.0, symbol="F", short="imperfection_point_load"
     )
     point_location: float = quantity(
-        "1", "where the constant force acts, over the length", default=0.5, low=0.0, high=1.0,
+        "1", "location of the constant force over the length", default=0.5, low=0.0, high=1.0,
         short="imperfection_point_location",
     )  # fmt: skip
     uniform_load: float = quantity(

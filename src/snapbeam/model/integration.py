@@ -67,7 +67,7 @@ class Integration:
     step: float | None = quantity("s", "step in free flight", default=None, low=0.0, optional=True)
     accuracy: str = quantity("1", "accuracy level", default="standard", kind=str, choices=ACCURACIES)
     tolerance: float | None = quantity(
-        "1", "greatest error of the displacement, over b", default=None, low=1e-10, high=0.1, closed="both",
+        "1", "maximum error of the displacement, over b", default=None, low=1e-10, high=0.1, closed="both",
         optional=True,
     )  # fmt: skip
     engine: str = quantity("1", "what integrates", default="auto", kind=str, choices=ENGINES)

@@ -70,7 +70,7 @@ fig6 = Recipe("fig6", "response over frequency and amplitude after 200 cycles, 1
 fig7 = Recipe("fig7", "response over frequency and amplitude after 1000 cycles, 1 and 32 modes")
 fig8 = Recipe("fig8", "response over location and amplitude, 1 and 32 modes")
 figA9 = Recipe("figA9", "error of the natural frequencies over the number of modes")
-figB10 = Recipe("figB10", "greatest displacement over frequency at two drives, 1 and 32 modes")
+figB10 = Recipe("figB10", "maximum displacement over frequency at two drives, 1 and 32 modes")
 si5 = Recipe("si5", "response over location and amplitude as modes are added (animation)")
 
 low_frequency = Recipe("low_frequency", "threshold over the quasi-static one at low frequency", "studies")

@@ -203,7 +203,7 @@ def _draw_line(ax: Axes, dataset: xr.Dataset, name: str) -> None:
         ax.plot(points, curve, color="white", linewidth=2.0)
         ax.plot(points, curve, ".-", color="black", linewidth=0.8, markersize=2.5)
     dress(ax.xaxis, dataset, name)
-    ax.set_ylabel("Centre displacement $w/b$,\nleast and greatest")
+    ax.set_ylabel("Mid-span displacement $w/b$,\nminimum and maximum")
     ax.set(xlim=edges[[0, -1]], ylim=(low - pad, high + pad))
 
 

@@ -191,7 +191,12 @@ def _line(data: xr.Dataset, ax: Axes, name: str, outcome: str, levels: tuple[flo
     share = 100.0 * float(data.attrs.get("confidence", 0.95))
     ax.fill_between(x, low, high, color="#16245E", alpha=0.25, linewidth=0.0, label=f"{share:g} % interval")
     ax.plot(
-        x, data["probability"].values, color="#16245E", marker="o", markersize=2.2, label="share of the runs"
+        x,
+        data["probability"].values,
+        color="#16245E",
+        marker="o",
+        markersize=2.2,
+        label="fraction of the runs",
     )
     ax.set(ylim=(-0.02, 1.02), ylabel=_WORDS.get(outcome, outcome))
     ax.legend(loc="best")

@@ -323,22 +323,22 @@ _ROWS = (
     ),
     Statistic("peak_force", "float64", "N", "peak contact force", lambda reading: reading.peak_force),
     Statistic("impacts", "int32", "1", "impacts", _plain("impacts")),
-    Statistic("contact_time_fraction", "float64", "1", "share of time in contact", _contact_share),
+    Statistic("contact_time_fraction", "float64", "1", "fraction of time in contact", _contact_share),
     Statistic("early_stop_time", "float64", "s", "time at which the class became certain", _plain("early_stop_time")),
     Statistic(
-        "peak_displacement", "float64", "1", "greatest distance of the contact point from the straight beam, over b",
+        "peak_displacement", "float64", "1", "maximum distance of the contact point from the straight beam, over b",
         _peak("min_displacement", "max_displacement"),
     ),
     Statistic(
-        "peak_midspan_displacement", "float64", "1", "greatest distance of the centre from the straight beam, over b",
+        "peak_midspan_displacement", "float64", "1", "maximum distance of mid-span from the straight beam, over b",
         _peak("min_center", "max_center"),
     ),
     Statistic(
-        "peak_velocity", "float64", "1", "greatest speed of the contact point at the end of a step, over b omega_1",
+        "peak_velocity", "float64", "1", "maximum speed of the contact point at the end of a step, over b omega_1",
         _seen("peak_velocity", lambda reading: 1.0 / reading.speed),
     ),
     Statistic(
-        "peak_midspan_velocity", "float64", "1", "greatest speed of the centre at the end of a step, over b omega_1",
+        "peak_midspan_velocity", "float64", "1", "maximum speed of mid-span at the end of a step, over b omega_1",
         _seen("peak_midspan_velocity", lambda reading: 1.0 / reading.speed),
     ),
     Statistic(
@@ -370,7 +370,7 @@ _ROWS = (
     ),
     Statistic("energy_lost_contact", "float64", "J", "energy lost in contact", _seen("lost")),
     Statistic(
-        "high_frequency_energy_fraction", "float64", "1", "share of the modal energy above a multiple of omega_1, over time",
+        "high_frequency_energy_fraction", "float64", "1", "fraction of the modal energy above a multiple of omega_1, over time",
         _high_share, comment=_SHARE,
     ),
     *(Statistic(name, "float64", "J", long_name, _seen(name)) for name, long_name in WORKS.items()),

@@ -135,7 +135,7 @@ def score_measurements(
             "most_likely": (
                 "measurement", np.array(_KINDS, dtype=np.int8)[best], labels | {"long_name": "most likely class"} | flags
             ),
-            "best": ("measurement", share[rows, best], labels | {"long_name": "its probability"}),
+            "best": ("measurement", share[rows, best], labels | {"long_name": "probability of the most likely class"}),
         },
         {name: ("measurement", getattr(measurements, name)[known]) for name in _COORDINATES},
         {

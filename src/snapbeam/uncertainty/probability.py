@@ -370,7 +370,7 @@ def _dataset(setup: SweepSetup, trials: Trials, counts: Counts, allocation: Samp
             counts.failed,
             "runs that failed; the intervals hold for whatever they might have done",
         ),
-        "reached": (~counts.open, "whether the interval is as narrow as asked"),
+        "reached": (~counts.open, "true where the interval has the requested width"),
     }
     for name, (values, text) in plain.items():
         dataset[name] = (points.dims, points.arranged(values), {"units": "1", "long_name": text})

@@ -590,7 +590,7 @@ def _labelled(
     dataset["outcome_of_search"] = (
         (*points.dims, LEVEL),
         codes,
-        {"units": "1", "long_name": "what was found"} | flags,
+        {"units": "1", "long_name": "status of the search"} | flags,
     )
     dataset["is_fitted"] = (
         (*points.dims, LEVEL),

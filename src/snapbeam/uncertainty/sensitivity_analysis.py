@@ -391,7 +391,7 @@ class ThresholdQoI:
     @property
     def long_name(self) -> str:
         """Long name of the quantity."""
-        return f"least {lookup(self.parameter).quantity.long_name} that snaps"
+        return f"minimum {lookup(self.parameter).quantity.long_name} for snap-through"
 
     @property
     def error(self) -> float:
@@ -461,7 +461,7 @@ class NotchQoI:
     def long_name(self) -> str:
         """Long name of the quantity."""
         place = lookup(self.parameter).quantity.long_name
-        return f"lowest threshold over {place}" if self.depth else f"{place} at which the threshold is lowest"
+        return f"minimum threshold over {place}" if self.depth else f"{place} of the minimum threshold"
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
         """A threshold at every value."""
@@ -746,9 +746,9 @@ _WORDS = {
     "derivative": "change of the quantity for a unit of the parameter",
     "quantity_minus": "mean quantity at the score -1",
     "quantity_plus": "mean quantity at the score +1",
-    "step": "half of what the parameter differs by between the scores -1 and +1, in its unit",
+    "step": "half the difference of the parameter between the scores -1 and +1, in its unit",
     "first_order": "share of the variance of the quantity that the parameter makes by itself",
-    "total_order": "share of the variance of the quantity that the parameter has a part in",
+    "total_order": "fraction of the variance of the quantity to which the parameter contributes",
 }
 
 

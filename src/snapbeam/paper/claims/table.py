@@ -61,8 +61,8 @@ def summary(claims: Sequence[Claim]) -> str:
     sketched = sum(claim.size != "full" for claim in claims)
     return (
         f"Of {total} statements {counts['holds']} hold, {counts['in part']} hold in part and {counts['fails']} fail; "
-        f"{close} of these verdicts (†) would be another within the uncertainty. {counts['open']} questions that "
-        "the paper leaves open are measured apart."
+        f"{close} of these verdicts (†) could change within the uncertainty. {counts['open']} properties "
+        "that the paper does not specify are measured separately."
         + (f" {sketched} rows (*) are measured on sketches." if sketched else "")
     )
 
@@ -110,7 +110,7 @@ def _table(rows: Iterable[Claim], is_open: bool) -> list[str]:
         lines = ["| # | question | measured | for comparison | shown in |", "|---|---|---|---|---|"]
     else:
         lines = [
-            "| # | the paper says | number in the paper | measured | uncertainty | verdict | shown in |",
+            "| # | statement of the paper | value in the paper | measured | uncertainty | verdict | shown in |",
             "|---|---|---|---|---|---|---|",
         ]
     for row in rows:

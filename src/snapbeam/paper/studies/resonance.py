@@ -68,7 +68,7 @@ def draw(results: Results) -> Figure:
                 rasterized=True, shading="nearest",
             )  # fmt: skip
             drives, ratios = ridge(ds)
-            ax.plot(ratios, drives, "o-", color=SHAKER_COLOR, markersize=2.5, label="greatest displacement")
+            ax.plot(ratios, drives, "o-", color=SHAKER_COLOR, markersize=2.5, label="maximum displacement")
             ax.plot(
                 whole.frequency_ratio, interwell_threshold(whole), color=BEAM_COLOR,
                 label="threshold of Fig. 6",

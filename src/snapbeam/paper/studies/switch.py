@@ -139,7 +139,7 @@ def draw(results: Results) -> Figure:
             )
             ax.set_xlabel("Velocity $V$")
         axes[0].set_ylabel("Length of the burst (cycles)")
-        figure.colorbar(mesh, ax=list(axes[:count]), label="Share that switches", pad=0.02)
+        figure.colorbar(mesh, ax=list(axes[:count]), label="Fraction that switches", pad=0.02)
         last = axes[count]
         found = [cheapest(ds, float(bias)) for bias in ds.bias.values]
         last.plot(
