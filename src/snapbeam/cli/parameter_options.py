@@ -365,7 +365,7 @@ def configured(
 
 
 def _needs_drive(given: Mapping[str, Any]) -> bool:
-    """Whether a command runs one drive, and has no axes of its own."""
+    """Return whether a command runs one drive, and has no axes of its own."""
     return "drive.frequency_ratio" in given and "sweep" not in given
 
 
@@ -399,7 +399,7 @@ def _shown(sections: Mapping[str, Mapping[str, Any]], name: str) -> str:
 
 
 def _is_axis(name: str, value: str) -> bool:
-    """Whether the text of an option that may be an axis is one, and not a number."""
+    """Return whether the text of an option is an axis, not a number."""
     from snapbeam.model.parameter_axes import PHYSICAL
     from snapbeam.model.parameters import parameters
 
@@ -614,7 +614,7 @@ def with_checkpoint(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def is_long(keeping: Mapping[str, Any]) -> bool:
-    """Whether any option but --log is set."""
+    """Return whether any option except --log is set."""
     return any(value not in (None, False) for name, value in keeping.items() if name != "log")
 
 

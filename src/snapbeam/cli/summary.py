@@ -132,7 +132,7 @@ def _ranges(dataset: xr.Dataset, names: Sequence[str]) -> list[str]:
 
 
 def map_facts(dataset: xr.Dataset) -> dict[str, Any]:
-    """What a map shows, as plain values: points of each class and status, the lowest interwell point, the notch."""
+    """Summary of a map as plain values: points of each class and status, the lowest interwell point, the notch."""
     kinds, codes = np.asarray(dataset["response_class"].values), np.asarray(dataset["status"].values)
     low = lowest_interwell(dataset)
     return {

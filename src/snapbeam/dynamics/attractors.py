@@ -175,7 +175,7 @@ _FEW = 8
 
 @dataclass(frozen=True, eq=False)
 class Attractor:
-    """What states are attracted to.
+    """One attractor: a periodic orbit or a chaotic set, with its states and its verification.
 
     Examples
     --------
@@ -207,7 +207,7 @@ class Attractor:
 
     @cached_property
     def trapping_region(self) -> list[Ball] | Cloud:
-        """How a state is told to be on its way there."""
+        """Region from which a state is known to converge to the attractor."""
         return balls_of(self.orbit) if self.orbit is not None else cloud_of(self.points)
 
     def __repr__(self) -> str:
@@ -448,7 +448,7 @@ def _reason(
     most: int,
     reasons: list[str],
 ) -> str:
-    """Why the search stopped, and why states are undecided."""
+    """Reasons why the search stopped, and why states are undecided."""
     lost = labels == UNDECIDED
     words = [f"{leave} periods left out ({rule})"]
     counts = (
@@ -588,7 +588,7 @@ def _groups(every: _Array) -> list[NDArray[np.int64]]:
 
 
 def _mingle(tree_one: Any, tree_other: Any) -> bool:
-    """Whether each run comes as near to the other's points as to its own."""
+    """Return whether each run comes as close to the points of the other as to its own."""
     own = max(float(np.median(tree.query(tree.data, 2)[0][:, 1])) for tree in (tree_one, tree_other))
     across = min(
         float(np.median(tree_one.query(tree_other.data)[0])),

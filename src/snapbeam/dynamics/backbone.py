@@ -50,7 +50,7 @@ _RETRACED = (
 _SAMPLES = 64
 """Instants of half a period from which means are taken."""
 _STABLE = 1e-4
-"""How far from 1 a Floquet multiplier of a stable orbit may be, by rounding."""
+"""Tolerance of the modulus of a Floquet multiplier of a stable orbit, for rounding."""
 
 
 @checked
@@ -175,7 +175,7 @@ class _Structure:
         self.omega = np.sqrt(squares)
         self.unit = float(self.omega[0])
         self.scale = model.length_scale / float(np.abs(model.midspan_shape @ self.shapes).max())
-        """What a coordinate of 1 is: it moves the centre by about a length scale."""
+        """Length of a coordinate of 1: it moves mid-span by about the length scale."""
         self.back = self.shapes * self.scale
         """Amplitudes of the buckling modes for each coordinate."""
         self.squares = squares / self.unit**2

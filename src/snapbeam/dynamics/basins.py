@@ -322,7 +322,7 @@ _SIGMAS = 3.0
 
 
 class BasinEntropy(NamedTuple):
-    """How uncertain the outcome is in boxes of a grid, over the decided points."""
+    """Basin entropy: uncertainty of the outcome in boxes of a grid, over the decided points."""
 
     basin: float
     """Mean over the boxes of the entropy of the labels within, S_b; NaN if no point is decided."""
@@ -344,7 +344,7 @@ class BasinEntropy(NamedTuple):
 
     @property
     def is_fractal(self) -> bool:
-        """Whether the lower bound of S_bb > ln 2 by three standard errors: enough, and not needed, for a fractal border."""
+        """True if S_bb exceeds ln 2 by three standard errors: sufficient, not necessary, for a fractal boundary."""
         return bool(self.boundary_bounds[0] - _SIGMAS * self.boundary_error > np.log(2.0))
 
 
@@ -467,7 +467,7 @@ def _mean(values: _Array) -> tuple[float, float]:
 
 
 class UncertaintyExponent(NamedTuple):
-    """How the share of uncertain points goes with the error of a start, f ~ epsilon^alpha, over the decided points."""
+    """Uncertainty exponent alpha of the fraction of uncertain points, f ~ epsilon^alpha."""
 
     exponent: float
     """alpha; the dimension of the border is that of the grid less alpha."""
@@ -557,7 +557,7 @@ def _uncertain(grid: NDArray[np.int64], step: int) -> tuple[float, float, float]
 
 
 class Integrity(NamedTuple):
-    """How safe a basin is in a window; lengths in units of the grid's axes as they are weighed."""
+    """Integrity measures of a basin in a window; lengths in units of the grid's axes with their weights."""
 
     global_measure: float
     """GIM: share of the window that it fills."""

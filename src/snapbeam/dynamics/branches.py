@@ -105,7 +105,7 @@ class Branch:
     orbits: list[PeriodicOrbit]
     special_points: list[SpecialPoint]
     termination_reason: str
-    """Why it ends."""
+    """Reason why the branch ends."""
     impacts: list[int]
     """Of each orbit within its period."""
     tangents: list[NDArray[np.float64]]
@@ -263,7 +263,7 @@ _TOUCHES = 5e-3
 _FINE, _ROUNDING = 1e-5, 1e-13
 """Relative error of tangents at level "reference", and of what is known exactly."""
 _ACROSS = 10.0
-"""How much faster multipliers may change across a branch than along it: an orbit that closes badly is off across."""
+"""Maximum ratio of the change of multipliers across a branch to that along it; above it, an orbit is inaccurate."""
 
 
 def _counts(came: Return) -> tuple[int, int, int]:
@@ -294,7 +294,7 @@ def between(corrector: Corrector, one: Spot, other: Spot, at: int) -> list[Speci
 
 
 def _test(spot: Spot, kind: str) -> float:
-    """What vanishes at an event."""
+    """Test function, zero at a special point."""
     if kind == "fold":
         return float(spot.tangent[-1])
     values = np.linalg.eigvals(spot.came.jacobian)
@@ -359,7 +359,7 @@ def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -
 
 
 def _distance(multipliers: NDArray[np.complex128], kind: str) -> float:
-    """How far the multiplier that is critical at an event is from where it then is."""
+    """Distance of the critical multiplier from its value at the special point."""
     if kind == "Neimark-Sacker":
         return float(np.abs(np.abs(multipliers) - 1.0).min())
     return float(np.abs(multipliers - (-1.0 if kind == "flip" else 1.0)).min())
@@ -373,7 +373,7 @@ def _derivative_error(flow: Flow, orbit: PeriodicOrbit) -> float:
 
 
 def _moved(corrector: Corrector, spots: tuple[Spot, Spot, Spot], part: float, off: float) -> float:
-    """How far the parameter moves if the place between the first and the last orbit is off by *off*.
+    """Change of the parameter if the location between the first and the last orbit is off by *off*.
 
     It is read off the parabola through the three, since at a fold the parameter moves with the square alone.
     """
@@ -387,7 +387,7 @@ def _moved(corrector: Corrector, spots: tuple[Spot, Spot, Spot], part: float, of
 
 
 def _unsettled(corrector: Corrector, spot: Spot) -> float:
-    """How far an orbit may be off, as a state and over the range of the parameter, since it closes no better."""
+    """Estimated error of an orbit, as a state and over the parameter range, from its closure error."""
     table = corrector.bordered(spot.came, spot.slope, spot.tangent)
     residual = max(float(np.linalg.norm(spot.came.x - spot.y[:-1])), _ROUNDING)
     least = float(np.linalg.svd(table, compute_uv=False)[-1])
@@ -395,7 +395,7 @@ def _unsettled(corrector: Corrector, spot: Spot) -> float:
 
 
 def _grazing(corrector: Corrector, one: Spot, other: Spot, at: int) -> SpecialPoint:
-    """Where the number of impacts changes between two orbits, by halving."""
+    """Special point at which the number of impacts changes between two orbits, by bisection."""
     sides = [one, other]
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
@@ -614,7 +614,7 @@ def _follow(
 
 
 def _returned(corrector: Corrector, spot: Spot, before: Corrector, first: Spot, near: float) -> bool:
-    """Whether an orbit is within a distance of the first one of the branch, and the branch goes on as there."""
+    """Return whether the branch has returned to its first orbit within a distance, in the same direction."""
     if not abs(spot.y[-1] - first.y[-1]) < near:
         return False
     try:

@@ -65,7 +65,7 @@ class EdgeState:
     orbit: PeriodicOrbit | None
     """The unstable orbit that it comes to, if it comes to one."""
     termination_reason: str
-    """Why the tracking stopped, whether the bisection reached its threshold, and why there is no orbit."""
+    """Reason why the tracking stopped, result of the bisection, and reason why there is no orbit."""
 
     def plot(self, ax: Any = None, **options: Any) -> Any:
         """Draw the motion once a period, and the unstable orbit that it settles on; returns the axes."""

@@ -97,7 +97,7 @@ class InitialConditions:
             )
 
     def describe(self) -> dict[str, Any]:
-        """What tells these starts from others."""
+        """Description of the initial conditions, for comparison."""
         return {
             "count": self.count,
             "displacement": self.displacement,
@@ -261,7 +261,7 @@ _BYTES = 2**27
 
 @dataclass(frozen=True, eq=False)
 class AdvancedStates:
-    """Where states came to."""
+    """States after a number of periods."""
 
     states: _Array
     """After the last period, shape (runs, d); NaN where a run failed."""
@@ -272,12 +272,12 @@ class AdvancedStates:
     statistics: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     """Of the way, by name, shape (runs,)."""
     hidden: Any = None
-    """What it takes to go on without losing a bit."""
+    """State of the solver for a bitwise exact restart."""
     hidden_every: tuple[Any, ...] | None = None
     """The same after each period, with *every*."""
 
     def beginnings(self, later: AdvancedStates) -> AdvancedStates:
-        """Where the periods of *later* began, which went on from here: the runs of each period one after the other."""
+        """States at the beginnings of the periods of *later*, a continuation of this result, ordered by period."""
         assert later.every is not None
         states = np.concatenate([self.states, *later.every.transpose(1, 0, 2)[:-1]])
         if later.hidden_every is None:
@@ -303,7 +303,7 @@ class Flow(Protocol):
 
     @property
     def smooth(self) -> bool:
-        """Whether tangents can be carried along."""
+        """True if tangents can be computed."""
         ...
 
     def advance(
@@ -446,7 +446,7 @@ class Stroboscope:
 
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """What is doubtful about derivatives of this flow."""
+        """Diagnostics of the derivatives of this flow."""
         if not self.smooth or self.integration.accuracy == "reference":
             return ()
         return (
@@ -622,7 +622,7 @@ class Stroboscope:
 
     @cached_property
     def striker_position(self) -> float:
-        """Where the mid-position of the tip is, m; NaN without one."""
+        """Mid-position of the tip, m; NaN without a striker."""
         if self.system.striker is None:
             return math.nan
         ensemble = make_ensemble(self.system, self.integration)

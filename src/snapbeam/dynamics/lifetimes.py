@@ -339,7 +339,7 @@ class LifetimeWork(PointWork):
         return ResultTable(integers, np.full((size, len(self.numbers)), np.nan))
 
     def columns(self, table: ResultTable) -> dict[str, NDArray[Any]]:
-        """What was kept by name, arrays of shape (points, starts)."""
+        """Stored results by name, arrays of shape (points, starts)."""
         count = self.initial_conditions.count
         found: dict[str, NDArray[Any]] = {
             name: table.integers[:, i * count : (i + 1) * count] for i, name in enumerate(_PER_START)
@@ -496,7 +496,7 @@ def _single(setup: SweepSetup, dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Dataset:
-    """What was kept of every run, labelled."""
+    """Dataset with the stored results of every run."""
     from snapbeam.util.datasets import xr
 
     setup, points = work.setup, work.setup.points

@@ -95,7 +95,7 @@ class OrbitNotFoundError(RuntimeError):
 
 
 class Shot(NamedTuple):
-    """What Newton's method came to."""
+    """Result of Newton's method."""
 
     x: _Array
     jacobian: _Array
@@ -103,7 +103,7 @@ class Shot(NamedTuple):
     residual: float
     iterations: int
     exact: bool
-    """Whether the derivative was taken at *x* itself."""
+    """True if the derivative was evaluated at *x* itself."""
 
 
 class Family:
@@ -151,7 +151,7 @@ class Family:
 
 
 class Return(NamedTuple):
-    """Where the flow brings one state, and the derivative of that by the state."""
+    """Image of a state under the return map, with the derivative by the state."""
 
     x: _Array
     jacobian: _Array
@@ -477,7 +477,7 @@ class PeriodicOrbit:
 
     @property
     def is_stable(self) -> bool:
-        """Whether every multiplier is inside the unit circle."""
+        """True if every multiplier is inside the unit circle."""
         return bool(np.abs(self.multipliers[0]) < 1.0)
 
     @property
@@ -519,12 +519,12 @@ class PeriodicOrbit:
 
     @cached_property
     def contact_summary(self) -> Passage:
-        """What it does on its way: impacts, how near it passes the tip, how far it goes."""
+        """Contacts of the orbit: impacts, closest approach to the tip, maximum displacement."""
         return passage_of(self._stroboscope, self.coordinates, self.period)
 
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """What is doubtful about the multipliers."""
+        """Diagnostics of the multipliers."""
         return getattr(self.flow, "diagnostics", ())
 
     @property

@@ -890,7 +890,7 @@ def system_of_file(path: str | os.PathLike[str]) -> System:
 
 
 def _is_saved_system(sections: Mapping[str, Any]) -> bool:
-    """Return whether the sections describe only a system, with the names that :meth:`~snapbeam.System.save` writes."""
+    """Return whether the sections are only those of a system, as :meth:`~snapbeam.System.save` writes."""
     sections = flattened(sections)
     contacts = [name for name in sections if numbered(name)[0] == "contact"]
     return all(
