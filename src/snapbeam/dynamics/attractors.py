@@ -164,7 +164,7 @@ UNDECIDED = -1
 """Label of a state of which it is not certain where it goes."""
 KINDS = ("periodic", "chaotic")
 _REPEATS = 2e-3
-"""Greatest coordinate by which states may differ that are taken to repeat before they are shot at."""
+"""Maximum coordinate by which states may differ that are taken to repeat before they are shot at."""
 _SAME = 1e-5
 _SIGMAS = 3.0
 _TRANSIENT = 1000

@@ -38,7 +38,7 @@ _RTOL, _ATOL = 1e-11, 1e-13
 _CONVERGED = 1e-10
 """Velocity at the turning point, in the same units."""
 _FIRST, _SHORTEST = 0.02, 1e-5
-"""Arc lengths between two points: the first, if it is not above the greatest, and the least."""
+"""Arc lengths between two points: the first, if it is not above the maximum, and the minimum."""
 _SAME_STATE = 1e-6
 """Difference of the two turning points, in units of the well's amplitude, up to which a motion has only one."""
 _NEAR_ZERO = 0.1
@@ -87,10 +87,10 @@ def backbone_curve(
         The curve ends where the frequency is this many first natural frequencies: in a well, the period grows without bound
         towards the barrier.
     max_points : int
-        Most points of the curve.
+        Maximum number of points of the curve.
     max_step : float
-        Greatest arc length between two points, in length scales and in half periods over pi/omega_1.  Near an internal resonance
-        the curve has a narrow tongue; a short step follows it, a long one passes it.
+        Maximum arc length between two points, in length scales and in half periods over pi/omega_1.  Near an internal
+        resonance the curve has a narrow tongue; a short step follows it, a long one passes it.
     progress : callable or bool, optional
         Called as ``progress(done, total)`` with points; True writes a line to standard error.
 
@@ -424,7 +424,7 @@ def _follow(
 ) -> tuple[list[_Array], str]:
     """Points of a curve from its start in one direction, and why it ends.
 
-    The *limits* are the greatest displacement of the centre, half period and arc length between two points.
+    The *limits* are the maximum displacement of the centre, half period and arc length between two points.
     """
     found = _corrected(structure, start[0], start[1], start[0])
     if found is None:

@@ -92,7 +92,7 @@ def basins_of_attraction(
     Raises
     ------
     InputError
-        For bad input.
+        If an axis of the grid or the number of periods is out of range.
 
     Examples
     --------

@@ -83,7 +83,7 @@ def bifurcation_diagram(
     Raises
     ------
     InputError
-        For bad input.
+        If *name* is not a numeric parameter, values are out of range, or there is neither a sweep nor an initial condition.
 
     Examples
     --------

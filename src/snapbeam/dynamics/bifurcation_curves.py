@@ -458,11 +458,11 @@ def bifurcation_curve(
     names : (str, str)
         Two parameters that can differ between runs, by dotted name or the name in datasets.
     bounds : pair of pairs of float
-        Least and greatest value of each.
+        Minimum and maximum value of each.
     max_points : int
         Points at most, to either side.
     step, max_step : float
-        First and greatest distance between points, in units of the well's amplitude for the state and of the range
+        First and maximum distance between points, in units of the well's amplitude for the state and of the range
         for each parameter; between 1e-6 and 1.
     tolerance : float
         Of orbit and condition, as in :func:`periodic_orbit`; up to 1,000 times as much where light impacts make the
@@ -479,7 +479,7 @@ def bifurcation_curve(
     Raises
     ------
     InputError
-        For bad input.
+        If the point is not a fold, flip or Neimark-Sacker point, or a parameter, its bounds or a step is out of range.
     OrbitNotFoundError
         If not even the first point is found with both parameters.
 

@@ -473,13 +473,13 @@ def continuation(
     name : str
         Parameter, by dotted name or the name in datasets.
     bounds : pair of float
-        Least and greatest value.
+        Minimum and maximum value.
     direction : {"up", "down"}
         Which way the parameter goes at first.
     max_points : int
         Orbits at most.
     step, max_step : float
-        First and greatest distance between orbits, in units of the well's amplitude for the state and of the range
+        First and maximum distance between orbits, in units of the well's amplitude for the state and of the range
         for the parameter; between 1e-8 and 1.
     tolerance : float
         Of the orbits, as in :func:`periodic_orbit`.
@@ -494,7 +494,7 @@ def continuation(
     Raises
     ------
     InputError
-        For bad input.
+        If the bounds do not contain the orbit, or the direction, a step or the number of points is out of range.
 
     Examples
     --------

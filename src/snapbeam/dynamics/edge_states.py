@@ -158,7 +158,7 @@ def edge_tracking(
     Raises
     ------
     InputError
-        For bad input, such as two states of the same outcome.
+        If both states have the same outcome, a threshold is out of range, or a run fails.
 
     Examples
     --------

@@ -406,7 +406,7 @@ def lifetime_map(
     Raises
     ------
     InputError
-        For bad input, and for a checkpoint of another sweep.
+        If an axis is not valid, or the checkpoint belongs to another sweep.
     CheckpointError
         If the checkpoint is in use, cannot be written or is damaged beyond repair.
 

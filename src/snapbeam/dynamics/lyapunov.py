@@ -104,7 +104,7 @@ def lyapunov_spectrum(
     Raises
     ------
     InputError
-        For bad input, and for a flow of your own without tangents: see :func:`largest_lyapunov`.
+        If a number is out of range, or a user-defined flow has no tangents: see :func:`largest_lyapunov`.
 
     Examples
     --------

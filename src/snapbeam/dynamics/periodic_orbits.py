@@ -329,13 +329,13 @@ class Passage(NamedTuple):
 
     impacts: int
     clearance: float
-    """Least gap, over the length scale b, at which the beam turns back from a tip without touching; NaN: never."""
+    """Minimum gap, over the length scale b, at which the beam turns back from a tip without touching; NaN: never."""
     min_penetration: float
-    """Greatest penetration of the lightest impact, over b; NaN: none."""
+    """Maximum penetration of the lightest impact, over b; NaN: none."""
     min_impulse: float
     """Of an impact, N s; NaN: none."""
     peak_displacement: float
-    """Greatest distance of the contact point from the straight beam, over b."""
+    """Maximum distance of the contact point from the straight beam, over b."""
     crossings: int
 
 
@@ -465,7 +465,7 @@ class PeriodicOrbit:
     jacobian: _Array
     """Derivative of the return map, in those coordinates, shape (d, d)."""
     residual: float
-    """Greatest coordinate of the state that came back less the one that set out."""
+    """Maximum coordinate of the state that came back less the one that set out."""
     iterations: int
 
     @cached_property
@@ -644,7 +644,7 @@ def periodic_orbit(
     transient : int
         Periods to advance from the guess first, which brings it to what attracts it.
     tolerance : float
-        Greatest coordinate that may remain, in units of the well's amplitude and of omega_1 times it; at most 1e-3.
+        Maximum coordinate that may remain, in units of the well's amplitude and of omega_1 times it; at most 1e-3.
     iterations : int
         Maximum number of iterations of Newton's method.  It also stops where no step reduces the residual.
     deflate : sequence of PeriodicOrbit
@@ -657,7 +657,7 @@ def periodic_orbit(
     Raises
     ------
     InputError
-        For bad input.
+        If the system has no excitation, or a number is out of range.
     OrbitNotFoundError
         If none is found: the message says why, and what to try.
 

@@ -125,7 +125,7 @@ STARTS = (1.0, 0.75, 1.33, 0.55, 1.8)
 HIGHER = (1.05, 1.15, 1.3)
 """Buckling levels that are tried beyond the one found, over it."""
 UNDETERMINED = 1e-5
-"""Least singular value of the relative sensitivities that counts as a response, over the greatest."""
+"""Minimum singular value of the relative sensitivities that counts as a response, over the maximum."""
 
 
 def sensitivity(frequencies: Callable[[_Array], _Array], logs: _Array, errors: _Array) -> _Array:

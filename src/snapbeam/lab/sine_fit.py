@@ -192,7 +192,7 @@ def fit_sine(
     -------
     SineFit
         Standard errors are those of least squares with the noise found near the frequency in the residual;
-        they hold for noise that is white over a band of some 50 lines.
+        they hold for noise that is white over a band of about 50 lines.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """A synthetic camera: recordings of known motions, together with the true motions.
 
 An ideal scene of a beam and a rounded shaker with a sticker is drawn as sharp edges, blurred by the optics,
-integrated over each pixel and over the exposure, lit unevenly, spoiled as asked, and given noise and a finite
+integrated over each pixel and over the exposure, lit unevenly, spoiled as requested, and given noise and a finite
 bit depth.  The optics are a Gaussian, as the tracker assumes, or a lens out of focus, as it does not.  The
 truth is the mean of the displacement over each exposure, exactly, for motion that is linear between the given
 samples.

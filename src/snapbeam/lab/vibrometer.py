@@ -687,7 +687,7 @@ def measure_drive(
     amplitude : float, optional
         The amplitude as set, in the unit of the signal, to check by.
     snr_limit : float
-        Least ratio [dB] of the sine to noise and distortion of an acceptable test; the paper's 15 dB.
+        Minimum ratio [dB] of the sine to noise and distortion of an acceptable test; the paper's 15 dB.
     tolerance : float
         How near to the steady sine a cycle must be, as a share of its amplitude, to count as steady.  Raised
         to four times the noise of one cycle's amplitude where that is more.

@@ -22,7 +22,7 @@ _Array = NDArray[np.float64]
 LOADS: dict[str, type[Drive]] = {}
 """Every way in which a load changes, by the name it has in parameter files."""
 _STEEPEST = 1.875
-"""Greatest slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""
+"""Maximum slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""
 
 
 class LoadMotion(Drive):

@@ -21,10 +21,10 @@ _RESOLVED = 1e-11
 
 
 def least_energy_at(model: ReducedModel, location: ArrayLike, displacement: ArrayLike) -> NDArray[np.float64]:
-    """Least potential energy of any shape that passes through a point, with U = 0 for the straight beam.
+    """Minimum potential energy of any shape that passes through a point, with U = 0 for the straight beam.
 
-    With c_i = phi_i(x_s) and S_1(Lambda) = sum c_i^2/(E I k_i^2 - Lambda), the least energy of a shape with
-    w(x_s) = r is the greatest value of
+    With c_i = phi_i(x_s) and S_1(Lambda) = sum c_i^2/(E I k_i^2 - Lambda), the minimum energy of a shape with
+    w(x_s) = r is the maximum value of
 
         r^2/(2 S_1(Lambda)) - (P - Lambda)^2/(4 gamma)
 

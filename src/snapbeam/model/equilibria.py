@@ -67,8 +67,8 @@ def equilibria_of(stiffness: _Array, gamma: float, force: _Array) -> list[tuple[
         h(s) = sum B_i^2/(kappa_i + gamma s)^2 - s = 0.
 
     Between two of its poles h is convex and has no root or two; beyond the last it falls, with one root, the well of
-    least energy.  So all roots are found: the least value between two poles decides.  Where B_i = 0 and kappa_i < 0 a
-    pair with alpha_i of either sign may branch off at kappa_i + gamma s = 0.
+    minimum energy.  So all roots are found: the minimum value between two poles decides.  Where B_i = 0 and
+    kappa_i < 0 a pair with alpha_i of either sign may branch off at kappa_i + gamma s = 0.
 
     The tangent stiffness is K0 + gamma s and 2 gamma alpha alpha^T, of rank one: it has as many negative
     eigenvalues as there are kappa_i + gamma s < 0, less one where h rises.
@@ -249,7 +249,7 @@ class Landscape:
 
     @property
     def deepest(self) -> Equilibrium:
-        """The well of least energy."""
+        """The well of minimum energy."""
         return self.lower if self.lower.energy <= self.upper.energy else self.upper
 
     @property
@@ -368,15 +368,15 @@ _BESIDE = 1e-9
 def least_energy_through(
     stiffness: _Array, gamma: float, force: _Array, shapes: _Array, heights: _Array
 ) -> _Array:
-    """Least potential energy of any amplitudes with c . alpha = r, J.
+    """Minimum potential energy of any amplitudes with c . alpha = r, J.
 
-    With S_cc = sum c_i^2/(K0_i - mu), S_cB = sum c_i B_i/(K0_i - mu) and S_BB alike, it is the greatest value of
+    With S_cc = sum c_i^2/(K0_i - mu), S_cB = sum c_i B_i/(K0_i - mu) and S_BB alike, it is the maximum value of
 
         (r - S_cB)^2/(2 S_cc) - S_BB/2 - mu^2/(4 gamma)
 
     over mu below the first zero of S_cc.  For every mu, gamma s^2/4 >= -mu s/2 - mu^2/(4 gamma), s = alpha . alpha, so
-    that the least value of the quadratic form that is left, on the plane, is a lower bound.  It is attained: the bound
-    is concave in mu, its slope is -(s + mu/gamma)/2 with the s of the shape that is least, and vanishes at
+    that the minimum of the remaining quadratic form on the plane is a lower bound.  It is attained: the bound
+    is concave in mu, its slope is -(s + mu/gamma)/2 with the s of the minimising shape, and vanishes at
     mu = -gamma s.
     Without B it is that of equal wells.
 

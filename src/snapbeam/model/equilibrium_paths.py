@@ -48,7 +48,7 @@ _LARGEST = 100.0
 """Force up to which a path is followed where a local force may grow without bound, in its unit."""
 _NEWTON = 12
 _LEAST_NORM = 40
-"""Steps of least norm, whose convergence is linear at a singular point."""
+"""Steps of minimum norm, whose convergence is linear at a singular point."""
 _CONVERGED = 1e-12
 _UNCOUPLED = 1e-6
 """Share of the row of the force in the direction that loses its stiffness, up to which a path branches off there."""
@@ -261,7 +261,7 @@ class _Tracer:
     def correct(self, guess: _Array, normal: _Array | None) -> _Array | None:
         """The point of the path on the plane across *normal* through *guess*; None if there is none near.
 
-        Without *normal*, by steps of least norm: at a singular point no plane is across all paths.
+        Without *normal*, by steps of minimum norm: at a singular point no plane is across all paths.
         """
         y = guess
         for _ in range(_NEWTON if normal is not None else _LEAST_NORM):

@@ -100,7 +100,7 @@ class HarmonicForce(ForceHistory):
         return np.asarray(2.0 * math.pi / (columns["frequency_ratio"] * scale.omega))
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """Greatest force, N."""
+        """Maximum force, N."""
         return np.asarray(columns["amplitude"] + np.abs(columns["mean"]))
 
     @staticmethod

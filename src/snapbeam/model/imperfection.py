@@ -88,7 +88,7 @@ class Imperfection:
     shape : {"mode", "sine"}
         Of *midspan_amplitude*: the first buckling mode, or a single half sine, of which the modes take the part that they hold.
     antisymmetric_amplitude : float
-        Greatest height, m, of an initial shape of the form of the second buckling mode, on the left half.
+        Maximum height, m, of an initial shape of the form of the second buckling mode, on the left half.
     profile : array_like of shape (2, points), optional
         A measured initial shape: places over the length, ascending from 0 to 1, and heights, m.  The straight line
         through its ends is taken away.

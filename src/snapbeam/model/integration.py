@@ -32,7 +32,7 @@ class Integration:
     accuracy : {"standard", "reference"}
         ``"standard"``: order 4.  ``"reference"``: order 6 and much shorter steps, to check others with.
     tolerance : float, optional
-        Greatest error allowed in the displacement of the contact point and of the centre of one run, in b, from
+        Maximum error allowed in the displacement of the contact point and of the centre of one run, in b, from
         1e-10 to 0.1, as far as the problem's conditioning lets any integrator promise it; in place of *step*
         and *accuracy*.
     engine : {"auto", "cpu", "cuda"}

@@ -231,7 +231,7 @@ class LocalForce:
         return found
 
     def greatest_stiffness(self, largest: float) -> float:
-        """Greatest slope of the conservative force over displacements up to *largest*, by differences; N/m."""
+        """Maximum slope of the conservative force over displacements up to *largest*, by differences; N/m."""
         numbers, (low, high) = self.numbers, self.displacement_range(self.numbers)
         inside = (1.0 - _NEAREST) * low, (1.0 - _NEAREST) * high
         at = np.linspace(max(-largest, inside[0]), min(largest, inside[1]), 401)
@@ -239,7 +239,7 @@ class LocalForce:
         return float(np.abs(np.diff(forces) / np.diff(at)).max())
 
     def greatest_damping(self, largest: float, fastest: float) -> float:
-        """Greatest damping coefficient over displacements and velocities up to *largest* and *fastest*; N s/m."""
+        """Maximum damping coefficient over displacements and velocities up to *largest* and *fastest*; N s/m."""
         numbers, damping = self.numbers, type(self).damping_coefficient
         # dense near 0, where friction changes
         speeds = [0.0, *(fastest * 10.0 ** (-k / 4.0) for k in range(24))]

@@ -302,7 +302,7 @@ class Wells:
 
     @property
     def about_reference_well(self) -> Self:
-        """The model, or its mirror image, whose lower well is the one of least energy: its first frequency normalises."""
+        """The model or its mirror image with the minimum of energy in the lower well, for the normalisation."""
         if self.landscape is None or not self.is_bistable:
             return self
         own, other = (each.energy for each in (self.landscape.lower, self.landscape.upper))
@@ -374,7 +374,7 @@ class Wells:
 
     @cached_property
     def two_well_limits(self) -> str:
-        """In words, the nearest imperfection and the least axial load with two wells, of a beam with one; computed.
+        """In words, the nearest imperfection and the minimum axial load with two wells, of a beam with one; computed.
 
         Raises
         ------
@@ -456,7 +456,7 @@ class Wells:
 
 
 _FURTHEST_IMPERFECTION = 100.0
-"""Greatest and, inverted, least factor of the imperfection at which two wells are looked for."""
+"""Maximum and, inverted, minimum factor of the imperfection at which two wells are looked for."""
 _FURTHEST_LOAD = 40.0
 """Over the critical load."""
 _HINT_STEPS = 81
@@ -532,7 +532,7 @@ class ReducedModel(Wells):
         that one, zeros if it is perfect.
     length_scale : float or None
         Length that normalises displacements, m: the buckling level b; of a beam that the load alone would not buckle
-        the height of the centre in the well of least energy; None for a straight beam.
+        the height of the centre in the well of minimum energy; None for a straight beam.
     damping_ratio : array of shape (N,)
         Damping ratio of each linear mode about a well, by ascending frequency.
     midspan_shape : array of shape (N,)
@@ -616,7 +616,7 @@ class ReducedModel(Wells):
             Damping ratio of the linear modes about a well, each in [0, 1).
         reference_frequency : float, optional
             Frequency that normalises the excitation, Hz; the first natural frequency by default, of unequal wells about
-            the one of least energy.
+            the one of minimum energy.
         imperfection : Imperfection, optional
             What makes the wells unequal; one that is nothing is left out.  Damping is that of the linear modes about
             the well that the striker pushes away from, and the same matrix everywhere.
@@ -792,7 +792,7 @@ class ReducedModel(Wells):
 
     @cached_property
     def lightest_contact_mass(self) -> float:
-        """Least :meth:`contact_mass` between 2 % and half of the span, kg, looked for at 25 places.
+        """Minimum :meth:`contact_mass` between 2 % and half of the span, kg, looked for at 25 places.
 
         The other half of a beam is the mirror image of the first.
         """

@@ -42,7 +42,7 @@ AXIS_LABELS = {
 _LONGEST = 44
 """Characters of a line along an axis of a picture of one column."""
 _SMALL, _LARGE = 0.01, 1e4
-"""Between these the greatest number along an axis is shown as it is."""
+"""Between these the maximum number along an axis is shown as it is."""
 _PREFIXES = {
     "m": ((-3, "m"), (-6, "µ")),
     "Pa": ((9, "G"), (6, "M"), (3, "k")),
@@ -53,7 +53,7 @@ _PREFIXES = {
 }
 """Powers of ten, from great to small, that have a prefix before a unit."""
 _DECADES = 10.0
-"""Greatest over least value, from which points in geometric progression are drawn on an axis of powers."""
+"""Ratio of the maximum to the minimum above which geometric points have a logarithmic axis."""
 
 
 def axis_label(dataset: xr.Dataset, name: str) -> str:

@@ -189,7 +189,7 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
 
 
 def _draw_line(ax: Axes, dataset: xr.Dataset, name: str) -> None:
-    """Draw classes along the axis *name*, with the least and the greatest displacement of the centre above them."""
+    """Draw classes along the axis *name*, with the minimum and the maximum displacement of the centre above them."""
     points, _ = positions(dataset, name)
     edges = edges_of(dataset, name)
     kinds = dataset["response_class"].squeeze().values[None, :]
@@ -360,7 +360,7 @@ def draw_measurements(
 
 
 _DECADES = 300.0
-"""Greatest over least value, from which colours go by powers of ten."""
+"""Ratio of the maximum to the minimum above which the colour scale is logarithmic."""
 
 
 @checked

@@ -318,7 +318,7 @@ def plot_run(
 
     Left, over cycles of excitation: the whole run or a window.  More than 100 cycles are drawn by the range, minimum to
     maximum, in intervals of whole cycles; choose a window to see each cycle.  Right, over time: the samples about
-    the greatest contact force within the window, from a little before the contact to a little after it.  A
+    the maximum contact force within the window, from a little before the contact to a little after it.  A
     measured run, which has no force, is drawn without what it lacks.
 
     Parameters

@@ -33,7 +33,7 @@ _TRIED, _BROKEN = "#4C97C8", "0.8"
 _STATES = (("violated", "X", "#B03A27"), ("undecided", "D", "#C3DD8A"), ("satisfied", "o", "#16245E"))
 _OBJECTIVE = "tried_objective_"
 _DECADE = 10.0
-"""Greatest over least value from which an axis is one of powers."""
+"""Ratio of the maximum to the minimum above which an axis is logarithmic."""
 
 
 def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None = None) -> Axes:

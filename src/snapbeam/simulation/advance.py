@@ -83,7 +83,7 @@ def advance(
     Raises
     ------
     InputError
-        For bad input; for more periods than a recorded motion has.
+        If the state has another number of modes, or a number of periods is not positive or exceeds the recorded motion.
 
     Examples
     --------

@@ -71,7 +71,7 @@ def simulate_to_file(
     Raises
     ------
     InputError
-        For bad input.
+        If the sample times are not increasing times within the run.
     NoRoomError
         If the disk is full.
 

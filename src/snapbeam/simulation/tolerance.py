@@ -120,7 +120,7 @@ def perturbation_growth(
     Raises
     ------
     InputError
-        For bad input.
+        If the perturbation is not positive, or the accuracy level does not exist.
 
     Examples
     --------

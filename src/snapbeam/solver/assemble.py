@@ -104,7 +104,7 @@ def _begun(drive: Drive, columns: Mapping[str, _Array], section: str, system: Sy
 
 
 def _speed(drive: Drive, columns: Mapping[str, _Array], section: str, system: System, runs: int) -> _Array:
-    """Greatest speed of the tip in the frame of the ends, m/s."""
+    """Maximum speed of the tip in the frame of the ends, m/s."""
     speed = drive.bounds(_own(columns, section, runs), system.scale)[1]
     base = system.base_excitation
     if base is not None and not base.striker_on_base:
@@ -240,7 +240,7 @@ def _samples(system: System, section: str, drive: Drive) -> _Array:
 
 
 def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
-    """Greatest angular frequency of the base, the axial load and external forces, rad/s; 0 without them."""
+    """Maximum angular frequency of the base, the axial load and external forces, rad/s; 0 without them."""
     found = np.zeros(runs)
     for section, drive in system.moving:
         if _is_around(section):

@@ -126,7 +126,7 @@ class Ensemble:
 
     @property
     def fastest(self) -> float:
-        """Greatest angular frequency of a mode or a drive, rad/s."""
+        """Maximum angular frequency of a mode or a drive, rad/s."""
         names = self.drive.number_names
         rate = names.index("fastest") if "fastest" in names else 0
         return max(float(self.structure.omega.max()), float(self.drive_numbers[:, rate].max()))

@@ -404,7 +404,7 @@ def _sums_of_sines(memory, table, t, low, width):
 
 
 def drive_rate(drive: Any) -> float:
-    """Greatest angular frequency of a drive's motion, rad/s."""
+    """Maximum angular frequency of a drive's motion, rad/s."""
     return float(drive.fastest if "fastest" in drive._fields else drive.omega)
 
 

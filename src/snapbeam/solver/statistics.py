@@ -167,7 +167,7 @@ def _seen(column: str, factor: Callable[[Reading], float] = lambda _: 1.0) -> Ca
 
 
 def _low_high(low: str, high: str, greatest: bool) -> Callable[[Reading], Values]:
-    """Least or maximum displacement over b, in the signs of space."""
+    """Minimum or maximum displacement over b, in the signs of space."""
 
     def value(reading: Reading) -> Values:
         upward = reading.sign > 0.0

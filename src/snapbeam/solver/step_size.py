@@ -84,7 +84,7 @@ def flight_step(model: ReducedModel, order: int, limit: float, impact: float = m
     order : int
         Of the composition.
     limit : float
-        Greatest error of a displacement, over the buckling level, after two periods of the first mode; where the
+        Maximum error of a displacement, over the buckling level, after two periods of the first mode; where the
         start is sensitive, that many times the displacement's relative slope along the velocity at the start.
     impact : float
         Duration of an impact, s: the impulses that are tried last no longer, and of impacts shorter than 1/150 of the
@@ -202,7 +202,7 @@ class _Bench:
         return float(counts[-1])
 
     def _errors(self, counts: _Array) -> _Array:
-        """Greatest error of each number of flight steps, over what each start is allowed."""
+        """Maximum error of each number of flight steps, over what each start is allowed."""
         worst = np.zeros(counts.size)
         for velocity, (_, _, longer, share) in zip(self.starts, _STARTS, strict=True):
             own = np.ceil(_PERIODS * counts / longer)

@@ -75,8 +75,8 @@ def sweep(
     Raises
     ------
     InputError
-        For bad input, and for a checkpoint of another sweep.  Runs that fail numerically do not raise: their class is
-        UNKNOWN, and their ``status`` gives the reason.
+        If an axis is not valid, or the checkpoint belongs to another sweep.  Runs that fail numerically do not raise:
+        their class is UNKNOWN, and their ``status`` gives the reason.
     CheckpointError
         If the checkpoint is in use, cannot be written or is damaged beyond repair.
 

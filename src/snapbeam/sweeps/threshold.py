@@ -100,8 +100,8 @@ def threshold(
     Raises
     ------
     InputError
-        For bad input, such as a parameter that belongs to the model and cannot differ between the runs of an
-        ensemble.
+        If the parameter belongs to the model and cannot differ between the runs of an ensemble, or there are fewer
+        than two values.
 
     Examples
     --------

@@ -109,7 +109,7 @@ def estimate_cost(
     Raises
     ------
     InputError
-        For a function without a cost estimate, and for bad input of the question.
+        If the function has no cost estimate, or its own arguments are not valid.
 
     Examples
     --------
@@ -176,7 +176,7 @@ def _of_probability(
 
 
 def _needed(share: float, allocation: SamplingPlan) -> int:
-    """Runs after which a probability is known as narrowly as asked."""
+    """Runs after which a probability is known as narrowly as requested."""
     assert allocation.half_width is not None
     n = allocation.initial_runs
     while n < allocation.max_runs:

@@ -22,7 +22,7 @@ HERTZ_TIME = 2.943275  # contact time over d/v for a force k d^1.5: 2 int_0^1 dx
 class ContactTest:
     """One collision of the shaker's tip: closing speed, and two of duration, peak force, effective mass.
 
-    For a force k d^1.5 between two bodies of effective mass m that close at v (Hertz): greatest penetration
+    For a force k d^1.5 between two bodies of effective mass m that close at v (Hertz): maximum penetration
     d = (5 m v^2/(4 k))^0.4, peak force k d^1.5, duration 2.943 d/v.  The bodies are rigid but for the
     contact: a test on a block or a heavy clamp, not on the limp beam.
 
@@ -99,7 +99,7 @@ class Measurements:
     lower_well_shape, upper_well_shape : sequence of str, optional
         "symmetric" or "antisymmetric" for each frequency about a well.  Where given, frequencies are matched
         to the model's modes of that shape in their order; else to all modes in their order, which at a
-        buckling level of some 6 radii of gyration changes.
+        buckling level of about 6 radii of gyration changes.
     damping_ratio : sequence of float
         From free decays.
     damping_ratio_se : float or sequence of float, optional

@@ -794,7 +794,7 @@ def optimize_design(
     Raises
     ------
     InputError
-        For bad input, and if no design that was tried keeps the constraints.
+        If an argument is out of range, or no tested design satisfies the constraints.
 
     Examples
     --------

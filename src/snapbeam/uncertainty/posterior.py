@@ -698,7 +698,7 @@ def class_likelihood(
     Raises
     ------
     InputError
-        For bad input, an uncertainty with a parameter of the posterior, and measurements without a class.
+        If the uncertainty contains a parameter of the posterior, or no measurement has a response class.
 
     Examples
     --------

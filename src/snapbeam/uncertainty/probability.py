@@ -211,7 +211,8 @@ def probability_map(
 ) -> xr.Dataset:
     """Compute the probability of each outcome at every point under parameter uncertainty.
 
-    Sample s is the same at every point.  Runs are spent where the interval is widest, until each is as narrow as asked.
+    Sample s is the same at every point.  Points with the widest intervals get further runs, until each interval has the
+    requested width.
 
     Parameters
     ----------
@@ -242,7 +243,7 @@ def probability_map(
     Raises
     ------
     InputError
-        For bad input, an uncertainty without uncertain parameters, and for a checkpoint of another computation.
+        If no parameter is uncertain, an axis is not valid, or the checkpoint belongs to another computation.
     CheckpointError
         If the checkpoint is in use, cannot be written or is damaged beyond repair.
 

@@ -139,7 +139,7 @@ def crossing(values: ArrayLike, hits: ArrayLike, probability: float, confidence:
 
 
 def _constrained(hits: _Array, at: int, q: float) -> float:
-    """Minus the greatest log likelihood if the probability passes *q* before coin *at*."""
+    """Minus the maximum log likelihood if the probability passes *q* before coin *at*."""
     total = 0.0
     if at > 0:
         total += float(np.sum(_losses(hits[:at], np.minimum(isotonic(hits[:at]), q))))
@@ -442,7 +442,7 @@ def quantile_threshold(
     Raises
     ------
     InputError
-        For bad input, such as a parameter that needs another structure, and for a checkpoint of another computation.
+        If the parameter changes the structure, bounds are out of range, or the checkpoint belongs to another computation.
 
     Examples
     --------

@@ -211,7 +211,7 @@ def sobol_indices(
     Raises
     ------
     InputError
-        For bad input, a result of another shape, or one that is constant up to rounding.
+        If a number is out of range, or the result has another shape or is constant up to rounding.
 
     Examples
     --------
@@ -347,7 +347,7 @@ class StatisticQoI:
 
 @dataclass(frozen=True, kw_only=True)
 class ThresholdQoI:
-    """The least value of a parameter at which a sample snaps, on a row of values and then by halving.
+    """The minimum value of a parameter at which a sample snaps, on a row of values and then by halving.
 
     Parameters
     ----------
@@ -622,8 +622,8 @@ def sensitivity(
     Raises
     ------
     InputError
-        For bad input, a quantity that is missing for some samples, such as a threshold out of range, correlated
-        parameters with Sobol's indices, and a quantity that does not vary.
+        If the quantity is missing for some samples, such as a threshold out of range, or does not vary, or if parameters
+        are correlated with Sobol's indices.
 
     Examples
     --------

@@ -74,7 +74,7 @@ class AmplitudeJump(NamedTuple):
 
 
 def find_release(samples: SignalSamples, frequency: float) -> int:
-    """First sample of the free decay: where its swing, seen over a period, is the greatest.
+    """First sample of the free decay: where its swing, seen over a period, is the maximum.
 
     0 where the record begins with it.  The swing is that of the rate of change, so that the deflection before
     a release, a constant, is none.
@@ -107,7 +107,7 @@ def find_release(samples: SignalSamples, frequency: float) -> int:
 def find_ceiling(samples: SignalSamples, frequency: float) -> Ceiling | None:
     """Detect clipping of the first cycles of a decay, and its end.
 
-    Either the record hits its greatest or least value in runs of equal samples, or the maxima of at least four
+    Either the record hits its maximum or minimum value in runs of equal samples, or the maxima of at least four
     cycles stay level, and flat, where the later ones fall.
     """
     values = samples.values
@@ -284,7 +284,7 @@ class Decay:
 
 
 def dominant(samples: SignalSamples, low: float = 0.0, high: float | None = None) -> float:
-    """Frequency [Hz] of the strongest decaying sine, under a window that is greatest at the start.
+    """Frequency [Hz] of the strongest decaying sine, under a window that is maximum at the start.
 
     A window that rises from zero would hide what decays fast.
 

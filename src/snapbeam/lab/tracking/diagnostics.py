@@ -296,7 +296,7 @@ def rounding_shift(beam: BeamView) -> float:
 
 
 def never_touching(penetration: np.ndarray, rows: TrackedRows) -> float:
-    """Least gap [px] between tip and beam if the beam moves without ever being touched; else 0."""
+    """Minimum gap [px] between tip and beam if the beam moves without ever being touched; else 0."""
     row = rows.row
     known, seen = np.isfinite(penetration), np.isfinite(row)
     if not known.any() or not seen.any() or np.ptp(np.percentile(row[seen], (0.5, 99.5))) <= 2.0:

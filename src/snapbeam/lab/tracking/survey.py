@@ -313,7 +313,7 @@ def _light(y: Floats, error: Floats, gamma: float, ratio: float, sign: float) ->
 
 
 def _asymmetry(x: Floats, light: Floats, error: Floats) -> tuple[float, float]:
-    """Chi-square of an edge turned about its centre against itself, least over the centre, and the centre."""
+    """Chi-square of an edge turned about its centre against itself, minimum over the centre, and the centre."""
     away = np.arange(0.5, 4.0 / _STEP) * _STEP
 
     def chi(centre: float) -> float:

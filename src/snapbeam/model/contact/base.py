@@ -18,7 +18,7 @@ __all__ = ["LAWS", "ContactLaw", "LawProperties", "hertzian_time"]
 LAWS: dict[str, type[ContactLaw]] = {}
 """Every law by the name it has in parameter files."""
 _HERTZ_PHASE = 4.03026
-"""Phase of the linear oscillator with the greatest slope of Hertz's contact during an impact: (4/5) B(2/5, 1/2) sqrt(15/8)."""
+"""Phase of a linear oscillator with the maximum slope of an impact under Hertz's law: (4/5) B(2/5, 1/2) sqrt(15/8)."""
 
 
 def hertzian_time(slope: float, mass: float) -> float:
@@ -129,7 +129,7 @@ class ContactLaw:
         """Duration, s, of the impact of a free *mass* (kg) that arrives with *velocity* (m/s); 0 if it is never stopped.
 
         Of the force without what it loses: 2 times the integral of 1/sqrt(v^2 - 2 E/m) over the penetration, from 0 to
-        the greatest, where the energy E of the law is m v^2/2.
+        the maximum, where the energy E of the law is m v^2/2.
         """
         depth = self._greatest_penetration(mass, velocity)
         if depth == 0.0:

@@ -27,7 +27,7 @@ __all__ = ["HertzStress", "bending_stress", "hertz_stress"]
 
 _Array = NDArray[np.float64]
 _YIELD = 1.60
-"""Greatest pressure over the yield stress at which a sphere on a flat first yields, below the surface (nu = 0.3)."""
+"""Maximum pressure over the yield stress at which a sphere on a flat first yields, below the surface (nu = 0.3)."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class HertzStress:
     Attributes
     ----------
     pressure : float
-        Greatest pressure p_0, in the middle of the contact, Pa.
+        Maximum pressure p_0, in the middle of the contact, Pa.
     contact_radius : float
         Of the circle of contact, m.
     yield_force : float or None
@@ -110,7 +110,7 @@ def hertz_stress(
 
 @checked
 def bending_stress(model: Any, amplitude: ArrayLike, count: int = 201) -> _Array:
-    """Greatest bending stress along the beam, E (h/2) max abs(w''), Pa, of amplitudes of shape (..., N), shape (...).
+    """Maximum bending stress along the beam, E (h/2) max abs(w''), Pa, of amplitudes of shape (..., N), shape (...).
 
     The stress of the shape itself is meant, that of a beam made straight; the axial stress is not in it.
     """

@@ -143,7 +143,7 @@ class Drive:
         return [2.0 * math.pi / self.cycle(columns, scale)] if self.is_periodic else None
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """Highest displacement (m) from the mid-position and greatest speed (m/s) ever, shape (runs,)."""
+        """Highest displacement (m) from the mid-position and maximum speed (m/s) ever, shape (runs,)."""
         raise NotImplementedError
 
     def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
@@ -156,7 +156,7 @@ class Drive:
         return cls.peak_acceleration is not Drive.peak_acceleration
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """Greatest acceleration (m/s^2) ever, shape (runs,): of a motion that a base may have."""
+        """Maximum acceleration (m/s^2) ever, shape (runs,): of a motion that a base may have."""
         raise NotImplementedError
 
     def samples(self) -> _Array:

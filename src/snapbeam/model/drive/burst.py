@@ -19,9 +19,9 @@ __all__ = ["Burst"]
 
 _Array = NDArray[np.float64]
 _STEEPEST = 1.875
-"""Greatest slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""
+"""Maximum slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""
 _SHARPEST = 5.7736
-"""Its greatest curvature, 10/sqrt(3)."""
+"""Its maximum curvature, 10/sqrt(3)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,7 +23,7 @@ LINES = 32
 _LOW_BITS = np.uint64(0xFFFFFFFF)
 _STEEPEST = 1.875
 _SHARPEST = 5.7736
-"""Greatest curvature of x^3 (10 - 15 x + 6 x^2) on [0, 1], 10/sqrt(3)."""
+"""Maximum curvature of x^3 (10 - 15 x + 6 x^2) on [0, 1], 10/sqrt(3)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,7 +22,7 @@ __all__ = ["RecordedMotion"]
 
 _Array = NDArray[np.float64]
 _SPEED_MARGIN = 1.5
-"""Greatest speed of the cubic through a record over the greatest recorded one, at most."""
+"""Upper bound of the ratio of the speed of the interpolating cubic to the recorded speed."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,7 +37,7 @@ class RecordedMotion(Drive):
     displacement, velocity : array_like of shape (samples,)
         Displacement (m) and velocity (m/s), positive towards the beam's upper well; they must belong
         together: over each interval the displacement changes by the velocities' mean, within a tenth
-        of the greatest change.
+        of the maximum change.
     sampling_frequency : float
         Samples per second, Hz.
     frequency : float

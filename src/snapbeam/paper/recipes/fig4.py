@@ -87,7 +87,7 @@ def _choose(searched: xr.Dataset, modes: int, cycles: int) -> dict[str, tuple[fl
     """Omega and V of each kind, by a rule.
 
     At each frequency: the smallest V that snaps through exactly once; the smallest above it that changes wells at
-    least three times, both settled in the second well within the cycles shown; and of the three greatest intrawell
+    least three times, both settled in the second well within the cycles shown; and of the three largest intrawell
     V below the threshold the one that repeats itself worst.  The frequency is the one at which that is worst.
     """
     best: tuple[float, dict[str, tuple[float, float]]] | None = None

@@ -1,4 +1,4 @@
-"""Fig. B.10: greatest displacement at the contact over frequency, at two drives, for 1 and 32 modes."""
+"""Fig. B.10: maximum displacement at the contact over frequency, at two drives, for 1 and 32 modes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _STYLES = (("#2E7EBB", "-"), ("#B03A27", "-"))
 
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
-    """Greatest displacement at the contact over a sweep of frequency."""
+    """Maximum displacement at the contact over a sweep of frequency."""
     ratio = results.pick(np.linspace(0.5, 4.0, 36), np.linspace(0.25, 4.0, 151))
     found = {}
     for modes in (1, results.pick(4, 32)):
@@ -56,7 +56,7 @@ def maxima(ds: xr.Dataset, level: int, prominence: float = 0.1) -> list[tuple[fl
 
 
 def draw(results: Results) -> Figure:
-    """One panel a model, with the greatest two maxima of each drive marked."""
+    """One panel a model, with the two largest maxima of each drive marked."""
     data = results["figB10"]
     with figure_style():
         figure = new_figure("double", 62.0)

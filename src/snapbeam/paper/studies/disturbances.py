@@ -127,7 +127,7 @@ def _impacts(results: Results, model: sb.ReducedModel, points: _Array) -> _Array
 def _repeat(model: sb.ReducedModel, omega: float, drive: float) -> list[float] | None:
     """Impulse and work within a quarter of the first period, and the time of the next impact, of both repetitions.
 
-    The impact is the one of the greatest impulse after four periods of the first mode; None if there is none.
+    The impact is the one of the maximum impulse after four periods of the first mode; None if there is none.
     """
     first = 1.0 / model.reference_frequency
     shaker = sb.Shaker(frequency_ratio=omega, velocity_amplitude=drive, location=LOCATION)

@@ -39,7 +39,7 @@ _ALONE = (0.453, 0.487, 0.5)
 _LEFT, _RIGHT = np.linspace(0.213, 0.463, 6), (0.503, 0.513, 0.533, 0.573)
 """Places over the length that are tried at every buckling level: of a single tip, and of both of a pair."""
 _FIRM, _STEPS, _STRIDE = 2e5, 5000, 0.03
-"""Stiffness of a creeping beam's tips over the beam's greatest; its steps at most, and how long one is over b."""
+"""Stiffness of a creeping beam's tips over the beam's maximum; its steps at most, and how long one is over b."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class _Press:
         return a, force
 
     def lowest(self, a: _Array, active: list[int]) -> tuple[float, _Array]:
-        """Least curvature of the energy along what the active tips leave free, and where it is."""
+        """Minimum curvature of the energy along what the active tips leave free, and where it is."""
         free = scipy.linalg.null_space(self.rows[active])
         values, vectors = scipy.linalg.eigh(free.T @ self.tangent(a) @ free)
         return float(values[0]), free @ vectors[:, 0]

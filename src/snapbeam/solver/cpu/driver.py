@@ -49,7 +49,7 @@ _ASKING = Lock()
 _POLL = 0.2
 """Seconds after which an interrupt is heard."""
 _SLICE_STEPS = 200_000
-"""Steps of a recorded run between two checks for a stop or full buffers: some 0.1 s."""
+"""Steps of a recorded run between two checks for a stop or full buffers: about 0.1 s."""
 _SLICE_BYTES = 32 * 2**20
 """Size of a slice's buffers, at most."""
 

@@ -1,4 +1,4 @@
-"""Section 4.3: where to strike, for the least velocity and for a transient response."""
+"""Section 4.3: where to strike, for the minimum velocity and for a transient response."""
 
 from __future__ import annotations
 
