@@ -249,7 +249,7 @@ class Attractors:
 
     @property
     def undecided(self) -> float:
-        """Share of the states that could not be told."""
+        """Fraction of undecided states."""
         return float((self.labels == UNDECIDED).mean())
 
     def unseen_share(self, confidence: float = 0.95) -> float:
@@ -380,8 +380,8 @@ def find_attractors(
     Returns
     -------
     Attractors
-        ``attractors.unseen_share()`` bounds the share of initial states that go to attractors that were not found;
-        ``attractors.termination_reason`` says why states are undecided.
+        ``attractors.unseen_share()`` bounds the share of initial states that go to attractors that were not
+        found; ``attractors.termination_reason`` gives the reason why states are undecided.
 
     Examples
     --------

@@ -67,15 +67,16 @@ def backbone_curve(
 ) -> xr.Dataset:
     """Compute a backbone curve: free periodic motions without damping and excitation, over their energy.
 
-    Each motion begins and turns back at rest: a nonlinear normal mode.  About a well the curve begins at a natural
-    frequency with a vanishing amplitude; across both wells it begins with three times the energy of the barrier and is
-    followed in both directions.  The equations are integrated with DOP853 of SciPy over half a period, with tangents;
-    Newton's method and steps of arc length follow the curve.  Floquet multipliers tell the stability.
+    Each motion begins and turns back at rest: a nonlinear normal mode.  About a well the curve begins at a
+    natural frequency with a vanishing amplitude; across both wells it begins with three times the energy of the
+    barrier and is followed in both directions.  The equations are integrated with DOP853 of SciPy over half a
+    period, with tangents; Newton's method and steps of arc length follow the curve.  Floquet multipliers
+    determine the stability.
 
     Parameters
     ----------
     system : System or ReducedModel
-        Damping is left out.  A system may have one striker that stands still, a :class:`~snapbeam.FixedStop` under an
+        Damping is left out.  A system may have one stationary striker, a :class:`~snapbeam.FixedStop` under an
         elastic contact law; nothing else may act on the beam.
     well : {"lower", "upper", "both"}
         Motion about a well, or across both.
@@ -97,12 +98,12 @@ def backbone_curve(
     Returns
     -------
     xarray.Dataset
-        Over ``point``: ``frequency`` (Hz), ``frequency_ratio``, ``energy`` (J, above the well), ``min_midspan`` and
-        ``max_midspan`` (over the length scale), ``stable``, ``unstable_multipliers``; over ``point`` and ``mode``
-        ``initial_amplitude`` (of the buckling modes, at rest) and ``participation``, the share of each linear mode in the
-        mean kinetic energy; over ``point`` and ``multiplier`` their size and angle.  The attribute ``end`` says why the
-        curve ends: among others at an equilibrium or where the two turning points meet, since from there on the same
-        motions would follow again.
+        Over ``point``: ``frequency`` (Hz), ``frequency_ratio``, ``energy`` (J, above the well), ``min_midspan``
+        and ``max_midspan`` (over the length scale), ``stable``, ``unstable_multipliers``; over ``point`` and
+        ``mode`` ``initial_amplitude`` (of the buckling modes, at rest) and ``participation``, the share of each
+        linear mode in the mean kinetic energy; over ``point`` and ``multiplier`` their size and angle.  The
+        attribute ``end`` gives the reason why the curve ends: among others at an equilibrium or where the two
+        turning points meet, since from there on the same motions would follow again.
 
     Raises
     ------

@@ -59,10 +59,10 @@ def basins_of_attraction(
     consecutive checks and at the end.  All other states are undecided after *periods*, -1.  The tip's mid-position is
     fixed in space.  If more than 5 % of the states are undecided, a warning is given.
 
-    Near a fractal border the error of the integration changes labels.  Every state that has another label beside it, and
-    a random sample of 300 others, is therefore integrated at half the step too.  ``sensitive`` marks the states whose
-    label changes; the attribute ``sensitive_share`` is the share of such states of the plane, with its interval at 95 %
-    (Jeffreys, for the sampled part).  If it exceeds 1 %, a warning is given.
+    Near a fractal border the error of the integration changes labels.  Every state with a neighbour of another
+    label, and a random sample of 300 others, is therefore integrated at half the step too.  ``sensitive`` marks
+    the states whose label changes; the attribute ``sensitive_share`` is the share of such states of the plane,
+    with its interval at 95 % (Jeffreys, for the sampled part).  If it exceeds 1 %, a warning is given.
 
     Parameters
     ----------
@@ -375,7 +375,7 @@ def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
     labels : array_like of int
         A grid of any dimension, such as basins or the classes of a map; a negative label is undecided.
     box : int
-        Points along a side; what does not fill a box is left out.
+        Points along a side; incomplete boxes are ignored.
 
     Examples
     --------

@@ -68,7 +68,7 @@ def bifurcation_diagram(
         Periods to leave out at each value, and to keep.  None leaves out 16 time constants of the slowest mode, at
         least 200 and at most 20,000 periods.
     grazing : bool
-        Whether to look at every approach within four of the kept periods: ``clearance``, ``min_penetration``.
+        Sample every approach within four of the recorded periods densely: ``clearance``, ``min_penetration``.
     progress : callable, optional
         Called as ``progress(done, total)`` with values; True writes a line to standard error.
 

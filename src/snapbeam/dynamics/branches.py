@@ -462,9 +462,10 @@ def continuation(
 ) -> Branch:
     """Follow a periodic orbit, stable or not, along one parameter.
 
-    Folds, period doublings (flips), Neimark-Sacker bifurcations, branch points and grazing are located between the
-    orbits that they are found between.  The branch ends at a limit of the parameter, when it closes, at *max_points* orbits,
-    or where no orbit is found, as under a law of restitution where it grazes; ``branch.termination_reason`` says which.
+    Folds, period doublings (flips), Neimark-Sacker bifurcations, branch points and grazing are located between
+    the orbits that they are found between.  The branch ends at a limit of the parameter, when it closes, at
+    *max_points* orbits, or where no orbit is found, as under a law of restitution where it grazes;
+    ``branch.termination_reason`` gives the reason.
 
     Parameters
     ----------
@@ -629,7 +630,8 @@ def switch_branch(
 ) -> PeriodicOrbit:
     """Find an orbit of the branch that begins at a flip or a branch point, *size* away from it.
 
-    At a flip it has twice the period.  It is sought on the plane at that distance along the critical eigenvector.
+    At a flip it has twice the period.  Newton's method searches on the plane at that distance along the
+    critical eigenvector.
 
     Parameters
     ----------

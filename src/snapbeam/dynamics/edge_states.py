@@ -153,7 +153,8 @@ def edge_tracking(
     Returns
     -------
     EdgeState
-        With the unstable periodic orbit that it settles on, if it does; ``termination_reason`` says why it stopped.
+        With the unstable periodic orbit that it settles on, if it does; ``termination_reason`` gives the reason
+        why it stopped.
 
     Raises
     ------

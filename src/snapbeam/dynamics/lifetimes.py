@@ -381,9 +381,10 @@ def lifetime_map(
     ----------
     system : System
     axes : optional
-        As in :func:`snapbeam.sweep`; one point, the system as it stands, by default.
+        As in :func:`snapbeam.sweep`; by default one point, the system itself.
     integration : Integration, optional
-        1000 cycles by default.  Runs end early once they provably snap no more, whatever it says.
+        1000 cycles by default. Early termination is always used, also if ``integration.early_termination`` is
+        False.
     initial_conditions : InitialConditions or int
         Starts of each point, the same for all of them.
     settings : LifetimeSettings, optional

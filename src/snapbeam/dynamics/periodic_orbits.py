@@ -77,7 +77,7 @@ _SLOW = 0.25
 
 
 class OrbitNotFoundError(RuntimeError):
-    """No orbit was found: the message says why, and what to try.
+    """Error if no orbit was found; the message states the cause and a remedy.
 
     Examples
     --------
@@ -639,10 +639,11 @@ def periodic_orbit(
         ``accuracy="reference"`` by default: a derivative is only as accurate as the steps.  At level
         ``"standard"`` it is off by up to 2 %, which is warned of.
     phase : float, optional
-        Of the drive at which the orbit is seen, rad.  By default that at which a run begins; under a law that is not
-        smooth, where a contact is near that, the phase farthest from all contacts.  ``orbit.flow.phase`` tells it.
+        Of the drive at which the orbit is seen, rad.  By default that at which a run begins; under a law that
+        is not smooth, where a contact is near that, the phase farthest from all contacts.  ``orbit.flow.phase``
+        contains it.
     transient : int
-        Periods to advance from the guess first, which brings it to what attracts it.
+        Transient periods to integrate from the guess, so that it approaches the attractor.
     tolerance : float
         Maximum coordinate that may remain, in units of the well's amplitude and of omega_1 times it; at most 1e-3.
     iterations : int
@@ -659,7 +660,7 @@ def periodic_orbit(
     InputError
         If the system has no excitation, or a number is out of range.
     OrbitNotFoundError
-        If none is found: the message says why, and what to try.
+        If no orbit is found; the message states the cause and a remedy.
 
     Examples
     --------

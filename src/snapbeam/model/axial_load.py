@@ -162,8 +162,8 @@ class LoadRamp(LoadMotion, Timed):
 class AxialLoadModulation:
     """An axial load P(t) = P + motion(t), P that under which the beam was reduced.
 
-    The beam's linear stiffness then is E I k_i^2 - P(t): beside the tension, m alpha'' + ... = (P(t) - P) alpha.  The
-    work of the change is that on the shortening alpha . alpha / 2 of the span.
+    The linear stiffness of the beam then is E I k_i^2 - P(t). In addition to the tension, m alpha'' + ... =
+    (P(t) - P) alpha.  The work of the change is that on the shortening alpha . alpha / 2 of the span.
 
     Parameters
     ----------

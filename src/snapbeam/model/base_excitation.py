@@ -29,8 +29,8 @@ class BaseExcitation:
 
         m alpha'' + ... = -y''(t) rho S integral(phi) + phi(x_s) f.
 
-    Displacements, velocities, energies and the work of the base are those of that frame: the work is that of the
-    inertial force.  A run begins at rest in that frame, whatever the velocity of the base is.
+    Displacements, velocities, energies and the work of the base are those of that frame: the work is that of
+    the inertial force.  A run begins at rest in that frame, for any velocity of the base.
 
     Parameters
     ----------
@@ -40,8 +40,8 @@ class BaseExcitation:
     direction : {"up", "down"}
         Whether y counts positive towards the upper well or towards the lower one.
     striker_on_base : bool
-        Whether what the striker is mounted on moves with the base: a stop in the same frame.  If not it stays in
-        space, and the tip moves by -y(t) in the frame of the ends.
+        True if the mount of the striker moves with the base, like a stop in the same frame. Otherwise it stays
+        in space, and the tip moves by -y(t) in the frame of the ends.
 
     Raises
     ------

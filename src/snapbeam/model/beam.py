@@ -52,8 +52,8 @@ class Beam:
         Axial load P, N, compression positive.  Below the critical load the beam is straight; a
         negative load is tension.
     boundary : BoundaryConditions
-        How the ends are held; clamped and rigid by default.  Others change the critical loads, the first of them in the
-        relation above, and 4 L^2/(pi^2 E S) in it to phi_1(L/2)^2/gamma.
+        Boundary conditions; clamped and rigid by default. Other conditions change the critical loads, the first
+        of them in the relation above, and 4 L^2/(pi^2 E S) in it to phi_1(L/2)^2/gamma.
 
     Raises
     ------

@@ -25,7 +25,7 @@ class BoundaryConditions:
     Parameters
     ----------
     left_rotational_stiffness, right_rotational_stiffness : float, optional
-        Rotational stiffness, N m/rad: 0 is a pinned end, and clamped is what nothing is given for.
+        Rotational stiffness, N m/rad: 0 is a pinned end, None (the default) a clamped one.
     axial_support_stiffness : float, optional
         K, N/m; rigid by default.
 

@@ -92,8 +92,8 @@ class PiezoelectricHarvester(Harvester):
 
         theta_i = Theta [phi_i'(x_2) - phi_i'(x_1)],     C v' = -v/R - theta . alpha',
 
-    with Theta the bending moment per volt.  Their own mass and stiffness are left out.  Of a structure given by matrices
-    theta is Theta times its ``patch_shape``, whatever the locations.
+    with Theta the bending moment per volt.  Their own mass and stiffness are left out.  Of a structure given by
+    matrices theta is Theta times its ``patch_shape``, for all locations.
 
     Parameters
     ----------

@@ -61,7 +61,7 @@ class LocalForce:
     location : float, optional
         Of a beam: where the force acts, over the length.
     coordinate : {"displacement", "rotation"}
-        Of a beam: what u is, in m or rad.
+        Of a beam: the coordinate u, in m or rad.
     shape : array_like of shape (N,), optional
         Of a structure given by matrices: u = shape . alpha; its contact point by default.
     label : str, optional

@@ -536,17 +536,17 @@ class ReducedModel(Wells):
     damping_ratio : array of shape (N,)
         Damping ratio of each linear mode about a well, by ascending frequency.
     midspan_shape : array of shape (N,)
-        phi_i at the centre, whose displacement tells the wells apart.
+        phi_i at mid-span, whose displacement distinguishes the wells.
     contact_shape : array of shape (N,) or None
         phi_i at the shaker if it does not depend on the location (given by matrices).
     beam : Beam or None
-        What the model was reduced from.
+        Beam from which the model was reduced.
     given_reference_frequency : float or None
         Frequency to normalise with, Hz, if it is not the first natural frequency.
     transverse_force : array of shape (N,) or None
         B, of a structure whose wells are unequal.
     imperfection : Imperfection or None
-        What B follows from.
+        Imperfection from which B follows.
     base_shape : array of shape (N,) or None
         Displacement of each coordinate per unit of the base's, of a structure given by matrices.
     elongation_matrix : array of shape (N, N) or None
@@ -618,8 +618,8 @@ class ReducedModel(Wells):
             Frequency that normalises the excitation, Hz; the first natural frequency by default, of unequal wells about
             the one of minimum energy.
         imperfection : Imperfection, optional
-            What makes the wells unequal; one that is nothing is left out.  Damping is that of the linear modes about
-            the well that the striker pushes away from, and the same matrix everywhere.
+            Imperfection, which makes the wells unequal; a zero one is ignored.  Damping is that of the linear
+            modes about the well that the striker pushes away from, and the same matrix everywhere.
 
         Raises
         ------
@@ -710,7 +710,7 @@ class ReducedModel(Wells):
         contact_shape : array of shape (N,)
             Displacement under the shaker per unit of each coordinate.
         midspan_shape : array of shape (N,), optional
-            The same for the point whose sign tells the wells apart; the contact point if not given.
+            Shape values at the point whose sign distinguishes the wells; by default the contact point.
         nonlinear_stiffness : float
             gamma of the term gamma (alpha . alpha) alpha, at least 0.
         well_amplitude : array of shape (N,), optional
@@ -777,7 +777,7 @@ class ReducedModel(Wells):
     def shape_at(self, location: ArrayLike) -> _Array:
         """phi_i at a location x_s in [0, 1] of the length, or at each of several; shape (..., N), m^0.5.
 
-        A model given by matrices has its one contact point and returns it whatever the location.
+        A model given by matrices has one contact point, and returns it for every location.
         """
         at: Any = location if isinstance(location, (int, float)) else finite_array("location", location)
         if np.ndim(at) == 0:

@@ -75,7 +75,7 @@ def plot_response_map(
     quasi_static_line: bool = False,
     legend: bool = True,
 ) -> Axes:
-    """Draw the response class of every run of a map as one cell; over one axis, with how far the centre moves.
+    """Draw the response class of each run of a map; over one axis, with the range of the mid-span displacement.
 
     Cell borders lie midway between the points of an axis, the outermost as far out as the next one in (but
     not below zero, nor beyond the end of the beam).  Cells of a map with repeats are the paler the fewer
@@ -259,7 +259,7 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     Parameters
     ----------
     kinds : int8 array, optional
-        Classes of runs, whose shares then stand beside the names; classes without runs are left out.
+        Classes of runs, whose fractions are then shown with the names; classes without runs are omitted.
 
     Examples
     --------
@@ -523,7 +523,7 @@ def plot_points(
     quasi_static_line: bool = False,
     legend: bool = True,
 ) -> Axes:
-    """Draw the response class, or a statistic, of each point of a list where its own values stand.
+    """Draw the response class, or a statistic, of each point of a list at its parameter values.
 
     Parameters
     ----------

@@ -181,7 +181,7 @@ _LOAD_COLOR = CENTER_COLOR
 
 @checked
 def plot_system(system: System, title: str = "") -> Figure:
-    """Draw a system: the beam in the well that it rests in and, dashed, in the other, what strikes it, and its drive.
+    """Draw a system: the beam in its initial well and, dashed, in the other, the strikers and the drive.
 
     Heights are to the scale of the buckling level, and so is the gap; lengths along the beam are to the scale of its
     length.  Masses, springs and dampers are signs.

@@ -129,15 +129,15 @@ class Statistic:
         As UDUNITS knows it; ``"1"`` for displacements over b and velocities over b omega_1.
     long_name : str
     value : callable
-        From a :class:`~snapbeam.solver.statistics.Reading` of many runs to an array of shape (runs,).  With *update*:
-        from the reading and the array of what *update* left.
+        From a :class:`~snapbeam.solver.statistics.Reading` of many runs to an array of shape (runs,).  With
+        *update*: from the reading and the array of results of *update*.
     update : callable, optional
         ``update(held, step) -> held``, a scalar function of numbers that kernels compile; *step* is a
         :class:`CompletedStep`.
     start : float
-        What *update* begins with.
+        Initial value of *update*.
     comment : str
-        Relative error of the integration over time, beside the error of the run.
+        Relative error of the integration over time, in addition to the error of the run.
 
     Examples
     --------

@@ -111,7 +111,7 @@ def read_measured_points(
     Raises
     ------
     InputError
-        Names the file, the line and the column of what cannot be used.
+        If the file has an invalid entry; the message names file, line and column.
 
     Examples
     --------

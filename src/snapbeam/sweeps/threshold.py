@@ -73,7 +73,7 @@ def threshold(
     axes : mapping of str to array_like
         Axes of the threshold, as in :func:`snapbeam.sweep`.
     integration : Integration, optional
-        Solver settings.  Every run ends as soon as its response class is certain, whatever `early_termination` is.
+        Solver settings.  Early termination is always used, also if ``integration.early_termination`` is False.
     progress : callable, optional
         Function that receives ``(done, total)``, numbers of runs; True writes a line to standard error.
 

@@ -42,9 +42,9 @@ class CostEstimate:
     Attributes
     ----------
     runs, max_runs : int
-        Runs, as far as a trial can tell, and at most.
+        Estimated number of runs, and the maximum.
     seconds : float
-        Of this machine, with the threads asked for; kernels that must be compiled are not counted.
+        Seconds on this machine with the given threads, without compilation.
     memory, disk : float
         Bytes, the second in a checkpoint.
     trial_runs : int

@@ -21,7 +21,7 @@ _Array = NDArray[np.float64]
 
 
 class DifferentialEvolution:
-    """A population that is asked for designs and told their objectives and violations.
+    """Differential evolution in ask-and-tell form: a population of designs with objectives and violations.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class DifferentialEvolution:
         Parameters
         ----------
         objectives : array_like of shape (population, objectives)
-            To be made small; what is not known is infinite.
+            Minimised; infinite if unknown.
         violation : array_like of shape (population,)
             0 where all constraints are satisfied.
         """

@@ -127,7 +127,7 @@ class UniformTolerance(Distribution):
 
 @dataclass(frozen=True)
 class LogNormal(Distribution):
-    """The nominal value times exp(sigma z), z standard normal: for what is positive and known to a factor.
+    """Nominal value times exp(sigma z), z standard normal: for positive quantities known to a factor.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ class LogNormal(Distribution):
 
 @dataclass(frozen=True)
 class UniformRange(Distribution):
-    """Uniformly distributed between two values, whatever the nominal value: for example an uncontrolled phase.
+    """Uniform distribution between two values, independent of the nominal value: for example an uncontrolled phase.
 
     Parameters
     ----------

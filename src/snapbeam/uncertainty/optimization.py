@@ -313,7 +313,7 @@ class Constraint:
         return np.asarray((values >= low) & (values <= high))
 
     def excess(self, values: _Array) -> _Array:
-        """By how much designs break it, over its size; 0 where they keep it."""
+        """Constraint violation of designs, over its size; 0 if satisfied."""
         size = positive("size", max(abs(self.lower or 0.0), abs(self.upper or 0.0), 1e-300))
         low = -np.inf if self.lower is None else self.lower
         high = np.inf if self.upper is None else self.upper
@@ -639,12 +639,12 @@ class OptimizerSettings:
     population : int
         Designs of a generation, at least 6.
     samples : int
-        Runs of a design while it is sought, at least 8.
+        Runs of a design during the search, at least 8.
     validation_samples : int
         Validation samples of a design that is checked, and again of one of a front that is reported.  A single design
         is reported from four times as many.
     candidates : int
-        Designs that are checked at most, the best first, until one holds.
+        Maximum number of designs to validate, the best first, until one satisfies the constraints.
     refinements : int
         Further designs that are checked at most, between the one that holds and better ones that do not: they bring
         the design to its constraints.
@@ -776,20 +776,21 @@ def optimize_design(
     settings : OptimizerSettings, optional
     integration : Integration, optional
     checkpoint : path or CheckpointOptions, optional
-        Folder that keeps the runs; one that exists is resumed.
+        Checkpoint folder; an existing one is resumed.
     progress : callable, optional
         Called as ``progress(done, total)`` with generations; True writes a line to standard error.
 
     Returns
     -------
     xarray.Dataset
-        Along ``design``, one, or a front by its first objective: a variable a parameter; ``objective_...`` with ``_low`` and
-        ``_high`` and, as the search saw it, ``_sought``; ``satisfied_...``, the fraction of systems that satisfy
-        a constraint, with ``_low`` and ``_high``, and ``required_...``; ``constraints_satisfied``: whether every lower
-        limit is at least the required fraction, some upper limit is less, or neither is known; ``distance_...``: that of
-        the fraction from the required one, or of a quantity of the design from its limit.  Along ``tried``: every design
-        that was looked at, its objectives and ``violation``.  The attribute ``termination_reason`` says why the search
-        and the refinement stopped.
+        Along ``design``, one, or a front by its first objective: a variable a parameter; ``objective_...`` with
+        ``_low`` and ``_high`` and, as the search saw it, ``_sought``; ``satisfied_...``, the fraction of
+        systems that satisfy a constraint, with ``_low`` and ``_high``, and ``required_...``;
+        ``constraints_satisfied``: whether every lower limit is at least the required fraction, some upper limit
+        is less, or neither is known; ``distance_...``: that of the fraction from the required one, or of a
+        quantity of the design from its limit.  Along ``tried``: every design that was evaluated, its objectives
+        and ``violation``. The attribute ``termination_reason`` gives the reason why the search and the
+        refinement stopped.
 
     Raises
     ------

@@ -224,12 +224,12 @@ def probability_map(
     uncertainty : ParameterUncertainty
         Uncertain parameters and initial state.
     runs : SamplingPlan or int, optional
-        How runs are spent, or the same number of runs for every point; by default until the half width of the 95 %
+        Sampling plan, or the same number of runs for every point; by default until the half width of the 95 %
         interval of P(snap) is 0.05 everywhere.
     integration : Integration, optional
-        Runs end once their class is certain, whatever it says.
+        Early termination is always used, also if ``integration.early_termination`` is False.
     checkpoint : path or CheckpointOptions, optional
-        Folder that keeps the runs; one that exists is resumed.
+        Checkpoint folder; an existing one is resumed.
     cluster, progress
         As in :func:`snapbeam.sweep`; progress counts runs, of which the total grows.
 

@@ -275,7 +275,7 @@ class QuantileSearchSettings:
     seed : int
         Chooses the values at which runs are made.
     outcome : str
-        What the probability is of, as in :class:`SamplingPlan`.
+        Outcome of the probability, as in :class:`SamplingPlan`.
 
     Examples
     --------
@@ -404,11 +404,12 @@ def quantile_threshold(
 ) -> xr.Dataset:
     """Find the values of a parameter at which the probability of snap-through has given values, with intervals.
 
-    Every run has a value of its own.  The first round covers the range, each later one what is left open.  The
-    interval is that of the isotonic regression, of which nothing but a rise is assumed (Banerjee and Wellner, Ann.
-    Stat. 29 (2001) 1699); within it the threshold is where a logistic curve fitted to the runs about it passes the
-    value.  Where the probability is seen to fall, which fractal borders do, ``is_monotonic`` is False and the interval
-    reaches from the first value at which the probability may be so great to the last at which it may be so small.
+    Every run has its own value. The first round covers the range, each later one the remaining intervals.  The
+    interval is that of the isotonic regression, of which nothing but a rise is assumed (Banerjee and Wellner,
+    Ann.  Stat. 29 (2001) 1699); within it the threshold is where a logistic curve fitted to the runs about it
+    passes the value.  Where the probability is seen to fall, which fractal borders do, ``is_monotonic`` is
+    False and the interval reaches from the first value at which the probability may be so great to the last at
+    which it may be so small.
 
     Parameters
     ----------
@@ -417,7 +418,7 @@ def quantile_threshold(
     parameter : str
         Parameter to raise, such as ``"velocity_amplitude"``: a number that may differ between the runs of an ensemble.
     bounds : tuple of two floats
-        Range in which it is sought.
+        Range of the search.
     axes : mapping of str to array_like, optional
         Axes, as in :func:`snapbeam.sweep`; one point, the system as it stands, by default.
     uncertainty : ParameterUncertainty, optional
@@ -425,19 +426,19 @@ def quantile_threshold(
     options : QuantileSearchSettings, optional
         Probabilities, runs and rounds.
     integration : Integration, optional
-        Runs end once their class is certain, whatever it says.
+        Early termination is always used, also if ``integration.early_termination`` is False.
     checkpoint : path or CheckpointOptions, optional
-        Folder that keeps the runs; one that exists is resumed.
+        Checkpoint folder; an existing one is resumed.
     progress : callable, optional
         Called as ``progress(done, total)`` with runs; True writes a line to standard error.
 
     Returns
     -------
     xarray.Dataset
-        ``threshold`` with ``threshold_low`` and ``threshold_high`` over the axes and ``quantile``; infinite limits
-        where no run bounds it, NaN where ``outcome_of_search`` says why.  ``is_fitted``: whether the threshold is that
-        of the fitted curve, and not of the isotonic regression alone.  ``is_monotonic``, with the probability
-        ``monotonicity_p_value`` of so much falling if it rises; ``runs``, ``runs_failed``.
+        ``threshold`` with ``threshold_low`` and ``threshold_high`` over the axes and ``quantile``; infinite
+        limits where no run bounds it, NaN if ``outcome_of_search`` gives a reason. ``is_fitted``: true if the
+        threshold is that of the fitted curve, and not of the isotonic regression alone.  ``is_monotonic``, with
+        the probability ``monotonicity_p_value`` of so much falling if it rises; ``runs``, ``runs_failed``.
 
     Raises
     ------

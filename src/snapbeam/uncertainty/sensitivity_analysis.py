@@ -80,9 +80,10 @@ def sobol_indices_from_samples(
 ) -> Indices:
     """First-order indices Var(E[y | x_j])/Var(y) of a sample, however it was sampled, of correlated inputs too.
 
-    Inputs are cut into bins of equal numbers of runs; the index is the variance of the means of the bins over that of
-    the output, less what chance alone makes of it: Kelley's epsilon squared (Plischke, Borgonovo and Smith, Eur. J.
-    Oper. Res. 226 (2013) 536, on estimates from bins).  The interval is that of a jackknife over twenty groups of runs.
+    Inputs are cut into bins of equal numbers of runs; the index is the variance of the means of the bins over
+    that of the output, less the contribution of chance: Kelley's epsilon squared (Plischke, Borgonovo and
+    Smith, Eur. J.  Oper. Res. 226 (2013) 536, on estimates from bins).  The interval is that of a jackknife
+    over twenty groups of runs.
 
     Parameters
     ----------
@@ -90,7 +91,7 @@ def sobol_indices_from_samples(
     output : array_like of shape (runs,)
     confidence : float
     bins : int, optional
-        By default one for forty runs, 5 to 100: what varies within a bin is lost to the index.
+        By default one for forty runs, 5 to 100; the index does not contain the variation within a bin.
     rng : int, numpy.random.Generator or None
         A seed; a generator, which gives one; None takes one from the system.
         Chooses the groups.
@@ -191,9 +192,9 @@ def sobol_indices(
 ) -> Sobol:
     """Sobol's indices by Saltelli's estimator (``scipy.stats.sobol_indices``), over scrambled Sobol sequences.
 
-    A sequence is so even that resampling its points says too much of the error; *replicates* sequences, each scrambled
-    by itself, are independent, and their scatter is the error (Owen's scrambling; Student's interval of their mean).
-    At equal cost, few long sequences have a smaller error than many short ones.
+    A sequence is so uniform that resampling its points overestimates the error; *replicates* sequences, each
+    scrambled by itself, are independent, and their scatter is the error (Owen's scrambling; Student's interval
+    of their mean).  At equal cost, few long sequences have a smaller error than many short ones.
 
     Parameters
     ----------
@@ -359,7 +360,7 @@ class ThresholdQoI:
     halvings : int
         Of the step below the lowest that snaps.
     at : mapping of str to float, optional
-        Other parameters, as they are meant to be.
+        Other parameters, at nominal values.
 
     Examples
     --------
@@ -434,7 +435,7 @@ class NotchQoI:
         Its values, strictly increasing, at least 3; the place is that of the parabola through the lowest three.
     threshold : ThresholdQoI
     depth : bool
-        Whether the threshold there is meant, and not the place.
+        True for the threshold at the minimum, False for its position.
 
     Examples
     --------
@@ -454,7 +455,7 @@ class NotchQoI:
 
     @property
     def unit(self) -> str:
-        """Of what it is along, or of the threshold."""
+        """Unit of the parameter, or of the threshold."""
         return self.threshold.unit if self.depth else lookup(self.parameter).quantity.unit
 
     @property
@@ -608,7 +609,7 @@ def sensitivity(
     confidence : float
     integration : Integration, optional
     checkpoint : path or CheckpointOptions, optional
-        Folder that keeps the runs of all quantities except lifetimes; one that exists is resumed.
+        Checkpoint folder of the runs of all quantities except lifetimes; an existing one is resumed.
     progress : callable, optional
         Called as ``progress(done, total)`` with runs of each round; lifetimes report nothing; True writes a line to standard error.
 

@@ -32,7 +32,7 @@ __all__ = [
 
 
 class DiagnosticWarning(UserWarning):
-    """Something that can be computed but is probably not what was meant.
+    """Warning about an input that is valid but probably not intended.
 
     Examples
     --------
@@ -64,7 +64,7 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """One thing that is doubtful: what the numbers of an input or a result do not say by themselves.
+    """One finding about an input or a result that needs attention.
 
     Attributes
     ----------
@@ -72,11 +72,11 @@ class Diagnostic:
         Short name, stable over versions, such as ``"first-mode-antisymmetric"`` or ``"camera.gamma"``, by which
         programs tell diagnostics apart.
     message : str
-        What was found and what to do about it.
+        Cause and remedy.
     numbers : mapping of str to float
         The figures behind the words, by name.
     severity : Severity
-        How much it takes from the result; its name does, too.
+        Severity of the diagnostic, or its name.
 
     Examples
     --------
@@ -102,7 +102,7 @@ class Diagnostic:
         return self.severity is not Severity.INFO
 
     def plain(self) -> dict[str, Any]:
-        """The diagnostic as plain words and numbers; what is not finite becomes None."""
+        """Diagnostic as plain text and numbers; a nonfinite number becomes None."""
         numbers = {
             name: float(value) if math.isfinite(value) else None for name, value in self.numbers.items()
         }

@@ -49,7 +49,7 @@ __all__ = [
 
 
 class InputError(ValueError):
-    """A parameter that cannot be used: the message names it, its value and what is allowed.
+    """Invalid parameter; the message names the parameter, its value and the allowed values.
 
     Examples
     --------

@@ -46,8 +46,8 @@ class LawProperties:
 class ContactLaw:
     """A law of contact between the striker's tip and the beam: a frozen dataclass in a file of its own.
 
-    Its fields are quantities of scope *run*, each a positive number or zero.  Its physics are scalar functions of
-    numbers that every engine compiles for itself; ``law`` stands for the numbers, by the names of the fields:
+    Its fields are quantities of scope *run*, each a positive number or zero.  Its physics are scalar functions
+    of numbers, which every solver compiles; ``law`` contains the numbers, by the names of the fields:
 
     - ``force(law, penetration)``: force on both, N, for a penetration > 0 (m);
     - ``energy(law, penetration)``: energy stored in the contact, J, whose derivative is the force;
@@ -128,8 +128,8 @@ class ContactLaw:
     def impact_duration(self, mass: float, velocity: float) -> float:
         """Duration, s, of the impact of a free *mass* (kg) that arrives with *velocity* (m/s); 0 if it is never stopped.
 
-        Of the force without what it loses: 2 times the integral of 1/sqrt(v^2 - 2 E/m) over the penetration, from 0 to
-        the maximum, where the energy E of the law is m v^2/2.
+        Duration for the force without dissipation: 2 times the integral of 1/sqrt(v^2 - 2 E/m) over the
+        penetration, from 0 to the maximum, where the energy E of the law is m v^2/2.
         """
         depth = self._greatest_penetration(mass, velocity)
         if depth == 0.0:

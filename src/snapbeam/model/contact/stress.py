@@ -112,7 +112,7 @@ def hertz_stress(
 def bending_stress(model: Any, amplitude: ArrayLike, count: int = 201) -> _Array:
     """Maximum bending stress along the beam, E (h/2) max abs(w''), Pa, of amplitudes of shape (..., N), shape (...).
 
-    The stress of the shape itself is meant, that of a beam made straight; the axial stress is not in it.
+    Bending stress of a beam made straight; the axial stress is not included.
     """
     if not hasattr(model, "beam"):
         raise InputTypeError(f"model = {shown(model)}: must be a ReducedModel")

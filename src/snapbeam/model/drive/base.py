@@ -71,10 +71,10 @@ def sincos(angle: float) -> tuple[float, float]:
 class Drive:
     """A prescribed motion of the striker's tip about its mid-position: a frozen dataclass in a file of its own.
 
-    Kernels see its motion as a function of one argument that grows by ``omega`` radians a second.  A drive
-    that is not a sine brings ``motion(drive, memory, argument)``, a scalar function of numbers that every engine
-    compiles for itself and that returns displacement (m) and velocity (m/s), and ``acceleration`` likewise (m/s^2);
-    ``drive`` stands for its numbers and ``memory[drive.table:]`` for its samples.
+    Kernels see its motion as a function of one argument that grows by ``omega`` radians a second.  A drive that
+    is not a sine brings ``motion(drive, memory, argument)``, a scalar function of numbers that every engine
+    compiles for itself and that returns displacement (m) and velocity (m/s), and ``acceleration`` in the same
+    way (m/s^2); ``drive`` contains its numbers and ``memory[drive.table:]`` its samples.
 
     Examples
     --------

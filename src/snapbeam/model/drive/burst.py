@@ -45,7 +45,7 @@ class Burst(Timed):
     ramp_up_cycles, ramp_down_cycles : float
         Cycles that they take, each greater than 0, together at most *duration_cycles*.
     retraction : float
-        How far the tip withdraws in the cycle after the burst, over b: a beam released after so many cycles.
+        Withdrawal of the tip in the cycle after the burst, over b; it releases the beam.
 
     Examples
     --------

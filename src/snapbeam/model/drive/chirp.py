@@ -79,7 +79,7 @@ class Chirp(Timed):
         }
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """The amplitude of the slowest sine, and the velocity amplitude with what its change adds."""
+        """Amplitude of the slowest sine, and the velocity amplitude plus the effect of its change."""
         found = self.shape_numbers(columns, scale)
         slowest = np.minimum(found["first"], found["last"])
         highest = found["speed"] / slowest

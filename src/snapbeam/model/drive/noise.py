@@ -119,7 +119,7 @@ class BandLimitedNoise(Timed):
         return highest, LINES * found["strength"] + highest * _STEEPEST / found["risen"]
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """All sines at their hardest at once, with what the envelope adds."""
+        """Bound of the acceleration: the sum of all amplitudes, plus the effect of the envelope."""
         found = self.shape_numbers(columns, scale)
         parts = ((np.arange(LINES) + 1) / LINES)[:, None]
         fastest = found["low"] + parts * (found["high"] - found["low"])

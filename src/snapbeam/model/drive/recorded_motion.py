@@ -41,7 +41,7 @@ class RecordedMotion(Drive):
     sampling_frequency : float
         Samples per second, Hz.
     frequency : float
-        Nominal frequency of the excitation, Hz: what a cycle is.
+        Nominal frequency of the excitation, Hz, which defines a cycle.
 
     Examples
     --------
@@ -73,7 +73,7 @@ class RecordedMotion(Drive):
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> RecordedMotion:
-        """A drive from what :func:`snapbeam.lab.recorded_drive` returns, or from a file of it.
+        """Drive from the result of :func:`snapbeam.lab.recorded_drive`, or from its file.
 
         *dataset* has ``displacement`` (m) and ``velocity`` (m/s) over an even ``time`` (s), and the nominal
         ``frequency`` (Hz) among its attributes.
