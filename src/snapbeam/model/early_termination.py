@@ -82,7 +82,7 @@ def least_energy_at(model: ReducedModel, location: ArrayLike, displacement: Arra
 def passed_heights(
     model: ReducedModel, location: NDArray[np.float64], highest: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Height of the contact point, m, above which early decision speaks of a run in the far well.
+    """Height of the contact point, m, above which early termination applies to a run in the second well.
 
     The tip's highest position, or that of the saddle between the wells if it is higher: to come down to the tip
     the beam must pass it.

@@ -86,7 +86,7 @@ def draw(results: Results) -> Figure:
                         )  # fmt: skip
             ax.set(xlabel=r"Excitation frequency $\Omega$", xlim=(0.0, 4.0))
             ax.set_title(f"$N$ = {int(ds.attrs['modes'])}, {int(ds.attrs['cycles'])} cycles", loc="left")
-        axes[0].set_ylabel(r"Greatest displacement $w_\mathrm{b}(x_\mathrm{s})$")
+        axes[0].set_ylabel(r"Maximum displacement $w_\mathrm{b}(x_\mathrm{s})$")
         low, high = axes[0].get_ylim()
         axes[0].set_ylim(min(low, _FOOT - 0.06), high + 0.08 * (high - low))
         axes[0].legend(loc="upper left")

@@ -77,7 +77,7 @@ def draw(results: Results) -> Figure:
             ax.set_ylim(0.0, float(ds.velocity_amplitude[-1]))
             ax.set_title(f"$N$ = {int(ds.attrs['modes'])}", loc="left")
         axes[0].set_ylabel("Velocity amplitude $V$")
-        figure.colorbar(mesh, ax=list(axes), label=r"Greatest displacement $w_\mathrm{b}(x_\mathrm{s})$")
+        figure.colorbar(mesh, ax=list(axes), label=r"Maximum displacement $w_\mathrm{b}(x_\mathrm{s})$")
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2)
         fix_ticks(*axes)

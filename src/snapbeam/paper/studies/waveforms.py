@@ -242,6 +242,6 @@ def _peaks(ax: Axes, runs: xr.Dataset) -> None:
     low, middle, high = np.quantile(peak, (0.05, 0.5, 0.95), axis=0)
     ax.fill_between(mode, low, high, color="0.85", linewidth=0, label="90 % of the runs")
     ax.semilogy(mode, middle, ".-", color=BEAM_COLOR, markersize=3, label="median")
-    ax.set(xlabel="Buckling mode $i$", ylabel=r"Greatest $|\alpha_i|$ / $|\alpha_1|$ at rest")
+    ax.set(xlabel="Buckling mode $i$", ylabel=r"Maximum $|\alpha_i|$ / $|\alpha_1|$ at rest")
     ax.set_xlim(0.5, mode[-1] + 0.5)
     ax.legend(loc="upper right")
