@@ -92,7 +92,7 @@ _CLASSES = {
     for name in re.findall(r"autoclass:: (snapbeam\S+)", page.read_text(encoding="utf-8"))
 }
 """Classes that have an entry in the reference, by their own name."""
-_CLASS = re.compile(rf"(?<![\w.`~])({'|'.join(_CLASSES)})(?![\w.`])")
+_CLASS = re.compile(rf"(?<![\w.`~[])({'|'.join(_CLASSES)})(?![\w.`])")
 _format_field = GoogleDocstring._format_field
 
 

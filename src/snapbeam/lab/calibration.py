@@ -424,14 +424,15 @@ class Residual:
 class Calibration:
     """A calibrated beam.
 
-    ``beam`` is the result; ``values`` and ``standard_errors`` hold the fitted parameters by name (SI), in the
-    order of ``correlation``; a parameter that the data do not determine has no entry in ``standard_errors``
+    ``beam`` is the result; ``values`` and ``standard_errors`` contain the fitted parameters by name (SI), in
+    the order of ``correlation``; a parameter that the data do not determine has no entry in ``standard_errors``
     and is named in ``undetermined``.  ``scatter`` is the root of chi-square per degree of freedom by which
-    standard errors were raised, 1 if the data agree.  ``well_frequency``, ``start_well_frequency``, ``gauge_well_frequency``
-    [Hz] are the first frequency about a well of the result, of the beam the fit started from, and of the
-    result with the gauge's geometry; ``either_well`` holds the buckling level [m] that each well alone would
-    ask for.  ``imperfection``, if one was asked for, gives each well its own first frequency; ``beam`` then has
-    the buckling level that goes with it.  ``remarks`` say in words what was found, ``diagnostics`` what to beware of.
+    standard errors were raised, 1 if the data agree.  ``well_frequency``, ``start_well_frequency``,
+    ``gauge_well_frequency`` [Hz] are the first frequency about a well of the result, of the beam the fit
+    started from, and of the result with the gauge's geometry; ``either_well`` contains the buckling level [m]
+    from each well alone. ``imperfection``, if requested, gives each well its own first frequency; ``beam`` then
+    has the corresponding buckling level. ``remarks`` describe the result, ``diagnostics`` list doubtful
+    results.
 
     Examples
     --------
@@ -529,13 +530,13 @@ def calibrate(
     modes: int = MODES,
     imperfection: str | None = None,
 ) -> Calibration:
-    """Fit a beam to what was measured of it.
+    """Fit the parameters of a beam to measurements.
 
     Parameters
     ----------
     measured : Measurements
     beam : Beam
-        What is known of the beam, and where the fit starts; parameters that are not fitted are kept.  Its own
+        Nominal beam, which is the start of the fit; parameters that are not fitted keep its values.  Its own
         frequencies are compared with the measured ones in the diagnostics.
     fit : tuple of str, optional
         Which of thickness, young_modulus, density, length and buckling_level to fit.  By default the
@@ -544,8 +545,8 @@ def calibrate(
     modes : int
         Number of buckling modes of the model, which is that used for maps.
     imperfection : {"midspan_amplitude", "point_load", "uniform_load"}, optional
-        What makes the wells unequal, fitted last to the first frequencies about both; the parameter file then has
-        a section ``[imperfection]``.  Equal wells by default.
+        Imperfection, fitted last to the first frequencies about both wells; the parameter file then has a
+        section ``[imperfection]``.  Equal wells by default.
 
     Returns
     -------

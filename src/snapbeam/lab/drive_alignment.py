@@ -35,11 +35,11 @@ _CERTAIN = 25.0  # chi-square by which the best cycle must beat the next
 class Alignment:
     """Time shift from the vibrometer's clock to the camera's: t_camera = t_vibrometer + delay.
 
-    ``delay`` and ``delay_se`` in s; ``polarity`` is -1 if a motion that is positive for one is negative for
-    the other; ``gain``, the camera's amplitude over the vibrometer's, is 1 if both are calibrated;
+    ``delay`` and ``delay_se`` in s; ``polarity`` is -1 if a motion that is positive for one is negative for the
+    other; ``gain``, the camera's amplitude over the vibrometer's, is 1 if both are calibrated;
     ``clock_difference``, the camera's frequency over the vibrometer's less 1, and its standard error;
-    ``certain`` says whether the start of the motion told the cycle, ``margin`` by what chi-square;
-    ``diagnostics`` what makes the alignment doubtful.
+    ``certain`` is true if the onset of the motion determined the cycle, ``margin`` the difference of
+    chi-square; ``diagnostics`` lists the diagnostics.
 
     Examples
     --------
@@ -316,14 +316,14 @@ def recorded_drive(
     sampling_frequency : float
         Samples per second [Hz] of the result.
     bandwidth : float, optional
-        Highest frequency kept [Hz]; ten times the excitation frequency if left out, and never more than 0.4
-        of the measured sampling rate.
+        Highest frequency of the drive [Hz]; by default ten times the excitation frequency, and never more than
+        0.4 of the measured sampling rate.
     measurement : DriveMeasurement, optional
         That of this velocity; measured here if left out.
     alignment : Alignment, optional
         With the camera: turns the drive over where the vibrometer counts the other direction as positive.
     polarity : {1, -1}, optional
-        -1 to turn the drive over, instead of what the alignment says.
+        -1 to turn the drive over, instead of the polarity of the alignment.
     amplitude_from : {"vibrometer", "camera"}
         Whose amplitude the drive has; the camera's needs an alignment.
 

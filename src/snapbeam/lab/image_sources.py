@@ -64,7 +64,7 @@ class FrameSource:
     diagnostics, edge_error
         What makes measurements doubtful, and the standard error [px] that the format adds to every edge.
     metadata
-        What else the file says.
+        Other metadata of the file.
     """
 
     def __init__(self, path: Path) -> None:

@@ -184,7 +184,7 @@ def fit_sine(
     harmonics : int
         Multiples to fit, the sine itself included; those above 0.95 of the Nyquist frequency are left out.
     fixed : bool
-        Whether *frequency* is known and kept.
+        True if *frequency* is known and not fitted.
     keep : bool array, optional
         Samples to use; all if left out.
 

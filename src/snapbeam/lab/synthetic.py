@@ -512,7 +512,7 @@ class Defects:
     gamma
         Grey level = light**gamma.
     gain
-        Light over what the camera's full scale takes.
+        Light relative to full scale of the camera.
     flicker
         Relative change of the light with mains frequency (100 Hz).
     texture
@@ -785,7 +785,7 @@ def render_recording(
     rng: int | np.random.Generator | None = 0,
     **spoiled: Any,
 ) -> SyntheticRecording:
-    """Draw what a high-speed camera would see of a known motion.
+    """Render the recording of a high-speed camera for a known motion.
 
     Parameters
     ----------
@@ -798,7 +798,7 @@ def render_recording(
     camera, stage
         The camera and the scene; the paper's camera at 384 x 384 pixels unless given.
     defects
-        What goes wrong; nothing unless given.
+        Simulated defects; none by default.
     rest_frames
         Frames before the motion begins, at the first displacement.
     zero_row
@@ -931,7 +931,7 @@ def render_run(
     rng: int | np.random.Generator | None = 0,
     **options: Any,
 ) -> SyntheticRecording:
-    """Draw what a high-speed camera would see of a simulated run about the shaker.
+    """Render the recording of a high-speed camera for a simulated run, near the shaker.
 
     Parameters
     ----------

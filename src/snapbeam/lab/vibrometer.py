@@ -593,10 +593,10 @@ class DriveMeasurement:
 
     ``steady`` is the sine fitted after the start-up; ``startup`` is None where the record begins in motion;
     ``stop`` [s] is the end of the motion or of the record; ``cycle_time`` [s] and ``cycle_amplitude`` follow
-    the amplitude cycle by cycle; ``accepted`` says whether ``steady.sinad`` exceeds ``snr_limit`` [dB].
-    ``flaws`` are samples (first, one past the last) that are no part of the motion, ``lines`` hum, which is taken
-    out, and lines beside the sine; ``clipping`` the levels at which tops are cut off; ``diagnostics`` what makes the
-    result doubtful.
+    the amplitude cycle by cycle; ``accepted`` is true if ``steady.sinad`` exceeds ``snr_limit`` [dB].
+    ``flaws`` are samples (first, one past the last) that are not part of the motion, ``lines`` hum, which is
+    subtracted, and lines in addition to the sine; ``clipping`` the clipping levels; ``diagnostics`` the
+    diagnostics.
 
     Examples
     --------
@@ -676,7 +676,7 @@ def measure_drive(
 ) -> DriveMeasurement:
     """Measure the shaker's motion: find where it starts and settles, and fit the steady sine.
 
-    Dropouts and tops that are cut off are found in what the sine leaves and kept out of the fit.
+    Dropouts and clipped samples are detected in the residual of the sine and excluded from the fit.
 
     Parameters
     ----------
@@ -689,13 +689,13 @@ def measure_drive(
     snr_limit : float
         Minimum ratio [dB] of the sine to noise and distortion of an acceptable test; the paper's 15 dB.
     tolerance : float
-        How near to the steady sine a cycle must be, as a share of its amplitude, to count as steady.  Raised
-        to four times the noise of one cycle's amplitude where that is more.
+        Maximum deviation of a steady cycle from the steady sine, as a fraction of its amplitude.  Raised to
+        four times the noise of one cycle's amplitude where that is more.
 
     Raises
     ------
     InputError
-        If the signal is no such signal, or holds fewer than five cycles of steady motion.
+        If the signal has another quantity, or contains fewer than five cycles of steady motion.
 
     Examples
     --------
@@ -993,11 +993,11 @@ def displacement_from_velocity(
 ) -> xr.DataArray:
     """Integrate the shaker's velocity to its displacement [m] without drift.
 
-    The velocity's cubic spline is integrated exactly.  What noise and offset add is a slow drift; it is found
-    where the truth is known, at rest (zero) and in steady motion (zero mean over a cycle), as a smoothing
+    The velocity's cubic spline is integrated exactly.  Noise and offset add a slow drift, which is determined
+    where the motion is known, at rest (zero) and in steady motion (zero mean over a cycle), as a smoothing
     spline that follows nothing faster than about four cycles, and subtracted.  The start-up transient is
-    bridged, so it keeps its shape.  Dropouts and cut tops are replaced by the steady sine.  The shaker's
-    suspension is taken to hold its mean position.
+    bridged, so it keeps its shape.  Dropouts and clipped samples are replaced by the steady sine. The mean
+    position of the shaker is assumed constant.
 
     Parameters
     ----------

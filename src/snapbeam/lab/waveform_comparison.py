@@ -82,14 +82,13 @@ _RATIO = 0.05  # share by which the shakers' amplitudes may differ
 class WaveformComparison:
     """A measured and a simulated run over the same cycles of excitation.
 
-    ``waveforms`` over ``cycle``: displacement and shaker displacement of both [b], the measured shaker NaN if it was not
-    recorded.  ``spectra`` over ``frequency_ratio`` (multiples of the excitation): amplitude spectra of the two
-    displacements [b].  ``at`` names the variable that is compared.
-    ``shift`` [cycles] was added to the measured clock.  ``rms_difference`` [b] and ``correlation`` are
-    those of the beam, ``shaker_rms_difference`` [b] that of the shaker; ``measured_rms`` and
-    ``simulated_rms`` [b] are the beam's motion about its mean.  ``parted`` [cycles] is where the two beams
-    first stay more than ``apart`` [b] from each other for half a cycle, NaN if they never do.  ``diagnostics``
-    is what makes the comparison doubtful.
+    ``waveforms`` over ``cycle``: displacement and shaker displacement of both [b], the measured shaker NaN if
+    it was not recorded.  ``spectra`` over ``frequency_ratio`` (multiples of the excitation): amplitude spectra
+    of the two displacements [b].  ``at`` names the variable that is compared.  ``shift`` [cycles] was added to
+    the measured clock.  ``rms_difference`` [b] and ``correlation`` are those of the beam,
+    ``shaker_rms_difference`` [b] that of the shaker; ``measured_rms`` and ``simulated_rms`` [b] are the beam's
+    motion about its mean.  ``parted`` [cycles] is where the two beams first stay more than ``apart`` [b] from
+    each other for half a cycle, NaN if they never do.  ``diagnostics`` contains the diagnostics.
     """
 
     waveforms: xr.Dataset
@@ -157,7 +156,7 @@ def compare_waveforms(
     measured_onsets: ArrayLike | None = None,
     simulated_onsets: ArrayLike | None = None,
 ) -> WaveformComparison:
-    """Put a measured run beside a simulated one, aligned by the phase of the shaker.
+    """Compare a measured run with a simulated one, aligned by the phase of the shaker.
 
     Parameters
     ----------
@@ -171,8 +170,8 @@ def compare_waveforms(
     frequency : float, optional
         Excitation frequency [Hz] of the measured run, where it has no coordinate ``cycle``.
     start : float, optional
-        Start of the excitation in the measured run [s]; it says which cycle is the first, the phase of the
-        shaker says the rest.  Read from the shaker if left out, and the first sample if it begins in motion.
+        Start of the excitation in the measured run [s]; it determines the first cycle; the phase of the shaker
+        determines the rest. By default the onset of the shaker, or the first sample if it begins in motion.
     cycles : (float, float), optional
         The part to compare, counted from the start; all that both have if left out.
     measured_onsets, simulated_onsets : array_like, optional
@@ -415,9 +414,9 @@ _WHOLE = 0.98  # share of the wanted cycles that counts as all of them
 class MeasuredResponse:
     """Class and counts of a measured run.
 
-    ``response_class`` is UNKNOWN where ``reasons`` say why.  ``zero_crossings`` is at least what happened: more may
-    hide in dropouts.  ``noise`` and ``hysteresis`` are in units of b; ``final_well`` is -1 or 1, the sign
-    at the end.
+    ``response_class`` is UNKNOWN if ``reasons`` lists a cause. ``zero_crossings`` is a lower bound, because
+    dropouts can hide crossings.  ``noise`` and ``hysteresis`` are in units of b; ``final_well`` is -1 or 1, the
+    sign at the end.
 
     Examples
     --------
@@ -472,7 +471,7 @@ def measure_response(
     frequency : float, optional
         Excitation frequency [Hz]; not needed if the run has the coordinate ``cycle``.
     cycles : int
-        Cycles of excitation the class is asked for; the paper's experiments have 200.
+        Number of cycles for the response class; the paper's experiments have 200.
     at : {"displacement_at_striker", "midspan_displacement"}
         Where to count: at the shaker, which for a shaker near the centre serves as well, or at the centre.
     noise : float, optional
@@ -484,7 +483,7 @@ def measure_response(
     Raises
     ------
     InputError
-        If the dataset is no run, or neither *frequency* nor ``cycle`` says how long a cycle is.
+        If the dataset is not a run, or has neither *frequency* nor ``cycle``.
 
     Examples
     --------

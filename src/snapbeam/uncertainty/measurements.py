@@ -85,8 +85,8 @@ class ContactTest:
 class Measurements:
     """Measurements of one beam: frequencies, damping, geometry and contact tests.
 
-    Frequencies stand in the order of the modes.  A standard error may be one number or one for each; where
-    none is given, half a percent is assumed and said.
+    Frequencies are in the order of the modes. A standard error may be one number or one for each; the default
+    is 0.5 %, with a diagnostic.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def load_measurements(path: str | os.PathLike[str]) -> tuple[Measurements, dict[
     Raises
     ------
     InputError
-        If the file cannot be read, or holds an unknown or unusable entry; the message names file and entry.
+        If the file cannot be read, or has an unknown or invalid entry; the message names file and entry.
 
     Examples
     --------

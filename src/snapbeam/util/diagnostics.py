@@ -46,9 +46,8 @@ class DiagnosticWarning(UserWarning):
 class Severity(StrEnum):
     """Severity of a diagnostic.
 
-    INFO: worth knowing, the numbers stand.  WARNING: the numbers may not be what was meant, or be off by more than
-    their standard errors, which were widened where that could be told.  ERROR: the numbers contradict something
-    known and cannot be right as they are.
+    INFO: information only. WARNING: the numbers may not be what you intended, or the errors may exceed the
+    standard errors, which are increased where possible. ERROR: the numbers contradict known facts.
 
     Examples
     --------

@@ -454,7 +454,7 @@ def mode_shapes(first: xr.DataArray, second: xr.DataArray, fit: DecayFit) -> tup
     first, second : xarray.DataArray
         The two records, of one length and rate.
     fit : DecayFit
-        What :func:`snapbeam.lab.identify_decay` made of the first.
+        Result of :func:`snapbeam.lab.identify_decay` for the first signal.
 
     Raises
     ------

@@ -119,13 +119,13 @@ class TrackingSettings:
         Unless given, the well that faces the shaker: -(b/2)(1 - cos 2 pi x_s/L), of opposite sign for a
         shaker above; 0 without ``buckling_level``.
     rest_frames
-        Frames in which the beam is at rest: how many at the start, or (first, one past the last), negative
-        numbers counted from the end.  Unless given, the first half of those before it first departs from
-        their mean by three standard errors.
+        Frames in which the beam is at rest: their number at the start, or (first, one past the last), negative
+        numbers counted from the end.  Unless given, the first half of those before it first departs from their
+        mean by three standard errors.
     beam_thickness
-        Thickness of the beam as measured with a gauge [m], to check what was found and the pixel size.
+        Thickness of the beam as measured with a gauge [m], to check the tracked thickness and the pixel size.
     side
-        Side of the beam on which the shaker stands: "below", "above", "left" or "right".  Up (or right) is
+        Side of the beam on which the shaker is: "below", "above", "left" or "right".  Up (or right) is
         positive.
     objects
         "bright" or "dark" against the background, or "auto": unlike the rows beyond the beam.
@@ -148,7 +148,7 @@ class TrackingSettings:
         Edge width [px] beyond which a frame is flagged as blurred; 2.5 times the usual plus 0.5 unless given.
     fixed_marks
         Parts of the picture, each (first row, last row + 1, first column, last column + 1), that show
-        something which stands still; their motion is the camera's and is taken out.
+        stationary objects; their motion is that of the camera and is subtracted.
 
     Examples
     --------
