@@ -76,7 +76,7 @@ def backbone_curve(
     Parameters
     ----------
     system : System or ReducedModel
-        Damping is left out.  A system may have one stationary striker, a :class:`~snapbeam.FixedStop` under an
+        Damping is ignored.  A system may have one stationary striker, a :class:`~snapbeam.FixedStop` under an
         elastic contact law; nothing else may act on the beam.
     well : {"lower", "upper", "both"}
         Motion about a well, or across both.
@@ -108,7 +108,7 @@ def backbone_curve(
     Raises
     ------
     InputError
-        For a system with an excitation, a lossy contact, or a beam without two wells where both are asked for.
+        For a system with an excitation, a lossy contact, or a beam without two wells if both are requested.
     RuntimeError
         If no motion is found where the curve begins.
 

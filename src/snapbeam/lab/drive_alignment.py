@@ -101,7 +101,7 @@ def align(
     frequency : float, optional
         The excitation frequency [Hz] as set, used as a guess.
     polarity : {1, -1}, optional
-        Whether the two count the same direction as positive; found from the start of the motion if left out.
+        True if both count the same direction as positive; by default from the onset of the motion.
     near : float, optional
         A delay [s] known beforehand to better than half a cycle, as from a common trigger; it then decides
         the cycle.
@@ -305,9 +305,9 @@ def recorded_drive(
     """Resample a measured drive, start-up transient included, for use in the model, without adding energy.
 
     The drift-free displacement is low-passed without phase shift to *bandwidth*, resampled through a
-    band-limited interpolation, and differentiated, so that displacement and velocity belong together.  The
-    gain of the filter is at most 1 at every frequency.  At ends that are not at rest half the filter's length
-    is left out, where it would have had to invent samples.
+    band-limited interpolation, and differentiated, so that displacement and velocity belong together.  The gain
+    of the filter is at most 1 at every frequency.  At ends that are not at rest half the filter's length is
+    discarded, because samples are missing there.
 
     Parameters
     ----------
@@ -319,7 +319,7 @@ def recorded_drive(
         Highest frequency of the drive [Hz]; by default ten times the excitation frequency, and never more than
         0.4 of the measured sampling rate.
     measurement : DriveMeasurement, optional
-        That of this velocity; measured here if left out.
+        Result of :func:`measure_drive` for this velocity; measured by default.
     alignment : Alignment, optional
         With the camera: turns the drive over where the vibrometer counts the other direction as positive.
     polarity : {1, -1}, optional

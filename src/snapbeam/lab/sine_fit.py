@@ -180,13 +180,13 @@ def fit_sine(
         A signal, as :func:`snapbeam.lab.make_signal` and :func:`snapbeam.lab.read_signal` return it; or its samples,
         from :func:`~snapbeam.lab.signals.check_signal`.
     frequency : float, optional
-        A guess [Hz]; the highest peak of the spectrum if left out.
+        Initial guess [Hz]; by default the highest peak of the spectrum.
     harmonics : int
         Multiples to fit, the sine itself included; those above 0.95 of the Nyquist frequency are left out.
     fixed : bool
         True if *frequency* is known and not fitted.
     keep : bool array, optional
-        Samples to use; all if left out.
+        Samples to use; all by default.
 
     Returns
     -------

@@ -940,7 +940,7 @@ def render_run(
         ``length_scale``, the buckling level b [m].
     camera, stage, rng, **options
         As for :func:`render_recording`.  Unless a stage is given, its beam is as thick as the run's and the
-        shaker stands on the run's side.
+        shaker is on the side of the run.
 
     Examples
     --------

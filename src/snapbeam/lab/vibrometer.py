@@ -683,9 +683,9 @@ def measure_drive(
     signal : xarray.DataArray
         Velocity [m/s] or displacement [m] of the shaker.
     frequency : float, optional
-        The excitation frequency [Hz] as set, used as a guess; the highest peak of the spectrum if left out.
+        Set excitation frequency [Hz], the initial guess; by default the highest peak of the spectrum.
     amplitude : float, optional
-        The amplitude as set, in the unit of the signal, to check by.
+        Set amplitude, in the unit of the signal, for a check.
     snr_limit : float
         Minimum ratio [dB] of the sine to noise and distortion of an acceptable test; the paper's 15 dB.
     tolerance : float
@@ -1004,7 +1004,7 @@ def displacement_from_velocity(
     velocity : xarray.DataArray
         Velocity [m/s].
     measurement : DriveMeasurement, optional
-        That of this velocity; measured here if left out.
+        Result of :func:`measure_drive` for this velocity; measured by default.
 
     Raises
     ------

@@ -173,7 +173,7 @@ def compare_waveforms(
         Start of the excitation in the measured run [s]; it determines the first cycle; the phase of the shaker
         determines the rest. By default the onset of the shaker, or the first sample if it begins in motion.
     cycles : (float, float), optional
-        The part to compare, counted from the start; all that both have if left out.
+        Part to compare, counted from the start; by default the common part.
     measured_onsets, simulated_onsets : array_like, optional
         Times of impacts [s], to be shown over cycles.
 
@@ -478,7 +478,7 @@ def measure_response(
         Standard deviation of the displacement's noise, in units of b; estimated from its third differences if
         left out.
     start : float, optional
-        Start of the excitation [s]; the first sample if left out.
+        Start of the excitation [s]; the first sample by default.
 
     Raises
     ------

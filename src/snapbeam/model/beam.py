@@ -166,8 +166,8 @@ class Beam:
     def replace(self, **changes: float) -> Beam:
         """Return a beam with some parameters changed.
 
-        Of ``buckling_level`` and ``axial_load`` the one the beam was made with is kept, unless either
-        is among the *changes*.
+        Of ``buckling_level`` and ``axial_load`` the given one is unchanged, unless either is among the
+        *changes*.
 
         Raises
         ------

@@ -16,8 +16,8 @@ class BoundaryConditions:
     """Ends that do not move sideways, each on a rotational spring.
 
     E I phi'' = k_left phi' at the left end and -k_right phi' at the right one.  The buckling modes under these
-    conditions stay orthogonal in their slopes and, with the energy of the springs, in their curvatures, so that the
-    reduced model keeps its form; mass, shapes and critical loads change.
+    conditions stay orthogonal in their slopes and, with the energy of the springs, in their curvatures, so that
+    the reduced model has the same form; mass, shapes and critical loads change.
 
     Supports that give way along the axis, with the stiffness K between them, share the stretching with the beam:
     gamma = (E S/(2 L))/(1 + E S/(K L)).

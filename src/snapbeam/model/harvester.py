@@ -92,8 +92,8 @@ class PiezoelectricHarvester(Harvester):
 
         theta_i = Theta [phi_i'(x_2) - phi_i'(x_1)],     C v' = -v/R - theta . alpha',
 
-    with Theta the bending moment per volt.  Their own mass and stiffness are left out.  Of a structure given by
-    matrices theta is Theta times its ``patch_shape``, for all locations.
+    with Theta the bending moment per volt.  Their own mass and stiffness are neglected.  Of a structure given
+    by matrices theta is Theta times its ``patch_shape``, for all locations.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ class ElectromagneticHarvester(Harvester):
 
         L_c i' = K w'(x_c) - (R + R_c) i,     f_c = -K i,
 
-    with the velocity w' relative to the ends.  The magnet's mass is left out.
+    with the velocity w' relative to the ends.  The mass of the magnet is neglected.
 
     Parameters
     ----------

@@ -41,9 +41,9 @@ _NEAREST = 0.1
 class LocalForce:
     """A law of a force that acts on one point: derive a frozen dataclass from it, with the law's constants as fields.
 
-    The law depends on the displacement u of the point from the straight beam, or on its rotation, and on the rate v of
-    that.  Its physics are scalar functions, which the solver compiles into the time step.  ``law`` stands for the
-    constants, by the names of the fields:
+    The law depends on the displacement u of the point from the straight beam, or on its rotation, and on the
+    rate v of that.  Its physics are scalar functions, which the solver compiles into the time step.  ``law``
+    contains the constants, by the names of the fields:
 
     - ``force(law, displacement)``: conservative force on the beam, N, or moment, N m; positive in the direction of u;
     - ``energy(law, displacement)``: its potential energy, J; the force is minus its derivative.

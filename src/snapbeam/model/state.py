@@ -215,7 +215,7 @@ class State:
         Raises
         ------
         InputError
-            If modes that move would be left out.
+            If moving modes would be discarded.
         """
         if modes == self.modes:
             return self

@@ -69,7 +69,7 @@ class DifferentialEvolution:
         self._asked: _Array | None = None
 
     def ask(self) -> _Array:
-        """The designs to be looked at next, of shape (population, variables)."""
+        """Designs to evaluate next, of shape (population, variables)."""
         if self._asked is None:
             generator = np.random.default_rng(np.random.SeedSequence([self.seed, self.generation]))
             unit = self._first(generator) if self.generation == 0 else self._offspring(generator)

@@ -183,12 +183,12 @@ def load_measurements(path: str | os.PathLike[str]) -> tuple[Measurements, dict[
     """Read measurements from a TOML file.
 
     The section ``[measured]`` has the names of :class:`Measurements`; each ``[[measured.contact]]`` is a
-    :class:`ContactTest`.  A section ``[beam]`` as in a parameter file may give what is known of the beam.
+    :class:`ContactTest`.  A section ``[beam]`` as in a parameter file may give the nominal beam.
 
     Returns
     -------
     (Measurements, dict)
-        The dictionary holds the other sections.
+        The dictionary contains the other sections.
 
     Raises
     ------

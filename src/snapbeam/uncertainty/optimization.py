@@ -168,7 +168,7 @@ class Objective:
         ``"peak_force_contact_2"``, a parameter, ``"speed"``, ``"stroke"``, ``"acceleration"`` or
         ``"cycles_to_settle"``.
     quantile : float, optional
-        Of a statistic, in (0, 1): what is exceeded by no more than the rest of the runs; its mean by default.
+        Quantile of a statistic, in (0, 1), to optimise; its mean by default.
     maximize : bool
         Whether it is to be large.
 
@@ -646,8 +646,8 @@ class OptimizerSettings:
     candidates : int
         Maximum number of designs to validate, the best first, until one satisfies the constraints.
     refinements : int
-        Further designs that are checked at most, between the one that holds and better ones that do not: they bring
-        the design to its constraints.
+        Maximum number of further designs to validate, between the feasible one and better infeasible ones; they
+        bring the design to its constraints.
     confidence : float
     seed : int
 

@@ -48,7 +48,7 @@ class SamplingPlan:
         Half the width of the interval of *outcome* that every point is to reach, in (0, 0.5); None: *initial_runs* runs for
         every point.
     outcome : str
-        Whose interval is looked at: ``"snap"``, ``"continuous"``, ``"first_well"`` or ``"other_well"``.
+        Outcome whose interval is used: ``"snap"``, ``"continuous"``, ``"first_well"`` or ``"other_well"``.
     initial_runs : int
         Runs that every point has to begin with, at least 8 where more follow.
     max_runs : int
@@ -62,7 +62,7 @@ class SamplingPlan:
     Raises
     ------
     InputError
-        For values out of range, and names of outcomes or intervals that there are not.
+        If a value is out of range, or an outcome or interval does not exist.
 
     Examples
     --------

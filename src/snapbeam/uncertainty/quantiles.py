@@ -420,7 +420,7 @@ def quantile_threshold(
     bounds : tuple of two floats
         Range of the search.
     axes : mapping of str to array_like, optional
-        Axes, as in :func:`snapbeam.sweep`; one point, the system as it stands, by default.
+        Axes, as in :func:`snapbeam.sweep`; by default one point, the system itself.
     uncertainty : ParameterUncertainty, optional
         Uncertain parameters.  Without uncertainty all quantiles are one threshold.
     options : QuantileSearchSettings, optional

@@ -60,7 +60,7 @@ def fit_decay(
     units : str
         Unit of the signal; tells displacement from velocity.
     soften : bool
-        Whether frequencies may depend on amplitude.
+        True if frequencies may depend on amplitude.
     known : (float, float), optional
         Softening kappa of the first mode and its standard deviation, known beforehand.
     law : DampingLaw, optional

@@ -67,7 +67,7 @@ def identify_decay(
         Number of modes, strongest first, by the matrix pencil (see :mod:`snapbeam.lab.decay.poles`); with the
         method ``"fit"`` all are fitted together.
     frequencies : array_like, optional
-        Rough frequencies [Hz] of the modes, to ten percent, instead of *modes*.
+        Approximate frequencies [Hz] of the modes, within 10 %, instead of *modes*.
     method : {"fit", "hilbert", "log_decrement"}
         Nonlinear least squares on the signal itself; regression on amplitude and phase of the analytic
         signal; regression on height and time of the maxima.
@@ -75,12 +75,12 @@ def identify_decay(
         The part of the signal [s] that decays freely.  The start is found if left out: where the motion sets
         in, and where its tops are no longer cut off; a second hit ends the decay.
     soften : bool
-        Whether frequencies may depend on amplitude.
+        True if frequencies may depend on amplitude.
     buckling_level : float, optional
         b [m], for the displacement or velocity of mid-span: the softening then has a prior near 0.75 (a/b)^2,
         that of one mode, within 10 %, which narrows the frequency of a short decay.
     exponential_window : float, optional
-        Time constant T [s] of a window exp(-t/T) by which an analyser has multiplied the record; undone.
+        Time constant T [s] of a window exp(-t/T) of the analyser, to correct.
 
     Returns
     -------
