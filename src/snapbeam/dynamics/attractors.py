@@ -63,7 +63,7 @@ _SHELLS = 9
 _LARGEST = 0.5
 """Radius of the largest shell, in units of the well's amplitude along the longest axis."""
 _SHARE = 0.5
-"""Of the radius that was tried, within which a state counts as captured."""
+"""Fraction of the tested radius within which a state counts as captured."""
 _SEED = 20240817
 
 
@@ -236,7 +236,7 @@ class Attractors:
     attractors: list[Attractor]
     """Periodic ones first, by period, then by the coordinates of their points."""
     labels: NDArray[np.int64]
-    """Of every state: number of its attractor, or :data:`UNDECIDED`."""
+    """Number of the attractor of every state, or :data:`UNDECIDED`."""
     check_periods: int
     """Periods over which a chaotic attractor was seen not to end."""
     termination_reason: str
@@ -244,7 +244,7 @@ class Attractors:
 
     @property
     def shares(self) -> _Array:
-        """Of the states that go to each."""
+        """Fractions of the states that converge to each attractor."""
         return np.array([float((self.labels == i).mean()) for i in range(len(self.attractors))])
 
     @property

@@ -34,7 +34,7 @@ _Array = NDArray[np.float64]
 
 _WELLS = ("lower", "upper", "both")
 _RTOL, _ATOL = 1e-11, 1e-13
-"""Of the integration, in units of the well's amplitude and of 1/omega_1."""
+"""Tolerances of the integration, in units of the well's amplitude and of 1/omega_1."""
 _CONVERGED = 1e-10
 """Velocity at the turning point, in the same units."""
 _FIRST, _SHORTEST = 0.02, 1e-5

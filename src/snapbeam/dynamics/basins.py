@@ -566,7 +566,7 @@ class Integrity(NamedTuple):
     factor: float
     """IF: radius of the largest circle within it."""
     center: tuple[int, ...]
-    """Of that circle."""
+    """Centre of that circle."""
     undecided: float
     """Share of the window that is undecided; it counts as outside, so that every measure is a lower bound."""
 

@@ -287,7 +287,7 @@ class _Curve:
         return moved, moved.correct(y, along, along, table)
 
     def error(self, point: _Point, relative: float) -> _Array:
-        """By how much the parameters may be off for the residual and the error of the map's derivative."""
+        """Uncertainty of the parameters from the residual and the error of the map's derivative."""
         size = point.y.size - 2
         steep = float(np.abs(point.came.jacobian).sum())
         # a gap follows from the run itself, a multiplier from the derivative of the map
@@ -337,7 +337,7 @@ def _pair(came: Return) -> tuple[float, float]:
 
 
 def _tangent(table: _Array, before: _Array) -> _Array:
-    """Of the curve, of length one, towards where *before* points."""
+    """Unit tangent of the curve, in the direction of *before*."""
     found: _Array = np.linalg.svd(table)[2][-1]
     return found if found @ before >= 0.0 else -found
 

@@ -72,11 +72,11 @@ class SpecialPoint:
     """One of :data:`SPECIAL_POINTS`."""
     orbit: PeriodicOrbit
     value: float
-    """Of the parameter."""
+    """Value of the parameter."""
     index: int
     """Number of the orbit of the branch that it comes after."""
     error: float = math.nan
-    """By how much the value may be off at these steps; NaN: not known."""
+    """Uncertainty of the value at these steps; NaN: unknown."""
 
     def __repr__(self) -> str:
         off = "" if math.isnan(self.error) else f" ± {self.error:.1g}"
@@ -107,7 +107,7 @@ class Branch:
     termination_reason: str
     """Reason why the branch ends."""
     impacts: list[int]
-    """Of each orbit within its period."""
+    """Number of impacts of each orbit within its period."""
     tangents: list[NDArray[np.float64]]
 
     def __repr__(self) -> str:
@@ -117,12 +117,12 @@ class Branch:
 
     @cached_property
     def values(self) -> NDArray[np.float64]:
-        """Of the parameter along the branch."""
+        """Values of the parameter along the branch."""
         return np.array([orbit.flow.value(self.name) for orbit in self.orbits])
 
     @cached_property
     def is_stable(self) -> NDArray[np.bool_]:
-        """Of each orbit."""
+        """Stability of each orbit."""
         return np.array([orbit.is_stable for orbit in self.orbits])
 
     def plot(self, variable: str | None = None, ax: Any = None, **options: Any) -> Any:
@@ -254,7 +254,7 @@ def _labels(words: str) -> dict[str, str]:
 
 
 _LOCATED = 1e-9
-"""Of a multiplier at an event."""
+"""Tolerance of a multiplier at an event."""
 _CRITICAL = 1e-3
 """Distance of the critical multiplier at an event from where it is in theory, at most."""
 _HALVINGS = 20

@@ -256,7 +256,7 @@ _SAME_PHASE = 1e-6
 _NEAR_CONTACT = 0.25
 """Distance of a contact from the instant of observation that is small, over that of the instant farthest from contacts."""
 _BYTES = 2**27
-"""Of the states that are held on the way at most."""
+"""Maximum memory of the stored states."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,7 +270,7 @@ class AdvancedStates:
     tangents: _Array | None
     """Small changes that were carried along, shape (runs, k, d)."""
     statistics: Mapping[str, NDArray[Any]] = field(default_factory=dict)
-    """Of the way, by name, shape (runs,)."""
+    """Statistics of the motion, by name, shape (runs,)."""
     hidden: Any = None
     """State of the solver for a bitwise exact restart."""
     hidden_every: tuple[Any, ...] | None = None
@@ -460,7 +460,7 @@ class Stroboscope:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the coordinates."""
+        """Names of the coordinates."""
         modes = range(1, self.modes + 1)
         own = (f"{name}[{place + 1}]" for name, place, _ in self._own)
         return (*(f"amplitude[{i}]" for i in modes), *(f"velocity[{i}]" for i in modes), *own)
@@ -638,7 +638,7 @@ class Stroboscope:
         every: bool = False,
         points: Mapping[str, _Array] | None = None,
     ) -> AdvancedStates:
-        """As :meth:`Flow.advance`; a run does not depend on the runs that are integrated with it."""
+        """Advance as :meth:`Flow.advance`; a run does not depend on the runs that are integrated with it."""
         if tangents is not None and not self.smooth:
             return self._advance_with_differences(states, periods, tangents, every, points)
         begun = states.hidden if isinstance(states, AdvancedStates) else self._begun(states)
@@ -665,7 +665,7 @@ class Stroboscope:
         every: bool,
         points: Mapping[str, _Array] | None,
     ) -> AdvancedStates:
-        """As :meth:`advance`, with tangents by differences between neighbours, a period at a time."""
+        """Advance as :meth:`advance`, with tangents by differences between neighbours, a period at a time."""
         came = self.advance(states, periods, every=True, points=points)
         assert came.every is not None
         begun = states.states if isinstance(states, AdvancedStates) else _rows(states)

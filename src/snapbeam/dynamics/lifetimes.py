@@ -188,7 +188,7 @@ def _fit_one(times: _Array, ends: NDArray[np.bool_], delay: float | None) -> tup
 
 
 def _from(times: _Array, ends: NDArray[np.bool_]) -> tuple[float, ...]:
-    """As :func:`_fit_one`, of times that are counted from the delay."""
+    """Fit as :func:`_fit_one`, for times that are counted from the delay."""
     order = np.argsort(times, kind="stable")
     times, ends = times[order], ends[order]
     exposure, count = float(times.sum()), int(ends.sum())

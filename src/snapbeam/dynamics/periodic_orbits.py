@@ -63,7 +63,7 @@ __all__ = [
 
 
 _LARGEST_ERROR = 1e-3
-"""Of a derivative by differences, beyond which it counts as unknown."""
+"""Error of a derivative by differences beyond which it counts as unknown."""
 _SPLIT = 16
 """Tangents from which on they are shared among threads."""
 _LONGEST = 0.25
@@ -99,7 +99,7 @@ class Shot(NamedTuple):
 
     x: _Array
     jacobian: _Array
-    """Of the return map there, or near it."""
+    """Jacobian of the return map at *x*, or near it."""
     residual: float
     iterations: int
     exact: bool
@@ -188,7 +188,7 @@ def require_isolated_orbits(flow: Flow) -> None:
 
 
 def _by_differences(family: Family, x: _Array, periods: int, value: float | None) -> Return:
-    """As :func:`jacobian`, from states beside it that meet the tip as often as it does."""
+    """Jacobian as :func:`jacobian`, from neighbouring states with the same number of impacts."""
 
     def advance_rows(rows: _Array, runs: NDArray[np.intp]) -> tuple[_Array, _Array | None]:
         beside = family.advance(rows, periods, value)
@@ -333,7 +333,7 @@ class Passage(NamedTuple):
     min_penetration: float
     """Maximum penetration of the lightest impact, over b; NaN: none."""
     min_impulse: float
-    """Of an impact, N s; NaN: none."""
+    """Minimum impulse of an impact, N s; NaN: none."""
     peak_displacement: float
     """Maximum distance of the contact point from the straight beam, over b."""
     crossings: int
@@ -773,7 +773,7 @@ def shoot(
 
 _ITERATIONS = 14
 _DIFFERENCE = 2e-6
-"""Of the difference by the parameter, over its range."""
+"""Step of the difference by the parameter, over its range."""
 
 
 class Spot(NamedTuple):
@@ -840,7 +840,7 @@ class Corrector:
         return Spot(shot.x, self.tangent(came, slope, before), came, slope, shot.iterations)
 
     def tangent(self, came: Return, slope: _Array, before: _Array) -> _Array:
-        """Of the branch, of length one, towards where *before* points."""
+        """Unit tangent of the branch, in the direction of *before*."""
         wanted = np.zeros(slope.size + 1)
         wanted[-1] = 1.0
         try:
@@ -886,7 +886,7 @@ class Corrector:
         return found._replace(tangent=along if along[-1] * spot.tangent[-1] >= 0.0 else -along)
 
     def orbit(self, spot: Spot) -> PeriodicOrbit:
-        """As an orbit of the flow at its value."""
+        """Orbit of the flow at its parameter value."""
         came, x = spot.came, spot.y[:-1]
         residual = float(np.abs(came.x - x).max())
         flow = self.family.at(float(spot.y[-1]) * self.span)

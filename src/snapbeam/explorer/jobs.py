@@ -59,7 +59,7 @@ class Cancelled(Exception):
 
 @dataclass(eq=False)
 class Token:
-    """By which a job is told to stop, and stops itself when its time is up.
+    """Cancellation token of a job, with a time limit.
 
     The time before its first report, in which an engine may be compiled, is not counted.
     """

@@ -1032,7 +1032,7 @@ class Scatter:
         return np.array(sides)
 
     def fixed_values(self) -> dict[str, Any]:
-        """Nothing is the same for all points by itself."""
+        """Fixed values: none for a list of points."""
         return {}
 
     def at(self, number: int) -> Point:

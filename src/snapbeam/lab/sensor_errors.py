@@ -164,7 +164,7 @@ _TIMES = 3.0  # times the third harmonic that saturation takes from the first
 
 
 def one_sided(samples: SignalSamples, rest: int, first: int, last: int, fit: SineFit) -> float:
-    """By what share of its amplitude a record's mean moves when the motion starts; 0 if it may.
+    """Relative shift of the mean at the onset of the motion, over the amplitude; 0 if it is admissible.
 
     A shaker comes back, so the mean of its velocity is that at rest.  The mean of a rectified or squared one is not.
     """

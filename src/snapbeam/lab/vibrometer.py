@@ -379,8 +379,7 @@ def _at_rest(
 
 
 _NOISE_FLOOR = 1e-6
-"""Of the amplitude: a record without noise is taken to have this much, or the sums that find its start
-would lose it to rounding."""
+"""Minimum noise over the amplitude, which prevents rounding errors in the search for the onset."""
 _DEGREES = (0, 1, 2, 3, 5)
 _LONGEST = 4000  # samples that are fitted
 

@@ -80,7 +80,7 @@ class HarmonicLoad(LoadMotion):
         return np.asarray(2.0 * math.pi / (columns["frequency_ratio"] * scale.omega))
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """Its amplitudes, N and N/s."""
+        """Amplitudes of load and load rate, N and N/s."""
         return columns["amplitude"], columns["amplitude"] * columns["frequency_ratio"] * scale.omega
 
 
@@ -138,7 +138,7 @@ class LoadRamp(LoadMotion, Timed):
         }
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """Its change, N, and its steepest, N/s."""
+        """Maximum change, N, and maximum rate, N/s."""
         found = self.shape_numbers(columns, scale)
         return np.maximum(found["change"], 0.0), _STEEPEST * np.abs(found["change"]) / found["duration"]
 
@@ -154,7 +154,7 @@ class LoadRamp(LoadMotion, Timed):
 
     @staticmethod
     def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """Nothing asks for it."""
+        """Acceleration, which no caller needs."""
         return 0.0
 
 

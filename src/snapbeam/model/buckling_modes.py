@@ -162,7 +162,7 @@ class BucklingModes:
 
 _HALVINGS = 200
 _NODES = 16
-"""Of Gauss and Legendre in each panel, of which a half wave of the last mode has two."""
+"""Gauss-Legendre nodes in each panel; a half wave of the last mode has two panels."""
 
 
 def _mixed(stiffness: float) -> tuple[float, float]:

@@ -17,7 +17,7 @@ __all__ = ["RESERVE", "crossing_energy", "decidable_energy", "least_energy_at", 
 RESERVE = 2e-3
 _ITERATIONS = 100
 _RESOLVED = 1e-11
-"""Of the first load: what Newton's last step is below; the bound is flat there."""
+"""Tolerance of Newton's last step, over the first critical load; the bound is flat there."""
 
 
 def least_energy_at(model: ReducedModel, location: ArrayLike, displacement: ArrayLike) -> NDArray[np.float64]:

@@ -240,7 +240,7 @@ class Landscape:
     """Equilibria of a structure: wells and saddles."""
 
     equilibria: tuple[Equilibrium, ...]
-    """By energy."""
+    """Equilibria, ordered by energy."""
     lower: Equilibrium
     """The well whose centre is lower; the only one if there is one only."""
     upper: Equilibrium

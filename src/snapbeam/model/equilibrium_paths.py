@@ -41,7 +41,7 @@ _STEP = 1.0 / 80.0
 """Longest step; displacement and amplitudes over those of the wells, the force over that which moves a well as far."""
 _SHORTEST = 1e-7
 _STEPS = 20_000
-"""Of a path, at most."""
+"""Maximum number of steps of a path."""
 _TURN = 0.15
 """Angle between the tangents of two points, rad."""
 _LARGEST = 100.0

@@ -157,7 +157,7 @@ class ConstantForce(ForceHistory, Timed):
         return {"fastest": np.zeros(columns["force"].size), "force": columns["force"]}
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """Its size, N."""
+        """Peak force, N."""
         return np.abs(columns["force"])
 
     @staticmethod

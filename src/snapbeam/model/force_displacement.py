@@ -30,9 +30,9 @@ __all__ = ["force_displacement"]
 _Array = NDArray[np.float64]
 
 _MARGIN = 0.25
-"""Of the default range beyond the outermost equilibrium and critical point, over the distance of the two."""
+"""Margin of the default range beyond the outermost equilibrium and critical point, over their distance."""
 _BEYOND = 2.0
-"""Of the range in which critical points are looked for, beyond the outermost equilibria, over the size of a well."""
+"""Margin of the search for critical points beyond the outermost equilibria, over the size of a well."""
 
 
 @checked

@@ -46,7 +46,7 @@ class Harvester:
     rate_dependent: ClassVar[bool] = True
     """True if the force depends on the velocity of the structure."""
     resistance: float
-    """Of the load, ohm."""
+    """Load resistance, ohm."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -226,7 +226,7 @@ class PiezoelectricHarvester(Harvester):
         return np.ones_like(resistance)
 
     def volts(self, resistance: _Array) -> _Array:
-        """It is the voltage."""
+        """Voltage: the coordinate itself."""
         return np.ones_like(resistance)
 
     def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:

@@ -23,7 +23,7 @@ __all__ = ["FORMS", "Imperfection", "perfect_equilibria", "projected"]
 
 
 _POINTS = 16
-"""Of Gauss and Legendre, in each of the panels that a half wave of the last mode has two of."""
+"""Gauss-Legendre points in each panel; a half wave of the last mode has two panels."""
 
 
 def projected(modes: Modes, profile: _Array, symmetric: bool = False) -> _Array:

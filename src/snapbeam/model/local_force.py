@@ -32,7 +32,7 @@ LOCAL_FORCES: dict[str, type[LocalForce]] = {}
 """Every law of a local force, by the name it has in parameter files."""
 _PLACES = ("location", "coordinate", "shape", "label")
 _PERMITTIVITY = 8.8541878188e-12
-"""Of vacuum, F/m (CODATA 2022)."""
+"""Permittivity of vacuum, F/m (CODATA 2022)."""
 _NEAREST = 0.1
 """Share of the way to the end of the range of a law, from which on the steps of a run do not follow its stiffness."""
 
@@ -336,7 +336,7 @@ class ElectrostaticForce(_TowardsGap):
 
     @staticmethod
     def energy(law: Any, displacement: float) -> float:
-        """Of the electrode and its source, -eps_0 A V^2/(2 |g - u|)."""
+        """Energy of the electrode and its source, -eps_0 A V^2/(2 |g - u|)."""
         return -0.5 * _PERMITTIVITY * law.area * law.voltage * law.voltage / abs(law.gap - displacement)
 
 

@@ -408,7 +408,7 @@ Sections = Mapping[str, Mapping[str, Any]]
 
 DEFAULT_DRIVE = {"frequency_ratio": 1.21, "velocity_amplitude": 0.18}
 DEFAULT_AXES = {"drive.frequency_ratio": "0.1:4:64", "drive.velocity_amplitude": "0.01:0.65:40"}
-"""Of a map for which no axis is named."""
+"""Default axes of a map."""
 _AROUND, _STRIKING = (
     ("base_excitation", "axial_load", "force", "harvester"),
     ("contact", "drive"),

@@ -28,7 +28,7 @@ _STARTS = 512
 _ITERATIONS = 200
 _HALVINGS = 40
 _RESIDUAL = 1e-11
-"""Of the sum of the magnitudes of the terms of the gradient."""
+"""Tolerance of the gradient, over the sum of the magnitudes of its terms."""
 _SAME = 1e-6
 """Distance of two solutions that are one, over the largest amplitude."""
 _NEAR = 1e-3
@@ -40,7 +40,7 @@ _TOWARDS = 40
 _FAR = 20.0
 """Amplitudes, over the size, beyond which equilibria may be missing."""
 _REACH = 3.0
-"""Of the region of the starting points, over the largest amplitude of the equilibria without local forces."""
+"""Extent of the region of starting points, over the largest amplitude of the equilibria without local forces."""
 
 
 class Saddle(NamedTuple):
@@ -48,7 +48,7 @@ class Saddle(NamedTuple):
 
     equilibrium: Equilibrium
     wells: tuple[int | None, int | None]
-    """Their numbers, by the height of the centre; None for a descent that leaves the range of a law, such as pull-in."""
+    """Numbers of the wells, by the height of mid-span; None if the descent leaves the range of a law (pull-in)."""
 
 
 @dataclass(frozen=True, eq=False)

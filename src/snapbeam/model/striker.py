@@ -102,7 +102,7 @@ class Striker:
 
     @property
     def damping_ratio(self) -> float:
-        """Of the suspension, c_s/(2 sqrt(k_s m_s)); infinite for a damper without a spring."""
+        """Damping ratio of the suspension, c_s/(2 sqrt(k_s m_s)); infinite for a damper without a spring."""
         if self.mass is None or self.suspension_damping == 0.0:
             return 0.0
         return (

@@ -163,7 +163,7 @@ def _ohms(value: float) -> str:
 _Array = NDArray[np.float64]
 _POINTS = 201
 _RADIUS = 0.10
-"""Of the tip, in units of the picture: b upwards, L/7 sideways."""
+"""Radius of the tip, in units of the picture: b upwards, L/7 sideways."""
 _WIDE = 7.0
 """Length of the beam in those units."""
 _LAWS = {

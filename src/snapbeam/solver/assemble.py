@@ -122,7 +122,7 @@ class Driven(NamedTuple):
     kind: type[Drive]
     numbers: _Array
     period: _Array
-    """Of one cycle, s."""
+    """Period of one cycle, s."""
     highest: _Array
     """From the mid-position, m."""
     speed: _Array

@@ -59,7 +59,7 @@ _IDLE = frozenset({"inline_inlinables", "inline_overloads", "nopython_rewrites",
 
 
 class _Nobody:
-    """Of what a code generator is asked for about a part: nothing, since a part is never called by itself."""
+    """Placeholder for the code library of a part, which is never called on its own."""
 
     def set_env(self, name: str, env: Any) -> None:
         """Nowhere to put it."""
@@ -90,7 +90,7 @@ def pipeline() -> dict[str, Any]:
             module.data_layout = self._codegen._data_layout
 
         def finalize(self) -> None:
-            """Nothing is linked in here: a part of parts would carry all of them, and its callers again."""
+            """Link nothing: a part of parts would contain all of them, and their callers again."""
             self._raise_if_finalized()
             for library in self._linking_libraries:
                 self._reload_init.update(library._reload_init)
@@ -371,7 +371,7 @@ def _package_mark() -> str:
 
 @cache
 def fingerprint(kinds: tuple[type, ...]) -> str | None:
-    """Of everything that a kernel for these laws and drives bakes in, in 20 hexadecimal digits.
+    """Fingerprint of everything that a kernel for these laws and drives contains, 20 hexadecimal digits.
 
     That is every file of the engines, the codes, the versions of Python, Numba and NumPy, and of each law and drive
     its plain attributes and its static methods, with all that those call and every constant that they read.  None if
@@ -388,7 +388,7 @@ def fingerprint(kinds: tuple[type, ...]) -> str | None:
 
 
 def _marks_of_class(kind: type) -> Iterable[str]:
-    """Of a class that anybody can import by its name."""
+    """Fingerprint of a class that can be imported by name."""
     module = sys.modules.get(kind.__module__)
     if kind.__module__ == "__main__" or getattr(module, kind.__qualname__, None) is not kind:
         raise _Unknown(kind.__qualname__)
@@ -409,7 +409,7 @@ def _is_names(value: Any) -> bool:
 
 
 def _marks(value: Any, seen: set[int]) -> Iterable[str]:
-    """Of a function with all that it refers to, of a constant, of a module or what is built into one."""
+    """Fingerprint of a function with all its references, of a constant, of a module or of a builtin."""
     if isinstance(value, _CONSTANTS):
         yield repr(value)
     elif isinstance(value, tuple):
@@ -454,7 +454,7 @@ INLINE_HERE: dict[str, Any] = {**INLINE, **_PART}
 
 
 def overloaded(function: Any) -> Callable[[Any], Any]:
-    """As :func:`numba.extending.overload`, inlined on every engine, and on the processor as a part of its kernel."""
+    """Decorate as :func:`numba.extending.overload`; inlined by every solver."""
 
     def register(implementation: Any) -> Any:
         overload(function, jit_options=INLINE)(implementation)
@@ -489,7 +489,7 @@ def compiled(function: Callable[..., Any], **options: Any) -> Any:
 
 
 def called(function: Callable[..., Any]) -> Any:
-    """As :func:`compiled`, for what is long and rarely needed: never forced into its callers.
+    """Compile as :func:`compiled`, without inlining, for long and rarely needed functions.
 
     What is merely compiled is written into a caller that is inlined itself, since Numba's options pass on from there.
     """
@@ -497,7 +497,7 @@ def called(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """As :func:`compiled`, and always written into its callers."""
+    """Compile as :func:`compiled`, always inlined."""
     return compiled(function, forceinline=True)
 
 
@@ -522,7 +522,7 @@ class _Telling(event.Listener):
             _LOG.info("compiling %s, once on this machine: 10 to 20 s on a free core", self.name)
 
     def on_end(self, event: Any) -> None:
-        """Nothing to say."""
+        """Do nothing."""
 
 
 def is_compiled(march: Any, *arguments: Any) -> bool:

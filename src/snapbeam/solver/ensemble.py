@@ -27,9 +27,9 @@ class CircuitCoupling(NamedTuple):
     """A harvester's circuit, for every run, arrays of shape (runs,)."""
 
     rate: _Array
-    """Of loss, 1/s; without inertia what the coordinate is of the coupling's velocity."""
+    """Decay rate, 1/s; without inertia, the ratio of the coordinate to the velocity of the coupling."""
     share: _Array
-    """Of the loss, that ends in the load."""
+    """Fraction of the loss that is dissipated in the load."""
     volts: _Array
     """Across the load, V, per unit of the circuit's coordinate."""
     unit: float
@@ -56,7 +56,7 @@ class Ensemble:
     structure: Structure
     scale: Scale
     order: int
-    """Of the composition."""
+    """Order of the composition."""
     law: type[ContactLaw]
     drive: type[Drive]
     runs: NDArray[Any]
@@ -81,7 +81,7 @@ class Ensemble:
     cycles: float
     """Cycles of excitation of each run."""
     circuits: tuple[CircuitCoupling, ...] = ()
-    """Of the harvesters."""
+    """Circuits of the harvesters."""
     others: FurtherContactTable | None = None
 
     @property

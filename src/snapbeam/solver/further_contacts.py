@@ -61,7 +61,7 @@ __all__ = [
 
 _SEPARATOR = "__"
 NUMBERS = 40
-"""Of a striker in memory, a block of whole registers."""
+"""Numbers of a striker in memory, a block of whole registers."""
 # given
 OFFSET, REST, SIGN, SPEED = 0, 1, 2, 3
 # as they stand

@@ -57,7 +57,7 @@ class CompletedStep(NamedTuple):
     """At its beginning, s."""
     length: float
     displacement: tuple[float, float]
-    """Of the beam at the striker's location, at the two ends of the step."""
+    """Displacement of the beam at the striker's location, at the two ends of the step."""
     velocity: tuple[float, float]
     midspan_displacement: tuple[float, float]
     midspan_velocity: tuple[float, float]
@@ -458,7 +458,7 @@ def unregister_statistic(name: str) -> None:
 
 
 CIRCUIT_LOSS, CIRCUIT_LATE_LOSS, CIRCUIT_PEAK = range(3)
-"""Of each circuit: energy lost, J, load included; that in the last quarter; maximum of its coordinate at ends of steps."""
+"""Columns of each circuit: energy lost, J, with load; that in the last quarter; maximum of its coordinate."""
 
 
 def accumulators_dtype(others: int = 0, circuits: int = 0) -> np.dtype[Any]:
@@ -472,7 +472,7 @@ def accumulators_dtype(others: int = 0, circuits: int = 0) -> np.dtype[Any]:
 
 
 ACCUMULATORS = accumulators_dtype()
-"""Of the package's own statistics."""
+"""Data type of the accumulators of the package's own statistics."""
 
 
 def empty_accumulators(runs: int, others: int = 0, circuits: int = 0) -> Any:
@@ -520,7 +520,7 @@ def of_one_named(name: str) -> Statistic | None:
 
 
 def _of_one(name: str, number: int) -> Statistic:
-    """Of one striker, the first being 1."""
+    """Value of one striker, counted from 1."""
     whole, (column, words) = STATISTICS[name], _EACH[name]
     words = f"{words}, contact {number}"
     return Statistic(
@@ -620,7 +620,7 @@ class Reading:
 
     @property
     def peak_force(self) -> NDArray[np.float64]:
-        """Of the law's force, the maximum of any striker; NaN where an impact lasts no time."""
+        """Peak force of any striker; NaN if impacts have zero duration."""
         force = self.seen("peak_force")
         if self.ensemble.others is not None:
             return np.maximum(force, self.others[:, :, OTHER_PEAK].max(axis=1))
@@ -715,7 +715,7 @@ class Last(NamedTuple):
     p: _Array
     well_sign: int
     contact_ticks: NDArray[np.int64]
-    """Of each striker, shape (strikers,)."""
+    """Contact ticks of each striker, shape (strikers,)."""
 
 
 class Recorded(NamedTuple):

@@ -46,7 +46,7 @@ class Clock(NamedTuple):
     step: int
     """Flight step."""
     period: int
-    """Of the drive's argument."""
+    """Period of the drive's argument, ticks."""
     output_interval: int
     """Between two output states."""
     end: int

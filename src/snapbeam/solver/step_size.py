@@ -60,7 +60,7 @@ _STARTS = ((0.15, 1.0 / 60.0, 2.0, 0.3), (10.0, 1.0 / 160.0, 1.0, 1.0))
 steps that are tried over the flight step, and the error allowed over the limit: a beam that rings in its well, and one
 after a strong impulse.  The first may ring for many cycles, so that steps of twice the length must serve."""
 _SHORT_IMPACT = 1.0 / 150.0
-"""Of the period of the first mode: impacts that are shorter excite higher modes, and the error allowed falls with them."""
+"""Impact duration over the period of the first mode, below which higher modes reduce the error limit."""
 _STRUCK = 0.46
 """Relative location on the beam of a reference striker: no mode has an isolated node near it."""
 _PERIODS = 2.0
@@ -262,9 +262,9 @@ _LIMIT_OF_HITS = {"standard": 1e-9, "reference": 1e-13}
 """Error limit of impacts of zero duration: there are no contact steps to share the error, and only one mode."""
 _ORDER = {"standard": 4, "reference": 6}
 _FREE_TURN = 4.0
-"""Of the fastest mode in a flight step of level "reference", rad."""
+"""Maximum phase of the fastest mode in a flight step of level "reference", rad."""
 _MOST_DECAY = 1.8
-"""Of the mode that decays fastest, in a flight step."""
+"""Maximum decay of the fastest decaying mode in a flight step."""
 # Contact: longest step over the time of an impact at the speed 0.2 b omega_1, by level, and how many
 # halvings below it the shortest step is, by order.
 _CONTACT_SHARE = {"standard": 1.0 / 8.0, "reference": 1.0 / 32.0}
@@ -272,8 +272,7 @@ _CONTACT_SPEED = 0.2
 _HALVINGS = {4: 4, 6: 10}
 _MOST_HALVINGS = {"standard": 5, "reference": 7}
 _CONTACT_TURN = math.pi
-"""Of the fastest mode in the longest contact step, rad: the contact moves every mode, and beyond half a turn
-its kicks come in step with the fastest ones."""
+"""Maximum phase of the fastest mode in the longest contact step, rad; beyond half a turn, kicks are in resonance."""
 
 
 class Plan(NamedTuple):

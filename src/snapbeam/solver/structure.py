@@ -73,7 +73,7 @@ class StrikerBody:
     """A striker with mass."""
 
     contact: int
-    """Of which contact, from 0."""
+    """Number of the contact, from 0."""
     mass: float
     """kg."""
     sign: float
@@ -116,16 +116,16 @@ class Structure:
     """alpha in the well, as it is in space."""
     model: ReducedModel
     unequal_wells: UnequalWells | None = None
-    """Of unequal wells."""
+    """Terms of unequal wells."""
     base_load: _Array | None = None
-    """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi)."""
+    """Load vector of a moving base for an upward acceleration, -V^T rho S integral(phi)."""
     force_rows: tuple[_Array, ...] = ()
-    """Of each external force F(t) along a row h: V^T h."""
+    """Row V^T h of each external force F(t) along a row h."""
     local_forces: tuple[LocalForceRow, ...] = ()
     circuits: tuple[CircuitRow, ...] = ()
-    """Of harvesters.  The modes of their charges come last."""
+    """Circuits of harvesters; the modes of their charges are last."""
     bodies: tuple[StrikerBody, ...] = ()
-    """Of strikers with mass, whose own modes follow those of the beam."""
+    """Strikers with mass, whose modes follow those of the beam."""
     indentations: tuple[int, ...] = ()
     """Contacts, from 0, whose residual indentation is the displacement of a mode of its own, behind those of the bodies."""
     strikers: int = 0

@@ -53,7 +53,7 @@ class Distribution:
         raise NotImplementedError
 
     def describe(self) -> dict[str, Any]:
-        """Its kind and its numbers, plain."""
+        """Type and parameters of the distribution as plain values."""
         return {"type": self.kind, **self.__dict__}
 
 
@@ -186,7 +186,7 @@ class UniformRange(Distribution):
 
 @dataclass(frozen=True)
 class Empirical(Distribution):
-    """As something was seen to be distributed, whatever the nominal value.
+    """Empirical distribution of observed values, independent of the nominal value.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ _KINDS = (
     ResponseClass.CONTINUOUS,
 )
 _PRIOR = 0.5
-"""Of each class, added to its runs (Jeffreys): a class that no run had is unlikely, not impossible."""
+"""Pseudocount of each class (Jeffreys): a class without runs is unlikely, not impossible."""
 _COORDINATES = ("frequency_ratio", "velocity_amplitude", "location")
 
 

@@ -68,7 +68,7 @@ class _DrawnSetup(SweepSetup):
     made: _Made = field(default_factory=dict)
 
     def neighbour(self, changes: dict[str, Any]) -> tuple[System, Integration]:
-        """As of any sweep."""
+        """Neighbour of a point, as in any sweep."""
         if any(name.startswith("integration.") for name in changes):
             return super().neighbour(changes)
         return _made(self.made, self.system, changes), self.integration
@@ -83,7 +83,7 @@ class Trials:
     """
 
     system: System
-    """With its tip held in space if starts differ."""
+    """System, with the tip fixed in space if initial states differ."""
     integration: Integration
     uncertainty: ParameterUncertainty
     keeping: CheckpointOptions = field(default_factory=CheckpointOptions)

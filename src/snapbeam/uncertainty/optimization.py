@@ -200,7 +200,7 @@ class Objective:
 
     @property
     def label(self) -> str:
-        """Its name in datasets."""
+        """Name in datasets."""
         name = self.quantity.replace(".", "_")
         return name if self.quantile is None else f"{name}_q{100.0 * self.quantile:g}".replace(".", "_")
 
@@ -296,7 +296,7 @@ class Constraint:
 
     @property
     def label(self) -> str:
-        """Its name in datasets."""
+        """Name in datasets."""
         return self.quantity.replace(".", "_")
 
     @property
@@ -349,16 +349,16 @@ def require_kinds(objectives: Any, constraints: Any) -> tuple[tuple[Objective, .
 
 
 _SURE = 0.99
-"""Of the interval by which a design is dropped after a quarter of its runs."""
+"""Confidence level at which a design is discarded after a quarter of its runs."""
 
 
 class Worth(NamedTuple):
     """Objectives and constraint violations of designs, from their runs."""
 
     objectives: _Array
-    """Of shape (designs, objectives), to be made small: maxima are negated; infinite where not known."""
+    """Objectives to minimise, shape (designs, objectives): maxima are negated; infinite if unknown."""
     violation: _Array
-    """Of shape (designs,): 0 where every constraint is kept by the share of the runs that it asks for, and a margin."""
+    """Violation of the constraints, shape (designs,): 0 if all are satisfied with a margin."""
     runs: NDArray[np.int64]
 
 
@@ -382,7 +382,7 @@ class DesignProblem:
 
     trials: Trials
     bounds: dict[str, tuple[float, float]]
-    """By dotted name."""
+    """Bounds of the variables, by dotted name."""
     objectives: tuple[Objective, ...]
     constraints: tuple[Constraint, ...]
     samples: int = 64
@@ -543,7 +543,7 @@ class DesignProblem:
         return np.where(np.isfinite(signed), signed, np.inf)
 
     def _missing(self, found: dict[str, NDArray[Any]], *, hopeful: bool = False) -> float:
-        """By how much the shares of runs that keep the constraints are too small; failed runs keep none.
+        """Deficit of the fractions of runs that satisfy the constraints; failed runs satisfy none.
 
         *hopeful*: by how much they are too small even if they are as great as the runs let hope, without a margin.
         """

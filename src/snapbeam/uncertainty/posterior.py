@@ -98,11 +98,11 @@ class Forward:
 
     @property
     def errors(self) -> _Array:
-        """Their standard errors, Hz."""
+        """Standard errors of the frequencies, Hz."""
         return self._listed("_se")
 
     def frequencies(self, beam: Beam) -> _Array:
-        """Those of a beam, Hz."""
+        """Frequencies of a beam, Hz."""
         found = []
         for state in _STATES:
             count = len(getattr(self.measured, f"{state}_frequencies"))
@@ -227,7 +227,7 @@ class Waveform:
 
     @property
     def period(self) -> float:
-        """Of the drive, s."""
+        """Period of the drive, s."""
         assert self.system.striker is not None
         ratio = float(self.system.striker.drive.frequency_ratio)  # type: ignore[attr-defined]
         return 1.0 / (ratio * unit_of(self.system, "drive.frequency_hz"))

@@ -101,7 +101,7 @@ class Counts:
     """Counts of outcomes at every point."""
 
     hits: _Index
-    """Of shape (outcomes, points)."""
+    """Hits of each outcome, shape (outcomes, points)."""
     runs: _Index
     """Completed runs."""
     failed: _Index

@@ -254,7 +254,7 @@ _Index = NDArray[np.int64]
 Ask = Callable[[_Index, _Array, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]
 """Given columns, values and numbers of samples: which runs hit, and which failed."""
 _WIDER = 0.5
-"""Of an interval, by which the next round reaches beyond it on either side."""
+"""Fraction of an interval by which the next round extends it on either side."""
 _SURE = 0.99
 
 

@@ -330,7 +330,7 @@ class StatisticQoI:
 
     @property
     def unit(self) -> str:
-        """Of the statistic."""
+        """Unit of the statistic."""
         return STATISTICS[self.name].unit if self.name in STATISTICS else "1"
 
     @property
@@ -386,7 +386,7 @@ class ThresholdQoI:
 
     @property
     def unit(self) -> str:
-        """Of the parameter."""
+        """Unit of the parameter."""
         return lookup(self.parameter).quantity.unit
 
     @property

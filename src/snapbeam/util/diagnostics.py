@@ -260,7 +260,7 @@ def counting(progress: _Counts | bool | None, what: str, noun: str = "points") -
 
 
 def sharing(progress: _Shares | bool | None, what: str) -> _Shares | None:
-    """As :func:`counting`, of what is reported as a share."""
+    """Progress function as :func:`counting`, for progress as a fraction."""
     if progress is None or progress is False:
         return None
     if progress is True:

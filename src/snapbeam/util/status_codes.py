@@ -148,7 +148,7 @@ def classify(
 
 
 def class_of(total: Any, last: Any, duration: Any, side: Any) -> NDArray[np.int8]:
-    """As :func:`classify`, of what an engine has counted: unchecked, and without meaning for a run that failed."""
+    """Response class as :func:`classify`, from counts of the solver: unchecked, and undefined for a failed run."""
     result = np.where(side > 0, ResponseClass.TRANSIENT_2, ResponseClass.TRANSIENT_1)
     result = np.where(last * 20 > duration, ResponseClass.CONTINUOUS, result)
     result = np.where(total == 0, ResponseClass.INTRAWELL, result)

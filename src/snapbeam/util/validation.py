@@ -465,7 +465,7 @@ class NamedTable(dict[str, Kind]):
     Parameters
     ----------
     find : callable
-        What has a name that is not listed, or None if there is no such thing.
+        Function that returns the object of an unlisted name, or None.
     listed : pairs, optional
         Of name and thing.
     """
@@ -484,5 +484,5 @@ class NamedTable(dict[str, Kind]):
         return isinstance(name, str) and (super().__contains__(name) or self._find(name) is not None)
 
     def get(self, name: str, default: Any = None) -> Any:
-        """As of any mapping."""
+        """Return the value of a key, as for any mapping."""
         return self[name] if name in self else default

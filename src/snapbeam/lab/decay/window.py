@@ -210,7 +210,7 @@ _SECOND = 2.0  # times the square of the softening that its next order may be, t
 
 
 def frequency_drift(cycles: Cycles, frequency: float) -> float:
-    """By what share a frequency changes over a decay with time alone; 0 if by no more than its error.
+    """Relative change of a frequency over a decay with time alone; 0 if it is within its error.
 
     The phase of the cycles is a line, the integrals of a^2 and a^4 (softening, a the amplitude of the cycles as it is;
     the second is held to the size that goes with the first) and, where the frequency drifts at a steady rate, t^2: a

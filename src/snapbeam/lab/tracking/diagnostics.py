@@ -279,7 +279,7 @@ def tracking_diagnostics(
 
 
 def contact_shift(touch: Touch, known: float) -> float:
-    """By how much [px] shaker and beam are shifted against each other, as far as their contact tells; 0 if not.
+    """Offset [px] between shaker and beam from their contact; 0 if it cannot be determined.
 
     *known* is the standard error [px] of where tip and beam are, which explains as much.
     """

@@ -208,7 +208,7 @@ class TrackingSettings:
             object.__setattr__(self, name, check(value))
 
     def changed(self, **changes: Any) -> TrackingSettings:
-        """These settings with some changed, by name.
+        """Copy of the settings with some changed, by name.
 
         Raises
         ------
@@ -220,7 +220,7 @@ class TrackingSettings:
         return dataclasses.replace(self, **changes)
 
     def checked_for(self, shape: tuple[int, int], frames: int) -> TrackingSettings:
-        """These settings, if they fit a recording of *frames* frames of *shape*.
+        """Settings, checked for a recording of *frames* frames of *shape*.
 
         Raises
         ------
@@ -433,7 +433,7 @@ class NoiseShape:
 
     @property
     def factor(self) -> float:
-        """By how much errors are larger than neighbouring columns seem to say, as their noise is alike."""
+        """Factor between the true errors and those from neighbouring columns, because their noise is correlated."""
         return math.sqrt((1.0 + self.along) / (1.0 - self.along))
 
     @property

@@ -102,7 +102,7 @@ class HuntCrossley(ContactLaw):
         return math.inf if self.damping_factor == 0.0 else loss_number(restitution) / self.damping_factor
 
     def impact_duration(self, mass: float, velocity: float) -> float:
-        """As of Hertz's law, s: a loss shortens the approach and lengthens the departure."""
+        """Duration under Hertz's law, s: dissipation shortens the approach and lengthens the departure."""
         return HertzContact(self.stiffness).impact_duration(mass, velocity)
 
     def time_scale(self, mass: float, velocity: float) -> float:

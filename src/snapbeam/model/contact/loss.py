@@ -28,7 +28,7 @@ PRESETS: dict[str, Preset] = {
     ),
     "flores": Preset(lambda e: 1.6 * (1.0 - e) / e, "Flores et al., Multibody Syst. Dyn. 25 (2011)"),
 }
-"""By name.  None of them gives the restitution that it is asked for: :func:`restitution_of_loss` says what it gives."""
+"""Published approximations by name; :func:`restitution_of_loss` gives the restitution that results."""
 
 _SMALL = 1e-3
 

@@ -147,7 +147,7 @@ class Drive:
         raise NotImplementedError
 
     def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """As the first of :meth:`bounds`, of the mirror image of the motion; the same unless it is lopsided."""
+        """Bound of the displacement of the mirrored motion; differs from :meth:`bounds` if asymmetric."""
         return self.bounds(columns, scale)[0]
 
     @classmethod

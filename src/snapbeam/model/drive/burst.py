@@ -21,7 +21,7 @@ _Array = NDArray[np.float64]
 _STEEPEST = 1.875
 """Maximum slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""
 _SHARPEST = 5.7736
-"""Its maximum curvature, 10/sqrt(3)."""
+"""Maximum curvature of that polynomial, 10/sqrt(3)."""
 
 
 @dataclass(frozen=True, kw_only=True)

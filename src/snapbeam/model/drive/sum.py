@@ -76,7 +76,7 @@ class SumDrive(Timed):
 
     @property
     def parts_of_sum(self) -> list[Drive]:
-        """Its terms."""
+        """Terms of the sum."""
         return [
             kind(**{name: getattr(self, f"{name}_{i}") for name in _names(kind)})
             for i, kind in enumerate(self.terms, 1)
@@ -127,11 +127,11 @@ class SumDrive(Timed):
         return found | {"fastest": fastest}
 
     def samples(self) -> _Array:
-        """Those of every term, in their order."""
+        """Samples of every term, in their order."""
         return np.concatenate([drive.samples() for drive in self.parts_of_sum])
 
     def frequencies(self, columns: Mapping[str, _Array], scale: Scale) -> list[_Array] | None:
-        """Those of every term; None if one of them does not repeat."""
+        """Frequencies of every term; None if one of them is not periodic."""
         found: list[_Array] = []
         for _, drive, own in self._each(columns):
             of_term = drive.frequencies(own, scale)

@@ -69,7 +69,7 @@ def mean_of(values: NDArray[np.float64], *more: float) -> Quantity:
 
 
 def median_of(values: NDArray[np.float64], *more: float) -> Quantity:
-    """Their median, those that are not a number left out, by :func:`resampled`."""
+    """Median of the finite values, with its uncertainty by :func:`resampled`."""
     known = values[~np.isnan(values)]
     return resampled(lambda at: float(np.median(known[at])), known.size, *more)
 

@@ -34,7 +34,7 @@ LONGEST = (0.75, 0.58)
 """Point of the longest lifetime of 32 modes."""
 _SEED = 118291
 _SCALE = (5.0, 5000.0)
-"""Of the colours, cycles."""
+"""Limits of the colour scale, cycles."""
 _APART = 1.0
 """Cycles by which the ends of two runs must differ."""
 

@@ -47,8 +47,7 @@ class Pushed:
     """Result of a beam under tips that rise together."""
 
     height: float
-    """Of the tips over b when the beam snapped; NaN if it still rests on them when they reach
-    the upper of the shapes that it has by itself."""
+    """Height of the tips over b at the snap; NaN if the beam reaches its upper equilibrium in contact."""
     tips: int
     """Number of tips in contact just before the snap; fewer than all if the beam had left the others."""
     amplitude: _Array

@@ -128,7 +128,7 @@ def run_ensemble(
 def integrate_with_output_states(
     ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
 ) -> OutputStates:
-    """As :func:`run_ensemble`, and the states at every output time."""
+    """Integrate as :func:`run_ensemble`, with the states at every output time."""
     output_states = int(-(-ensemble.runs["end"][0] // ensemble.runs["output_interval"][0]))
     return _march(ensemble, threads, progress, output_states)
 
@@ -139,7 +139,7 @@ def integrate_tangents(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> tuple[OutputStates, _Array]:
-    """As :func:`integrate_with_output_states`, with tangents carried along to the end.
+    """Integrate as :func:`integrate_with_output_states`, with tangents.
 
     Parameters
     ----------

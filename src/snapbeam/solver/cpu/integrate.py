@@ -67,7 +67,7 @@ class KernelOutput(NamedTuple):
     contacts: Any
     """Current well, and ticks since contact onset of each striker (-1: apart), shape (runs, output states, 1 + strikers)."""
     stop_flag: Any
-    """Not 0: stop."""
+    """Stop flag: the integration stops if it is not 0."""
 
 
 @inlined

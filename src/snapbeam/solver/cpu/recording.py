@@ -84,7 +84,7 @@ class _Instant(NamedTuple):
     p: int
     kinematics: ContactKinematics
     energy: float
-    """Of the beam, J."""
+    """Energy of the beam, J."""
 
 
 class _Sums(NamedTuple):
@@ -94,14 +94,14 @@ class _Sums(NamedTuple):
     dissipated: float
     lost: float
     works: Any
-    """Of the terms, a tuple."""
+    """Work of the terms, a tuple."""
     within: float
     """1 with what a part of a step gave, 0 without."""
 
 
 @inlined
 def _sums(terms, accumulators):
-    """As a run's record of accumulators has them."""
+    """Sums from a record of accumulators."""
     return _Sums(
         accumulators.work,
         accumulators.dissipated,
@@ -184,7 +184,7 @@ def record_instants(memory, blocks, layout, stages, run, tip, now, step, accumul
 
 @inlined
 def record_held(memory, blocks, layout, run, tip, now, step, accumulators, outputs):
-    """As :func:`record_instants`, of a step in which the tip carries a single mode."""
+    """Record as :func:`record_instants`, for a step in which the tip carries a single mode."""
     clock, sample, size, done = run.clock, now.sample, layout.size, outputs.marks[0]
     times, q2, p2 = outputs.times, run.spare, run.spare + size
     while done < times.size:

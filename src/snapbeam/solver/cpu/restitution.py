@@ -303,9 +303,9 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
 _LOCATIONS = 24
 """Newton steps in which a hit is located, at most."""
 _NOISE = 1e-12
-"""Of the tip's speed: relative velocities that are rounding."""
+"""Relative velocities below this multiple of the tip's speed are rounding."""
 _SOON = 0.05
-"""Of the shortest period: how long the rest of a chatter may last to be taken as complete."""
+"""Maximum remaining duration of a chatter that is completed at once, over the shortest period."""
 
 
 @inlined
@@ -428,7 +428,7 @@ def _turns(u0, v0, u1, v1, h):
 
 @compiled
 def _rise(u0, v0, u1, v1, h):
-    """As first_rise, and where the signal falls at both ends and has risen between them."""
+    """Upcrossing as first_rise, also if the signal decreases at both ends and increases between them."""
     rise = first_upcrossing(u0, v0, u1, v1, h)
     if rise >= 0.0 or v0 > 0.0 or v1 > 0.0:
         return rise
@@ -562,7 +562,7 @@ def _moved_on(memory, blocks, workspace, run, tip, step, done, q, p, k, after, p
 def accept_step_restitution(
     memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, outputs
 ):
-    """As :func:`snapbeam.solver.cpu.events.accept_step`, of a run whose impacts last no time."""
+    """Accept a step as :func:`snapbeam.solver.cpu.events.accept_step`, for impacts of zero duration."""
     layout, clock, tick = workspace.layout, run.clock, run.clock.tick
     tip = tip_about_well(run.tip, now.well_sign, run.rest_contact)
     rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center

@@ -87,7 +87,7 @@ class KernelInput(NamedTuple):
     """Any numbers of the law, for their type; so is the drive's."""
     drive: Any
     other_numbers: Any
-    """Of the strikers beside the first, shape (runs, strikers, numbers); so are the places of their rows."""
+    """Numbers of the further strikers, shape (runs, strikers, numbers)."""
     other_places: Any
     other_rows: Any
     circuit_rates: Any
@@ -153,9 +153,9 @@ class Run(NamedTuple):
     shortest_subinterval: float
     """Longest subinterval in which a step is sampled, s."""
     step_subintervals: int
-    """Such subintervals in a flight step."""
+    """Number of such subintervals in a flight step."""
     step_time: float
-    """Of the flight step, s."""
+    """Duration of the flight step, s."""
     coefficients: int
     """Memory offset of the prepared steps, one for each number of halvings from 0 on."""
     slot: int

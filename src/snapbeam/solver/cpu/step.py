@@ -107,13 +107,13 @@ class StepIncrement(NamedTuple):
     qr: float
     impulse: float
     work: float
-    """Of the strikers."""
+    """Work of the strikers."""
     gross: float
     lost: float
     """In the contact."""
     dissipated: float
     external: ExternalWork
-    """Of the terms."""
+    """Work of the terms."""
 
 
 @inlined
@@ -186,7 +186,7 @@ class StepData(NamedTuple):
     gamma: float
     in_contact: bool
     sine: float
-    """Of the phase of the drive at the beginning, if in contact."""
+    """Sine of the phase of the drive at the beginning, if in contact."""
     cosine: float
 
 

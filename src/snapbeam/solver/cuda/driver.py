@@ -104,7 +104,7 @@ class Options(NamedTuple):
     first_budget: int = 1000
     """Steps of the first slice; later ones last about 0.4 s."""
     fewest_threads: int | None = None
-    """Of a block: 16 on a device by default, where fewer leave lanes idle all the same."""
+    """Minimum threads of a block: 16 on a device by default, because fewer leave lanes idle."""
     warps: int | None = None
     """Warps that a multiprocessor is to hold; see :data:`snapbeam.solver.cuda.layout.RESIDENT_WARPS`."""
 

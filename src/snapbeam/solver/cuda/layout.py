@@ -42,7 +42,7 @@ MOST_MODES = 128
 """Modes, and threads of a block, that the kernel is built for."""
 WARP = 32
 FEWEST_THREADS = 16
-"""Of a block on a device, where fewer would leave lanes of the warp idle all the same."""
+"""Minimum threads of a block on a device, because fewer leave lanes of the warp idle."""
 STRUCTURE = ("omega", "omega_squared", "omega_damped", "damping", "g", "center", "shift", "high")
 """Rows of the structure."""
 MARKS = 6
@@ -182,7 +182,7 @@ class Block(NamedTuple):
     near: Any
     """Shared: q of the modes that the tension couples to this one."""
     coupling: Any
-    """This mode's column of G, over the modes it is coupled to; in registers."""
+    """Column of G of this mode, over the modes coupled to it; in registers."""
     flows: Any
     """Flows of all modes over the parts of each length of step, shape (flows, 4, threads)."""
     turns: Any

@@ -52,7 +52,7 @@ class Fixed(NamedTuple):
     step_time: float
     mode: Mode
     g: float
-    """Of this thread's mode, in the first well."""
+    """Element of g of this thread's mode, in the first well."""
     shift: float
     gamma: float
     rest_stretch: float

@@ -89,7 +89,7 @@ class ExternalWork(NamedTuple):
     """Work of the terms on the beam within a step, J."""
 
     works: Any
-    """Of each term, a tuple; 0 of those that do none."""
+    """Work of each term, a tuple; 0 if a term does none."""
     gross: float
     """Sum of the absolute values of the works in the kicks."""
 
@@ -383,7 +383,7 @@ _compiled_for_terms(has_state, _write_flag("after_flow"))
 
 
 def no_external_work(terms: Any) -> ExternalWork:
-    """Of a step that has not begun."""
+    """Zero work of all terms."""
     raise _of_kernels()
 
 
@@ -394,7 +394,7 @@ _compiled_for_terms(
 
 
 def total_work(terms: Any, one: ExternalWork, two: ExternalWork) -> ExternalWork:
-    """Of two parts of a step."""
+    """Sum of the work of two parts of a step."""
     raise _of_kernels()
 
 

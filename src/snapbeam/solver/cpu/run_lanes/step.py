@@ -196,7 +196,7 @@ class StepData(NamedTuple):
     """Mask of those that are."""
     length: Any
     sine: Any
-    """Of the phase of the drive at the beginning."""
+    """Sine of the phase of the drive at the beginning."""
     cosine: Any
 
 
@@ -596,7 +596,7 @@ def _tension_of(m, shape, gamma, which, q):
 
 
 def bounds(m: Any, shape: Any) -> Any:
-    """Of contact point and centre: a speed that the linear flow cannot exceed, and what the tension accelerates by."""
+    """Bounds of the speed of contact point and mid-span, and of the acceleration by the tension."""
     raise TypeError("bounds runs in compiled code only")
 
 

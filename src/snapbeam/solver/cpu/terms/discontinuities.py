@@ -21,7 +21,7 @@ _TWO_PI = 2.0 * math.pi
 _MARGIN = 2
 """Ticks on either side of a jump, between which one step goes across it."""
 APART = 8e-15
-"""Of the argument of a drive, rad: so far from the jump both parts of that step read the motion, beyond rounding."""
+"""Distance from a jump, rad, at which both parts of a step evaluate the motion, beyond rounding."""
 
 
 class Jump(NamedTuple):
@@ -30,7 +30,7 @@ class Jump(NamedTuple):
     time: str
     """The number that holds it, s since what jumps began."""
     begun: tuple[tuple[str, str], ...]
-    """Of each motion that it is part of, its argument's phase and rate: what jumps may have begun before the whole."""
+    """Names of phase and rate of the argument of each motion in a combination, for the order of the jumps."""
 
 
 def jumps_of(kind: Any, prefix: str = "") -> list[Jump]:

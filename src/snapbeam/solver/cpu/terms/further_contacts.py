@@ -85,9 +85,9 @@ class FurtherContacts(NamedTuple):
     """Memory offsets of the strikers after the first."""
 
     rows: int
-    """Their contact rows, one after the other."""
+    """Offset of the contact rows, one after the other."""
     numbers: int
-    """Their blocks of numbers."""
+    """Offset of the blocks of numbers."""
     kinds: Any
     """A value whose type says which laws they touch by."""
     indentations: Any
