@@ -93,7 +93,7 @@ def _plain(found: object) -> str:
 
 
 def _finish(dataset: xr.Dataset, output: Path, plot: Path | None, lines: list[str]) -> None:
-    """Write the results, draw them, and say what they are."""
+    """Write, draw and print the results."""
     from snapbeam.cli.console import draw, write_map
 
     reason = dataset.attrs.get("termination_reason")

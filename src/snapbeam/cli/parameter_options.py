@@ -304,7 +304,7 @@ def configured(
 ) -> Config:
     """The parameters of the ``--config`` file overridden by what was given on the command line.
 
-    *axes_of* says what the axes of a command are, those that it has by itself among them, for ``--print-config``.
+    *axes_of* returns the axes of a command, its own ones included, for ``--print-config``.
     """
     from snapbeam.model.parameter_file import Config, load_config, override, same_axis
     from snapbeam.model.parameters import lookup
@@ -370,7 +370,7 @@ def _needs_drive(given: Mapping[str, Any]) -> bool:
 
 
 def _require_striker(config: Config, sections: Mapping[str, Any], axes: Mapping[str, Any]) -> None:
-    """Refuse the drive of a striker that neither the file nor an option gives, beside what the file does move."""
+    """Raise an error for a striker without a drive next to another excitation of the file."""
     from snapbeam.model.parameter_axes import physical_name
     from snapbeam.model.parameters import lookup
     from snapbeam.model.quantity import split_name

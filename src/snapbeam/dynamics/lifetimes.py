@@ -352,7 +352,7 @@ class LifetimeWork(PointWork):
 
 TITLE = "lifetimes of the snapping of a struck bistable beam"
 CYCLES = 1000
-"""Cycles of a run unless others are asked for."""
+"""Default number of cycles of a run."""
 WELLS = ("first", "other")
 START, WELL, AFTER = "start", "well", "after"
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))

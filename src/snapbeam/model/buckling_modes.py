@@ -363,7 +363,7 @@ def damping_ratios(value: ArrayLike, count: int) -> _Array:
 
 
 def checked_structure(given: StructureMatrices) -> dict[str, Any]:
-    """The fields of a reduced model for a structure, or an ``InputError`` that says what is wrong."""
+    """Fields of a reduced model for a structure; raises an ``InputError`` with the reason."""
     mass, stiffness = _pair(given)
     count = mass.shape[0]
     rows: dict[str, _Array | None] = {"contact_shape": _shape("contact_shape", given.contact_shape, count)}

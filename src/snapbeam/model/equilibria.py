@@ -317,7 +317,7 @@ def landscape_of(
     midspan_shape: _Array,
     elongation: _Array | None = None,
 ) -> Landscape:
-    """All equilibria under the transverse force B, told apart.
+    """All distinct equilibria under the transverse force B.
 
     At most two of them are stable: beyond the second eigenvalue of K0 + gamma s the term 2 gamma alpha alpha^T, of rank
     one, cannot make up for two negative ones.
@@ -325,7 +325,7 @@ def landscape_of(
     Raises
     ------
     InputError
-        If no equilibrium is stable, or two wells cannot be told apart by the centre.
+        If no equilibrium is stable, or the wells do not differ at mid-span.
     """
     found = []
     if elongation is None:

@@ -61,7 +61,7 @@ _VALUES = 5
 _DIFFERENCE = 1e-5
 """Half the distance of the values of a derivative by the parameter, over the range."""
 _KNOWN = 256
-"""Potentials that are held, by the value of the parameter."""
+"""Cached potentials, by the value of the parameter."""
 _BESIDE = 0.02
 """Distance from the end of the range of a law, over that of the end from the straight beam."""
 _SAME = 1e-3

@@ -247,7 +247,7 @@ def _well(potential: Potential, given: str | None) -> tuple[str, str]:
 
 
 def _unstable_at_fixed_displacement(potential: Potential, row: _Array, alpha: _Array) -> NDArray[np.int_]:
-    """Negative eigenvalues of the tangent stiffness, with the displacement on the row held, at (points, N) amplitudes."""
+    """Negative eigenvalues of the tangent stiffness, at fixed displacement on the row, at (points, N) amplitudes."""
     if alpha.shape[1] == 1:
         return np.zeros(alpha.shape[0], dtype=np.int_)
     free = np.linalg.svd(row[None, :])[2][1:]

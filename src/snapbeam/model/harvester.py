@@ -29,7 +29,7 @@ _STRONGEST_COUPLING = 1.0
 
 
 class Harvester:
-    """A circuit of one state beside the beam: a frozen dataclass.
+    """Circuit with one state, coupled to the beam: a frozen dataclass.
 
     With theta the row of the coupling in buckling modes, z what pulls back (the voltage, or the current the other way
     round) and M and rho its inertia and its loss,

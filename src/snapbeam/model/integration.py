@@ -15,7 +15,7 @@ __all__ = ["ACCURACIES", "CYCLES", "ENGINES", "Integration"]
 ACCURACIES = ("standard", "reference")
 ENGINES = ("auto", "cpu", "cuda")
 CYCLES = 200
-"""Cycles of a run unless others are asked for."""
+"""Default number of cycles of a run."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Stiffness and mass matrices: symmetry, coordinates held by a penalty, and eigenvalues with a decision on rigid modes."""
+"""Stiffness and mass matrices: symmetry, coordinates fixed by a penalty, and eigenvalues with a decision on rigid modes."""
 
 from __future__ import annotations
 

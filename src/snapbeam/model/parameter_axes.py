@@ -65,7 +65,7 @@ def parse_axis(
         ``0.18``, ``"0.18"``, ``"1/2.1"``, ``"0.1,0.2,0.5"``, or ``"0.1:4:64"`` for 64 points from 0.1 to 4,
         both included.  Numbers of text may have a unit that pint knows: ``"1.9um:2.1um:5"``, ``"1kohm,1Mohm"``.
     whole : bool
-        Whether the numbers are to be whole, as a refusal then says.
+        True if the numbers must be integers, for the error message.
     unit : str
         Unit of the parameter, in which the result is.
 
@@ -243,7 +243,7 @@ def checked_physical(system: System, name: str, value: float, shown: str) -> flo
     Raises
     ------
     InputError
-        If the ratio is out of its range; the message says both.
+        If the ratio is out of its range; the message contains both.
     """
     ratio, row = float(from_physical(system, name, value)), lookup(PHYSICAL[name].parameter)
     short = split_name(row.name)[1]

@@ -386,7 +386,7 @@ def contradictions(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
 
 
 def with_section(message: str, found: Mapping[str, Mapping[str, Any]]) -> str:
-    """The refusal of a value with the section that it stands in."""
+    """Error message of a value with its section."""
     name = message.partition(" ")[0].rstrip(":")
     for section, values in found.items():
         if name in values:
@@ -474,7 +474,7 @@ class Config:
 
     @cached_property
     def defaulted(self) -> tuple[str, ...]:
-        """Names of what was not given: the values of the paper's beam beside another beam, and else the default drive."""
+        """Names of values that were not given: those of the paper's beam for another beam, else the default drive."""
         if not self.section("beam"):
             return ()
         found, swept = self._defaults(), self.axes(keep_units=True) if self.section("sweep") else {}
@@ -487,7 +487,7 @@ class Config:
         )
 
     def whole(self, axes: Mapping[str, Any] | None = None) -> Config:
-        """Everything, what was not given too, as a file would hold it: to print, to keep, to start another file from.
+        """All values, defaults included, in the layout of a parameter file.
 
         Parameters
         ----------
@@ -639,7 +639,7 @@ class Config:
 
     @property
     def _around(self) -> list[str]:
-        """The sections of what acts on the structure beside strikers."""
+        """Sections of excitations other than strikers."""
         return [name for name, values in self.given.items() if numbered(name)[0] in _AROUND and values]
 
     @property
@@ -792,7 +792,7 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "", *, comple
         Values by section and name.  The paper's values complete them if they contain ``extends = "paper"`` or no section
         of a system.  Sections of commands such as ``probability`` are left out.
     source : str
-        Where they come from, to stand before each refusal.
+        Source of the values, the prefix of each error message.
     complete : bool
         Whether they must describe a system.  If not, each value is checked, but others may complete them.
 
@@ -850,7 +850,7 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]], source: 
 
 
 def same_axis(name: str) -> set[str]:
-    """The dotted names, that in a physical unit among them, of what *name* stands for; none if it is unknown."""
+    """Dotted names of *name*, those in physical units included; empty if it is unknown."""
     try:
         physical = physical_name(name)
         full = lookup(name).name if physical is None else PHYSICAL[physical].parameter
@@ -908,7 +908,7 @@ def dump_config(config: Config, path: str | os.PathLike[str], comment: str = "")
     path : path
         Ends in ``.toml``.
     comment : str
-        Lines to stand at the top.
+        Comment lines at the top.
     """
     target = check_writable(path, "path", (".toml",))
     with atomic_path(target) as temporary:

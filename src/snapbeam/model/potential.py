@@ -372,7 +372,7 @@ class Potential:
 
     @property
     def force_texts(self) -> list[str]:
-        """The forces that act beside those of the structure, a sentence each."""
+        """Description of the additional forces, one sentence for each."""
         found = [f"with {shown(law)}" for law in self.local_forces]
         return [*found, "with the constant part of the external force"] if self.constant.any() else found
 
@@ -397,7 +397,7 @@ class Potential:
         return own if abs(found - own) <= _SAME * self._length else found
 
     def barrier(self, well: int) -> float:
-        """Energy from a well, by number, to the lowest saddle beside it, J; NaN if there is none."""
+        """Energy from a well, by number, to the lowest adjacent saddle, J; NaN if there is none."""
         if not self.local_forces:
             return self.structure.saddle_energy - self.wells[well].energy if len(self.wells) > 1 else math.nan
         heights = [each.equilibrium.energy for each in self.saddles if well in each.wells]

@@ -55,7 +55,7 @@ _A: dict[str, tuple[Any, str]] = {
     "base_excitation": (BaseExcitation, "a BaseExcitation(motion=AccelerationSine(...))"),
     "axial_load": (AxialLoadModulation, "an AxialLoadModulation(motion=HarmonicLoad(...))"),
 }
-"""Parts of a system beside its model: their classes, and words for them."""
+"""Parts of a system other than the model: their classes and names."""
 
 
 @dataclass(frozen=True, eq=False)

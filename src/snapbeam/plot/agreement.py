@@ -32,7 +32,7 @@ def draw_agreement(
 ) -> Patch:
     """Lay white over the cells of a map, the more the fewer repeats have the class of the cell's own run.
 
-    Returns what a legend needs to say so: a scale of the shades.
+    Returns the scale of the shades, for the legend.
     """
     share = dataset["class_fraction"].squeeze().transpose(dims[1], dims[0], "class_code")
     kinds = dataset["response_class"].squeeze().transpose(dims[1], dims[0]).values

@@ -1,4 +1,4 @@
-"""Axes of pictures over any parameter: what stands along them, and how their points are spread."""
+"""Axes of pictures over any parameter: labels, and spacing of the points."""
 
 from __future__ import annotations
 

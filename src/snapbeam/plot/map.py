@@ -62,7 +62,7 @@ UPWARD = ("velocity_amplitude", "location")
 _CURVES = ("min_midspan_displacement", "max_midspan_displacement")
 """Drawn over the classes of a map over one axis."""
 _LONGEST = 38
-"""Characters of a line beside a map of one column."""
+"""Characters of a line next to a map of one column."""
 _NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
 
 
@@ -468,7 +468,7 @@ def _swept(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, name: str) -> None
 
 
 def scaled_values(dataset: xr.Dataset, name: str) -> tuple[_Array, str]:
-    """Values of a variable in a unit that suits them, and what stands beside them."""
+    """Values of a variable in a suitable unit, and their label."""
     values = dataset[name].values.astype(np.float64)
     factor, label = _label(dataset, name, values)
     scaled: _Array = values / factor

@@ -117,7 +117,7 @@ def _layers(ax: Axes, piezo: PiezoelectricHarvester, x: _Array, w: _Array, sign:
 
 
 def _coil(ax: Axes, coil: ElectromagneticHarvester, x: _Array, w: _Array, sign: float, wide: float) -> None:
-    """A magnet on the beam and the windings beside it."""
+    """Draw a magnet on the beam and the coil next to it."""
     at = coil.location * wide
     there = float(np.interp(at, x, w))
     edge = there + 0.03 * sign

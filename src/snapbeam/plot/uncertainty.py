@@ -139,7 +139,8 @@ def plot_probability(
     """Draw a probability map of one outcome.
 
     Over two parameters colours say the probability, in tenths, and lines where it passes *levels*; points whose
-    interval is wider than was asked for have a small cross.  Over one parameter the line has its interval as a band.
+    interval is wider than requested have a small cross.  Over one parameter the line has its interval as a
+    band.
 
     Parameters
     ----------
@@ -355,8 +356,9 @@ _UP, _DOWN, _TOTAL = "#B03A27", "#16245E", "#70BBF0"
 def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Draw the result of :func:`snapbeam.uncertainty.sensitivity`: a bar for each parameter, with intervals.
 
-    Locally, bars reach from the mean answer to those with the parameter one standard score down and up; how much that
-    is in the parameter's own unit stands beside its name.  Of indices, the first order and, if there is one, the total.
+    Locally, bars reach from the mean answer to those with the parameter one standard score down and up; how
+    much that is in the unit of the parameter is next to its name.  Of indices, the first order and, if there is
+    one, the total.
 
     Raises
     ------

@@ -65,7 +65,7 @@ def threshold(
     Parameters
     ----------
     system : System
-        The model; parameters that are not in `axes` keep their values.
+        Nominal system; parameters that are not in *axes* have its values.
     parameter : str
         Parameter to raise, such as ``"velocity_amplitude"``: one that may differ between the runs of an ensemble.
     values : array_like

@@ -1,4 +1,4 @@
-"""Diagnostics: what is doubtful about an input or a result, as data; and the ways they are told, kept and refused."""
+"""Diagnostics: findings about an input or a result, as data; printing, storing and raising them."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ _HASHED = 64 * 2**20
 
 @dataclass
 class _Guard:
-    """The files that a command names, those that it may write to, and what it was asked for."""
+    """Input files, output files and arguments of a command."""
 
     named: tuple[Path, ...]
     defaults: tuple[Path, ...]
@@ -263,12 +263,12 @@ def check_writable(
 
 
 class NoRoomError(OSError):
-    """A file that could not be written since the disk is full: the message says how much room is needed."""
+    """Error if the disk is full; the message states the required size."""
 
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary path beside *path* to write to, and rename it to *path* if all went well.
+    """Provide a temporary path next to *path* to write to, and rename it to *path* if all went well.
 
     If the block raises, an interrupt included, the temporary file is removed and *path* is left as it was.  What a
     process that was killed left of its own is removed by the next that writes there.
@@ -306,7 +306,7 @@ _HERE = hashlib.sha256(platform.node().encode()).hexdigest()[:6]
 
 
 def _sweep(target: Path) -> None:
-    """Remove what killed processes of this machine left beside *target*."""
+    """Remove temporary files next to *target* of killed processes of this machine."""
     if os.name == "nt":
         return
     begin = f".{target.stem}.{_HERE}-"

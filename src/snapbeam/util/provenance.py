@@ -168,7 +168,7 @@ def array_hash(values: Any) -> str:
 
 
 def made_by(parameters: Any = None, *, command: str | None = None) -> dict[str, str]:
-    """Return the attributes that say what made a file.
+    """Return the provenance attributes of a file.
 
     Parameters
     ----------

@@ -194,7 +194,7 @@ def integer(name: str, value: Any, low: int, high: int | None = None) -> int:
 
 
 def seed_of(rng: int | np.random.Generator | None) -> int:
-    """Return the seed that *rng* stands for: itself, a number that the generator draws, or one from the system (SPEC 7)."""
+    """Return the seed of *rng*: itself, a number that the generator draws, or one from the system (SPEC 7)."""
     if rng is None:
         rng = np.random.default_rng()
     if isinstance(rng, np.random.Generator):
@@ -296,7 +296,7 @@ def mapping(name: str, value: Any) -> Mapping[Any, Any]:
 
 
 def parsed_json(text: Any, name: str) -> dict[str, Any]:
-    """The object that a JSON text holds; refused, by the name of where it stands, if it is damaged."""
+    """Object of a JSON text; raises an error with the name of the source if it is damaged."""
     try:
         found = json.loads(text)
     except (TypeError, ValueError, RecursionError) as error:
@@ -416,7 +416,7 @@ def _words(kinds: list[Any]) -> str:
 
 
 def checked(function: _F) -> _F:
-    """Refuse arguments of another kind than *function*'s annotations say, before it begins.
+    """Raise an error for arguments of another type than the annotations of *function*, before it begins.
 
     What is a number, a flag, a dataset, a system or a sequence is decided here; which numbers and words are allowed is
     the function's to say.

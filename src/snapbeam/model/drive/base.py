@@ -44,7 +44,7 @@ class Scale(NamedTuple):
 
 
 SCALAR: list[Callable[..., Any]] = []
-"""Functions of numbers that motions share; kernels compile them as they stand."""
+"""Scalar functions that motions share; kernels compile them unchanged."""
 
 
 def scalar(function: _Scalar) -> _Scalar:
@@ -187,7 +187,7 @@ class Timed(Drive):
     is_periodic = False
 
     def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
-        """The numbers beside ``omega``."""
+        """Numbers in addition to ``omega``."""
         raise NotImplementedError
 
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
