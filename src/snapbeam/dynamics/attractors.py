@@ -150,7 +150,7 @@ class Cloud:
 
 
 def cloud_of(points: _Array) -> Cloud:
-    """A cloud from points of shape (points, d): half of them say how far the other half is."""
+    """Cloud of points of shape (points, d): one half determines the distance of the other."""
     first, second = points[::2], points[1::2]
     away, _ = cKDTree(first).query(second)
     return Cloud(points, cKDTree(points), 1.5 * float(np.quantile(away, 0.99)))
@@ -198,7 +198,7 @@ class Attractor:
     """Largest Lyapunov exponent, 1/s (per period of a map)."""
     exponent_error: float
     verification: PeriodicOrbit | None = None
-    """The orbit at accuracy level "reference", whose multipliers say that it is stable."""
+    """The orbit at accuracy level "reference", whose multipliers are inside the unit circle."""
 
     @property
     def period(self) -> int:
@@ -526,7 +526,7 @@ def _is_same(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
 
 
 def _nearest(orbits: list[PeriodicOrbit], x: _Array) -> int:
-    """The orbit that a state is on, as nearly as states that repeat are told."""
+    """Orbit of a state, within the tolerance of repeating states."""
     for number, orbit in enumerate(orbits):
         if float(np.abs(orbit.points - x).max(axis=1).min()) < 10.0 * _REPEATS:
             return number
@@ -598,7 +598,7 @@ def _mingle(tree_one: Any, tree_other: Any) -> bool:
 
 
 def _ordered(found: list[Attractor]) -> tuple[list[Attractor], NDArray[np.int64]]:
-    """Attractors in an order of their own, whatever state led to them, and where each stands in it."""
+    """Attractors in a fixed order, independent of the states that led to them, and the position of each."""
 
     def key(i: int) -> tuple[Any, ...]:
         each = found[i]

@@ -36,7 +36,7 @@ _AMONG = 8
 _MANY = 0.05
 """Share of undecided states from which on a warning is given."""
 _SAMPLE = 300
-"""States with no other label beside them that are integrated at half the step too."""
+"""Number of states without a neighbour of another label that are integrated at half the step too."""
 _SENSITIVE = 0.01
 """Share of labels that change with the step from which on a warning is given."""
 _CONFIDENCE = 0.95

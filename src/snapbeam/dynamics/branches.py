@@ -442,7 +442,7 @@ def grazing_end(spots: list[tuple[Corrector, Spot]]) -> SpecialPoint | None:
 _Array = NDArray[np.float64]
 _TOLERANCE = 1e-10
 _SHORTEST, _LONGEST = 1e-8, 1.0
-"""Bounds of the distance between orbits that may be asked for."""
+"""Allowed range of the distance between orbits."""
 _EASY, _HARD = 4, 9
 """Iterations up to which the step grows, and from which on it shrinks."""
 

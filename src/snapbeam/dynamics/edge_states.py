@@ -1,4 +1,4 @@
-"""Edge states: the state on the border between snapping and not, held there by bisection with the state carried on."""
+"""Edge states: the state on the border between snapping and not, tracked by bisection of full states."""
 
 from __future__ import annotations
 

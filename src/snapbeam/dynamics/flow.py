@@ -266,7 +266,7 @@ class AdvancedStates:
     states: _Array
     """After the last period, shape (runs, d); NaN where a run failed."""
     every: _Array | None
-    """After each period, shape (runs, periods, d), if they were asked for."""
+    """After each period, shape (runs, periods, d), if requested."""
     tangents: _Array | None
     """Small changes that were carried along, shape (runs, k, d)."""
     statistics: Mapping[str, NDArray[Any]] = field(default_factory=dict)
@@ -375,7 +375,7 @@ class Stroboscope:
 
     @cached_property
     def _own(self) -> tuple[tuple[str, int, float], ...]:
-        """States beside the beam's: array of :class:`State`, place in it, and unit."""
+        """States in addition to those of the beam: array of :class:`State`, place in it, and unit."""
         parts = self.system.contacts
         if not self.system.harvesters and all(
             each.striker.mass is None and not each.law.memory for each in parts

@@ -98,7 +98,7 @@ class LifetimeFit(NamedTuple):
     """An exponential law of lifetimes; arrays of the shape of the batch."""
 
     lifetime: _Array
-    """tau; NaN where no end says it."""
+    """tau; NaN without an end."""
     low: _Array
     high: _Array
     """Interval of tau; infinite where the ends do not bound it."""

@@ -157,7 +157,7 @@ class Return(NamedTuple):
     jacobian: _Array
     """Shape (d, d)."""
     impacts: int
-    """On the way; -1 where it is not told."""
+    """Impacts on the way; -1 if unknown."""
 
 
 def jacobian(family: Family, x: _Array, periods: int, value: float | None = None) -> Return:

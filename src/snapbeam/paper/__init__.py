@@ -6,8 +6,8 @@ A recipe computes its data by the public interface alone and draws them:
 >>> figure = paper.fig2()  # doctest: +SKIP
 >>> paper.fig6.write("out", size="quick")  # doctest: +SKIP
 
-``size="quick"`` is a sketch for tests (small grids, few modes, few cycles), ``"full"`` what the
-documentation shows. :func:`snapbeam.paper.claims.measure_claims` measures what the paper says.
+``size="quick"`` is a sketch for tests (small grids, few modes, few cycles), ``"full"`` what the documentation
+shows. :func:`snapbeam.paper.claims.measure_claims` measures the statements of the paper.
 """
 
 from __future__ import annotations
@@ -100,4 +100,4 @@ FIGURES: dict[str, Recipe] = {
         notch, two_tips, switch, harvesting,
     )
 }  # fmt: skip
-"""Every recipe by name: the figures of the paper, its fifth video, and those that its claims need beside."""
+"""Every recipe by name: the figures of the paper, its fifth video, and further runs of its claims."""

@@ -1,4 +1,4 @@
-"""Differential evolution for one objective or several under constraints, asked for designs and told what they are worth.
+"""Differential evolution for one objective or several under constraints, in ask-and-tell form.
 
 Generalised differential evolution (GDE3; Kukkonen and Lampinen, IEEE Congress on Evolutionary Computation 2005, 443):
 DE/rand/1/bin, in which a design that satisfies its constraints beats one that does not, of two that do not the one that breaks

@@ -390,9 +390,9 @@ class ParameterUncertainty:
 def uncertainty_from_mapping(given: Mapping[str, Any], name: str = "uncertainty") -> ParameterUncertainty:
     """Read the uncertainty from a section of a parameter file.
 
-    Each parameter stands with a table that names one distribution: ``{normal = 0.02, relative = true}``,
-    ``{uniform = 1e-5}``, ``{lognormal = 0.3}`` or ``{range = [3.14, 6.28]}``; further keys are ``displacement``,
-    ``phase``, ``hold_fixed`` and ``seed``.
+    Each parameter has a table that names one distribution: ``{normal = 0.02, relative = true}``, ``{uniform =
+    1e-5}``, ``{lognormal = 0.3}`` or ``{range = [3.14, 6.28]}``; further keys are ``displacement``, ``phase``,
+    ``hold_fixed`` and ``seed``.
 
     Raises
     ------

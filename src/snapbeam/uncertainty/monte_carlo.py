@@ -48,7 +48,7 @@ _Numbers = NDArray[np.int64]
 
 _Made = dict[tuple[Any, ...], System]
 _KEPT = 4096
-"""Systems that are kept at most."""
+"""Maximum number of cached systems."""
 
 
 def _made(made: _Made, system: System, changes: dict[str, Any]) -> System:
@@ -76,10 +76,11 @@ class _DrawnSetup(SweepSetup):
 
 @dataclass
 class Trials:
-    """Samples of a system, run where they are asked for.
+    """Monte Carlo samples of a system, run on demand.
 
-    What a run gives hangs on its point and the number of its sample alone.  Rounds are kept in a folder each of the
-    store, in the order in which they are asked for: a question that asks the same again reads them instead.
+    The result of a run depends only on its point and the number of its sample.  Rounds are kept in a folder
+    each of the store, in the order in which they are asked for: a question that asks the same again reads them
+    instead.
     """
 
     system: System
@@ -89,7 +90,7 @@ class Trials:
     keeping: CheckpointOptions = field(default_factory=CheckpointOptions)
     cluster: str | None = None
     runs: int = 0
-    """Runs asked for so far."""
+    """Number of requested runs."""
     rounds: int = 0
     made: dict[tuple[Any, ...], System] = field(default_factory=dict, repr=False)
     """Systems of the structures that were sampled so far."""

@@ -109,7 +109,7 @@ def _settled(_: System, values: Values) -> _Array:
 
 
 CYCLE = "cycle"
-"""Seconds of a cycle, beside the statistics of a run."""
+"""Key of the seconds of a cycle, in addition to the statistics of a run."""
 
 
 OWN: dict[str, DesignQuantity] = {
@@ -121,7 +121,7 @@ OWN: dict[str, DesignQuantity] = {
         DesignQuantity("cycles_to_settle", "1", "cycles to the last snap", "run", _settled),
     )
 }
-"""Quantities beside statistics, outcomes and parameters; the first three are of a sine."""
+"""Quantities in addition to statistics, outcomes and parameters; the first three are of a sine."""
 
 
 def quantity_of(name: str) -> DesignQuantity:
@@ -248,7 +248,7 @@ def _quantile(ordered: _Array, share: float, confidence: float) -> tuple[float, 
 
 @dataclass(frozen=True, kw_only=True)
 class Constraint:
-    """Something to keep.
+    """Constraint of a design, with a probability.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ class Constraint:
     lower, upper : float, optional
         One of them at least.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
     probability : float
-        Of a statistic of runs: share of all systems that must keep it, in (0, 1).
+        Of a statistic of runs: required fraction of all systems that satisfy it, in (0, 1).
 
     Examples
     --------
@@ -301,11 +301,11 @@ class Constraint:
 
     @property
     def required(self) -> float:
-        """Share of the runs that must keep it."""
+        """Required fraction of the runs that satisfy it."""
         return float(self.lower) if self._quantity.kind == "outcome" else self.probability  # type: ignore[arg-type]
 
     def kept(self, values: NDArray[Any]) -> NDArray[np.bool_]:
-        """Which runs keep it."""
+        """Mask of the runs that satisfy it."""
         if self._quantity.kind == "outcome":
             return np.asarray(values, dtype=bool)
         low = -np.inf if self.lower is None else self.lower
@@ -368,7 +368,7 @@ class Estimate(NamedTuple):
     objectives: _Array
     """Value, lower and upper limit, of shape (objectives, 3), in their own signs."""
     constraints: _Array
-    """Share of the runs that keep each constraint with its interval, of shape (constraints, 3)."""
+    """Fraction of the runs that satisfy each constraint, with its interval, shape (constraints, 3)."""
     runs: int
     failed: int
 
@@ -575,7 +575,7 @@ def _joined(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
 def problem_of(
     trials: Trials, variables: Any, objectives: Any, constraints: Any, samples: int, validation_samples: int
 ) -> DesignProblem:
-    """Check what may be chosen and what is asked of it.
+    """Check variables, objectives and constraints.
 
     Raises
     ------

@@ -79,9 +79,9 @@ class Crossing(NamedTuple):
     value: float
     """Midway where the isotonic regression is less and where it is more; infinite where it never is."""
     low: float
-    """-inf where no run says that it lies higher."""
+    """-inf if no run bounds it from below."""
     high: float
-    """inf where no run says that it lies lower."""
+    """inf if no run bounds it from above."""
 
 
 def isotonic(hits: ArrayLike) -> _Array:

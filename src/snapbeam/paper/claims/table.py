@@ -28,9 +28,9 @@ BEGINS = {"claims.md": "**Of ", "claims.csv": "number,topic,says,paper,", "claim
 class Claim:
     """Statement of the paper, the measured value with its rule, and the verdict.
 
-    ``verdict``: ``holds``, ``in part``, ``fails``, or ``open`` for what the paper does not say and whose
-    influence is measured instead.  ``close``: whether it would be another within the uncertainty.  ``size``:
-    whether it was measured at the size of the paper or on a sketch.
+    ``verdict``: ``holds``, ``in part``, ``fails``, or ``open`` for properties that the paper does not specify
+    and whose influence is measured instead.  ``close``: whether it would be another within the uncertainty.
+    ``size``: whether it was measured at the size of the paper or on a sketch.
     """
 
     number: str
