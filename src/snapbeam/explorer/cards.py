@@ -92,7 +92,7 @@ class WindowControl:
         self._waiting = Waiting(card.shared.compiling, card.later)
 
     def wake(self) -> None:
-        """The page stands in a browser: from now on what is seen is worth computing."""
+        """Start computing visible windows; the page is now loaded in a browser."""
         self._awake = True
         self.view_moved()
 
@@ -224,7 +224,7 @@ class WindowControl:
             self.card.tell(words or f"window: all {window.wanted} points computed")
 
     def more(self) -> None:
-        """Compute the level that was asked about."""
+        """Compute the requested level."""
         window = next((w for w in reversed(self.card.windows()) if w.asks is not None), None)
         self.card.more.visible = False
         asked = 0.0 if window is None or window.asks is None else window.asks[1]
@@ -283,7 +283,7 @@ class MapCard:
         self.moved: Callable[[], None] = lambda: None
         self.cut_moved: Callable[[dict[str, Any]], None] = lambda _: None
         self.own: set[Any] = set()
-        """Keys of the windows that this page has asked for: those of other tabs are not laid over its map."""
+        """Keys of the windows that this page requested; those of other tabs are not drawn over its map."""
         self._drawn: list[tuple[Window, NDArray[np.int8]]] = []
         self._picked: tuple[float, float] | None = None
         self._words = list(address.words)
@@ -472,7 +472,7 @@ class MapCard:
         return self.system.hash, self.integration, self.plane.names, fixed
 
     def windows(self) -> list[Window]:
-        """The windows over this cut that this page has asked for, the widest first."""
+        """Windows over this section that the page requested, the widest first."""
         if self.system is None or self.source.is_list:
             return []
         return self.shared.windows(self.plane_key, self.own)
@@ -889,7 +889,7 @@ class SystemCard:
     # ------------------------------------------------------------------ doing
 
     def apply(self) -> None:
-        """Use what stands in the fields from now on; refused with words, and nothing changes."""
+        """Apply the values of the fields; invalid ones give a message and change nothing."""
         try:
             changed = self.changed_fields()
             card = self.page.card
@@ -1101,7 +1101,7 @@ class TakeCard:
     # ------------------------------------------------------------------ files
 
     def _make(self, name: str, suffix: str, write: Callable[[Any, Token], object]) -> None:
-        """Make a file beside the page and hand it to the browser."""
+        """Make a file in the background and send it to the browser."""
         token = Token(_EXPORT_SECONDS)
         work, done = self._job(name, suffix, write, token)
         self.page.shared.jobs.export(work, done, token)

@@ -1,4 +1,4 @@
-"""Work that a page asks for, beside the page: newest first, cancelled when it is asked for again.
+"""Background jobs of a page: newest first, cancelled by a new request.
 
 Kernels let go of Python's lock, so that threads are enough.  A job hears that it is cancelled where it reports its
 progress; a window's next batch waits while a run, which a person waits for, is computed.
@@ -88,7 +88,7 @@ class Token:
         Raises
         ------
         Cancelled
-            If it was told to stop.
+            If cancellation was requested.
         InputError
             If it has taken longer than a page may ask for.
         """
@@ -154,7 +154,7 @@ class Jobs:
         Raises
         ------
         Cancelled
-            If the window was told to stop while it waited.
+            If the window was cancelled while it waited.
         """
         ticket = object()
         with self._turns:
@@ -338,7 +338,7 @@ WINDOW_SECONDS = 1800.0
 UPLOAD = 2 * 2**20
 """Bytes of a file given to the page."""
 ADDRESS = 4096
-"""Characters of what stands behind the page's address."""
+"""Maximum length of the query string."""
 BODY = 8 * 2**20
 """Bytes of one message from a page."""
 

@@ -305,7 +305,7 @@ class MapView:
         }  # fmt: skip
 
     def show_quasi_static(self, visible: bool, fixed: dict[str, Any]) -> str:
-        """Draw V_QS1 of one mode (Eq. 21); says why it cannot be drawn, if it cannot."""
+        """Draw V_QS1 of one mode (Eq. 21); returns the reason if it cannot be drawn."""
         self.curve.data = {"x": [], "y": []}
         if not visible:
             return ""

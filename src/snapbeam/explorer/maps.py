@@ -372,7 +372,7 @@ class SystemSource(Source):
 
 
 _SMALL = 2**25
-"""Bytes of a map up to which all of it is held, once a point of it has been asked for."""
+"""Size of a map up to which it is loaded completely on the first access, bytes."""
 
 
 class FileSource(DatasetSource):
@@ -562,7 +562,7 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A point that is asked for.
+    """Requested point.
 
     Attributes
     ----------
@@ -604,7 +604,7 @@ def _brief(value: Any) -> str:
 
 
 def system_of(attrs: Mapping[str, Any], name: str) -> System:
-    """The system that a map says it was computed of.
+    """System stored in a map.
 
     Raises
     ------
@@ -1616,7 +1616,7 @@ def _value(value: Any) -> str:
 
 
 def run_command(values: Mapping[str, Any], file: str, on_map: bool) -> str:
-    """The command that computes a point: of a file's map, or of a parameter file kept beside it."""
+    """The command that computes a point: of a file's map, or of a parameter file stored next to it."""
     if file and on_map:
         point = ",".join(f"{parameter_of_axis(name).short}={_value(value)}" for name, value in values.items())
         source = ["--from", file, "--point", point]
@@ -1628,7 +1628,7 @@ def run_command(values: Mapping[str, Any], file: str, on_map: bool) -> str:
 
 
 def map_command(window: Window, fixed: Mapping[str, Any]) -> str:
-    """The command that computes a window, on the cut at *fixed*, of a parameter file kept beside it."""
+    """The command that computes a window, on the cut at *fixed*, of a parameter file stored next to it."""
     parts = ["snapbeam", "map", "--config", _CONFIG]
     for name, value in fixed.items():
         parts += ["--set", f"{name}={_value(value)}"]
@@ -1641,7 +1641,7 @@ def map_command(window: Window, fixed: Mapping[str, Any]) -> str:
 
 
 def python_lines(system: System, integration: Integration) -> str:
-    """Lines of Python that compute a run of a system, with nothing beside them."""
+    """Self-contained Python code that computes a run of a system."""
     run = _integration_section(integration)
     arguments = ", ".join(f"{name}={value!r}" for name, value in run.items())
     sections = plain(system.to_mapping())

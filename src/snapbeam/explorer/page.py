@@ -124,7 +124,7 @@ class Page:
     shared : Shared
         What all pages of the server share.
     arguments : mapping
-        What stands behind the page's address.
+        Query string of the address.
     """
 
     def __init__(self, shared: Shared, arguments: dict[str, list[bytes]]) -> None:
@@ -192,7 +192,7 @@ class Page:
         self.later(self._at_rest, _AFTER)
 
     def _at_rest(self) -> None:
-        """Once the page stands: what is not seen yet, and what the first run will need."""
+        """Build hidden parts and prepare the first run after the page is loaded."""
         self.runs[0].complete()
         self.shared.warm()
 
@@ -350,11 +350,11 @@ class Page:
 
     @property
     def which(self) -> int:
-        """Which of the two runs is asked for."""
+        """Number of the requested run of the two."""
         return 1 if self.compare.value and self.target.value == "B" else 0
 
     def ask(self, point: Point, which: int | None = None) -> None:
-        """Compute the run of a point; what was asked for before is not wanted any more."""
+        """Compute the run of a point; earlier requests are cancelled."""
         which = self.which if which is None else which
         view, words = self.runs[which], point.words()
         if self.card.system is None:
@@ -461,7 +461,7 @@ class Page:
         self.write_address()
 
     def _adopt(self, changes: Mapping[str, Any]) -> None:
-        """Take the map's system with some parameters changed, and say whether the map is old."""
+        """Take the map's system with some parameters changed, and mark the map if it is outdated."""
         if self.shared.system is None:
             return
         system, integration = self.shared.system, self.shared.integration

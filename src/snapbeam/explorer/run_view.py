@@ -913,7 +913,7 @@ _BUSY = Markup('<span class="busy">{}</span>')
 _BAD = Markup('<span class="bad">{}</span>')
 _FAINT = Markup('<span class="faint">{}</span>')
 FIRST = "Click on the map, use the arrow keys, or type numbers, to see the run of a point."
-"""Words of a run that is not asked for yet."""
+"""Text of a run that is not requested yet."""
 
 
 def _counted(number: int, what: str) -> str:

@@ -423,7 +423,7 @@ def serve(
     integration: Integration | None = None,
     ready: Callable[[str], None] = print,
 ) -> None:
-    """Serve the page until the process is interrupted; *ready* is told its address.
+    """Serve the page until the process is interrupted; *ready* is called with its address.
 
     Raises
     ------

@@ -509,7 +509,7 @@ def framed(page: Page) -> Any:
 
 
 def page_tabs(page: Page) -> dict[str, Callable[[], Any]]:
-    """The tabs beside the map, by title: what makes them."""
+    """Constructors of the tabs next to the map, by title."""
     found: dict[str, Callable[[], Any]] = {}
     if page.shared.system is not None:
         found["System"] = lambda: page.system_card().layout

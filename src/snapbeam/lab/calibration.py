@@ -407,7 +407,7 @@ FITTED = ("thickness", "young_modulus", "density", "length", "buckling_level")
 
 @dataclass(frozen=True)
 class Residual:
-    """One measured frequency [Hz] beside the model's, and their difference in standard errors."""
+    """One measured frequency [Hz] and that of the model, and their difference in standard errors."""
 
     name: str
     measured: float

@@ -404,7 +404,7 @@ def pixel_size_from_marks(
 
 
 def _centre(picture: _Array, where: tuple[float, float], reach: int, name: str) -> _Array:
-    """Centre of mass of what stands out of its surroundings about *where*, sought twice."""
+    """Centre of mass of the contrast about *where*, in two iterations."""
     at = np.array(where, dtype=np.float64)
     for _ in range(3):
         r, c = (round(float(value)) for value in at)

@@ -60,7 +60,7 @@ class FrameSource:
     frame_rate, pixel_size, exposure
         [Hz], [m], [s], or None where the file does not say.
     frame_rate_question, pixel_size_hint
-        What the file says that is not enough, for the refusal.
+        Ambiguous information of the file, for the error message.
     diagnostics, edge_error
         What makes measurements doubtful, and the standard error [px] that the format adds to every edge.
     metadata
@@ -86,7 +86,7 @@ class FrameSource:
         raise NotImplementedError
 
     def close(self) -> None:
-        """Release what is held open."""
+        """Close open files."""
 
 
 def grey_of(colors: NDArray[Any]) -> NDArray[Any]:
@@ -365,7 +365,7 @@ _EVEN = 0.02  # share by which the kinds of pixels under a mosaic may differ and
 
 
 def take_header(source: FrameSource, header: CameraHeader) -> None:
-    """Give a source what a header says of times and scales."""
+    """Copy times and scales of a header to a source."""
     source.frame_rate = header.timing.frame_rate
     source.frame_rate_question = header.timing.question
     source.pixel_size = header.pixel_size

@@ -414,7 +414,7 @@ def _curve(fields: HeaderFields) -> tuple[Diagnostic, ...]:
 
 
 def check_pixels(header: CameraHeader) -> None:
-    """Refuse pixels whose file size is not what the header says."""
+    """Raise an error if the file size of the pixels contradicts the header."""
     mraw = header.mraw
     try:
         found = mraw.stat().st_size

@@ -301,7 +301,7 @@ def _unpacked(name: str, data: NDArray[Any], attributes: Mapping[str, Any]) -> N
 
 
 def _refuse_scales(name: str, data: NDArray[Any], values: Mapping[str, Any]) -> None:
-    """Refuse counts beside a number that may scale them."""
+    """Raise an error for counts with a number that may be their scale."""
     for key, value in values.items():
         neutral = 1.0 if _key(key) in _SCALES else 0.0 if _key(key) in _OFFSETS else None
         if neutral is None or (data.dtype.kind == "f" and key not in ("scale_factor", "add_offset")):
@@ -383,7 +383,7 @@ def _channels(stored: Mapping[str, _Stored], groups: Mapping[str, Mapping[str, A
 
 
 def _unit(texts: Mapping[str, str], name: str) -> str | None:
-    """The unit that a text beside an array states, under its name or for all of its group."""
+    """Unit from a text next to an array, for its name or for its group."""
     folder, _, last = name.rpartition("/")
     for key in UNIT_NAMES:
         common = () if is_time(last) else (f"{folder}/{key}" if folder else key,)
@@ -638,7 +638,7 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
     path
         The file.
     columns
-        How many columns there are, where a person says so.
+        Number of columns, if the user gives it.
 
     Raises
     ------

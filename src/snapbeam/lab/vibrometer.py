@@ -320,7 +320,7 @@ def _phasors(
 
 
 def _peak(left: _Array, rate: float, rough: SineFit) -> float | None:
-    """Frequency of the highest line of a spectrum that stands out, or None."""
+    """Frequency of the highest significant line of a spectrum, or None."""
     n = left.size
     window = np.hanning(n)
     spectrum = np.abs(np.fft.rfft(left * window)) * 2.0 / window.sum()

@@ -1,4 +1,4 @@
-"""A measured run beside a simulated one, on one clock: waveforms, spectra, impacts (Fig. 4 of the paper)."""
+"""Comparison of a measured run with a simulated one, on one time axis: waveforms, spectra, impacts (Fig. 4 of the paper)."""
 
 from __future__ import annotations
 

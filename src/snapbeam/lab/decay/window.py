@@ -321,7 +321,7 @@ def prepared(samples: SignalSamples, start: float | None, stop: float | None) ->
     samples
         The record.
     start, stop
-        The part [s] that decays freely, as far as a person says so.
+        Part [s] of the free decay, as far as the user gives it.
 
     Raises
     ------
@@ -403,7 +403,7 @@ def _below_ceiling(samples: SignalSamples, frequency: float) -> tuple[SignalSamp
 
 
 def _decay_rate(samples: SignalSamples, frequency: float) -> float:
-    """A rough rate of decay [1/s] of the strongest mode, 0 where none can be told."""
+    """Approximate decay rate [1/s] of the strongest mode; 0 if unknown."""
     try:
         cycles = hilbert_cycles(samples, frequency, noise_level(samples))
         mode = regress(cycles, float(samples.time[0]), "1", "hilbert", soften=False)

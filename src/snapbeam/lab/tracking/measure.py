@@ -636,7 +636,7 @@ class Drift(NamedTuple):
 
 
 class Follower:
-    """Collects the measurements of batch after batch and says what is wrong with each frame."""
+    """Collect the measurements of all batches, and flag invalid frames."""
 
     def __init__(self, scene: Scene, blur_limit: float | None) -> None:
         self.scene = scene

@@ -60,7 +60,7 @@ HOT = 0.25  # share of saturated pixels, beyond the usual, from which an edge is
 
 @dataclass(frozen=True)
 class Orientation:
-    """The side of the beam on which the shaker stands, and the turn that brings it below."""
+    """Side of the beam on which the shaker is, and the rotation that brings it below."""
 
     side: str
     shape: tuple[int, int]

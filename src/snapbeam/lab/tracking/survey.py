@@ -191,7 +191,7 @@ def _still_bands(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _peaks(share: NDArray[np.floating]) -> NDArray[np.intp]:
-    """Middle of each stretch of rows at which an edge stands in most of the sample."""
+    """Middle of each range of rows with an edge in most of the sample."""
     still = share >= _STILL
     steps = np.diff(np.concatenate([[0], still.astype(np.int8), [0]]))
     middle: NDArray[np.intp] = (np.flatnonzero(steps == 1) + np.flatnonzero(steps == -1) - 1) // 2

@@ -340,7 +340,7 @@ def _sample(recording: Recording) -> tuple[NDArray[np.integer], int]:
 
 
 class _Prepare:
-    """Turn a batch of frames so that the shaker stands below, undo the camera's curve, take the background out."""
+    """Rotate a batch of frames so that the shaker is below, linearise grey levels, subtract the background."""
 
     def __init__(
         self, recording: Recording, turn: Orientation, settings: TrackingSettings, saturated: float
