@@ -479,7 +479,7 @@ def bifurcation_curve(
     Raises
     ------
     InputError
-        If the point is not a fold, flip or Neimark-Sacker point, or a parameter, its bounds or a step is out of range.
+        If the type of the point is not supported, or a parameter, its bounds or a step is out of range.
     OrbitNotFoundError
         If not even the first point is found with both parameters.
 
