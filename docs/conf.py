@@ -122,6 +122,13 @@ def link_errors_only(self: Any, rolename: str, domain: str, target: str, *more: 
 PyXrefMixin.make_xrefs = link_errors_only
 
 
+def with_dashes(app: Any, doctree: Any) -> None:
+    """Write a dash between an error and its description."""
+    for text in list(doctree.findall(nodes.Text)):
+        if text == " -- ":
+            text.parent.replace(text, nodes.Text(" – "))
+
+
 def draw_paper(app: Any) -> None:
     """Draw every figure of the paper for the page on its reproduction."""
     import matplotlib.pyplot as plt
@@ -152,3 +159,4 @@ shutil.copyfile(
 def setup(app: Any) -> None:
     """Connect to Sphinx."""
     app.connect("builder-inited", draw_paper)
+    app.connect("doctree-read", with_dashes)
