@@ -32,7 +32,7 @@ help:
 	@echo "make test-oldest  the tests with the oldest packages that are allowed, on Python 3.11"
 	@echo "make docs       the documentation, in docs/_build/html"
 	@echo "make tables     the tables of the reference pages, from the program"
-	@echo "make prose      a report on the sentences of the pages"
+	@echo "make prose      a report on the sentences of pages, docstrings, help and labels"
 	@echo "make bench      the benchmarks, in out/bench; variable: BENCH"
 	@echo "make coverage   the lines that the quick tests run"
 	@echo "make lock       requirements-dev.txt from constraints.txt, with hashes"
@@ -117,7 +117,7 @@ tables: $(VENV)/.installed-dev
 	$(BIN)/python docs/_ext/reference.py
 
 prose: $(VENV)/.installed-run
-	$(BIN)/python tests/docs/prose.py
+	$(BIN)/python tests/prose.py
 
 bench: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks -o $(BENCH)

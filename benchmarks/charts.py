@@ -21,7 +21,7 @@ _COLORS = {
     "diffrax": "#8A8A8A",
 }
 _MARKS = {
-    "snapbeam map": ("o", "-"),
+    "snapbeam standard": ("o", "-"),
     "snapbeam reference": ("s", "--"),
     "scipy DOP853": ("v", "-"),
     "scipy LSODA": ("^", "--"),
@@ -72,7 +72,7 @@ def work_precision_chart(data: dict[str, Any], path: Path) -> None:
 
 
 def requests_chart(data: dict[str, Any], path: Path) -> None:
-    """Measured error against the tolerance asked for."""
+    """Measured error against the requested tolerance."""
     marks = {1: ("o", "#16245E"), 8: ("^", "#3D9BE0"), 32: ("s", "#B03A27")}
     with figure_style():
         figure = new_figure("single", 80.0)
@@ -98,7 +98,7 @@ def requests_chart(data: dict[str, Any], path: Path) -> None:
         ax.set(
             xscale="log",
             yscale="log",
-            xlabel="tolerance asked for (b)",
+            xlabel="requested tolerance (b)",
             ylabel="error measured up to the horizon (b)",
         )
         ax.grid(True, color="#E4E4E4", linewidth=0.4)

@@ -67,7 +67,14 @@ def run(folder: Path, quick: bool) -> None:
         for r in records
     ]
     text = table(
-        ("modes", "early decision", "runs", "ms per run and core", "runs decided", "simulated time saved"),
+        (
+            "modes",
+            "early termination",
+            "runs",
+            "ms per run and core",
+            "runs that ended early",
+            "simulated time saved",
+        ),
         rows,
     )
     save(folder, "ensemble", quick, data, text)

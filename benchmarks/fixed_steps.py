@@ -74,5 +74,5 @@ def run(folder: Path, quick: bool) -> None:
         "N", "step of the program, us", "its e5: median, maximum", "snapbeam's e5", "ms per run, program", "snapbeam", "ratio",
     )  # fmt: skip
     text = table(head, rows)
-    text += f"\n{cycles} cycles; one core; early decision off; e5 at the well-conditioned points.\n"
+    text += f"\n{cycles} cycles; one core; early termination off; e5 at the well-conditioned points.\n"
     save(folder, "fixed_steps", quick, {"cycles": cycles, "limit": LIMIT, "records": records}, text)

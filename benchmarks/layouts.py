@@ -38,7 +38,7 @@ def run(folder: Path, quick: bool) -> None:
         ]
         for r in records
     ]
-    head = ("modes", "early decision", "eight modes of a run, ns a step", "eight runs, ns a step", "ratio")
+    head = ("modes", "early termination", "eight modes of a run, ns a step", "eight runs, ns a step", "ratio")
     save(folder, "layouts", quick, {"records": records}, table(head, rows))
     layouts_chart(folder / "layouts.png", [r for r in records if not r["early"]])
 

@@ -43,13 +43,17 @@ def run(folder: Path, quick: bool) -> None:
                 short = "" if r["horizon"] > 0.999 else f" to {r['horizon'] * ERROR_CYCLES:.1f} cycles"
                 cells.append(f"{r['error']:.0e}{short}{'' if r['reached'] else ' (short)'}")
             rows.append([*cells, f"{r['conditioning']:.0e}"])
-    header = ("modes", "(Omega, V)", *(f"asked {t:g}" for t in tolerances), "conditioning")
+    header = ("modes", "(Omega, V)", *(f"tolerance {t:g}" for t in tolerances), "conditioning")
     data = {"cycles": ERROR_CYCLES, "records": records}
     worst = max(r["error"] / r["tolerance"] for r in records)
     held = sum(r["reached"] for r in records)
+    within = (
+        f"All {len(records)} requests are met"
+        if held == len(records)
+        else f"{held} of {len(records)} requests are met; (short) marks a shorter verified time"
+    )
     text = table(header, rows) + (
-        f"\nGreatest error over request: {worst:.2g}. {held} of {len(records)} requests were met as far as "
-        "the conditioning allows; (short): met for a shorter time than that.\n"
+        f"\n{within} up to the predictability horizon; the maximum error is {worst:.2g} of the tolerance.\n"
     )
     save(folder, "requests", quick, data, text)
     requests_chart(data, folder / "requests.png")

@@ -65,13 +65,13 @@ def run(folder: Path, quick: bool) -> None:
         said = f"{worst:.1e}" + ("" if worst <= LIMIT else " (too large)")
         each = f"{r['seconds'] / count:.2g} (+{100 * r['spread']:.0f} %)"
         rows.append([r["method"], r["options"], said, each, f"{r['seconds'] / own:.2g}"])
-    text = table(("method", "options", "greatest e5", "s per run", "ratio"), rows)
+    text = table(("method", "options", "maximum e5", "s per run", "ratio"), rows)
     text += (
         f"\n{count} points of {cycles} cycles, {_MODES} modes, {repeats} repeats of each method; the tip is in contact "
-        f"for {100 * share.min():.0f} to {100 * share.max():.0f} % of the time. One core; early decision off.\n"
+        f"for {100 * share.min():.0f} to {100 * share.max():.0f} % of the time. One core; early termination off.\n"
     )
     fair = sum(case.conditioning <= WELL for case in cases)
-    text += f"e5 is the greatest at the {fair} of them that are well-conditioned.\n"
+    text += f"e5 is the maximum over the {fair} well-conditioned points.\n"
     rivals = [r for r in records[1:] if _worst(cases, r["errors"]) <= LIMIT]
     if rivals:
         best = min(rivals, key=lambda r: r["seconds"])

@@ -108,12 +108,14 @@ def _fastest(records: list[dict[str, Any]], point: str, method: str) -> dict[str
 
 def _tables(records: list[dict[str, Any]], conditioning: dict[str, Any]) -> str:
     ours = {
-        r["point"]: r for r in records if r["method"] == "snapbeam map" and r["setting"].endswith("default")
+        r["point"]: r
+        for r in records
+        if r["method"] == "snapbeam standard" and r["setting"].endswith("default")
     }
     rows: list[list[object]] = []
     for method in dict.fromkeys(r["method"] for r in records):
         for point, own in ours.items():
-            best = own if method == "snapbeam map" else _fastest(records, point, method)
+            best = own if method == "snapbeam standard" else _fastest(records, point, method)
             if best is None:
                 rows.append([method, point, "-", f"above {LIMIT:g}", "-", "-"])
                 continue

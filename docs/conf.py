@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import logging
 import os
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -85,6 +86,29 @@ def keep_whole(self: Any) -> tuple[str, list[str]]:
 
 GoogleDocstring._consume_inline_attribute = keep_whole
 
+_CLASSES = {
+    name.rpartition(".")[2]: name
+    for page in sorted(Path(__file__).parent.glob("api*.md"))
+    for name in re.findall(r"autoclass:: (snapbeam\S+)", page.read_text(encoding="utf-8"))
+}
+"""Classes that have an entry in the reference, by their own name."""
+_CLASS = re.compile(rf"(?<![\w.`~[])({'|'.join(_CLASSES)})(?![\w.`])")
+_format_field = GoogleDocstring._format_field
+
+
+def linked_field(self: Any, name: str, kind: str, description: list[str]) -> list[str]:
+    """A parameter with links to the classes of its type, and a dash: two hyphens are an option's."""
+    if "`" not in kind and _CLASS.search(kind):
+        parts = [part.strip() for part in _CLASS.split(kind)]
+        kind = " ".join(
+            f":class:`~{_CLASSES[part]}`" if i % 2 else f"*{part}*" for i, part in enumerate(parts) if part
+        ).replace("` *,", "`\\ *,")
+    first, *others = _format_field(self, name, kind, description)
+    return [first.replace(" -- ", " – ", 1), *others]
+
+
+GoogleDocstring._format_field = linked_field
+
 _link = PyXrefMixin.make_xrefs
 
 
@@ -96,6 +120,13 @@ def link_errors_only(self: Any, rolename: str, domain: str, target: str, *more: 
 
 
 PyXrefMixin.make_xrefs = link_errors_only
+
+
+def with_dashes(app: Any, doctree: Any) -> None:
+    """Write a dash between an error and its description."""
+    for text in list(doctree.findall(nodes.Text)):
+        if text == " -- ":
+            text.parent.replace(text, nodes.Text(" – "))
 
 
 def draw_paper(app: Any) -> None:
@@ -128,3 +159,4 @@ shutil.copyfile(
 def setup(app: Any) -> None:
     """Connect to Sphinx."""
     app.connect("builder-inited", draw_paper)
+    app.connect("doctree-read", with_dashes)

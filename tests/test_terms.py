@@ -7,8 +7,10 @@ import inspect
 import re
 import types
 import typing
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import prose
 import pytest
 import typer
 
@@ -218,6 +220,35 @@ def test_commands_and_options() -> None:
 def test_pages(page: Path) -> None:
     lines = page.read_text(encoding="utf-8").splitlines()
     assert [line for line in lines if WORDS.search(line)] == []
+
+
+@pytest.fixture(scope="module")
+def docstrings() -> list[tuple[str, str]]:
+    return list(prose.docstrings())
+
+
+def test_docstrings_begin_with_a_noun_or_an_imperative(docstrings: list[tuple[str, str]]) -> None:
+    """A first word such as What or Whether names no object."""
+    begins = ((place, re.match(r"\W*(\w+)", text)) for place, text in docstrings)
+    assert [(place, word[1]) for place, word in begins if word and word[1] in prose.CLAUSES] == []
+
+
+def test_docstrings(docstrings: list[tuple[str, str]]) -> None:
+    assert [
+        place
+        for place, text in docstrings
+        if WORDS.search(prose.plain(text)) or prose.BANNED.search(prose.plain(text))
+    ] == []
+
+
+@pytest.mark.parametrize(
+    "texts", [prose.help_texts, prose.headings, prose.labels], ids=lambda each: each.__name__
+)
+def test_printed_texts(texts: Callable[[], Iterator[tuple[str, str]]]) -> None:
+    """Help of the command line, headings of tables, labels of figures and variables."""
+    found = [(place, text) for place, text in texts() if WORDS.search(text) or prose.BANNED.search(text)]
+    found += [(place, text) for place, text in texts() if text.startswith("What ")]
+    assert found == []
 
 
 def test_parts_are_found() -> None:

@@ -28,8 +28,8 @@ WORDS = {
 }
 FILE = Path(__file__).parents[2] / "docs" / "data" / "random_defects.md"
 HEAD = (
-    "| | good | of these doubted | largest error of good ones, in standard errors | with a defect | of these flagged "
-    "or refused | of all off by more than 5 standard errors without a message |\n|---|---|---|---|---|---|---|\n"
+    "| | good | good, flagged by mistake | maximum error of good ones (SE) | defective | defective, flagged or refused "
+    "| undetected errors (> 5 SE) |\n|---|---|---|---|---|---|---|\n"
 )
 MAKERS = {
     "scene": (

@@ -121,7 +121,7 @@ def text() -> str:
     """The whole of it."""
     data = stored("lifetimes")
     lines = [
-        "| modes | points that snap | median lifetime, cycles | still snapping at 200 | at 950 |",
+        "| modes | points with snap-through | median lifetime, cycles | still snapping at 200 | at 950 |",
         "|---|---|---|---|---|",
     ]
     for modes in MODES:
@@ -144,8 +144,8 @@ def text() -> str:
         "",
     ]
     lines += [
-        "| (Omega, V), 32 modes | lifetime, cycles | 95 % interval | measured before | still snapping at the end | "
-        "end in the far well |",
+        "| (Omega, V), 32 modes | lifetime, cycles | 95 % interval | earlier measurement | still snapping at the end | "
+        "end in the second well |",
         "|---|---|---|---|---|---|",
     ]
     points = data["points"]
@@ -161,7 +161,7 @@ def text() -> str:
         )
     lines += [
         "",
-        "| modes | stored map | still snapping after | share here | continuous in the map | apart, standard errors |",
+        "| modes | stored map | still snapping after | fraction here | continuous in the map | difference (SE) |",
         "|---|---|---|---|---|---|",
     ]
     for modes, figure, cycles, here, there, off in figures():

@@ -136,8 +136,8 @@ def test_summary_counts():
     table = [first, replace(first, verdict="fails", close=True), replace(first, verdict="in part", size="quick"),
              replace(first, verdict="open", close=True)]  # fmt: skip
     assert summary(table) == (
-        "Of 3 statements 1 hold, 1 hold in part and 1 fail; 1 of these verdicts (†) would be another within the "
-        "uncertainty. 1 questions that the paper leaves open are measured apart. 1 rows (*) are measured on sketches."
+        "Of 3 statements 1 hold, 1 hold in part and 1 fail; 1 of these verdicts (†) could change within the "
+        "uncertainty. 1 properties that the paper does not specify are measured separately. 1 rows (*) are measured on sketches."
     )
 
 

@@ -49,7 +49,7 @@ def test_probabilities_over_two_parameters(probabilities) -> None:
 
 def test_probabilities_over_one_parameter(probabilities) -> None:
     ax = plot_probability(probabilities.isel(frequency_ratio=1))
-    line = next(line for line in ax.lines if line.get_label() == "share of the runs")
+    line = next(line for line in ax.lines if line.get_label() == "fraction of the runs")
     np.testing.assert_array_equal(line.get_ydata(), probabilities["probability"][1, :, 0])
     with pytest.raises(InputError, match="must be one of snap, first_well"):
         plot_probability(probabilities, "continuous")

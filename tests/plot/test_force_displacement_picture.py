@@ -23,7 +23,7 @@ def test_branches_units_and_snaps() -> None:
     legend = [each.get_text() for each in ax.get_legend().get_texts()]
     assert legend == [
         "stable",
-        "stable only if the displacement is held",
+        "stable under displacement control only",
         "unstable",
         "bifurcation point",
     ]

@@ -197,7 +197,10 @@ def stored() -> dict[str, dict]:
 
 def text() -> str:
     """A table; ± is two standard errors of counting."""
-    lines = ["| interval of 95 % | trials | holds the truth | of each | engine |", "|---|---|---|---|---|"]
+    lines = [
+        "| 95 % interval | trials | coverage | coverage of each quantity | engine |",
+        "|---|---|---|---|---|",
+    ]
     for name, one in stored().items():
         shares = one["shares"]
         value = float(np.mean(list(shares.values())))

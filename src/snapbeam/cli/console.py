@@ -77,7 +77,7 @@ class _OutputOptions:
 
     @property
     def silent(self) -> bool:
-        """Whether nothing but JSON may go to standard output."""
+        """True if only JSON may be written to standard output."""
         return self.quiet or self.json == Path("-")
 
 

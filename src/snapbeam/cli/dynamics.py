@@ -93,7 +93,7 @@ def _plain(found: object) -> str:
 
 
 def _finish(dataset: xr.Dataset, output: Path, plot: Path | None, lines: list[str]) -> None:
-    """Write the results, draw them, and say what they are."""
+    """Write, draw and print the results."""
     from snapbeam.cli.console import draw, write_map
 
     reason = dataset.attrs.get("termination_reason")
@@ -285,7 +285,9 @@ def backbone_curve(
         float | None,
         opt.number_option("Displacement of the centre, over b, where the curve ends (2.5).", _OWN),
     ] = None,
-    max_points: Annotated[int | None, opt.count_option("Most points of the curve (200).", _OWN)] = None,
+    max_points: Annotated[
+        int | None, opt.count_option("Maximum number of points of the curve (200).", _OWN)
+    ] = None,
     output: Output = Path("backbone_curve.nc"),
     plot: opt.Plot = None,
 ) -> None:

@@ -304,7 +304,7 @@ def configured(
 ) -> Config:
     """The parameters of the ``--config`` file overridden by what was given on the command line.
 
-    *axes_of* says what the axes of a command are, those that it has by itself among them, for ``--print-config``.
+    *axes_of* returns the axes of a command, its own ones included, for ``--print-config``.
     """
     from snapbeam.model.parameter_file import Config, load_config, override, same_axis
     from snapbeam.model.parameters import lookup
@@ -365,12 +365,12 @@ def configured(
 
 
 def _needs_drive(given: Mapping[str, Any]) -> bool:
-    """Whether a command runs one drive, and has no axes of its own."""
+    """Return whether a command runs one drive, and has no axes of its own."""
     return "drive.frequency_ratio" in given and "sweep" not in given
 
 
 def _require_striker(config: Config, sections: Mapping[str, Any], axes: Mapping[str, Any]) -> None:
-    """Refuse the drive of a striker that neither the file nor an option gives, beside what the file does move."""
+    """Raise an error for a striker without a drive next to another excitation of the file."""
     from snapbeam.model.parameter_axes import physical_name
     from snapbeam.model.parameters import lookup
     from snapbeam.model.quantity import split_name
@@ -399,7 +399,7 @@ def _shown(sections: Mapping[str, Mapping[str, Any]], name: str) -> str:
 
 
 def _is_axis(name: str, value: str) -> bool:
-    """Whether the text of an option that may be an axis is one, and not a number."""
+    """Return whether the text of an option is an axis, not a number."""
     from snapbeam.model.parameter_axes import PHYSICAL
     from snapbeam.model.parameters import parameters
 
@@ -614,7 +614,7 @@ def with_checkpoint(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def is_long(keeping: Mapping[str, Any]) -> bool:
-    """Whether any option but --log is set."""
+    """Return whether any option except --log is set."""
     return any(value not in (None, False) for name, value in keeping.items() if name != "log")
 
 

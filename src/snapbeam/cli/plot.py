@@ -31,7 +31,7 @@ def plot(
     variable: Annotated[
         str | None,
         typer.Option(
-            help="What to draw, such as a statistic of a map or phase_portrait of a run; an unknown name lists all.",
+            help="Variable or plot, such as a statistic of a map or phase_portrait of a run; an unknown name lists all.",
             metavar="NAME",
         ),
     ] = None,

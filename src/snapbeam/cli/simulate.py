@@ -146,7 +146,7 @@ def simulate(
 
 
 _LARGE_FILE = 100e6
-"""Bytes of a run above which the command says so before it writes the file."""
+"""Size of a run above which the command prints a warning before it writes the file, bytes."""
 
 
 def _warn_of_size(dataset: xr.Dataset, path: Path) -> None:

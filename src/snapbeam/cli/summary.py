@@ -121,7 +121,7 @@ def _highest(dataset: xr.Dataset, variable: str | None) -> tuple[dict[str, Any],
 
 
 def _ranges(dataset: xr.Dataset, names: Sequence[str]) -> list[str]:
-    """Lines with the least and the greatest value of variables."""
+    """Lines with the minimum and the maximum value of variables."""
     lines = []
     for name in names:
         unit = dataset[name].attrs.get("units", "1")
@@ -132,7 +132,7 @@ def _ranges(dataset: xr.Dataset, names: Sequence[str]) -> list[str]:
 
 
 def map_facts(dataset: xr.Dataset) -> dict[str, Any]:
-    """What a map shows, as plain values: points of each class and status, the lowest interwell point, the notch."""
+    """Summary of a map as plain values: points of each class and status, the lowest interwell point, the notch."""
     kinds, codes = np.asarray(dataset["response_class"].values), np.asarray(dataset["status"].values)
     low = lowest_interwell(dataset)
     return {
@@ -257,7 +257,7 @@ def class_table(dataset: xr.Dataset) -> Table:
 
 
 def lowest_interwell(dataset: xr.Dataset) -> dict[str, Any] | None:
-    """Return the coordinates of the interwell run of least excitation amplitude; None without such a run or axis.
+    """Return the coordinates of the interwell run of minimum excitation amplitude; None without such a run or axis.
 
     Points of unknown class are left out; they may be interwell at a smaller value.
     """

@@ -63,7 +63,7 @@ _SHELLS = 9
 _LARGEST = 0.5
 """Radius of the largest shell, in units of the well's amplitude along the longest axis."""
 _SHARE = 0.5
-"""Of the radius that was tried, within which a state counts as captured."""
+"""Fraction of the tested radius within which a state counts as captured."""
 _SEED = 20240817
 
 
@@ -150,7 +150,7 @@ class Cloud:
 
 
 def cloud_of(points: _Array) -> Cloud:
-    """A cloud from points of shape (points, d): half of them say how far the other half is."""
+    """Cloud of points of shape (points, d): one half determines the distance of the other."""
     first, second = points[::2], points[1::2]
     away, _ = cKDTree(first).query(second)
     return Cloud(points, cKDTree(points), 1.5 * float(np.quantile(away, 0.99)))
@@ -164,7 +164,7 @@ UNDECIDED = -1
 """Label of a state of which it is not certain where it goes."""
 KINDS = ("periodic", "chaotic")
 _REPEATS = 2e-3
-"""Greatest coordinate by which states may differ that are taken to repeat before they are shot at."""
+"""Maximum coordinate by which states may differ that are taken to repeat before they are shot at."""
 _SAME = 1e-5
 _SIGMAS = 3.0
 _TRANSIENT = 1000
@@ -175,7 +175,7 @@ _FEW = 8
 
 @dataclass(frozen=True, eq=False)
 class Attractor:
-    """What states are attracted to.
+    """One attractor: a periodic orbit or a chaotic set, with its states and its verification.
 
     Examples
     --------
@@ -198,7 +198,7 @@ class Attractor:
     """Largest Lyapunov exponent, 1/s (per period of a map)."""
     exponent_error: float
     verification: PeriodicOrbit | None = None
-    """The orbit at accuracy level "reference", whose multipliers say that it is stable."""
+    """The orbit at accuracy level "reference", whose multipliers are inside the unit circle."""
 
     @property
     def period(self) -> int:
@@ -207,7 +207,7 @@ class Attractor:
 
     @cached_property
     def trapping_region(self) -> list[Ball] | Cloud:
-        """How a state is told to be on its way there."""
+        """Region from which a state is known to converge to the attractor."""
         return balls_of(self.orbit) if self.orbit is not None else cloud_of(self.points)
 
     def __repr__(self) -> str:
@@ -236,7 +236,7 @@ class Attractors:
     attractors: list[Attractor]
     """Periodic ones first, by period, then by the coordinates of their points."""
     labels: NDArray[np.int64]
-    """Of every state: number of its attractor, or :data:`UNDECIDED`."""
+    """Number of the attractor of every state, or :data:`UNDECIDED`."""
     check_periods: int
     """Periods over which a chaotic attractor was seen not to end."""
     termination_reason: str
@@ -244,12 +244,12 @@ class Attractors:
 
     @property
     def shares(self) -> _Array:
-        """Of the states that go to each."""
+        """Fractions of the states that converge to each attractor."""
         return np.array([float((self.labels == i).mean()) for i in range(len(self.attractors))])
 
     @property
     def undecided(self) -> float:
-        """Share of the states that could not be told."""
+        """Fraction of undecided states."""
         return float((self.labels == UNDECIDED).mean())
 
     def unseen_share(self, confidence: float = 0.95) -> float:
@@ -296,7 +296,7 @@ class Attractors:
                 "exponent_error": (
                     "attractor", [each.exponent_error for each in self.attractors], labels("standard error", unit)
                 ),
-                "share": ("attractor", self.shares, labels("share of the states that go there")),
+                "share": ("attractor", self.shares, labels("fraction of the states that converge to it")),
                 "points": (("attractor", "point", "coordinate"), points, labels("the attractor once a period")),
                 "label": ("state", self.labels, labels("attractor that a state goes to; -1: undecided")),
             },
@@ -380,8 +380,8 @@ def find_attractors(
     Returns
     -------
     Attractors
-        ``attractors.unseen_share()`` bounds the share of initial states that go to attractors that were not found;
-        ``attractors.termination_reason`` says why states are undecided.
+        ``attractors.unseen_share()`` bounds the share of initial states that go to attractors that were not
+        found; ``attractors.termination_reason`` gives the reason why states are undecided.
 
     Examples
     --------
@@ -448,7 +448,7 @@ def _reason(
     most: int,
     reasons: list[str],
 ) -> str:
-    """Why the search stopped, and why states are undecided."""
+    """Reasons why the search stopped, and why states are undecided."""
     lost = labels == UNDECIDED
     words = [f"{leave} periods left out ({rule})"]
     counts = (
@@ -526,7 +526,7 @@ def _is_same(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
 
 
 def _nearest(orbits: list[PeriodicOrbit], x: _Array) -> int:
-    """The orbit that a state is on, as nearly as states that repeat are told."""
+    """Orbit of a state, within the tolerance of repeating states."""
     for number, orbit in enumerate(orbits):
         if float(np.abs(orbit.points - x).max(axis=1).min()) < 10.0 * _REPEATS:
             return number
@@ -588,7 +588,7 @@ def _groups(every: _Array) -> list[NDArray[np.int64]]:
 
 
 def _mingle(tree_one: Any, tree_other: Any) -> bool:
-    """Whether each run comes as near to the other's points as to its own."""
+    """Return whether each run comes as close to the points of the other as to its own."""
     own = max(float(np.median(tree.query(tree.data, 2)[0][:, 1])) for tree in (tree_one, tree_other))
     across = min(
         float(np.median(tree_one.query(tree_other.data)[0])),
@@ -598,7 +598,7 @@ def _mingle(tree_one: Any, tree_other: Any) -> bool:
 
 
 def _ordered(found: list[Attractor]) -> tuple[list[Attractor], NDArray[np.int64]]:
-    """Attractors in an order of their own, whatever state led to them, and where each stands in it."""
+    """Attractors in a fixed order, independent of the states that led to them, and the position of each."""
 
     def key(i: int) -> tuple[Any, ...]:
         each = found[i]

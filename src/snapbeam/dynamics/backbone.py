@@ -34,11 +34,11 @@ _Array = NDArray[np.float64]
 
 _WELLS = ("lower", "upper", "both")
 _RTOL, _ATOL = 1e-11, 1e-13
-"""Of the integration, in units of the well's amplitude and of 1/omega_1."""
+"""Tolerances of the integration, in units of the well's amplitude and of 1/omega_1."""
 _CONVERGED = 1e-10
 """Velocity at the turning point, in the same units."""
 _FIRST, _SHORTEST = 0.02, 1e-5
-"""Arc lengths between two points: the first, if it is not above the greatest, and the least."""
+"""Arc lengths between two points: the first, if it is not above the maximum, and the minimum."""
 _SAME_STATE = 1e-6
 """Difference of the two turning points, in units of the well's amplitude, up to which a motion has only one."""
 _NEAR_ZERO = 0.1
@@ -50,7 +50,7 @@ _RETRACED = (
 _SAMPLES = 64
 """Instants of half a period from which means are taken."""
 _STABLE = 1e-4
-"""How far from 1 a Floquet multiplier of a stable orbit may be, by rounding."""
+"""Tolerance of the modulus of a Floquet multiplier of a stable orbit, for rounding."""
 
 
 @checked
@@ -67,15 +67,16 @@ def backbone_curve(
 ) -> xr.Dataset:
     """Compute a backbone curve: free periodic motions without damping and excitation, over their energy.
 
-    Each motion begins and turns back at rest: a nonlinear normal mode.  About a well the curve begins at a natural
-    frequency with a vanishing amplitude; across both wells it begins with three times the energy of the barrier and is
-    followed in both directions.  The equations are integrated with DOP853 of SciPy over half a period, with tangents;
-    Newton's method and steps of arc length follow the curve.  Floquet multipliers tell the stability.
+    Each motion begins and turns back at rest: a nonlinear normal mode.  About a well the curve begins at a
+    natural frequency with a vanishing amplitude; across both wells it begins with three times the energy of the
+    barrier and is followed in both directions.  The equations are integrated with DOP853 of SciPy over half a
+    period, with tangents; Newton's method and steps of arc length follow the curve.  Floquet multipliers
+    determine the stability.
 
     Parameters
     ----------
     system : System or ReducedModel
-        Damping is left out.  A system may have one striker that stands still, a :class:`~snapbeam.FixedStop` under an
+        Damping is ignored.  A system may have one stationary striker, a :class:`~snapbeam.FixedStop` under an
         elastic contact law; nothing else may act on the beam.
     well : {"lower", "upper", "both"}
         Motion about a well, or across both.
@@ -87,27 +88,27 @@ def backbone_curve(
         The curve ends where the frequency is this many first natural frequencies: in a well, the period grows without bound
         towards the barrier.
     max_points : int
-        Most points of the curve.
+        Maximum number of points of the curve.
     max_step : float
-        Greatest arc length between two points, in length scales and in half periods over pi/omega_1.  Near an internal resonance
-        the curve has a narrow tongue; a short step follows it, a long one passes it.
+        Maximum arc length between two points, in length scales and in half periods over pi/omega_1.  Near an internal
+        resonance the curve has a narrow tongue; a short step follows it, a long one passes it.
     progress : callable or bool, optional
         Called as ``progress(done, total)`` with points; True writes a line to standard error.
 
     Returns
     -------
     xarray.Dataset
-        Over ``point``: ``frequency`` (Hz), ``frequency_ratio``, ``energy`` (J, above the well), ``min_midspan`` and
-        ``max_midspan`` (over the length scale), ``stable``, ``unstable_multipliers``; over ``point`` and ``mode``
-        ``initial_amplitude`` (of the buckling modes, at rest) and ``participation``, the share of each linear mode in the
-        mean kinetic energy; over ``point`` and ``multiplier`` their size and angle.  The attribute ``end`` says why the
-        curve ends: among others at an equilibrium or where the two turning points meet, since from there on the same
-        motions would follow again.
+        Over ``point``: ``frequency`` (Hz), ``frequency_ratio``, ``energy`` (J, above the well), ``min_midspan``
+        and ``max_midspan`` (over the length scale), ``stable``, ``unstable_multipliers``; over ``point`` and
+        ``mode`` ``initial_amplitude`` (of the buckling modes, at rest) and ``participation``, the share of each
+        linear mode in the mean kinetic energy; over ``point`` and ``multiplier`` their size and angle.  The
+        attribute ``end`` gives the reason why the curve ends: among others at an equilibrium or where the two
+        turning points meet, since from there on the same motions would follow again.
 
     Raises
     ------
     InputError
-        For a system with an excitation, a lossy contact, or a beam without two wells where both are asked for.
+        For a system with an excitation, a lossy contact, or a beam without two wells if both are requested.
     RuntimeError
         If no motion is found where the curve begins.
 
@@ -175,7 +176,7 @@ class _Structure:
         self.omega = np.sqrt(squares)
         self.unit = float(self.omega[0])
         self.scale = model.length_scale / float(np.abs(model.midspan_shape @ self.shapes).max())
-        """What a coordinate of 1 is: it moves the centre by about a length scale."""
+        """Length of a coordinate of 1: it moves mid-span by about the length scale."""
         self.back = self.shapes * self.scale
         """Amplitudes of the buckling modes for each coordinate."""
         self.squares = squares / self.unit**2
@@ -424,7 +425,7 @@ def _follow(
 ) -> tuple[list[_Array], str]:
     """Points of a curve from its start in one direction, and why it ends.
 
-    The *limits* are the greatest displacement of the centre, half period and arc length between two points.
+    The *limits* are the maximum displacement of the centre, half period and arc length between two points.
     """
     found = _corrected(structure, start[0], start[1], start[0])
     if found is None:
@@ -503,11 +504,11 @@ def _dataset(structure: _Structure, points: list[_Array], end: str) -> xr.Datase
         "frequency": ("point", frequency, "Hz", "frequency of the free motion"),
         "frequency_ratio": ("point", frequency / reference, "1", "frequency over the first natural frequency"),
         "energy": ("point", rows["energy"], "J", "energy above the well"),
-        "min_midspan": ("point", rows["low"], "1", "least displacement of the centre, over the length scale"),
-        "max_midspan": ("point", rows["high"], "1", "greatest displacement of the centre, over the length scale"),
+        "min_midspan": ("point", rows["low"], "1", "minimum displacement of mid-span, over the length scale"),
+        "max_midspan": ("point", rows["high"], "1", "maximum displacement of mid-span, over the length scale"),
         "stable": ("point", unstable == 0, "1", "whether no Floquet multiplier is outside the unit circle"),
         "unstable_multipliers": ("point", unstable, "1", "Floquet multipliers outside the unit circle"),
-        "participation": (("point", "mode"), rows["share"], "1", "share of a linear mode in the mean kinetic energy"),
+        "participation": (("point", "mode"), rows["share"], "1", "fraction of a linear mode in the mean kinetic energy"),
         "initial_amplitude": (
             ("point", "mode"), rows["begun"], "1" if model.beam is None else "m^0.5",
             "amplitude of a buckling mode where the motion turns back",

@@ -36,7 +36,7 @@ _AMONG = 8
 _MANY = 0.05
 """Share of undecided states from which on a warning is given."""
 _SAMPLE = 300
-"""States with no other label beside them that are integrated at half the step too."""
+"""Number of states without a neighbour of another label that are integrated at half the step too."""
 _SENSITIVE = 0.01
 """Share of labels that change with the step from which on a warning is given."""
 _CONFIDENCE = 0.95
@@ -59,10 +59,10 @@ def basins_of_attraction(
     consecutive checks and at the end.  All other states are undecided after *periods*, -1.  The tip's mid-position is
     fixed in space.  If more than 5 % of the states are undecided, a warning is given.
 
-    Near a fractal border the error of the integration changes labels.  Every state that has another label beside it, and
-    a random sample of 300 others, is therefore integrated at half the step too.  ``sensitive`` marks the states whose
-    label changes; the attribute ``sensitive_share`` is the share of such states of the plane, with its interval at 95 %
-    (Jeffreys, for the sampled part).  If it exceeds 1 %, a warning is given.
+    Near a fractal border the error of the integration changes labels.  Every state with a neighbour of another
+    label, and a random sample of 300 others, is therefore integrated at half the step too.  ``sensitive`` marks
+    the states whose label changes; the attribute ``sensitive_share`` is the share of such states of the plane,
+    with its interval at 95 % (Jeffreys, for the sampled part).  If it exceeds 1 %, a warning is given.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def basins_of_attraction(
     Raises
     ------
     InputError
-        For bad input.
+        If an axis of the grid or the number of periods is out of range.
 
     Examples
     --------
@@ -322,7 +322,7 @@ _SIGMAS = 3.0
 
 
 class BasinEntropy(NamedTuple):
-    """How uncertain the outcome is in boxes of a grid, over the decided points."""
+    """Basin entropy: uncertainty of the outcome in boxes of a grid, over the decided points."""
 
     basin: float
     """Mean over the boxes of the entropy of the labels within, S_b; NaN if no point is decided."""
@@ -344,7 +344,7 @@ class BasinEntropy(NamedTuple):
 
     @property
     def is_fractal(self) -> bool:
-        """Whether the lower bound of S_bb > ln 2 by three standard errors: enough, and not needed, for a fractal border."""
+        """True if S_bb exceeds ln 2 by three standard errors: sufficient, not necessary, for a fractal boundary."""
         return bool(self.boundary_bounds[0] - _SIGMAS * self.boundary_error > np.log(2.0))
 
 
@@ -375,7 +375,7 @@ def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
     labels : array_like of int
         A grid of any dimension, such as basins or the classes of a map; a negative label is undecided.
     box : int
-        Points along a side; what does not fill a box is left out.
+        Points along a side; incomplete boxes are ignored.
 
     Examples
     --------
@@ -467,7 +467,7 @@ def _mean(values: _Array) -> tuple[float, float]:
 
 
 class UncertaintyExponent(NamedTuple):
-    """How the share of uncertain points goes with the error of a start, f ~ epsilon^alpha, over the decided points."""
+    """Uncertainty exponent alpha of the fraction of uncertain points, f ~ epsilon^alpha."""
 
     exponent: float
     """alpha; the dimension of the border is that of the grid less alpha."""
@@ -557,7 +557,7 @@ def _uncertain(grid: NDArray[np.int64], step: int) -> tuple[float, float, float]
 
 
 class Integrity(NamedTuple):
-    """How safe a basin is in a window; lengths in units of the grid's axes as they are weighed."""
+    """Integrity measures of a basin in a window; lengths in units of the grid's axes with their weights."""
 
     global_measure: float
     """GIM: share of the window that it fills."""
@@ -566,7 +566,7 @@ class Integrity(NamedTuple):
     factor: float
     """IF: radius of the largest circle within it."""
     center: tuple[int, ...]
-    """Of that circle."""
+    """Centre of that circle."""
     undecided: float
     """Share of the window that is undecided; it counts as outside, so that every measure is a lower bound."""
 

@@ -65,25 +65,25 @@ def bifurcation_diagram(
     initial_conditions : InitialConditions or int
         Initial conditions at every value, in addition to the sweeps; none by default.
     periods : pair of int
-        Periods to leave out at each value, and to keep.  None leaves out 16 time constants of the slowest mode, at
-        least 200 and at most 20,000 periods.
+        Transient periods to discard at each value, and periods to record. None discards 16 time constants of
+        the slowest mode, at least 200 and at most 20,000 periods.
     grazing : bool
-        Whether to look at every approach within four of the kept periods: ``clearance``, ``min_penetration``.
+        Sample every approach within four of the recorded periods densely: ``clearance``, ``min_penetration``.
     progress : callable, optional
         Called as ``progress(done, total)`` with values; True writes a line to standard error.
 
     Returns
     -------
     xarray.Dataset
-        Over ``sweep``, the parameter and ``period``: displacements over b and velocities over b omega_1 of the centre
-        and of the contact point at the phase of the start; over ``sweep`` and the parameter: ``impacts_per_period``,
-        ``crossings_per_period`` and ``minimal_period`` (0: none seen).  Runs that failed are NaN, as are all that follow
-        them in their sweep; ``failed`` says so.
+        Over ``sweep``, the parameter and ``period``: displacements over b and velocities over b omega_1 of the
+        centre and of the contact point at the phase of the start; over ``sweep`` and the parameter:
+        ``impacts_per_period``, ``crossings_per_period`` and ``minimal_period`` (0: none seen).  Runs that
+        failed are NaN, as are all that follow them in their sweep; ``failed`` marks them.
 
     Raises
     ------
     InputError
-        For bad input.
+        If *name* is not a numeric parameter, values are out of range, or there is neither a sweep nor an initial condition.
 
     Examples
     --------
@@ -165,7 +165,7 @@ class _Diagram:
         self.counts: list[_Array] = []
 
     def _go(self, x: _Array, at: NDArray[np.int64]) -> tuple[_Array, _Array]:
-        """The states that are kept of some runs, shape (runs, keep, d), and impacts and crossings a period."""
+        """Recorded states of some runs, shape (runs, keep, d), and impacts and crossings a period."""
         values, periods = self.values[at], self.leave + self.keep
         if lookup(self.name).is_run:
             advanced = [self.flow.advance(x, periods, every=True, points={self.name: values})]

@@ -287,7 +287,7 @@ class _Curve:
         return moved, moved.correct(y, along, along, table)
 
     def error(self, point: _Point, relative: float) -> _Array:
-        """By how much the parameters may be off for the residual and the error of the map's derivative."""
+        """Uncertainty of the parameters from the residual and the error of the map's derivative."""
         size = point.y.size - 2
         steep = float(np.abs(point.came.jacobian).sum())
         # a gap follows from the run itself, a multiplier from the derivative of the map
@@ -337,7 +337,7 @@ def _pair(came: Return) -> tuple[float, float]:
 
 
 def _tangent(table: _Array, before: _Array) -> _Array:
-    """Of the curve, of length one, towards where *before* points."""
+    """Unit tangent of the curve, in the direction of *before*."""
     found: _Array = np.linalg.svd(table)[2][-1]
     return found if found @ before >= 0.0 else -found
 
@@ -458,11 +458,11 @@ def bifurcation_curve(
     names : (str, str)
         Two parameters that can differ between runs, by dotted name or the name in datasets.
     bounds : pair of pairs of float
-        Least and greatest value of each.
+        Minimum and maximum value of each.
     max_points : int
         Points at most, to either side.
     step, max_step : float
-        First and greatest distance between points, in units of the well's amplitude for the state and of the range
+        First and maximum distance between points, in units of the well's amplitude for the state and of the range
         for each parameter; between 1e-6 and 1.
     tolerance : float
         Of orbit and condition, as in :func:`periodic_orbit`; up to 1,000 times as much where light impacts make the
@@ -479,7 +479,7 @@ def bifurcation_curve(
     Raises
     ------
     InputError
-        For bad input.
+        If the type of the point is not supported, or a parameter, its bounds or a step is out of range.
     OrbitNotFoundError
         If not even the first point is found with both parameters.
 

@@ -72,11 +72,11 @@ class SpecialPoint:
     """One of :data:`SPECIAL_POINTS`."""
     orbit: PeriodicOrbit
     value: float
-    """Of the parameter."""
+    """Value of the parameter."""
     index: int
     """Number of the orbit of the branch that it comes after."""
     error: float = math.nan
-    """By how much the value may be off at these steps; NaN: not known."""
+    """Uncertainty of the value at these steps; NaN: unknown."""
 
     def __repr__(self) -> str:
         off = "" if math.isnan(self.error) else f" ± {self.error:.1g}"
@@ -105,9 +105,9 @@ class Branch:
     orbits: list[PeriodicOrbit]
     special_points: list[SpecialPoint]
     termination_reason: str
-    """Why it ends."""
+    """Reason why the branch ends."""
     impacts: list[int]
-    """Of each orbit within its period."""
+    """Number of impacts of each orbit within its period."""
     tangents: list[NDArray[np.float64]]
 
     def __repr__(self) -> str:
@@ -117,12 +117,12 @@ class Branch:
 
     @cached_property
     def values(self) -> NDArray[np.float64]:
-        """Of the parameter along the branch."""
+        """Values of the parameter along the branch."""
         return np.array([orbit.flow.value(self.name) for orbit in self.orbits])
 
     @cached_property
     def is_stable(self) -> NDArray[np.bool_]:
-        """Of each orbit."""
+        """Stability of each orbit."""
         return np.array([orbit.is_stable for orbit in self.orbits])
 
     def plot(self, variable: str | None = None, ax: Any = None, **options: Any) -> Any:
@@ -254,7 +254,7 @@ def _labels(words: str) -> dict[str, str]:
 
 
 _LOCATED = 1e-9
-"""Of a multiplier at an event."""
+"""Tolerance of a multiplier at an event."""
 _CRITICAL = 1e-3
 """Distance of the critical multiplier at an event from where it is in theory, at most."""
 _HALVINGS = 20
@@ -263,7 +263,7 @@ _TOUCHES = 5e-3
 _FINE, _ROUNDING = 1e-5, 1e-13
 """Relative error of tangents at level "reference", and of what is known exactly."""
 _ACROSS = 10.0
-"""How much faster multipliers may change across a branch than along it: an orbit that closes badly is off across."""
+"""Maximum ratio of the change of multipliers across a branch to that along it; above it, an orbit is inaccurate."""
 
 
 def _counts(came: Return) -> tuple[int, int, int]:
@@ -294,7 +294,7 @@ def between(corrector: Corrector, one: Spot, other: Spot, at: int) -> list[Speci
 
 
 def _test(spot: Spot, kind: str) -> float:
-    """What vanishes at an event."""
+    """Test function, zero at a special point."""
     if kind == "fold":
         return float(spot.tangent[-1])
     values = np.linalg.eigvals(spot.came.jacobian)
@@ -359,7 +359,7 @@ def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -
 
 
 def _distance(multipliers: NDArray[np.complex128], kind: str) -> float:
-    """How far the multiplier that is critical at an event is from where it then is."""
+    """Distance of the critical multiplier from its value at the special point."""
     if kind == "Neimark-Sacker":
         return float(np.abs(np.abs(multipliers) - 1.0).min())
     return float(np.abs(multipliers - (-1.0 if kind == "flip" else 1.0)).min())
@@ -373,7 +373,7 @@ def _derivative_error(flow: Flow, orbit: PeriodicOrbit) -> float:
 
 
 def _moved(corrector: Corrector, spots: tuple[Spot, Spot, Spot], part: float, off: float) -> float:
-    """How far the parameter moves if the place between the first and the last orbit is off by *off*.
+    """Change of the parameter if the location between the first and the last orbit is off by *off*.
 
     It is read off the parabola through the three, since at a fold the parameter moves with the square alone.
     """
@@ -387,7 +387,7 @@ def _moved(corrector: Corrector, spots: tuple[Spot, Spot, Spot], part: float, of
 
 
 def _unsettled(corrector: Corrector, spot: Spot) -> float:
-    """How far an orbit may be off, as a state and over the range of the parameter, since it closes no better."""
+    """Estimated error of an orbit, as a state and over the parameter range, from its closure error."""
     table = corrector.bordered(spot.came, spot.slope, spot.tangent)
     residual = max(float(np.linalg.norm(spot.came.x - spot.y[:-1])), _ROUNDING)
     least = float(np.linalg.svd(table, compute_uv=False)[-1])
@@ -395,7 +395,7 @@ def _unsettled(corrector: Corrector, spot: Spot) -> float:
 
 
 def _grazing(corrector: Corrector, one: Spot, other: Spot, at: int) -> SpecialPoint:
-    """Where the number of impacts changes between two orbits, by halving."""
+    """Special point at which the number of impacts changes between two orbits, by bisection."""
     sides = [one, other]
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
@@ -442,7 +442,7 @@ def grazing_end(spots: list[tuple[Corrector, Spot]]) -> SpecialPoint | None:
 _Array = NDArray[np.float64]
 _TOLERANCE = 1e-10
 _SHORTEST, _LONGEST = 1e-8, 1.0
-"""Bounds of the distance between orbits that may be asked for."""
+"""Allowed range of the distance between orbits."""
 _EASY, _HARD = 4, 9
 """Iterations up to which the step grows, and from which on it shrinks."""
 
@@ -462,9 +462,10 @@ def continuation(
 ) -> Branch:
     """Follow a periodic orbit, stable or not, along one parameter.
 
-    Folds, period doublings (flips), Neimark-Sacker bifurcations, branch points and grazing are located between the
-    orbits that they are found between.  The branch ends at a limit of the parameter, when it closes, at *max_points* orbits,
-    or where no orbit is found, as under a law of restitution where it grazes; ``branch.termination_reason`` says which.
+    Folds, period doublings (flips), Neimark-Sacker bifurcations, branch points and grazing are located between
+    the orbits that they are found between.  The branch ends at a limit of the parameter, when it closes, at
+    *max_points* orbits, or where no orbit is found, as under a law of restitution where it grazes;
+    ``branch.termination_reason`` gives the reason.
 
     Parameters
     ----------
@@ -473,13 +474,13 @@ def continuation(
     name : str
         Parameter, by dotted name or the name in datasets.
     bounds : pair of float
-        Least and greatest value.
+        Minimum and maximum value.
     direction : {"up", "down"}
         Which way the parameter goes at first.
     max_points : int
         Orbits at most.
     step, max_step : float
-        First and greatest distance between orbits, in units of the well's amplitude for the state and of the range
+        First and maximum distance between orbits, in units of the well's amplitude for the state and of the range
         for the parameter; between 1e-8 and 1.
     tolerance : float
         Of the orbits, as in :func:`periodic_orbit`.
@@ -494,7 +495,7 @@ def continuation(
     Raises
     ------
     InputError
-        For bad input.
+        If the bounds do not contain the orbit, or the direction, a step or the number of points is out of range.
 
     Examples
     --------
@@ -614,7 +615,7 @@ def _follow(
 
 
 def _returned(corrector: Corrector, spot: Spot, before: Corrector, first: Spot, near: float) -> bool:
-    """Whether an orbit is within a distance of the first one of the branch, and the branch goes on as there."""
+    """Return whether the branch has returned to its first orbit within a distance, in the same direction."""
     if not abs(spot.y[-1] - first.y[-1]) < near:
         return False
     try:
@@ -629,7 +630,8 @@ def switch_branch(
 ) -> PeriodicOrbit:
     """Find an orbit of the branch that begins at a flip or a branch point, *size* away from it.
 
-    At a flip it has twice the period.  It is sought on the plane at that distance along the critical eigenvector.
+    At a flip it has twice the period.  Newton's method searches on the plane at that distance along the
+    critical eigenvector.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Edge states: the state on the border between snapping and not, held there by bisection with the state carried on."""
+"""Edge states: the state on the border between snapping and not, tracked by bisection of full states."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class EdgeState:
     orbit: PeriodicOrbit | None
     """The unstable orbit that it comes to, if it comes to one."""
     termination_reason: str
-    """Why the tracking stopped, whether the bisection reached its threshold, and why there is no orbit."""
+    """Reason why the tracking stopped, result of the bisection, and reason why there is no orbit."""
 
     def plot(self, ax: Any = None, **options: Any) -> Any:
         """Draw the motion once a period, and the unstable orbit that it settles on; returns the axes."""
@@ -153,12 +153,13 @@ def edge_tracking(
     Returns
     -------
     EdgeState
-        With the unstable periodic orbit that it settles on, if it does; ``termination_reason`` says why it stopped.
+        With the unstable periodic orbit that it settles on, if it does; ``termination_reason`` gives the reason
+        why it stopped.
 
     Raises
     ------
     InputError
-        For bad input, such as two states of the same outcome.
+        If both states have the same outcome, a threshold is out of range, or a run fails.
 
     Examples
     --------

@@ -97,7 +97,7 @@ class InitialConditions:
             )
 
     def describe(self) -> dict[str, Any]:
-        """What tells these starts from others."""
+        """Description of the initial conditions, for comparison."""
         return {
             "count": self.count,
             "displacement": self.displacement,
@@ -256,28 +256,28 @@ _SAME_PHASE = 1e-6
 _NEAR_CONTACT = 0.25
 """Distance of a contact from the instant of observation that is small, over that of the instant farthest from contacts."""
 _BYTES = 2**27
-"""Of the states that are held on the way at most."""
+"""Maximum memory of the stored states."""
 
 
 @dataclass(frozen=True, eq=False)
 class AdvancedStates:
-    """Where states came to."""
+    """States after a number of periods."""
 
     states: _Array
     """After the last period, shape (runs, d); NaN where a run failed."""
     every: _Array | None
-    """After each period, shape (runs, periods, d), if they were asked for."""
+    """After each period, shape (runs, periods, d), if requested."""
     tangents: _Array | None
     """Small changes that were carried along, shape (runs, k, d)."""
     statistics: Mapping[str, NDArray[Any]] = field(default_factory=dict)
-    """Of the way, by name, shape (runs,)."""
+    """Statistics of the motion, by name, shape (runs,)."""
     hidden: Any = None
-    """What it takes to go on without losing a bit."""
+    """State of the solver for a bitwise exact restart."""
     hidden_every: tuple[Any, ...] | None = None
     """The same after each period, with *every*."""
 
     def beginnings(self, later: AdvancedStates) -> AdvancedStates:
-        """Where the periods of *later* began, which went on from here: the runs of each period one after the other."""
+        """States at the beginnings of the periods of *later*, a continuation of this result, ordered by period."""
         assert later.every is not None
         states = np.concatenate([self.states, *later.every.transpose(1, 0, 2)[:-1]])
         if later.hidden_every is None:
@@ -303,7 +303,7 @@ class Flow(Protocol):
 
     @property
     def smooth(self) -> bool:
-        """Whether tangents can be carried along."""
+        """True if tangents can be computed."""
         ...
 
     def advance(
@@ -375,7 +375,7 @@ class Stroboscope:
 
     @cached_property
     def _own(self) -> tuple[tuple[str, int, float], ...]:
-        """States beside the beam's: array of :class:`State`, place in it, and unit."""
+        """States in addition to those of the beam: array of :class:`State`, place in it, and unit."""
         parts = self.system.contacts
         if not self.system.harvesters and all(
             each.striker.mass is None and not each.law.memory for each in parts
@@ -446,7 +446,7 @@ class Stroboscope:
 
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """What is doubtful about derivatives of this flow."""
+        """Diagnostics of the derivatives of this flow."""
         if not self.smooth or self.integration.accuracy == "reference":
             return ()
         return (
@@ -460,7 +460,7 @@ class Stroboscope:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the coordinates."""
+        """Names of the coordinates."""
         modes = range(1, self.modes + 1)
         own = (f"{name}[{place + 1}]" for name, place, _ in self._own)
         return (*(f"amplitude[{i}]" for i in modes), *(f"velocity[{i}]" for i in modes), *own)
@@ -622,7 +622,7 @@ class Stroboscope:
 
     @cached_property
     def striker_position(self) -> float:
-        """Where the mid-position of the tip is, m; NaN without one."""
+        """Mid-position of the tip, m; NaN without a striker."""
         if self.system.striker is None:
             return math.nan
         ensemble = make_ensemble(self.system, self.integration)
@@ -638,7 +638,7 @@ class Stroboscope:
         every: bool = False,
         points: Mapping[str, _Array] | None = None,
     ) -> AdvancedStates:
-        """As :meth:`Flow.advance`; a run does not depend on the runs that are integrated with it."""
+        """Advance as :meth:`Flow.advance`; a run does not depend on the runs that are integrated with it."""
         if tangents is not None and not self.smooth:
             return self._advance_with_differences(states, periods, tangents, every, points)
         begun = states.hidden if isinstance(states, AdvancedStates) else self._begun(states)
@@ -665,7 +665,7 @@ class Stroboscope:
         every: bool,
         points: Mapping[str, _Array] | None,
     ) -> AdvancedStates:
-        """As :meth:`advance`, with tangents by differences between neighbours, a period at a time."""
+        """Advance as :meth:`advance`, with tangents by differences between neighbours, a period at a time."""
         came = self.advance(states, periods, every=True, points=points)
         assert came.every is not None
         begun = states.states if isinstance(states, AdvancedStates) else _rows(states)

@@ -98,7 +98,7 @@ class LifetimeFit(NamedTuple):
     """An exponential law of lifetimes; arrays of the shape of the batch."""
 
     lifetime: _Array
-    """tau; NaN where no end says it."""
+    """tau; NaN without an end."""
     low: _Array
     high: _Array
     """Interval of tau; infinite where the ends do not bound it."""
@@ -188,7 +188,7 @@ def _fit_one(times: _Array, ends: NDArray[np.bool_], delay: float | None) -> tup
 
 
 def _from(times: _Array, ends: NDArray[np.bool_]) -> tuple[float, ...]:
-    """As :func:`_fit_one`, of times that are counted from the delay."""
+    """Fit as :func:`_fit_one`, for times that are counted from the delay."""
     order = np.argsort(times, kind="stable")
     times, ends = times[order], ends[order]
     exposure, count = float(times.sum()), int(ends.sum())
@@ -339,7 +339,7 @@ class LifetimeWork(PointWork):
         return ResultTable(integers, np.full((size, len(self.numbers)), np.nan))
 
     def columns(self, table: ResultTable) -> dict[str, NDArray[Any]]:
-        """What was kept by name, arrays of shape (points, starts)."""
+        """Stored results by name, arrays of shape (points, starts)."""
         count = self.initial_conditions.count
         found: dict[str, NDArray[Any]] = {
             name: table.integers[:, i * count : (i + 1) * count] for i, name in enumerate(_PER_START)
@@ -352,7 +352,7 @@ class LifetimeWork(PointWork):
 
 TITLE = "lifetimes of the snapping of a struck bistable beam"
 CYCLES = 1000
-"""Cycles of a run unless others are asked for."""
+"""Default number of cycles of a run."""
 WELLS = ("first", "other")
 START, WELL, AFTER = "start", "well", "after"
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
@@ -381,9 +381,10 @@ def lifetime_map(
     ----------
     system : System
     axes : optional
-        As in :func:`snapbeam.sweep`; one point, the system as it stands, by default.
+        As in :func:`snapbeam.sweep`; by default one point, the system itself.
     integration : Integration, optional
-        1000 cycles by default.  Runs end early once they provably snap no more, whatever it says.
+        1000 cycles by default. Early termination is always used, also if ``integration.early_termination`` is
+        False.
     initial_conditions : InitialConditions or int
         Starts of each point, the same for all of them.
     settings : LifetimeSettings, optional
@@ -406,7 +407,7 @@ def lifetime_map(
     Raises
     ------
     InputError
-        For bad input, and for a checkpoint of another sweep.
+        If an axis is not valid, or the checkpoint belongs to another sweep.
     CheckpointError
         If the checkpoint is in use, cannot be written or is damaged beyond repair.
 
@@ -496,7 +497,7 @@ def _single(setup: SweepSetup, dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Dataset:
-    """What was kept of every run, labelled."""
+    """Dataset with the stored results of every run."""
     from snapbeam.util.datasets import xr
 
     setup, points = work.setup, work.setup.points

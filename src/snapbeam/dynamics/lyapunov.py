@@ -104,7 +104,7 @@ def lyapunov_spectrum(
     Raises
     ------
     InputError
-        For bad input, and for a flow of your own without tangents: see :func:`largest_lyapunov`.
+        If a number is out of range, or a user-defined flow has no tangents: see :func:`largest_lyapunov`.
 
     Examples
     --------
@@ -172,7 +172,7 @@ def _stopped(total: int, before: int, rule: str) -> str:
 def _runs(
     flow: Flow, states: State | ArrayLike | None, axes: Mapping[str, Any] | None
 ) -> tuple[_Array, Points | None, dict[str, _Array] | None]:
-    """Where runs begin, the points of a map, and its columns."""
+    """Initial states of the runs, the points of a map, and its columns."""
     if states is None or isinstance(states, State):
         if not isinstance(flow, Stroboscope):
             raise InputTypeError(
@@ -229,7 +229,7 @@ def _grazing(share: float) -> tuple[Diagnostic, ...]:
 
 
 def _crossed(advanced: AdvancedStates) -> NDArray[np.bool_] | bool:
-    """Whether the centre crossed zero in the period."""
+    """Mask of the runs in which mid-span crossed zero in the period."""
     found = advanced.statistics.get("zero_crossings")
     return False if found is None else found > 0
 

@@ -63,7 +63,7 @@ __all__ = [
 
 
 _LARGEST_ERROR = 1e-3
-"""Of a derivative by differences, beyond which it counts as unknown."""
+"""Error of a derivative by differences beyond which it counts as unknown."""
 _SPLIT = 16
 """Tangents from which on they are shared among threads."""
 _LONGEST = 0.25
@@ -77,7 +77,7 @@ _SLOW = 0.25
 
 
 class OrbitNotFoundError(RuntimeError):
-    """No orbit was found: the message says why, and what to try.
+    """Error if no orbit was found; the message states the cause and a remedy.
 
     Examples
     --------
@@ -95,15 +95,15 @@ class OrbitNotFoundError(RuntimeError):
 
 
 class Shot(NamedTuple):
-    """What Newton's method came to."""
+    """Result of Newton's method."""
 
     x: _Array
     jacobian: _Array
-    """Of the return map there, or near it."""
+    """Jacobian of the return map at *x*, or near it."""
     residual: float
     iterations: int
     exact: bool
-    """Whether the derivative was taken at *x* itself."""
+    """True if the derivative was evaluated at *x* itself."""
 
 
 class Family:
@@ -151,13 +151,13 @@ class Family:
 
 
 class Return(NamedTuple):
-    """Where the flow brings one state, and the derivative of that by the state."""
+    """Image of a state under the return map, with the derivative by the state."""
 
     x: _Array
     jacobian: _Array
     """Shape (d, d)."""
     impacts: int
-    """On the way; -1 where it is not told."""
+    """Impacts on the way; -1 if unknown."""
 
 
 def jacobian(family: Family, x: _Array, periods: int, value: float | None = None) -> Return:
@@ -188,7 +188,7 @@ def require_isolated_orbits(flow: Flow) -> None:
 
 
 def _by_differences(family: Family, x: _Array, periods: int, value: float | None) -> Return:
-    """As :func:`jacobian`, from states beside it that meet the tip as often as it does."""
+    """Jacobian as :func:`jacobian`, from neighbouring states with the same number of impacts."""
 
     def advance_rows(rows: _Array, runs: NDArray[np.intp]) -> tuple[_Array, _Array | None]:
         beside = family.advance(rows, periods, value)
@@ -329,13 +329,13 @@ class Passage(NamedTuple):
 
     impacts: int
     clearance: float
-    """Least gap, over the length scale b, at which the beam turns back from a tip without touching; NaN: never."""
+    """Minimum gap, over the length scale b, at which the beam turns back from a tip without touching; NaN: never."""
     min_penetration: float
-    """Greatest penetration of the lightest impact, over b; NaN: none."""
+    """Maximum penetration of the lightest impact, over b; NaN: none."""
     min_impulse: float
-    """Of an impact, N s; NaN: none."""
+    """Minimum impulse of an impact, N s; NaN: none."""
     peak_displacement: float
-    """Greatest distance of the contact point from the straight beam, over b."""
+    """Maximum distance of the contact point from the straight beam, over b."""
     crossings: int
 
 
@@ -465,7 +465,7 @@ class PeriodicOrbit:
     jacobian: _Array
     """Derivative of the return map, in those coordinates, shape (d, d)."""
     residual: float
-    """Greatest coordinate of the state that came back less the one that set out."""
+    """Maximum coordinate of the state that came back less the one that set out."""
     iterations: int
 
     @cached_property
@@ -477,7 +477,7 @@ class PeriodicOrbit:
 
     @property
     def is_stable(self) -> bool:
-        """Whether every multiplier is inside the unit circle."""
+        """True if every multiplier is inside the unit circle."""
         return bool(np.abs(self.multipliers[0]) < 1.0)
 
     @property
@@ -519,12 +519,12 @@ class PeriodicOrbit:
 
     @cached_property
     def contact_summary(self) -> Passage:
-        """What it does on its way: impacts, how near it passes the tip, how far it goes."""
+        """Contacts of the orbit: impacts, closest approach to the tip, maximum displacement."""
         return passage_of(self._stroboscope, self.coordinates, self.period)
 
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """What is doubtful about the multipliers."""
+        """Diagnostics of the multipliers."""
         return getattr(self.flow, "diagnostics", ())
 
     @property
@@ -639,12 +639,13 @@ def periodic_orbit(
         ``accuracy="reference"`` by default: a derivative is only as accurate as the steps.  At level
         ``"standard"`` it is off by up to 2 %, which is warned of.
     phase : float, optional
-        Of the drive at which the orbit is seen, rad.  By default that at which a run begins; under a law that is not
-        smooth, where a contact is near that, the phase farthest from all contacts.  ``orbit.flow.phase`` tells it.
+        Of the drive at which the orbit is seen, rad.  By default that at which a run begins; under a law that
+        is not smooth, where a contact is near that, the phase farthest from all contacts.  ``orbit.flow.phase``
+        contains it.
     transient : int
-        Periods to advance from the guess first, which brings it to what attracts it.
+        Transient periods to integrate from the guess, so that it approaches the attractor.
     tolerance : float
-        Greatest coordinate that may remain, in units of the well's amplitude and of omega_1 times it; at most 1e-3.
+        Maximum coordinate that may remain, in units of the well's amplitude and of omega_1 times it; at most 1e-3.
     iterations : int
         Maximum number of iterations of Newton's method.  It also stops where no step reduces the residual.
     deflate : sequence of PeriodicOrbit
@@ -657,9 +658,9 @@ def periodic_orbit(
     Raises
     ------
     InputError
-        For bad input.
+        If the system has no excitation, or a number is out of range.
     OrbitNotFoundError
-        If none is found: the message says why, and what to try.
+        If no orbit is found; the message states the cause and a remedy.
 
     Examples
     --------
@@ -772,7 +773,7 @@ def shoot(
 
 _ITERATIONS = 14
 _DIFFERENCE = 2e-6
-"""Of the difference by the parameter, over its range."""
+"""Step of the difference by the parameter, over its range."""
 
 
 class Spot(NamedTuple):
@@ -839,7 +840,7 @@ class Corrector:
         return Spot(shot.x, self.tangent(came, slope, before), came, slope, shot.iterations)
 
     def tangent(self, came: Return, slope: _Array, before: _Array) -> _Array:
-        """Of the branch, of length one, towards where *before* points."""
+        """Unit tangent of the branch, in the direction of *before*."""
         wanted = np.zeros(slope.size + 1)
         wanted[-1] = 1.0
         try:
@@ -885,7 +886,7 @@ class Corrector:
         return found._replace(tangent=along if along[-1] * spot.tangent[-1] >= 0.0 else -along)
 
     def orbit(self, spot: Spot) -> PeriodicOrbit:
-        """As an orbit of the flow at its value."""
+        """Orbit of the flow at its parameter value."""
         came, x = spot.came, spot.y[:-1]
         residual = float(np.abs(came.x - x).max())
         flow = self.family.at(float(spot.y[-1]) * self.span)

@@ -79,7 +79,7 @@ def poincare_section(
     Raises
     ------
     InputError
-        For bad input.
+        If the system has no excitation, a number is out of range, or the run fails during the transient.
 
     Examples
     --------

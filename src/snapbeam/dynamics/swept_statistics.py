@@ -72,8 +72,8 @@ def hysteresis(
     Raises
     ------
     InputError
-        Before the first run: for bad input, for a value at which the run does not fit the record, and for a tip that
-        moves where an excitation does not repeat, because the restart would shift the tip by a jump.
+        Before the first run: if *name* is not a numeric parameter, a value is out of range or exceeds the recorded
+        motion, or a tip moves under an excitation that does not repeat, because the restart would shift the tip by a jump.
 
     Examples
     --------

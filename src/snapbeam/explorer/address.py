@@ -1,4 +1,4 @@
-"""What stands behind a page's address: what is shown, so that a link shows it again.
+"""Query string of the page's address: the displayed state, so that a link shows it again.
 
 Whatever comes from there is checked like any input, and counts for nothing where it is wrong.
 """
@@ -45,7 +45,7 @@ class Address:
     theme, type : str
         "dark" or "default"; "large" for a lecture.
     tab, card : str
-        The view of the run, and the card beside it; empty for the first one.
+        View of the run and card next to it; empty for the first ones.
     words : tuple of str
         What was wrong in the address.
     """
@@ -66,7 +66,7 @@ class Address:
 
     @classmethod
     def read(cls, arguments: Mapping[str, list[bytes]]) -> Address:
-        """The state that an address describes; what is wrong in it is left out and told."""
+        """The state that an address describes; invalid parts are ignored and reported."""
         size = sum(len(name) + sum(map(len, values)) for name, values in arguments.items())
         if size > ADDRESS:
             return cls(words=(f"the address is longer than {ADDRESS} characters and counts for nothing",))

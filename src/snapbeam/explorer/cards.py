@@ -92,7 +92,7 @@ class WindowControl:
         self._waiting = Waiting(card.shared.compiling, card.later)
 
     def wake(self) -> None:
-        """The page stands in a browser: from now on what is seen is worth computing."""
+        """Start computing visible windows; the page is now loaded in a browser."""
         self._awake = True
         self.view_moved()
 
@@ -175,7 +175,7 @@ class WindowControl:
         )
 
     def _bounds(self) -> tuple[float, float, float, float] | None:
-        """What is seen, within what the axes may be."""
+        """Visible ranges of the axes, clipped to the allowed parameter values."""
         left, right, low, high = self.card.view.view
         found: list[float] = []
         for (a, b), name, axis in (
@@ -224,7 +224,7 @@ class WindowControl:
             self.card.tell(words or f"window: all {window.wanted} points computed")
 
     def more(self) -> None:
-        """Compute the level that was asked about."""
+        """Compute the requested level."""
         window = next((w for w in reversed(self.card.windows()) if w.asks is not None), None)
         self.card.more.visible = False
         asked = 0.0 if window is None or window.asks is None else window.asks[1]
@@ -283,7 +283,7 @@ class MapCard:
         self.moved: Callable[[], None] = lambda: None
         self.cut_moved: Callable[[dict[str, Any]], None] = lambda _: None
         self.own: set[Any] = set()
-        """Keys of the windows that this page has asked for: those of other tabs are not laid over its map."""
+        """Keys of the windows that this page requested; those of other tabs are not drawn over its map."""
         self._drawn: list[tuple[Window, NDArray[np.int8]]] = []
         self._picked: tuple[float, float] | None = None
         self._words = list(address.words)
@@ -466,19 +466,19 @@ class MapCard:
 
     @property
     def plane_key(self) -> Any:
-        """What two windows must share to be drawn over one another."""
+        """Key that two windows must share to be drawn over one another."""
         assert self.system is not None
         fixed = tuple(sorted(self.plane.fixed_values().items()))
         return self.system.hash, self.integration, self.plane.names, fixed
 
     def windows(self) -> list[Window]:
-        """The windows over this cut that this page has asked for, the widest first."""
+        """Windows over this section that the page requested, the widest first."""
         if self.system is None or self.source.is_list:
             return []
         return self.shared.windows(self.plane_key, self.own)
 
     def _units(self) -> dict[str, tuple[float, str]]:
-        """What a ratio of 1 is in Hz, mm/s or g along the axes of the map, where one structure is shown."""
+        """Physical value and unit of a ratio of 1 along each axis of the map (Hz, mm/s or g)."""
         names, fixed = self.plane.names, {} if self.source.is_list else self.plane.fixed_values()
         if self.system is None or any(name.startswith(CHANGES_UNITS) for name in names):
             return {}
@@ -643,7 +643,7 @@ class MapCard:
         return self.plane.at(*self.plane.index(x, y))
 
     def expected(self, point: Point) -> dict[str, Any]:
-        """What the map holds of a point; empty if it is none of the map's, or the system has changed."""
+        """Results of the map at a point; empty if the point is not on the map, or the system has changed."""
         if point.expected or self.changed or not self.source.skeleton.data_vars:
             return point.expected
         place = self.plane.find(point.values)
@@ -889,7 +889,7 @@ class SystemCard:
     # ------------------------------------------------------------------ doing
 
     def apply(self) -> None:
-        """Use what stands in the fields from now on; refused with words, and nothing changes."""
+        """Apply the values of the fields; invalid ones give a message and change nothing."""
         try:
             changed = self.changed_fields()
             card = self.page.card
@@ -1101,7 +1101,7 @@ class TakeCard:
     # ------------------------------------------------------------------ files
 
     def _make(self, name: str, suffix: str, write: Callable[[Any, Token], object]) -> None:
-        """Make a file beside the page and hand it to the browser."""
+        """Make a file in the background and send it to the browser."""
         token = Token(_EXPORT_SECONDS)
         work, done = self._job(name, suffix, write, token)
         self.page.shared.jobs.export(work, done, token)
@@ -1109,7 +1109,7 @@ class TakeCard:
     def _job(
         self, name: str, suffix: str, write: Callable[[Any, Token], object], token: Token
     ) -> tuple[Any, Any]:
-        """What makes a file, and what is done with it."""
+        """Function that makes a file, and function that offers it for download."""
         page = self.page
         self.words.object = Markup('<p class="busy">making {}{}</p>').format(name, suffix)
 

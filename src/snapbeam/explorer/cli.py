@@ -22,14 +22,12 @@ def explore(
     file: Annotated[
         Path | None,
         typer.Argument(
-            help="NetCDF file or checkpoint of a map; the paper's beam if left out.", metavar="[MAP]"
+            help="NetCDF file or checkpoint of a map; by default the paper's beam.", metavar="[MAP]"
         ),
     ] = None,
     config: Annotated[
         Path | None,
-        typer.Option(
-            "--config", help="TOML file of the system to begin with, where no map is given.", metavar="FILE"
-        ),
+        typer.Option("--config", help="TOML file of the initial system, if no map is given.", metavar="FILE"),
     ] = None,
     port: Annotated[
         int | None,
@@ -40,19 +38,19 @@ def explore(
     address: Annotated[str, typer.Option(help="Address to serve on.")] = "127.0.0.1",
     allow_remote: Annotated[
         bool,
-        typer.Option("--allow-remote", help="Allow an address that others can reach."),
+        typer.Option("--allow-remote", help="Allow an address that other machines can reach."),
     ] = False,
     token: Annotated[
         str | None,
         typer.Option(
-            help="Token in the address of the page; by default one that is kept for this user, and a random one for an address that others can reach."
+            help="Token in the address of the page; by default a stored one of this user, or a random one with --allow-remote."
         ),
     ] = None,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
     ] = True,
 ) -> None:
-    """Open a map in the browser: click on a point, see its run, watch the beam.
+    """Open a map in the browser; click on a point to simulate it and to see the beam.
 
     Example: snapbeam explore map.nc
     """

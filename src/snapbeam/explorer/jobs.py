@@ -1,4 +1,4 @@
-"""Work that a page asks for, beside the page: newest first, cancelled when it is asked for again.
+"""Background jobs of a page: newest first, cancelled by a new request.
 
 Kernels let go of Python's lock, so that threads are enough.  A job hears that it is cancelled where it reports its
 progress; a window's next batch waits while a run, which a person waits for, is computed.
@@ -59,7 +59,7 @@ class Cancelled(Exception):
 
 @dataclass(eq=False)
 class Token:
-    """By which a job is told to stop, and stops itself when its time is up.
+    """Cancellation token of a job, with a time limit.
 
     The time before its first report, in which an engine may be compiled, is not counted.
     """
@@ -79,7 +79,7 @@ class Token:
 
     @property
     def cancelled(self) -> bool:
-        """Whether it was told to stop."""
+        """True if cancellation was requested."""
         return self.event.is_set()
 
     def check(self, *report: Any) -> None:
@@ -88,7 +88,7 @@ class Token:
         Raises
         ------
         Cancelled
-            If it was told to stop.
+            If cancellation was requested.
         InputError
             If it has taken longer than a page may ask for.
         """
@@ -154,7 +154,7 @@ class Jobs:
         Raises
         ------
         Cancelled
-            If the window was told to stop while it waited.
+            If the window was cancelled while it waited.
         """
         ticket = object()
         with self._turns:
@@ -309,7 +309,7 @@ class Waiting:
         return mark
 
     def waits(self, which: int, mark: object) -> bool:
-        """Whether the wait that :meth:`begin` gave *mark* for goes on."""
+        """Return whether the wait that :meth:`begin` started for *mark* continues."""
         return self._asked.get(which) is mark
 
     def end(self, which: int, computed: bool = True) -> None:
@@ -338,7 +338,7 @@ WINDOW_SECONDS = 1800.0
 UPLOAD = 2 * 2**20
 """Bytes of a file given to the page."""
 ADDRESS = 4096
-"""Characters of what stands behind the page's address."""
+"""Maximum length of the query string."""
 BODY = 8 * 2**20
 """Bytes of one message from a page."""
 
@@ -416,7 +416,7 @@ class Downloads:
 
 
 def file_bytes(suffix: str, write: Callable[[Path], object]) -> bytes:
-    """What ``write(path)`` writes to a file of its own, which is gone afterwards."""
+    """Bytes that ``write(path)`` writes to a temporary file."""
     with tempfile.TemporaryDirectory(prefix="snapbeam-") as folder:
         path = Path(folder) / f"file{suffix}"
         write(path)

@@ -218,7 +218,7 @@ class MapView:
 
     @property
     def is_whole(self) -> bool:
-        """Whether all of the map is seen."""
+        """True if the complete map is visible."""
         left, right, low, high = self.view
         return bool(
             left <= self.x.span[0]
@@ -305,7 +305,7 @@ class MapView:
         }  # fmt: skip
 
     def show_quasi_static(self, visible: bool, fixed: dict[str, Any]) -> str:
-        """Draw V_QS1 of one mode (Eq. 21); says why it cannot be drawn, if it cannot."""
+        """Draw V_QS1 of one mode (Eq. 21); returns the reason if it cannot be drawn."""
         self.curve.data = {"x": [], "y": []}
         if not visible:
             return ""

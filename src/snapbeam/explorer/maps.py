@@ -1,4 +1,4 @@
-"""What is explored: a map in memory, a map in a file, or a system of which there is no map yet."""
+"""Sources of the explorer: a map in memory, a map in a file, or a system without a map."""
 
 from __future__ import annotations
 
@@ -232,7 +232,7 @@ class Source:
 
     @property
     def attrs(self) -> dict[str, Any]:
-        """What the map says of itself."""
+        """Attributes of the map."""
         return dict(self.skeleton.attrs)
 
     @property
@@ -250,7 +250,7 @@ class Source:
 
     @property
     def dims(self) -> list[str]:
-        """What may stand along an axis: dimensions of more than one point; of a list what differs among its points.
+        """Possible axes: dimensions of more than one point; for a list of points, parameters that differ.
 
         A map needs two: of one axis, or of one point, what else is known of it stands along the other, as a strip.
         """
@@ -259,7 +259,7 @@ class Source:
 
     @property
     def is_list(self) -> bool:
-        """Whether it is a list of points, not a grid."""
+        """True if the source is a list of points, not a grid."""
         return POINT in parameter_dims(self.skeleton)
 
     def coordinate(self, name: str) -> NDArray[Any]:
@@ -274,7 +274,7 @@ class Source:
         return found
 
     def variables(self) -> list[str]:
-        """What can be shown, the class first."""
+        """Variables that can be shown, the response class first."""
         return [name for name, layer in self.layers.items() if layer.shown]
 
     def numbers(self) -> list[str]:
@@ -282,7 +282,7 @@ class Source:
         return list(self.layers)
 
     def label(self, name: str) -> tuple[str, str]:
-        """What a variable or an axis is, in words, and its unit."""
+        """Long name and unit of a variable or an axis."""
         if name in self.layers:
             return self.layers[name].words, self.layers[name].unit
         if name in self.skeleton.variables:
@@ -372,7 +372,7 @@ class SystemSource(Source):
 
 
 _SMALL = 2**25
-"""Bytes of a map up to which all of it is held, once a point of it has been asked for."""
+"""Size of a map up to which it is loaded completely on the first access, bytes."""
 
 
 class FileSource(DatasetSource):
@@ -562,7 +562,7 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A point that is asked for.
+    """Requested point.
 
     Attributes
     ----------
@@ -576,7 +576,7 @@ class Point:
     expected: dict[str, Any] = field(default_factory=dict)
 
     def system(self, base: System, integration: Integration) -> tuple[System, Integration]:
-        """What is run at this point."""
+        """System and solver settings of the run at this point."""
         of_run = {
             split_name(name)[1]: value
             for name, value in self.values.items()
@@ -604,7 +604,7 @@ def _brief(value: Any) -> str:
 
 
 def system_of(attrs: Mapping[str, Any], name: str) -> System:
-    """The system that a map says it was computed of.
+    """System stored in a map.
 
     Raises
     ------
@@ -635,7 +635,7 @@ def _parsed(text: str, name: str) -> dict[str, Any]:
 
 
 def integration_of(attrs: Mapping[str, Any]) -> Integration:
-    """How a map says that it was integrated; one run is always the processor's work."""
+    """Solver settings stored in a map; the engine is left out, because single runs use the CPU."""
     found = _parsed(str(attrs.get("integration", "{}")), "integration")
     known = {item: value for item, value in found.items() if value is not None and item != "engine"}
     return Integration(**known)
@@ -648,7 +648,7 @@ def parameter_of(skeleton: xr.Dataset, name: str) -> str:
 
 
 def compared(expected: Mapping[str, Any], outcome: RunSummary, engine: str) -> tuple[bool, str]:
-    """Whether a run is what a map holds of it, bit for bit, and words for it."""
+    """Return whether a run is bitwise equal to the values of a map, and a message."""
     expected = {name: value for name, value in expected.items() if name in outcome}
     if not expected:
         return True, ""
@@ -750,7 +750,7 @@ class Axis:
 
     @staticmethod
     def words_of(source: Source, name: str) -> str:
-        """What stands along it: words, symbol and unit."""
+        """Axis label: long name, symbol and unit."""
         from snapbeam.model.parameter_axes import parameter_of_axis
 
         attrs = source.skeleton[name].attrs
@@ -779,7 +779,7 @@ class Axis:
 
     @property
     def even(self) -> bool:
-        """Whether its cells are equally wide on the screen."""
+        """True if the cells are equally wide on the screen."""
         edges = np.log(self.edges) if self.log and self.edges[0] > 0.0 else self.edges
         widths = np.diff(edges)
         return bool(np.allclose(widths, widths[0], rtol=_EVEN))
@@ -911,7 +911,7 @@ class Plane:
         return Point(values | self.fixed_values())
 
     def indexers(self, row: int, column: int) -> dict[str, int]:
-        """Where a cell lies in the arrays of the map."""
+        """Indices of a cell in the arrays of the map."""
         return {self.x.name: column, self.y.name: row, **self.fixed}
 
     def beside(self, place: tuple[float, float], across: int, upward: int) -> tuple[int, int]:
@@ -939,7 +939,7 @@ class Plane:
         return (place[0], place[1]) if same else None
 
     def place(self, values: dict[str, Any]) -> tuple[float, float] | None:
-        """Where a point is drawn; None if it is of another cut."""
+        """Plot coordinates of a point; None if the point belongs to another section of the map."""
         found = []
         for axis, name in ((self.x, self.names[0]), (self.y, self.names[1])):
             value = values.get(name)
@@ -956,7 +956,7 @@ class Plane:
 
     @property
     def can_zoom(self) -> bool:
-        """Whether both axes are of numbers between which there are others."""
+        """True if both axes are continuous parameters."""
         return all(parameter_of_axis(name).quantity.kind is float for name in self.names)
 
 
@@ -1032,7 +1032,7 @@ class Scatter:
         return np.array(sides)
 
     def fixed_values(self) -> dict[str, Any]:
-        """Nothing is the same for all points by itself."""
+        """Fixed values: none for a list of points."""
         return {}
 
     def at(self, number: int) -> Point:
@@ -1045,7 +1045,7 @@ class Scatter:
         return Point(values)
 
     def indexers(self, number: int) -> dict[str, int]:
-        """Where a point lies in the arrays of the map."""
+        """Index of a point in the arrays of the map."""
         return {POINT: number}
 
     def find(self, values: dict[str, Any]) -> tuple[int] | None:
@@ -1061,7 +1061,7 @@ class Scatter:
         return next(str(name) for name in skeleton.coords if parameter_name(skeleton, str(name)) == full)
 
     def place(self, values: dict[str, Any]) -> tuple[float, float] | None:
-        """Where a point is drawn; None if it does not say."""
+        """Plot coordinates of a point; None if its parameters are incomplete."""
         found = [values.get(name) for name in self.names]
         if any(value is None for value in found):
             number = self.find(values)
@@ -1191,7 +1191,7 @@ class Window:
         return int(self.refines(1).sum())
 
     def refines(self, stride: int | NDArray[np.int8]) -> NDArray[np.bool_]:
-        """Where blocks of *stride* cells are finer than other data; shape (ny, nx)."""
+        """Mask of the cells in which blocks of *stride* cells are finer than other data; shape (ny, nx)."""
         sides = np.broadcast_to(stride, self.stride.shape).astype(np.float64)
         if self.known is None:
             return np.ones(self.stride.shape, dtype=bool)
@@ -1231,7 +1231,7 @@ class Window:
         return found
 
     def covers(self, x: float, y: float) -> bool:
-        """Whether a place lies in it."""
+        """Return whether a point is inside the window."""
         left, right, low, high = self.bounds
         return left <= x <= right and low <= y <= high
 
@@ -1241,7 +1241,7 @@ _GAIN = 0.7
 
 
 def _finer(sides: tuple[_Array, _Array], below: tuple[_Array, _Array]) -> NDArray[np.bool_]:
-    """Where cells are neither wider nor taller than those below, and clearly smaller."""
+    """Mask of the cells that are neither wider nor taller than those below, and clearly smaller."""
     slack = 1.0 + 1e-9
     found: NDArray[np.bool_] = (
         (sides[0] <= slack * below[0])
@@ -1488,7 +1488,7 @@ def _filled(
 
 
 def _known(window: Window, row: int, column: int) -> bool:
-    """Whether the run of this very cell has been made: it is the point of a coarser block."""
+    """Return whether the run of this cell is already computed as the point of a coarser block."""
     stride = int(window.stride[row, column])
     return bool(stride and _middle(row, stride) == row and _middle(column, stride) == column)
 
@@ -1616,7 +1616,7 @@ def _value(value: Any) -> str:
 
 
 def run_command(values: Mapping[str, Any], file: str, on_map: bool) -> str:
-    """The command that computes a point: of a file's map, or of a parameter file kept beside it."""
+    """The command that computes a point: of a file's map, or of a parameter file stored next to it."""
     if file and on_map:
         point = ",".join(f"{parameter_of_axis(name).short}={_value(value)}" for name, value in values.items())
         source = ["--from", file, "--point", point]
@@ -1628,7 +1628,7 @@ def run_command(values: Mapping[str, Any], file: str, on_map: bool) -> str:
 
 
 def map_command(window: Window, fixed: Mapping[str, Any]) -> str:
-    """The command that computes a window, on the cut at *fixed*, of a parameter file kept beside it."""
+    """The command that computes a window, on the cut at *fixed*, of a parameter file stored next to it."""
     parts = ["snapbeam", "map", "--config", _CONFIG]
     for name, value in fixed.items():
         parts += ["--set", f"{name}={_value(value)}"]
@@ -1641,7 +1641,7 @@ def map_command(window: Window, fixed: Mapping[str, Any]) -> str:
 
 
 def python_lines(system: System, integration: Integration) -> str:
-    """Lines of Python that compute a run of a system, with nothing beside them."""
+    """Self-contained Python code that computes a run of a system."""
     run = _integration_section(integration)
     arguments = ", ".join(f"{name}={value!r}" for name, value in run.items())
     sections = plain(system.to_mapping())

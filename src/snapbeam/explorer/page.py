@@ -53,7 +53,7 @@ class Answer:
 
     run: Run
     words: str
-    """How it compares with what the map holds."""
+    """Result of the comparison with the map, as text."""
     same: bool
     chances: str
     """Probabilities and lifetime of the point, where the map holds them."""
@@ -117,14 +117,14 @@ _LONGEST = 1.0
 
 
 class Page:
-    """What one tab of a browser shows.
+    """Content of one tab of a browser.
 
     Parameters
     ----------
     shared : Shared
         What all pages of the server share.
     arguments : mapping
-        What stands behind the page's address.
+        Query string of the address.
     """
 
     def __init__(self, shared: Shared, arguments: dict[str, list[bytes]]) -> None:
@@ -162,7 +162,7 @@ class Page:
         self.back = ColumnDataSource({"search": [""], "count": [0]}, name="back")
         self.back.on_change("data", lambda _, __, data: self._went(str(data["search"][0])))
         self._quiet = True
-        """Whether the address is left as it is: while the page is made, and while it shows what an address says."""
+        """True while the address must not change: during construction, and while the page applies an address."""
         self.cards: Any = None
         self.card_names: list[str] = []
         self.keys = ColumnDataSource({"key": [""], "count": [0]}, name="keys")
@@ -192,7 +192,7 @@ class Page:
         self.later(self._at_rest, _AFTER)
 
     def _at_rest(self) -> None:
-        """Once the page stands: what is not seen yet, and what the first run will need."""
+        """Build hidden parts and prepare the first run after the page is loaded."""
         self.runs[0].complete()
         self.shared.warm()
 
@@ -245,7 +245,7 @@ class Page:
             self.doc.add_timeout_callback(guarded, milliseconds)
 
     def _together(self) -> contextlib.AbstractContextManager[None]:
-        """What changes within is told to the browser at once, and drawn once."""
+        """Context that sends all changes to the browser at once."""
         held: contextlib.AbstractContextManager[None] = pn.io.hold(self.doc)
         return held
 
@@ -350,11 +350,11 @@ class Page:
 
     @property
     def which(self) -> int:
-        """Which of the two runs is asked for."""
+        """Number of the requested run of the two."""
         return 1 if self.compare.value and self.target.value == "B" else 0
 
     def ask(self, point: Point, which: int | None = None) -> None:
-        """Compute the run of a point; what was asked for before is not wanted any more."""
+        """Compute the run of a point; earlier requests are cancelled."""
         which = self.which if which is None else which
         view, words = self.runs[which], point.words()
         if self.card.system is None:
@@ -461,7 +461,7 @@ class Page:
         self.write_address()
 
     def _adopt(self, changes: Mapping[str, Any]) -> None:
-        """Take the map's system with some parameters changed, and say whether the map is old."""
+        """Take the map's system with some parameters changed, and mark the map if it is outdated."""
         if self.shared.system is None:
             return
         system, integration = self.shared.system, self.shared.integration
@@ -576,7 +576,7 @@ class Page:
             self._written = search
 
     def _search(self) -> str:
-        """What is shown, as an address says it."""
+        """Query string of the displayed state."""
         card = self.card
         at, b = ({} if point is None else point.values for point in self.points)
         view = None if card.view.is_whole else card.view.view

@@ -100,7 +100,7 @@ class RunPanel:
             self.place.objects = parts
 
     def build(self) -> list[Any]:
-        """What stands in it."""
+        """Return the models of the panel."""
         raise NotImplementedError
 
     def show(self, run: Run, low: float, high: float) -> None:
@@ -117,7 +117,7 @@ class RunPanel:
 
 
 def across(run: Run) -> tuple[NDArray[np.float64], str]:
-    """What pictures over time have along them, and its label."""
+    """Abscissa of time plots, and its label."""
     if "cycle" in run.dataset.variables:
         return run.dataset["cycle"].values, "cycles of excitation τ"
     return run.dataset["time"].values, "time (s)"
@@ -219,7 +219,7 @@ class BeamPanel(RunPanel):
         look = self.look
         self.run: Run | None = None
         self.begin = 0.0
-        """Where playing begins: half a cycle before the first snap-through."""
+        """Start of the playback: half a cycle before the first snap-through."""
         self.fresh = True
         self.count = 0
         empty: list[float] = []
@@ -600,7 +600,7 @@ _COLORS = ("", "#E69F00", "#56B4E9", "#009E73", "#D55E00", "#CC79A7")
 
 
 class Modal(RunPanel):
-    """What each buckling mode does."""
+    """Amplitudes of the buckling modes."""
 
     title = "Modes"
 
@@ -823,7 +823,7 @@ _CURVES_WAVEFORM = ("midspan_displacement", "displacement_at_striker", "striker_
 
 
 class WaveformPanel(RunPanel):
-    """Who is where, and how hard they push."""
+    """Displacements of beam and striker, and the contact force."""
 
     title = "Waveform"
 
@@ -913,7 +913,7 @@ _BUSY = Markup('<span class="busy">{}</span>')
 _BAD = Markup('<span class="bad">{}</span>')
 _FAINT = Markup('<span class="faint">{}</span>')
 FIRST = "Click on the map, use the arrow keys, or type numbers, to see the run of a point."
-"""Words of a run that is not asked for yet."""
+"""Text of a run that is not requested yet."""
 
 
 def _counted(number: int, what: str) -> str:

@@ -38,11 +38,11 @@ _TEMPLATE = """
 {% endblock %}
 """
 _OWN = "static/extensions/panel/"
-"""Where the server keeps what pages are made of; what Panel is not told it fetches from elsewhere."""
+"""Path of the static files on the server; Panel loads all others from elsewhere."""
 
 
 def is_loopback(address: str) -> bool:
-    """Whether an address is of this machine alone."""
+    """Return whether an address is a loopback address."""
     if address == "localhost":
         return True
     try:
@@ -423,7 +423,7 @@ def serve(
     integration: Integration | None = None,
     ready: Callable[[str], None] = print,
 ) -> None:
-    """Serve the page until the process is interrupted; *ready* is told its address.
+    """Serve the page until the process is interrupted; *ready* is called with its address.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What the pages of one server share: the map, the threads, the windows that were computed."""
+"""Objects that the pages of one server share: the map, the threads, the computed windows."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Shared:
             return found
 
     def windows(self, plane: Any, keys: set[Any]) -> list[Window]:
-        """Those of the windows over one plane that have one of *keys*, the widest first; *plane* begins their keys."""
+        """Windows over one plane that have one of *keys*, the widest first; *plane* begins their keys."""
         with self._lock:
             found = [window for key, window in self._windows.items() if key[0] == plane and key in keys]
         return sorted(found, key=_area, reverse=True)

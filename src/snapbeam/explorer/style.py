@@ -125,7 +125,7 @@ def sheet(look: Look) -> str:
 
 
 def focused(look: Look) -> str:
-    """How what has the keyboard's focus is told, where the page's sheet does not reach."""
+    """Style sheet of the keyboard focus for elements that the sheet of the page does not reach."""
     return f":focus-visible {{ outline: 2px solid {look.accent} !important; outline-offset: -2px; }}"
 
 
@@ -311,7 +311,7 @@ def class_chip(kind: ResponseClass) -> Markup:
 
 
 class Cursor:
-    """Where the pointer is along a run, in cycles (or seconds), and the part of the run that is seen.
+    """Cursor position along a run, in cycles (or seconds), and the visible part of the run.
 
     Pictures over time share the range; each has a line at the cursor, and whatever else follows it listens to
     ``place``.
@@ -509,7 +509,7 @@ def framed(page: Page) -> Any:
 
 
 def page_tabs(page: Page) -> dict[str, Callable[[], Any]]:
-    """The tabs beside the map, by title: what makes them."""
+    """Constructors of the tabs next to the map, by title."""
     found: dict[str, Callable[[], Any]] = {}
     if page.shared.system is not None:
         found["System"] = lambda: page.system_card().layout

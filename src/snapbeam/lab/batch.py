@@ -229,7 +229,7 @@ class SeriesSettings:
         ``channel``, ``units``, ``sensitivity``, ``sampling_frequency`` and ``columns`` as for
         :func:`snapbeam.lab.read_signal`.
     cycles
-        Cycles of excitation that the response class is asked for; the rule needs 20.
+        Number of cycles for the response class; the rule needs 20.
     """
 
     camera: Mapping[str, Any] = field(default_factory=dict)
@@ -348,7 +348,7 @@ class TestResult:
 
     @property
     def doubtful(self) -> bool:
-        """Whether any diagnostic is worse than information."""
+        """True if any diagnostic has a severity above INFO."""
         return any(severity != Severity.INFO.value for _, severity, _ in self.diagnostics)
 
 
@@ -520,7 +520,7 @@ def run_test_series(
     Raises
     ------
     InputError
-        If there is nothing to measure.  A test that cannot be measured is a row that says why.
+        If there are no tests.  A test that cannot be measured has a row with the reason.
     """
     tests = find_tests(folder, table, output)
     kept = output / "tests"
@@ -557,7 +557,7 @@ def _files(test: Test) -> list[Path]:
 
 
 def _set(test: Test) -> str:
-    """What a table says of a test, for its fingerprint."""
+    """Values of a test as text, for its fingerprint."""
     values = (test.frequency, test.velocity, test.location)
     return (
         ""

@@ -90,7 +90,7 @@ def uneven_beam(beam: Beam, measured: Measurements, kind: str, modes: int) -> Re
 
 
 def uneven_words(kind: str, model: ReducedModel) -> str:
-    """What was found, and what it does not say."""
+    """Message about the imperfection found, and its ambiguity."""
     assert model.imperfection is not None and model.beam is not None
     value, level = getattr(model.imperfection, kind), model.beam.buckling_level * 1e3
     return (
@@ -100,7 +100,7 @@ def uneven_words(kind: str, model: ReducedModel) -> str:
 
 
 def imperfection_section(imperfection: Imperfection | None) -> dict[str, Any]:
-    """What differs from a perfect beam, as the section of a parameter file."""
+    """Nonzero parameters of an imperfection, as the section of a parameter file."""
     if imperfection is None:
         return {}
     perfect = vars(Imperfection())
@@ -125,7 +125,7 @@ STARTS = (1.0, 0.75, 1.33, 0.55, 1.8)
 HIGHER = (1.05, 1.15, 1.3)
 """Buckling levels that are tried beyond the one found, over it."""
 UNDETERMINED = 1e-5
-"""Least singular value of the relative sensitivities that counts as a response, over the greatest."""
+"""Minimum singular value of the relative sensitivities that counts as a response, over the maximum."""
 
 
 def sensitivity(frequencies: Callable[[_Array], _Array], logs: _Array, errors: _Array) -> _Array:
@@ -164,7 +164,7 @@ def search(
 
 
 def open_upwards(residual: Callable[[_Array], _Array], logs: _Array, names: list[str]) -> bool:
-    """Whether any higher buckling level meets the data as well as the one found.
+    """Return whether higher buckling levels fit the data as well as the one found.
 
     So it is where the only frequency about a well is that of the antisymmetric mode, which does not depend on
     the level; the symmetric one lies above it from b/r = 6.2 on.
@@ -191,7 +191,7 @@ _CROSSING = 0.05  # share within which the first two frequencies may be in the o
 
 
 def shape_diagnostics(beam: Beam, measured: Measurements, modes: int) -> list[Diagnostic]:
-    """Whether the order of the modes about a well is in doubt where nothing else tells them apart."""
+    """Diagnostics for an uncertain order of the modes about a well, if only the frequencies identify them."""
     told = [measured.lower_well_shape, measured.upper_well_shape]
     given = [freq for freq in (measured.lower_well_frequencies, measured.upper_well_frequencies) if freq]
     if modes < 2 or any(told) or not given:
@@ -280,7 +280,7 @@ def with_error(result: Calibration, name: str) -> str:
 
 
 def links(names: list[str], covariance: NDArray[np.float64], hidden: tuple[str, ...]) -> list[Diagnostic]:
-    """What to say of parameters that the data do not determine, link, or hardly tell."""
+    """Diagnostics for parameters that the data do not determine or determine only in combination."""
     told = []
     if len(hidden) == 1:
         words = f"no measured frequency depends on {hidden[0]}: it keeps its start"
@@ -314,7 +314,7 @@ def links(names: list[str], covariance: NDArray[np.float64], hidden: tuple[str, 
 
 
 def at_least(level: float) -> Diagnostic:
-    """What to say where any buckling level [m] above the one found meets the data as well."""
+    """Diagnostic for a buckling level [m] of which the data determine only a lower bound."""
     text = (
         f"any buckling_level above {level * 1e3:.4g} mm meets the measured frequencies as well: the first one about "
         "a well may be that of the antisymmetric mode, which does not depend on the level; measure the symmetric one"
@@ -323,7 +323,7 @@ def at_least(level: float) -> Diagnostic:
 
 
 def remarks(result: Calibration, measured: Measurements) -> list[str]:
-    """What was found: the frequencies about the wells, and the measured geometry beside the model's."""
+    """Remarks on the result: frequencies about the wells, and measured against fitted geometry."""
     told = []
     first = [
         values[0] for values in (measured.lower_well_frequencies, measured.upper_well_frequencies) if values
@@ -358,7 +358,7 @@ def remarks(result: Calibration, measured: Measurements) -> list[str]:
 
 
 def doubts(result: Calibration, measured: Measurements) -> list[Diagnostic]:
-    """What to beware of: unequal wells, assumed errors, data the model does not meet."""
+    """Diagnostics of a calibration: unequal wells, assumed standard errors, data that the model does not fit."""
     told = []
     pairs = zip(measured.lower_well_frequencies, measured.upper_well_frequencies, strict=False)
     for i, (one, two) in enumerate(pairs):
@@ -407,7 +407,7 @@ FITTED = ("thickness", "young_modulus", "density", "length", "buckling_level")
 
 @dataclass(frozen=True)
 class Residual:
-    """One measured frequency [Hz] beside the model's, and their difference in standard errors."""
+    """One measured frequency [Hz] and that of the model, and their difference in standard errors."""
 
     name: str
     measured: float
@@ -424,14 +424,15 @@ class Residual:
 class Calibration:
     """A calibrated beam.
 
-    ``beam`` is the result; ``values`` and ``standard_errors`` hold the fitted parameters by name (SI), in the
-    order of ``correlation``; a parameter that the data do not determine has no entry in ``standard_errors``
+    ``beam`` is the result; ``values`` and ``standard_errors`` contain the fitted parameters by name (SI), in
+    the order of ``correlation``; a parameter that the data do not determine has no entry in ``standard_errors``
     and is named in ``undetermined``.  ``scatter`` is the root of chi-square per degree of freedom by which
-    standard errors were raised, 1 if the data agree.  ``well_frequency``, ``start_well_frequency``, ``gauge_well_frequency``
-    [Hz] are the first frequency about a well of the result, of the beam the fit started from, and of the
-    result with the gauge's geometry; ``either_well`` holds the buckling level [m] that each well alone would
-    ask for.  ``imperfection``, if one was asked for, gives each well its own first frequency; ``beam`` then has
-    the buckling level that goes with it.  ``remarks`` say in words what was found, ``diagnostics`` what to beware of.
+    standard errors were raised, 1 if the data agree.  ``well_frequency``, ``start_well_frequency``,
+    ``gauge_well_frequency`` [Hz] are the first frequency about a well of the result, of the beam the fit
+    started from, and of the result with the gauge's geometry; ``either_well`` contains the buckling level [m]
+    from each well alone. ``imperfection``, if requested, gives each well its own first frequency; ``beam`` then
+    has the corresponding buckling level. ``remarks`` describe the result, ``diagnostics`` list doubtful
+    results.
 
     Examples
     --------
@@ -529,13 +530,13 @@ def calibrate(
     modes: int = MODES,
     imperfection: str | None = None,
 ) -> Calibration:
-    """Fit a beam to what was measured of it.
+    """Fit the parameters of a beam to measurements.
 
     Parameters
     ----------
     measured : Measurements
     beam : Beam
-        What is known of the beam, and where the fit starts; parameters that are not fitted are kept.  Its own
+        Nominal beam, which is the start of the fit; parameters that are not fitted keep its values.  Its own
         frequencies are compared with the measured ones in the diagnostics.
     fit : tuple of str, optional
         Which of thickness, young_modulus, density, length and buckling_level to fit.  By default the
@@ -544,8 +545,8 @@ def calibrate(
     modes : int
         Number of buckling modes of the model, which is that used for maps.
     imperfection : {"midspan_amplitude", "point_load", "uniform_load"}, optional
-        What makes the wells unequal, fitted last to the first frequencies about both; the parameter file then has
-        a section ``[imperfection]``.  Equal wells by default.
+        Imperfection, fitted last to the first frequencies about both wells; the parameter file then has a
+        section ``[imperfection]``.  Equal wells by default.
 
     Returns
     -------
@@ -641,7 +642,7 @@ def calibrate(
 
 @dataclass(frozen=True)
 class _Fitted:
-    """What the measured frequencies say of the parameters that are fitted."""
+    """Estimates of the fitted parameters from the measured frequencies."""
 
     logs: _Array
     covariance: _Array

@@ -44,8 +44,8 @@ _LARGEST_PIXEL = 0.01  # m
 class Recording:
     """Frames of a camera on demand, with the scales that turn them into metres and seconds.
 
-    Made by :func:`open_recording`.  Frames are read when asked for and not kept, so the memory used does not
-    grow with the length of the recording.  Use it as a context manager, or call :meth:`close`.
+    Made by :func:`open_recording`.  Frames are read on demand and not stored, so the memory used does not grow
+    with the length of the recording.  Use it as a context manager, or call :meth:`close`.
 
     Attributes
     ----------
@@ -64,9 +64,9 @@ class Recording:
     max_value
         Grey level at which a pixel is saturated.
     metadata
-        What else the file says.
+        Other metadata of the file.
     diagnostics
-        What in the file makes measurements in it doubtful.
+        Diagnostics of the file.
     edge_error
         Standard error [px] that the way the file stores pictures adds to every edge.
 
@@ -184,7 +184,7 @@ def _region(value: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> 
 
 
 def _rate_diagnostics(source: FrameSource, given: float | None) -> tuple[Diagnostic, ...]:
-    """What to say of a frame rate that was given although the file says something."""
+    """Diagnostics for a given frame rate that differs from the file."""
     if given is None:
         return ()
     if source.frame_rate_question:
@@ -208,23 +208,22 @@ def open_recording(
     ----------
     path
         A Photron header (.cih, .cihx) or its .mraw; a video (.avi, .mp4, .mov, .mkv); Phantom's .cine; a TIFF
-        stack; an array (.npy, or .h5, ``"file.h5::name"`` where it holds several); a folder of numbered images
+        stack; an array (.npy, or .h5, ``"file.h5::name"`` if it contains several); a folder of numbered images
         or a pattern such as ``"run3/img_*.png"``.
     frame_rate
-        Frames per second [Hz] of what is in the file.  Overrides the file.  A video must be given it: the
-        rate in a video file is how fast it plays.  A Photron header gives record rate over skipped frames,
-        and must be given it too where its fields contradict each other.
+        Frame rate [Hz] of the recording. Overrides the file. It is required for a video, because the rate in
+        the file is the playback rate. A Photron header gives record rate over skipped frames; the argument is
+        required if its fields contradict each other.
     pixel_size
         Metres per pixel in the plane of the beam.  Overrides the file.  Photron (.cihx) and ImageJ files may
-        hold it; nearly always it is measured with a scale in view.
+        contain it; usually it is measured with a scale in view.
     region
         (first row, last row + 1, first column, last column + 1), the part of the frame to read.
 
     Raises
     ------
     InputError
-        If the file is malformed, or if frame rate or pixel size stand neither in the file nor in the call:
-        they are never guessed.
+        If the file is malformed, or if frame rate or pixel size is neither in the file nor in the call.
 
     Examples
     --------
@@ -369,12 +368,12 @@ def pixel_size_from_marks(
     frame
         Frame to look in.
     reach
-        Half the side [px] of the square in which the centre of each mark is sought.
+        Half the side [px] of the square in which the centre of each mark is located.
 
     Raises
     ------
     InputError
-        If a mark does not stand out, or the two are the same.
+        If a mark has no contrast, or the two are the same.
 
     Examples
     --------
@@ -405,7 +404,7 @@ def pixel_size_from_marks(
 
 
 def _centre(picture: _Array, where: tuple[float, float], reach: int, name: str) -> _Array:
-    """Centre of mass of what stands out of its surroundings about *where*, sought twice."""
+    """Centre of mass of the contrast about *where*, in two iterations."""
     at = np.array(where, dtype=np.float64)
     for _ in range(3):
         r, c = (round(float(value)) for value in at)
@@ -469,8 +468,8 @@ def write_photron(
     Parameters
     ----------
     path
-        Name of the header, ``.cih`` or ``.cihx``; the pixels go beside it as ``.mraw``.  Only a ``.cihx``
-        header has a place for the pixel size.
+        Name of the header, ``.cih`` or ``.cihx``; the pixels are written next to it as ``.mraw``.  Only a
+        ``.cihx`` header has a place for the pixel size.
     frames
         Arrays of integers of one shape (height, width), taken one at a time.
     frame_rate

@@ -33,13 +33,13 @@ _CERTAIN = 25.0  # chi-square by which the best cycle must beat the next
 
 @dataclass(frozen=True)
 class Alignment:
-    """How to bring a vibrometer record to the camera's clock: t_camera = t_vibrometer + delay.
+    """Time shift from the vibrometer's clock to the camera's: t_camera = t_vibrometer + delay.
 
-    ``delay`` and ``delay_se`` in s; ``polarity`` is -1 if a motion that is positive for one is negative for
-    the other; ``gain``, the camera's amplitude over the vibrometer's, is 1 if both are calibrated;
+    ``delay`` and ``delay_se`` in s; ``polarity`` is -1 if a motion that is positive for one is negative for the
+    other; ``gain``, the camera's amplitude over the vibrometer's, is 1 if both are calibrated;
     ``clock_difference``, the camera's frequency over the vibrometer's less 1, and its standard error;
-    ``certain`` says whether the start of the motion told the cycle, ``margin`` by what chi-square;
-    ``diagnostics`` what makes the alignment doubtful.
+    ``certain`` is true if the onset of the motion determined the cycle, ``margin`` the difference of
+    chi-square; ``diagnostics`` lists the diagnostics.
 
     Examples
     --------
@@ -101,7 +101,7 @@ def align(
     frequency : float, optional
         The excitation frequency [Hz] as set, used as a guess.
     polarity : {1, -1}, optional
-        Whether the two count the same direction as positive; found from the start of the motion if left out.
+        True if both count the same direction as positive; by default from the onset of the motion.
     near : float, optional
         A delay [s] known beforehand to better than half a cycle, as from a common trigger; it then decides
         the cycle.
@@ -183,7 +183,7 @@ def align(
 
 @dataclass(frozen=True)
 class _Told:
-    """What the diagnostics of an alignment are drawn from; ``turned`` says that the start told the polarity."""
+    """Input of the diagnostics of an alignment; ``turned``: the onset determined the polarity."""
 
     polarity: int
     given: bool
@@ -305,9 +305,9 @@ def recorded_drive(
     """Resample a measured drive, start-up transient included, for use in the model, without adding energy.
 
     The drift-free displacement is low-passed without phase shift to *bandwidth*, resampled through a
-    band-limited interpolation, and differentiated, so that displacement and velocity belong together.  The
-    gain of the filter is at most 1 at every frequency.  At ends that are not at rest half the filter's length
-    is left out, where it would have had to invent samples.
+    band-limited interpolation, and differentiated, so that displacement and velocity belong together.  The gain
+    of the filter is at most 1 at every frequency.  At ends that are not at rest half the filter's length is
+    discarded, because samples are missing there.
 
     Parameters
     ----------
@@ -316,14 +316,14 @@ def recorded_drive(
     sampling_frequency : float
         Samples per second [Hz] of the result.
     bandwidth : float, optional
-        Highest frequency kept [Hz]; ten times the excitation frequency if left out, and never more than 0.4
-        of the measured sampling rate.
+        Highest frequency of the drive [Hz]; by default ten times the excitation frequency, and never more than
+        0.4 of the measured sampling rate.
     measurement : DriveMeasurement, optional
-        That of this velocity; measured here if left out.
+        Result of :func:`measure_drive` for this velocity; measured by default.
     alignment : Alignment, optional
         With the camera: turns the drive over where the vibrometer counts the other direction as positive.
     polarity : {1, -1}, optional
-        -1 to turn the drive over, instead of what the alignment says.
+        -1 to turn the drive over, instead of the polarity of the alignment.
     amplitude_from : {"vibrometer", "camera"}
         Whose amplitude the drive has; the camera's needs an alignment.
 

@@ -1,4 +1,4 @@
-"""What the reader needs of a file format.
+"""Interface of image formats.
 
 A source knows its ``shape`` (height, width), its ``numbers`` (the number of each frame in the original
 numbering, so that a missing frame leaves a hole) and can ``read`` a run of frames.  Nothing is kept in memory
@@ -60,11 +60,11 @@ class FrameSource:
     frame_rate, pixel_size, exposure
         [Hz], [m], [s], or None where the file does not say.
     frame_rate_question, pixel_size_hint
-        What the file says that is not enough, for the refusal.
+        Ambiguous information of the file, for the error message.
     diagnostics, edge_error
         What makes measurements doubtful, and the standard error [px] that the format adds to every edge.
     metadata
-        What else the file says.
+        Other metadata of the file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -86,7 +86,7 @@ class FrameSource:
         raise NotImplementedError
 
     def close(self) -> None:
-        """Release what is held open."""
+        """Close open files."""
 
 
 def grey_of(colors: NDArray[Any]) -> NDArray[Any]:
@@ -112,13 +112,13 @@ _LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micron": 1e-6, "
 
 
 def _is_picture(shape: tuple[int, ...], dtype: Any) -> bool:
-    """Whether a page holds grey levels, or colours in its last axis, of a kind that is read."""
+    """Return whether an array is a grey or colour image (last axis) of a supported type."""
     size = len(shape) == 2 or (len(shape) == 3 and shape[-1] in (3, 4))
     return size and all(shape) and (dtype.kind == "f" or (dtype.kind == "u" and dtype.itemsize <= 2))
 
 
 def float_range(pictures: list[NDArray[Any]], path: Path) -> float:
-    """What full scale is in pictures of floating point numbers: 1, or the next of 8, 10, 12, 14 and 16 bits.
+    """Full scale of floating-point images: 1, or the next full scale of 8, 10, 12, 14 and 16 bits.
 
     Raises
     ------
@@ -365,7 +365,7 @@ _EVEN = 0.02  # share by which the kinds of pixels under a mosaic may differ and
 
 
 def take_header(source: FrameSource, header: CameraHeader) -> None:
-    """Give a source what a header says of times and scales."""
+    """Copy times and scales of a header to a source."""
     source.frame_rate = header.timing.frame_rate
     source.frame_rate_question = header.timing.question
     source.pixel_size = header.pixel_size
@@ -596,7 +596,7 @@ LOSSLESS = (
 
 
 def _lossless_h264(context: Any) -> bool:
-    """Whether H.264 keeps all: x264 takes this profile without full colour only then."""
+    """Return whether H.264 is lossless: x264 uses this profile without full colour only then."""
     profile = str(context.profile or "")
     return profile == "High 4:4:4 Predictive" and "444" not in (context.pix_fmt or "444")
 
@@ -683,7 +683,7 @@ class VideoSource(FrameSource):
         self.numbers = np.arange(count)
 
     def _cine(self, stream: Any, metadata: dict[str, str]) -> None:
-        """What the header of a Phantom recording says: how fast it was recorded, for once."""
+        """Read the frame rate and exposure from the header of a Phantom recording."""
         rate = stream.average_rate or stream.base_rate or stream.guessed_rate
         self.frame_rate = float(rate) if rate else float(1 / stream.time_base)
         told = {**metadata, **stream.metadata}

@@ -32,11 +32,10 @@ _CLASSES = tuple(kind for kind in ResponseClass if kind is not ResponseClass.UNK
 class MapComparison:
     """Measured responses compared with a map.
 
-    ``table`` has one entry per measured point: its coordinates, ``measured`` and ``simulated`` class (that of the
-    nearest point of the map), ``used`` (1 if it counts) and ``distance``, in steps of the map, to the
-    nearest point that has the measured class (NaN if none has).  ``confusion[i, j]`` counts points of
-    measured class i and simulated class j, in the order of ``classes``.  ``diagnostics`` is what makes the
-    comparison doubtful.
+    ``table`` has one entry per measured point: its coordinates, ``measured`` and ``simulated`` class (that of
+    the nearest point of the map), ``used`` (1 if it counts) and ``distance``, in steps of the map, to the
+    nearest point that has the measured class (NaN if none has).  ``confusion[i, j]`` counts points of measured
+    class i and simulated class j, in the order of ``classes``.  ``diagnostics`` contains the diagnostics.
 
     Examples
     --------
@@ -128,9 +127,9 @@ def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -
     Notes
     -----
     A point does not count if it lies more than half a step outside the map, was measured at another value of a
-    coordinate that the map holds fixed (by more than 2 %), or has no class on either side.  Of several points with
-    the same coordinates and class only the first counts.  Points with the same coordinates and different classes do
-    not count.
+    coordinate that is fixed in the map (by more than 2 %), or has no class on either side.  Of several points
+    with the same coordinates and class only the first counts.  Points with the same coordinates and different
+    classes do not count.
 
     Examples
     --------
@@ -244,7 +243,7 @@ def _units(
     measured: NDArray[np.int8],
     attrs: dict[str, Any],
 ) -> list[Diagnostic]:
-    """Whether the points fit the map far better with another unit or with the columns exchanged."""
+    """Diagnostics for points that fit the map far better in another unit or with exchanged columns."""
     count = int((measured != ResponseClass.UNKNOWN).sum())
     if count < _FEW:
         return []

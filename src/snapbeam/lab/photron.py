@@ -75,7 +75,7 @@ class HeaderFields:
         self.xml = xml
 
     def name(self, key: str) -> str:
-        """What the header calls a field."""
+        """Name of a field in the header."""
         plain, tags = NAMES[key]
         if self.xml:
             return tags or plain[0]
@@ -276,7 +276,7 @@ _IMAGES = {"png": ".png", "tiff": ".tif", "tif": ".tif", "bmp": ".bmp", "jpeg": 
 
 @dataclass(frozen=True)
 class CameraHeader:
-    """What a .cih or .cihx header says about its recording.
+    """Content of a .cih or .cihx header.
 
     ``timing`` holds the rates and the exposure; ``pixel_size`` [m] is ``None`` where the header does not hold
     it, and ``scale_hint`` says what it holds instead.  ``stored_bits`` is the size of a pixel in the file and
@@ -399,7 +399,7 @@ def _pixel_size(fields: HeaderFields) -> float | None:
 
 
 def _scale_hint(fields: HeaderFields) -> str:
-    """What a .cih header holds of the scale: a number whose unit it gives as a code that is not documented."""
+    """Note on the scale in a .cih header: its unit is an undocumented code."""
     size = None if fields.xml else fields.number("scale")
     if size is None or size in (0.0, 1.0):
         return ""
@@ -414,7 +414,7 @@ def _curve(fields: HeaderFields) -> tuple[Diagnostic, ...]:
 
 
 def check_pixels(header: CameraHeader) -> None:
-    """Refuse pixels whose file size is not what the header says."""
+    """Raise an error if the file size of the pixels contradicts the header."""
     mraw = header.mraw
     try:
         found = mraw.stat().st_size

@@ -164,7 +164,7 @@ _TIMES = 3.0  # times the third harmonic that saturation takes from the first
 
 
 def one_sided(samples: SignalSamples, rest: int, first: int, last: int, fit: SineFit) -> float:
-    """By what share of its amplitude a record's mean moves when the motion starts; 0 if it may.
+    """Relative shift of the mean at the onset of the motion, over the amplitude; 0 if it is admissible.
 
     A shaker comes back, so the mean of its velocity is that at rest.  The mean of a rectified or squared one is not.
     """
@@ -217,7 +217,7 @@ _G = 9.80665
 
 
 def beyond_shakers(fit: SineFit, units: str) -> list[Diagnostic]:
-    """Whether a sine is faster, harder or wider than electrodynamic shakers can move."""
+    """Diagnostics for a sine beyond the speed, acceleration or stroke of electrodynamic shakers."""
     omega = 2.0 * math.pi * fit.frequency
     speed = fit.amplitude if units == "m/s" else omega * fit.amplitude
     hard, far = speed * omega, speed / omega

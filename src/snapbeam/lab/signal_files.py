@@ -39,13 +39,13 @@ def read_channels(
         ``# sampling_frequency: 12000 Hz``), ``.wav``, ``.uff``/``.unv`` (dataset 58, ASCII or binary), ``.tdms``,
         ``.h5``/``.hdf5``/``.nc``, ``.npz``/``.npy``.
     sampling_frequency : float, optional
-        Samples per second [Hz] where the file does not say.
+        Sampling frequency [Hz] if the file has none.
 
     Returns
     -------
     list of dict
-        Keys ``data``, ``name``, ``unit_str``, and ``fs`` [Hz] or ``time`` [s].  ``unit_str`` is None
-        where the file states no unit.  ``diagnostics`` lists what contradicts the header.
+        Keys ``data``, ``name``, ``unit_str``, and ``fs`` [Hz] or ``time`` [s].  ``unit_str`` is None where the
+        file states no unit.  ``diagnostics`` lists contradictions with the header.
 
     Raises
     ------
@@ -128,12 +128,12 @@ def read_signal(
     channel : str or int, optional
         Its name, or its number from 0; needed if there are several.
     units : str, optional
-        The unit of the numbers where the file does not say, such as ``"mm/s"``.
+        Unit of the values if the file has none, such as ``"mm/s"``.
     sensitivity : str, optional
-        What a volt or full scale stands for, such as ``"125 mm/s/V"`` or ``"0.5 m/s/FS"``; needed for
+        Sensitivity per volt or per full scale, such as ``"125 mm/s/V"`` or ``"0.5 m/s/FS"``; needed for
         channels in volts that are to become velocities, and for sound files of integers.
     sampling_frequency : float, optional
-        Samples per second [Hz] where the file does not say.
+        Sampling frequency [Hz] if the file has none.
 
     Returns
     -------
@@ -226,7 +226,7 @@ def write_signal(
     signal : xarray.DataArray
         See :mod:`snapbeam.lab.signals`.
     full_scale : float, optional
-        For WAV, what full scale stands for in the unit of the signal; 32-bit integers are written.
+        For WAV, full scale in the unit of the signal; 32-bit integers are written.
 
     Raises
     ------

@@ -90,7 +90,7 @@ _SECONDS = {
 
 
 class Told(NamedTuple):
-    """What a person says of a file: samples per second [Hz], and the columns of a table without a header."""
+    """User-given properties of a file: sampling frequency [Hz], and columns of a table without a header."""
 
     rate: float | None = None
     columns: str | None = None
@@ -102,7 +102,7 @@ def _key(name: str) -> str:
 
 
 def is_time(name: str) -> bool:
-    """Whether a channel's name is that of a time axis."""
+    """Return whether a channel name denotes a time axis."""
     return _key(name) in TIME_NAMES
 
 
@@ -301,7 +301,7 @@ def _unpacked(name: str, data: NDArray[Any], attributes: Mapping[str, Any]) -> N
 
 
 def _refuse_scales(name: str, data: NDArray[Any], values: Mapping[str, Any]) -> None:
-    """Refuse counts beside a number that may scale them."""
+    """Raise an error for counts with a number that may be their scale."""
     for key, value in values.items():
         neutral = 1.0 if _key(key) in _SCALES else 0.0 if _key(key) in _OFFSETS else None
         if neutral is None or (data.dtype.kind == "f" and key not in ("scale_factor", "add_offset")):
@@ -383,7 +383,7 @@ def _channels(stored: Mapping[str, _Stored], groups: Mapping[str, Mapping[str, A
 
 
 def _unit(texts: Mapping[str, str], name: str) -> str | None:
-    """The unit that a text beside an array states, under its name or for all of its group."""
+    """Unit from a text next to an array, for its name or for its group."""
     folder, _, last = name.rpartition("/")
     for key in UNIT_NAMES:
         common = () if is_time(last) else (f"{folder}/{key}" if folder else key,)
@@ -491,7 +491,7 @@ def _stating(attributes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _is_axis(name: str, attributes: Mapping[str, Any]) -> bool:
-    """Whether a dimension scale holds times."""
+    """Return whether a dimension scale contains times."""
     stated = next((_text(attributes[key]) for key in UNIT_NAMES if key in attributes), "")
     try:
         return is_time(split_unit(name.rpartition("/")[2])[0]) or (
@@ -621,7 +621,7 @@ def _dialects(lines: list[str]) -> list[_Dialect]:
 
 
 def _is_short(cells: list[list[str]]) -> bool:
-    """Whether the last number has fewer digits behind its point than those above it, which all have as many."""
+    """Return whether the last number has fewer decimals than those above it, which all have equally many."""
     column = [re.search(r"[.,](\d*)$", row[-1].strip()) for row in cells[-_ABOVE:] if row]
     digits = {len(found[1]) for found in column[:-1] if found}
     if len(digits) != 1 or len(column) < _ABOVE:
@@ -638,7 +638,7 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
     path
         The file.
     columns
-        How many columns there are, where a person says so.
+        Number of columns, if the user gives it.
 
     Raises
     ------
@@ -1256,7 +1256,7 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
 
 
 def _is_time(word: str, unit: str | None) -> bool:
-    """Whether a column is the time: by its name, unless that is one of an axis with another unit."""
+    """Return whether a column is the time: by its name, unless an axis name has another unit."""
     if not is_time(word) or unit is None or _key(word) not in ("xaxis", "xvalue"):
         return is_time(word)
     return si_unit(f"column {word!r}", unit)[1] == "s"

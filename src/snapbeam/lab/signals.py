@@ -78,7 +78,7 @@ def si_unit(name: str, unit: str) -> tuple[float, str]:
     Raises
     ------
     InputError
-        If the unit is unknown; *name* says whose unit it is.
+        If the unit is unknown; *name* is the name of the signal in the message.
     """
     if not isinstance(unit, str):
         where = f"unit of {name}" if isinstance(name, str) else "unit"
@@ -99,8 +99,8 @@ def si_unit(name: str, unit: str) -> tuple[float, str]:
 def parse_sensitivity(name: str, text: str) -> tuple[float, str, str]:
     """Read a sensitivity: return the factor, the SI unit, and V or FS.
 
-    Either what a volt (or full scale) stands for, ``"125 mm/s/V"``, or the volts that a sensor gives,
-    ``"100 mV/g"``, ``"50 mV/Pa"``, ``"10 mV/(m/s^2)"``.
+    Either the sensitivity per volt (or full scale), ``"125 mm/s/V"``, or the volts that a sensor gives, ``"100
+    mV/g"``, ``"50 mV/Pa"``, ``"10 mV/(m/s^2)"``.
 
     Raises
     ------

@@ -180,19 +180,19 @@ def fit_sine(
         A signal, as :func:`snapbeam.lab.make_signal` and :func:`snapbeam.lab.read_signal` return it; or its samples,
         from :func:`~snapbeam.lab.signals.check_signal`.
     frequency : float, optional
-        A guess [Hz]; the highest peak of the spectrum if left out.
+        Initial guess [Hz]; by default the highest peak of the spectrum.
     harmonics : int
         Multiples to fit, the sine itself included; those above 0.95 of the Nyquist frequency are left out.
     fixed : bool
-        Whether *frequency* is known and kept.
+        True if *frequency* is known and not fitted.
     keep : bool array, optional
-        Samples to use; all if left out.
+        Samples to use; all by default.
 
     Returns
     -------
     SineFit
         Standard errors are those of least squares with the noise found near the frequency in the residual;
-        they hold for noise that is white over a band of some 50 lines.
+        they hold for noise that is white over a band of about 50 lines.
 
     Raises
     ------
@@ -350,7 +350,7 @@ class Clipping(NamedTuple):
 
     @property
     def found(self) -> bool:
-        """Whether any top is cut off."""
+        """True if any maximum or minimum is clipped."""
         return math.isfinite(self.low) or math.isfinite(self.high)
 
     def touches(self, values: _Array) -> NDArray[np.bool_]:

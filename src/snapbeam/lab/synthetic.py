@@ -1,7 +1,7 @@
 """A synthetic camera: recordings of known motions, together with the true motions.
 
 An ideal scene of a beam and a rounded shaker with a sticker is drawn as sharp edges, blurred by the optics,
-integrated over each pixel and over the exposure, lit unevenly, spoiled as asked, and given noise and a finite
+integrated over each pixel and over the exposure, lit unevenly, spoiled as requested, and given noise and a finite
 bit depth.  The optics are a Gaussian, as the tracker assumes, or a lens out of focus, as it does not.  The
 truth is the mean of the displacement over each exposure, exactly, for motion that is linear between the given
 samples.
@@ -512,7 +512,7 @@ class Defects:
     gamma
         Grey level = light**gamma.
     gain
-        Light over what the camera's full scale takes.
+        Light relative to full scale of the camera.
     flicker
         Relative change of the light with mains frequency (100 Hz).
     texture
@@ -785,7 +785,7 @@ def render_recording(
     rng: int | np.random.Generator | None = 0,
     **spoiled: Any,
 ) -> SyntheticRecording:
-    """Draw what a high-speed camera would see of a known motion.
+    """Render the recording of a high-speed camera for a known motion.
 
     Parameters
     ----------
@@ -798,7 +798,7 @@ def render_recording(
     camera, stage
         The camera and the scene; the paper's camera at 384 x 384 pixels unless given.
     defects
-        What goes wrong; nothing unless given.
+        Simulated defects; none by default.
     rest_frames
         Frames before the motion begins, at the first displacement.
     zero_row
@@ -931,7 +931,7 @@ def render_run(
     rng: int | np.random.Generator | None = 0,
     **options: Any,
 ) -> SyntheticRecording:
-    """Draw what a high-speed camera would see of a simulated run about the shaker.
+    """Render the recording of a high-speed camera for a simulated run, near the shaker.
 
     Parameters
     ----------
@@ -940,7 +940,7 @@ def render_run(
         ``length_scale``, the buckling level b [m].
     camera, stage, rng, **options
         As for :func:`render_recording`.  Unless a stage is given, its beam is as thick as the run's and the
-        shaker stands on the run's side.
+        shaker is on the side of the run.
 
     Examples
     --------
@@ -999,7 +999,7 @@ def render_vibrometer(
     snr_db: float = 30.0,
     rng: int | np.random.Generator | None = 0,
 ) -> xr.DataArray:
-    """What a laser vibrometer would record of the shaker: rest, a start-up transient, a sine, and noise.
+    """Synthetic laser vibrometer signal of the shaker: rest, start-up transient, sine, and noise.
 
     From the onset t0 on the velocity is V [1 - s exp(-(t - t0)/T)] cos(omega (t - t0) + phase), with the
     share s and the time T of the start-up, and a second harmonic of relative size ``distortion``.

@@ -1,4 +1,4 @@
-"""What a laser vibrometer says about the shaker: steady sine, start-up transient, flaws of the record.
+"""Analysis of a laser vibrometer signal of the shaker: steady sine, start-up transient, signal errors.
 
 The paper accepts a test when the signal-to-noise ratio of the shaker's velocity exceeds 15 dB, and names the
 start-up transient as a cause of disagreement with simulations (sections 2 and 4.1).
@@ -184,7 +184,7 @@ def _pulling(times: _Array, cycles: NDArray[np.complex128]) -> float:
 
 
 def _counts(parts: _Array) -> float:
-    """How many of the parts of a record count for their mean: all, or one where they follow each other smoothly.
+    """Effective number of independent parts of a signal: all, or one if they vary smoothly.
 
     A slow change, as the beat of two lines too close to be parted, is no scatter that a mean evens out.
     """
@@ -298,7 +298,7 @@ def _design(time: _Array, frequencies: list[float]) -> _Array:
 
 
 def _left(part: SignalSamples, frequencies: list[float], sound: NDArray[np.bool_]) -> tuple[_Array, _Array]:
-    """What lines leave of a record, 0 where it is not sound, and their cosine and sine amplitudes."""
+    """Residual of a signal after subtraction of lines, 0 at invalid samples, and the amplitudes of the lines."""
     design = _design(part.time, frequencies)
     used = design[sound]
     gram = used.T @ used
@@ -320,7 +320,7 @@ def _phasors(
 
 
 def _peak(left: _Array, rate: float, rough: SineFit) -> float | None:
-    """Frequency of the highest line of a spectrum that stands out, or None."""
+    """Frequency of the highest significant line of a spectrum, or None."""
     n = left.size
     window = np.hanning(n)
     spectrum = np.abs(np.fft.rfft(left * window)) * 2.0 / window.sum()
@@ -379,8 +379,7 @@ def _at_rest(
 
 
 _NOISE_FLOOR = 1e-6
-"""Of the amplitude: a record without noise is taken to have this much, or the sums that find its start
-would lose it to rounding."""
+"""Minimum noise over the amplitude, which prevents rounding errors in the search for the onset."""
 _DEGREES = (0, 1, 2, 3, 5)
 _LONGEST = 4000  # samples that are fitted
 
@@ -416,7 +415,7 @@ def moving_part(samples: SignalSamples, frequency: float) -> tuple[int, int]:
 
 
 def moves_outside(samples: SignalSamples, frequency: float, first: int, last: int) -> float:
-    """How long [s] the record oscillates at *frequency* before *first* and after *last*, by a third as much."""
+    """Duration [s] of oscillation at *frequency* before *first* and after *last*, above 30 % of the level."""
     width = max(3, round(samples.sampling_frequency / frequency))
     if width >= samples.values.size:
         return 0.0
@@ -560,7 +559,7 @@ _STEADY = 0.03  # share by which the cycles of a steady motion may stray
 
 @dataclass(frozen=True)
 class StartUp:
-    """How the shaker started.
+    """Start-up transient of the shaker.
 
     ``onset`` [s] and its uncertainty; ``duration`` [s] and ``cycles`` until amplitude and phase stay within
     ``tolerance`` of the steady sine; ``overshoot``, the largest amplitude of a cycle over the steady one,
@@ -593,10 +592,10 @@ class DriveMeasurement:
 
     ``steady`` is the sine fitted after the start-up; ``startup`` is None where the record begins in motion;
     ``stop`` [s] is the end of the motion or of the record; ``cycle_time`` [s] and ``cycle_amplitude`` follow
-    the amplitude cycle by cycle; ``accepted`` says whether ``steady.sinad`` exceeds ``snr_limit`` [dB].
-    ``flaws`` are samples (first, one past the last) that are no part of the motion, ``lines`` hum, which is taken
-    out, and lines beside the sine; ``clipping`` the levels at which tops are cut off; ``diagnostics`` what makes the
-    result doubtful.
+    the amplitude cycle by cycle; ``accepted`` is true if ``steady.sinad`` exceeds ``snr_limit`` [dB].
+    ``flaws`` are samples (first, one past the last) that are not part of the motion, ``lines`` hum, which is
+    subtracted, and lines in addition to the sine; ``clipping`` the clipping levels; ``diagnostics`` the
+    diagnostics.
 
     Examples
     --------
@@ -621,7 +620,7 @@ class DriveMeasurement:
 
     @property
     def accepted(self) -> bool:
-        """Whether the steady motion is near enough to a sine: noise and distortion below the limit."""
+        """True if the SINAD of the steady motion exceeds the limit."""
         return self.steady.sinad > self.snr_limit
 
     @property
@@ -631,7 +630,7 @@ class DriveMeasurement:
 
     @property
     def has_start(self) -> bool:
-        """Whether the start-up is in the record and sound."""
+        """True if the record contains a complete start-up without dropouts."""
         broken = KINDS_VIBROMETER["dropout_in_start"].code
         return self.startup is not None and all(one.code != broken for one in self.diagnostics)
 
@@ -676,26 +675,26 @@ def measure_drive(
 ) -> DriveMeasurement:
     """Measure the shaker's motion: find where it starts and settles, and fit the steady sine.
 
-    Dropouts and tops that are cut off are found in what the sine leaves and kept out of the fit.
+    Dropouts and clipped samples are detected in the residual of the sine and excluded from the fit.
 
     Parameters
     ----------
     signal : xarray.DataArray
         Velocity [m/s] or displacement [m] of the shaker.
     frequency : float, optional
-        The excitation frequency [Hz] as set, used as a guess; the highest peak of the spectrum if left out.
+        Set excitation frequency [Hz], the initial guess; by default the highest peak of the spectrum.
     amplitude : float, optional
-        The amplitude as set, in the unit of the signal, to check by.
+        Set amplitude, in the unit of the signal, for a check.
     snr_limit : float
-        Least ratio [dB] of the sine to noise and distortion of an acceptable test; the paper's 15 dB.
+        Minimum ratio [dB] of the sine to noise and distortion of an acceptable test; the paper's 15 dB.
     tolerance : float
-        How near to the steady sine a cycle must be, as a share of its amplitude, to count as steady.  Raised
-        to four times the noise of one cycle's amplitude where that is more.
+        Maximum deviation of a steady cycle from the steady sine, as a fraction of its amplitude.  Raised to
+        four times the noise of one cycle's amplitude where that is more.
 
     Raises
     ------
     InputError
-        If the signal is no such signal, or holds fewer than five cycles of steady motion.
+        If the signal has another quantity, or contains fewer than five cycles of steady motion.
 
     Examples
     --------
@@ -938,7 +937,7 @@ _SAME_LINE = 0.02  # of the frequency by which the highest line may differ
 
 
 def _not_there(samples: SignalSamples, steady: SineFit, frequency: float | None) -> list[Diagnostic]:
-    """Whether the motion is at another frequency than the one that was set."""
+    """Diagnostic for a motion at another frequency than stated."""
     if frequency is None or steady.sinad > 0.0:
         return []
     found = spectral_peak(samples)
@@ -993,18 +992,18 @@ def displacement_from_velocity(
 ) -> xr.DataArray:
     """Integrate the shaker's velocity to its displacement [m] without drift.
 
-    The velocity's cubic spline is integrated exactly.  What noise and offset add is a slow drift; it is found
-    where the truth is known, at rest (zero) and in steady motion (zero mean over a cycle), as a smoothing
+    The velocity's cubic spline is integrated exactly.  Noise and offset add a slow drift, which is determined
+    where the motion is known, at rest (zero) and in steady motion (zero mean over a cycle), as a smoothing
     spline that follows nothing faster than about four cycles, and subtracted.  The start-up transient is
-    bridged, so it keeps its shape.  Dropouts and cut tops are replaced by the steady sine.  The shaker's
-    suspension is taken to hold its mean position.
+    bridged, so it keeps its shape.  Dropouts and clipped samples are replaced by the steady sine. The mean
+    position of the shaker is assumed constant.
 
     Parameters
     ----------
     velocity : xarray.DataArray
         Velocity [m/s].
     measurement : DriveMeasurement, optional
-        That of this velocity; measured here if left out.
+        Result of :func:`measure_drive` for this velocity; measured by default.
 
     Raises
     ------

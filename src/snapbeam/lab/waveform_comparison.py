@@ -1,4 +1,4 @@
-"""A measured run beside a simulated one, on one clock: waveforms, spectra, impacts (Fig. 4 of the paper)."""
+"""Comparison of a measured run with a simulated one, on one time axis: waveforms, spectra, impacts (Fig. 4 of the paper)."""
 
 from __future__ import annotations
 
@@ -82,14 +82,13 @@ _RATIO = 0.05  # share by which the shakers' amplitudes may differ
 class WaveformComparison:
     """A measured and a simulated run over the same cycles of excitation.
 
-    ``waveforms`` over ``cycle``: displacement and shaker displacement of both [b], the measured shaker NaN if it was not
-    recorded.  ``spectra`` over ``frequency_ratio`` (multiples of the excitation): amplitude spectra of the two
-    displacements [b].  ``at`` names the variable that is compared.
-    ``shift`` [cycles] was added to the measured clock.  ``rms_difference`` [b] and ``correlation`` are
-    those of the beam, ``shaker_rms_difference`` [b] that of the shaker; ``measured_rms`` and
-    ``simulated_rms`` [b] are the beam's motion about its mean.  ``parted`` [cycles] is where the two beams
-    first stay more than ``apart`` [b] from each other for half a cycle, NaN if they never do.  ``diagnostics``
-    is what makes the comparison doubtful.
+    ``waveforms`` over ``cycle``: displacement and shaker displacement of both [b], the measured shaker NaN if
+    it was not recorded.  ``spectra`` over ``frequency_ratio`` (multiples of the excitation): amplitude spectra
+    of the two displacements [b].  ``at`` names the variable that is compared.  ``shift`` [cycles] was added to
+    the measured clock.  ``rms_difference`` [b] and ``correlation`` are those of the beam,
+    ``shaker_rms_difference`` [b] that of the shaker; ``measured_rms`` and ``simulated_rms`` [b] are the beam's
+    motion about its mean.  ``parted`` [cycles] is where the two beams first stay more than ``apart`` [b] from
+    each other for half a cycle, NaN if they never do.  ``diagnostics`` contains the diagnostics.
     """
 
     waveforms: xr.Dataset
@@ -157,7 +156,7 @@ def compare_waveforms(
     measured_onsets: ArrayLike | None = None,
     simulated_onsets: ArrayLike | None = None,
 ) -> WaveformComparison:
-    """Put a measured run beside a simulated one, aligned by the phase of the shaker.
+    """Compare a measured run with a simulated one, aligned by the phase of the shaker.
 
     Parameters
     ----------
@@ -171,10 +170,10 @@ def compare_waveforms(
     frequency : float, optional
         Excitation frequency [Hz] of the measured run, where it has no coordinate ``cycle``.
     start : float, optional
-        Start of the excitation in the measured run [s]; it says which cycle is the first, the phase of the
-        shaker says the rest.  Read from the shaker if left out, and the first sample if it begins in motion.
+        Start of the excitation in the measured run [s]; it determines the first cycle; the phase of the shaker
+        determines the rest. By default the onset of the shaker, or the first sample if it begins in motion.
     cycles : (float, float), optional
-        The part to compare, counted from the start; all that both have if left out.
+        Part to compare, counted from the start; by default the common part.
     measured_onsets, simulated_onsets : array_like, optional
         Times of impacts [s], to be shown over cycles.
 
@@ -293,7 +292,7 @@ def compare_waveforms(
 def _diagnostics(
     columns: dict[str, _Array], grid: _Array, shift: float, ratio: float, started: bool
 ) -> list[Diagnostic]:
-    """What the two shakers say of the comparison; *started* says that their first cycle is known."""
+    """Diagnostics of a comparison from the two shaker motions; *started*: their first cycle is known."""
     told = []
     if not started:
         told.append(KINDS_COMPARISON["no_start"].found())
@@ -309,7 +308,7 @@ def _diagnostics(
 
 
 def _gaps(columns: dict[str, _Array]) -> list[Diagnostic]:
-    """Whether much of the measured displacement is missing."""
+    """Diagnostic for a large fraction of missing measured displacements."""
     missing = float(np.mean(~np.isfinite(columns["measured_displacement"])))
     return [KINDS_COMPARISON["gaps"].found(share_percent=100.0 * missing)] if missing > 0.1 else []
 
@@ -415,9 +414,9 @@ _WHOLE = 0.98  # share of the wanted cycles that counts as all of them
 class MeasuredResponse:
     """Class and counts of a measured run.
 
-    ``response_class`` is UNKNOWN where ``reasons`` say why.  ``zero_crossings`` is at least what happened: more may
-    hide in dropouts.  ``noise`` and ``hysteresis`` are in units of b; ``final_well`` is -1 or 1, the sign
-    at the end.
+    ``response_class`` is UNKNOWN if ``reasons`` lists a cause. ``zero_crossings`` is a lower bound, because
+    dropouts can hide crossings.  ``noise`` and ``hysteresis`` are in units of b; ``final_well`` is -1 or 1, the
+    sign at the end.
 
     Examples
     --------
@@ -472,19 +471,19 @@ def measure_response(
     frequency : float, optional
         Excitation frequency [Hz]; not needed if the run has the coordinate ``cycle``.
     cycles : int
-        Cycles of excitation the class is asked for; the paper's experiments have 200.
+        Number of cycles for the response class; the paper's experiments have 200.
     at : {"displacement_at_striker", "midspan_displacement"}
         Where to count: at the shaker, which for a shaker near the centre serves as well, or at the centre.
     noise : float, optional
         Standard deviation of the displacement's noise, in units of b; estimated from its third differences if
         left out.
     start : float, optional
-        Start of the excitation [s]; the first sample if left out.
+        Start of the excitation [s]; the first sample by default.
 
     Raises
     ------
     InputError
-        If the dataset is no run, or neither *frequency* nor ``cycle`` says how long a cycle is.
+        If the dataset is not a run, or has neither *frequency* nor ``cycle``.
 
     Examples
     --------

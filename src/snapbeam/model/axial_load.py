@@ -22,11 +22,11 @@ _Array = NDArray[np.float64]
 LOADS: dict[str, type[Drive]] = {}
 """Every way in which a load changes, by the name it has in parameter files."""
 _STEEPEST = 1.875
-"""Greatest slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""
+"""Maximum slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""
 
 
 class LoadMotion(Drive):
-    """How the axial load differs from the one that the beam was reduced under, N: a drive whose *motion* is a force."""
+    """Change of the axial load about the value of the beam, N: a drive whose *motion* is a force."""
 
     registry: ClassVar[dict[str, type[Drive]]] = LOADS
 
@@ -80,7 +80,7 @@ class HarmonicLoad(LoadMotion):
         return np.asarray(2.0 * math.pi / (columns["frequency_ratio"] * scale.omega))
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """Its amplitudes, N and N/s."""
+        """Amplitudes of load and load rate, N and N/s."""
         return columns["amplitude"], columns["amplitude"] * columns["frequency_ratio"] * scale.omega
 
 
@@ -138,7 +138,7 @@ class LoadRamp(LoadMotion, Timed):
         }
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """Its change, N, and its steepest, N/s."""
+        """Maximum change, N, and maximum rate, N/s."""
         found = self.shape_numbers(columns, scale)
         return np.maximum(found["change"], 0.0), _STEEPEST * np.abs(found["change"]) / found["duration"]
 
@@ -154,7 +154,7 @@ class LoadRamp(LoadMotion, Timed):
 
     @staticmethod
     def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """Nothing asks for it."""
+        """Acceleration, which no caller needs."""
         return 0.0
 
 
@@ -162,8 +162,8 @@ class LoadRamp(LoadMotion, Timed):
 class AxialLoadModulation:
     """An axial load P(t) = P + motion(t), P that under which the beam was reduced.
 
-    The beam's linear stiffness then is E I k_i^2 - P(t): beside the tension, m alpha'' + ... = (P(t) - P) alpha.  The
-    work of the change is that on the shortening alpha . alpha / 2 of the span.
+    The linear stiffness of the beam then is E I k_i^2 - P(t). In addition to the tension, m alpha'' + ... =
+    (P(t) - P) alpha.  The work of the change is that on the shortening alpha . alpha / 2 of the span.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ class AxialLoadModulation:
     noun: ClassVar[str] = "a changing axial load"
     """In messages."""
     rate_dependent: ClassVar[bool] = False
-    """Whether its force depends on the velocity of the structure."""
+    """True if the force depends on the velocity of the structure."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.motion, LoadMotion):

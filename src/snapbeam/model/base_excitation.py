@@ -29,8 +29,8 @@ class BaseExcitation:
 
         m alpha'' + ... = -y''(t) rho S integral(phi) + phi(x_s) f.
 
-    Displacements, velocities, energies and the work of the base are those of that frame: the work is that of the
-    inertial force.  A run begins at rest in that frame, whatever the velocity of the base is.
+    Displacements, velocities, energies and the work of the base are those of that frame: the work is that of
+    the inertial force.  A run begins at rest in that frame, for any velocity of the base.
 
     Parameters
     ----------
@@ -40,8 +40,8 @@ class BaseExcitation:
     direction : {"up", "down"}
         Whether y counts positive towards the upper well or towards the lower one.
     striker_on_base : bool
-        Whether what the striker is mounted on moves with the base: a stop in the same frame.  If not it stays in
-        space, and the tip moves by -y(t) in the frame of the ends.
+        True if the mount of the striker moves with the base, like a stop in the same frame. Otherwise it stays
+        in space, and the tip moves by -y(t) in the frame of the ends.
 
     Raises
     ------
@@ -70,7 +70,7 @@ class BaseExcitation:
     noun: ClassVar[str] = "a moving base"
     """In messages."""
     rate_dependent: ClassVar[bool] = False
-    """Whether its force depends on the velocity of the structure."""
+    """True if the force depends on the velocity of the structure."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.motion, Drive):

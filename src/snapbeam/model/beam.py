@@ -52,8 +52,8 @@ class Beam:
         Axial load P, N, compression positive.  Below the critical load the beam is straight; a
         negative load is tension.
     boundary : BoundaryConditions
-        How the ends are held; clamped and rigid by default.  Others change the critical loads, the first of them in the
-        relation above, and 4 L^2/(pi^2 E S) in it to phi_1(L/2)^2/gamma.
+        Boundary conditions; clamped and rigid by default. Other conditions change the critical loads, the first
+        of them in the relation above, and 4 L^2/(pi^2 E S) in it to phi_1(L/2)^2/gamma.
 
     Raises
     ------
@@ -166,8 +166,8 @@ class Beam:
     def replace(self, **changes: float) -> Beam:
         """Return a beam with some parameters changed.
 
-        Of ``buckling_level`` and ``axial_load`` the one the beam was made with is kept, unless either
-        is among the *changes*.
+        Of ``buckling_level`` and ``axial_load`` the given one is unchanged, unless either is among the
+        *changes*.
 
         Raises
         ------
@@ -238,7 +238,7 @@ class Beam:
 
     @property
     def is_buckled(self) -> bool:
-        """Whether the axial load exceeds the critical load, so that the beam is bistable."""
+        """True if the axial load exceeds the critical load, so that the beam is bistable."""
         return self.buckling_level > 0.0
 
 

@@ -1,4 +1,4 @@
-"""How the ends of a beam are held: rotational springs and the axial stiffness of the supports."""
+"""Boundary conditions of a beam: rotational springs and the axial stiffness of the supports."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class BoundaryConditions:
     """Ends that do not move sideways, each on a rotational spring.
 
     E I phi'' = k_left phi' at the left end and -k_right phi' at the right one.  The buckling modes under these
-    conditions stay orthogonal in their slopes and, with the energy of the springs, in their curvatures, so that the
-    reduced model keeps its form; mass, shapes and critical loads change.
+    conditions stay orthogonal in their slopes and, with the energy of the springs, in their curvatures, so that
+    the reduced model has the same form; mass, shapes and critical loads change.
 
     Supports that give way along the axis, with the stiffness K between them, share the stretching with the beam:
     gamma = (E S/(2 L))/(1 + E S/(K L)).
@@ -25,7 +25,7 @@ class BoundaryConditions:
     Parameters
     ----------
     left_rotational_stiffness, right_rotational_stiffness : float, optional
-        Rotational stiffness, N m/rad: 0 is a pinned end, and clamped is what nothing is given for.
+        Rotational stiffness, N m/rad: 0 is a pinned end, None (the default) a clamped one.
     axial_support_stiffness : float, optional
         K, N/m; rigid by default.
 
@@ -53,17 +53,17 @@ class BoundaryConditions:
 
     @property
     def is_elastic(self) -> bool:
-        """Whether an end can rotate, against a spring or freely."""
+        """True if an end can rotate, against a spring or freely."""
         return self.left_rotational_stiffness is not None or self.right_rotational_stiffness is not None
 
     @property
     def is_symmetric(self) -> bool:
-        """Whether both ends are held alike, so that modes are symmetric or antisymmetric."""
+        """True if both ends have the same rotational stiffness, so that modes are symmetric or antisymmetric."""
         return self.left_rotational_stiffness == self.right_rotational_stiffness
 
     @property
     def is_clamped(self) -> bool:
-        """Whether both ends are clamped and rigid."""
+        """True if both ends are clamped and rigid."""
         return not self.is_elastic and self.axial_support_stiffness is None
 
 

@@ -65,7 +65,7 @@ def wavenumbers(count: int, length: float) -> _Array:
 
 
 class _Evaluation(NamedTuple):
-    """What shape, slope and curvature are put together from; the modes lie along the first axis."""
+    """Terms of shape, slope and curvature; the modes are along the first axis."""
 
     xi: _Array
     k: _Array
@@ -162,7 +162,7 @@ class BucklingModes:
 
 _HALVINGS = 200
 _NODES = 16
-"""Of Gauss and Legendre in each panel, of which a half wave of the last mode has two."""
+"""Gauss-Legendre nodes in each panel; a half wave of the last mode has two panels."""
 
 
 def _mixed(stiffness: float) -> tuple[float, float]:
@@ -171,7 +171,7 @@ def _mixed(stiffness: float) -> tuple[float, float]:
 
 
 def _conditions(z: float, left: float, right: float) -> _Array:
-    """What phi = a (cos z x - 1) + b sin z x + c x, x from 0 to 1, must fulfil: phi(1) = 0, and both end moments."""
+    """Matrix of the conditions on phi = a (cos z x - 1) + b sin z x + c x: phi(1) = 0, and both end moments."""
     (bent0, turned0), (bent1, turned1) = _mixed(left), _mixed(right)
     cosine, sine = math.cos(z), math.sin(z)
     return np.array(
@@ -332,7 +332,7 @@ _BALANCE = 1e-8  # largest residual force at an equilibrium, relative to its two
 
 @dataclass(frozen=True, kw_only=True)
 class StructureMatrices:
-    """What a user gives for a structure, as given; see ``ReducedModel.from_matrices``."""
+    """Matrices of a structure as the user gave them; see ``ReducedModel.from_matrices``."""
 
     mass: ArrayLike
     stiffness: ArrayLike
@@ -363,7 +363,7 @@ def damping_ratios(value: ArrayLike, count: int) -> _Array:
 
 
 def checked_structure(given: StructureMatrices) -> dict[str, Any]:
-    """The fields of a reduced model for a structure, or an ``InputError`` that says what is wrong."""
+    """Fields of a reduced model for a structure; raises an ``InputError`` with the reason."""
     mass, stiffness = _pair(given)
     count = mass.shape[0]
     rows: dict[str, _Array | None] = {"contact_shape": _shape("contact_shape", given.contact_shape, count)}

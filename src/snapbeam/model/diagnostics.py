@@ -18,7 +18,7 @@ __all__ = ["doubts_of"]
 
 
 _STEEP = 0.2
-"""Greatest slope of the buckled beam, pi b / L, up to which w is small against L."""
+"""Maximum slope of the buckled beam, pi b / L, up to which w is small against L."""
 _STOCKY = 0.1
 """Thickness over length up to which shear and rotary inertia may be left out."""
 _CENTRAL = 0.05

@@ -1,4 +1,4 @@
-"""When the future class of a run is certain: the energy a beam in the far well needs to leave it."""
+"""Energy criterion of early termination: the energy that a beam in the second well needs to leave it."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = ["RESERVE", "crossing_energy", "decidable_energy", "least_energy_at", 
 RESERVE = 2e-3
 _ITERATIONS = 100
 _RESOLVED = 1e-11
-"""Of the first load: what Newton's last step is below; the bound is flat there."""
+"""Tolerance of Newton's last step, over the first critical load; the bound is flat there."""
 
 
 def least_energy_at(model: ReducedModel, location: ArrayLike, displacement: ArrayLike) -> NDArray[np.float64]:
-    """Least potential energy of any shape that passes through a point, with U = 0 for the straight beam.
+    """Minimum potential energy of any shape that passes through a point, with U = 0 for the straight beam.
 
-    With c_i = phi_i(x_s) and S_1(Lambda) = sum c_i^2/(E I k_i^2 - Lambda), the least energy of a shape with
-    w(x_s) = r is the greatest value of
+    With c_i = phi_i(x_s) and S_1(Lambda) = sum c_i^2/(E I k_i^2 - Lambda), the minimum energy of a shape with
+    w(x_s) = r is the maximum value of
 
         r^2/(2 S_1(Lambda)) - (P - Lambda)^2/(4 gamma)
 
@@ -82,7 +82,7 @@ def least_energy_at(model: ReducedModel, location: ArrayLike, displacement: Arra
 def passed_heights(
     model: ReducedModel, location: NDArray[np.float64], highest: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Height of the contact point, m, above which early decision speaks of a run in the far well.
+    """Height of the contact point, m, above which early termination applies to a run in the second well.
 
     The tip's highest position, or that of the saddle between the wells if it is higher: to come down to the tip
     the beam must pass it.

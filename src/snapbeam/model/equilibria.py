@@ -49,7 +49,7 @@ class Equilibrium:
 
     @property
     def is_stable(self) -> bool:
-        """Whether it is a well."""
+        """True if the equilibrium is a well."""
         return self.unstable_directions == 0
 
     def __repr__(self) -> str:
@@ -67,8 +67,8 @@ def equilibria_of(stiffness: _Array, gamma: float, force: _Array) -> list[tuple[
         h(s) = sum B_i^2/(kappa_i + gamma s)^2 - s = 0.
 
     Between two of its poles h is convex and has no root or two; beyond the last it falls, with one root, the well of
-    least energy.  So all roots are found: the least value between two poles decides.  Where B_i = 0 and kappa_i < 0 a
-    pair with alpha_i of either sign may branch off at kappa_i + gamma s = 0.
+    minimum energy.  So all roots are found: the minimum value between two poles decides.  Where B_i = 0 and
+    kappa_i < 0 a pair with alpha_i of either sign may branch off at kappa_i + gamma s = 0.
 
     The tangent stiffness is K0 + gamma s and 2 gamma alpha alpha^T, of rank one: it has as many negative
     eigenvalues as there are kappa_i + gamma s < 0, less one where h rises.
@@ -158,7 +158,7 @@ def _roots(kappa: _Array, force: _Array, gamma: float) -> list[tuple[int, float,
 def _lowest(
     slope: Callable[[int, float], float], left: int, right: int, width: float
 ) -> tuple[int, float] | None:
-    """Where the convex function between two edges is least, from the nearer of them; None if at the left end."""
+    """Minimum of the convex function between two edges, from the nearer edge; None if it is at the left end."""
     if slope(left, 0.5 * width) > 0.0:
         if left < 0 and slope(left, 0.0) >= 0.0:
             return None
@@ -237,10 +237,10 @@ def _branches(kappa: _Array, force: _Array, gamma: float) -> list[tuple[_Array, 
 
 @dataclass(frozen=True, eq=False)
 class Landscape:
-    """Where a structure can rest."""
+    """Equilibria of a structure: wells and saddles."""
 
     equilibria: tuple[Equilibrium, ...]
-    """By energy."""
+    """Equilibria, ordered by energy."""
     lower: Equilibrium
     """The well whose centre is lower; the only one if there is one only."""
     upper: Equilibrium
@@ -249,12 +249,12 @@ class Landscape:
 
     @property
     def deepest(self) -> Equilibrium:
-        """The well of least energy."""
+        """The well of minimum energy."""
         return self.lower if self.lower.energy <= self.upper.energy else self.upper
 
     @property
     def is_bistable(self) -> bool:
-        """Whether there are two wells."""
+        """True if there are two wells."""
         return self.saddle is not None
 
 
@@ -317,7 +317,7 @@ def landscape_of(
     midspan_shape: _Array,
     elongation: _Array | None = None,
 ) -> Landscape:
-    """All equilibria under the transverse force B, told apart.
+    """All distinct equilibria under the transverse force B.
 
     At most two of them are stable: beyond the second eigenvalue of K0 + gamma s the term 2 gamma alpha alpha^T, of rank
     one, cannot make up for two negative ones.
@@ -325,7 +325,7 @@ def landscape_of(
     Raises
     ------
     InputError
-        If no equilibrium is stable, or two wells cannot be told apart by the centre.
+        If no equilibrium is stable, or the wells do not differ at mid-span.
     """
     found = []
     if elongation is None:
@@ -368,15 +368,15 @@ _BESIDE = 1e-9
 def least_energy_through(
     stiffness: _Array, gamma: float, force: _Array, shapes: _Array, heights: _Array
 ) -> _Array:
-    """Least potential energy of any amplitudes with c . alpha = r, J.
+    """Minimum potential energy of any amplitudes with c . alpha = r, J.
 
-    With S_cc = sum c_i^2/(K0_i - mu), S_cB = sum c_i B_i/(K0_i - mu) and S_BB alike, it is the greatest value of
+    With S_cc = sum c_i^2/(K0_i - mu), S_cB = sum c_i B_i/(K0_i - mu) and S_BB alike, it is the maximum value of
 
         (r - S_cB)^2/(2 S_cc) - S_BB/2 - mu^2/(4 gamma)
 
     over mu below the first zero of S_cc.  For every mu, gamma s^2/4 >= -mu s/2 - mu^2/(4 gamma), s = alpha . alpha, so
-    that the least value of the quadratic form that is left, on the plane, is a lower bound.  It is attained: the bound
-    is concave in mu, its slope is -(s + mu/gamma)/2 with the s of the shape that is least, and vanishes at
+    that the minimum of the remaining quadratic form on the plane is a lower bound.  It is attained: the bound
+    is concave in mu, its slope is -(s + mu/gamma)/2 with the s of the minimising shape, and vanishes at
     mu = -gamma s.
     Without B it is that of equal wells.
 

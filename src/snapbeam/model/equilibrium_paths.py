@@ -41,14 +41,14 @@ _STEP = 1.0 / 80.0
 """Longest step; displacement and amplitudes over those of the wells, the force over that which moves a well as far."""
 _SHORTEST = 1e-7
 _STEPS = 20_000
-"""Of a path, at most."""
+"""Maximum number of steps of a path."""
 _TURN = 0.15
 """Angle between the tangents of two points, rad."""
 _LARGEST = 100.0
 """Force up to which a path is followed where a local force may grow without bound, in its unit."""
 _NEWTON = 12
 _LEAST_NORM = 40
-"""Steps of least norm, whose convergence is linear at a singular point."""
+"""Steps of minimum norm, whose convergence is linear at a singular point."""
 _CONVERGED = 1e-12
 _UNCOUPLED = 1e-6
 """Share of the row of the force in the direction that loses its stiffness, up to which a path branches off there."""
@@ -61,7 +61,7 @@ _VALUES = 5
 _DIFFERENCE = 1e-5
 """Half the distance of the values of a derivative by the parameter, over the range."""
 _KNOWN = 256
-"""Potentials that are held, by the value of the parameter."""
+"""Cached potentials, by the value of the parameter."""
 _BESIDE = 0.02
 """Distance from the end of the range of a law, over that of the end from the straight beam."""
 _SAME = 1e-3
@@ -85,10 +85,10 @@ class EquilibriumPath:
     unstable: NDArray[np.int_]
     singular: tuple[Singular, ...]
     secondary: bool
-    """Whether it branches off from another one."""
+    """True if the path branches off from another one."""
     closed: bool
     complete: bool
-    """Whether it was followed to its ends: the range, another path, or the end of the range of a law."""
+    """True if the path was followed to its ends: the range, another path, or the end of the range of a law."""
 
 
 class _Point(NamedTuple):
@@ -223,7 +223,7 @@ class _Tracer:
     high: float
     paths: list[EquilibriumPath] = field(default_factory=list)
     lost: bool = False
-    """Whether the path that is being followed ended for want of steps."""
+    """True if the current path ended because the maximum number of steps was reached."""
 
     def __post_init__(self) -> None:
         value, first = self.family.first
@@ -261,7 +261,7 @@ class _Tracer:
     def correct(self, guess: _Array, normal: _Array | None) -> _Array | None:
         """The point of the path on the plane across *normal* through *guess*; None if there is none near.
 
-        Without *normal*, by steps of least norm: at a singular point no plane is across all paths.
+        Without *normal*, by steps of minimum norm: at a singular point no plane is across all paths.
         """
         y = guess
         for _ in range(_NEWTON if normal is not None else _LEAST_NORM):
@@ -331,7 +331,7 @@ class _Tracer:
         return np.asarray(potential.model.linear_modes @ axes[:, int(np.abs(values).argmin())])
 
     def is_known(self, y: _Array) -> bool:
-        """Whether a point lies on a path that was followed."""
+        """Return whether a point is on a path that was already followed."""
         for path in self.paths:
             points = np.column_stack((path.amplitude / self.length, (path.value - self.origin) / self.unit))
             begin, away = points[:-1], np.diff(points, axis=0)
@@ -393,7 +393,7 @@ class _Tracer:
         return points, singular, False
 
     def _is_at_end_of_a_law(self, y: _Array) -> bool:
-        """Whether a local force acts beside the end of the range of its law, which the path cannot pass."""
+        """Return whether a local force is next to the end of the range of its law, which the path cannot pass."""
         potential = self.potential(y)
         for row, law in zip(potential.rows, potential.local_forces, strict=True):
             u = float(row @ self.amplitude(y))

@@ -100,7 +100,7 @@ class HarmonicForce(ForceHistory):
         return np.asarray(2.0 * math.pi / (columns["frequency_ratio"] * scale.omega))
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """Greatest force, N."""
+        """Maximum force, N."""
         return np.asarray(columns["amplitude"] + np.abs(columns["mean"]))
 
     @staticmethod
@@ -157,7 +157,7 @@ class ConstantForce(ForceHistory, Timed):
         return {"fastest": np.zeros(columns["force"].size), "force": columns["force"]}
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """Its size, N."""
+        """Peak force, N."""
         return np.abs(columns["force"])
 
     @staticmethod
@@ -320,7 +320,7 @@ class ExternalForce:
     noun: ClassVar[str] = "an external force"
     """In messages."""
     rate_dependent: ClassVar[bool] = False
-    """Whether its force depends on the velocity of the structure."""
+    """True if the force depends on the velocity of the structure."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.history, ForceHistory):

@@ -30,9 +30,9 @@ __all__ = ["force_displacement"]
 _Array = NDArray[np.float64]
 
 _MARGIN = 0.25
-"""Of the default range beyond the outermost equilibrium and critical point, over the distance of the two."""
+"""Margin of the default range beyond the outermost equilibrium and critical point, over their distance."""
 _BEYOND = 2.0
-"""Of the range in which critical points are looked for, beyond the outermost equilibria, over the size of a well."""
+"""Margin of the search for critical points beyond the outermost equilibria, over the size of a well."""
 
 
 @checked
@@ -72,18 +72,18 @@ def force_displacement(
     Returns
     -------
     xarray.Dataset
-        Over ``point``: ``displacement`` (m), ``force`` (N), ``energy`` (J, potential energy without the work of the
-        force), ``branch``, ``unstable_directions`` under a given force (0: stable),
-        ``unstable_directions_at_fixed_displacement``, and ``amplitude`` (alpha, over ``mode``).  Over ``branch_number``:
-        ``branch_kind``, "primary" or "secondary".  Over ``critical_point``: ``critical_kind`` ("limit" or
-        "bifurcation"), ``critical_displacement`` (m), ``critical_force`` (N), ``critical_branch``.
-        ``snap_through_force`` (N) is where the stable path from the well ends under a force towards the other side.
-        ``snap_back_force`` is where the stable path of the other well ends on the way back; with one well, where the path
-        that comes from a large force does.  ``snap_through_displacement`` and ``snap_back_displacement`` (m) belong to
-        them.  They are NaN if the beam does not snap.
-        ``energy_barrier`` (J) is that from the well to the lowest saddle beside it without a force,
-        ``energy_barrier_back`` that from the other well; NaN with one well.  The attributes name the well, how it was chosen, and the kind of the critical
-        points.
+        Over ``point``: ``displacement`` (m), ``force`` (N), ``energy`` (J, potential energy without the work of
+        the force), ``branch``, ``unstable_directions`` under a given force (0: stable),
+        ``unstable_directions_at_fixed_displacement``, and ``amplitude`` (alpha, over ``mode``).  Over
+        ``branch_number``: ``branch_kind``, "primary" or "secondary".  Over ``critical_point``:
+        ``critical_kind`` ("limit" or "bifurcation"), ``critical_displacement`` (m), ``critical_force`` (N),
+        ``critical_branch``.  ``snap_through_force`` (N) is where the stable path from the well ends under a
+        force towards the other side.  ``snap_back_force`` is where the stable path of the other well ends on
+        the way back; with one well, where the path that comes from a large force does.
+        ``snap_through_displacement`` and ``snap_back_displacement`` (m) belong to them.  They are NaN if the
+        beam does not snap.  ``energy_barrier`` (J) is that from the well to the lowest adjacent saddle without
+        a force, ``energy_barrier_back`` that from the other well; NaN with one well.  The attributes name the
+        well, how it was chosen, and the kind of the critical points.
 
     Raises
     ------
@@ -247,7 +247,7 @@ def _well(potential: Potential, given: str | None) -> tuple[str, str]:
 
 
 def _unstable_at_fixed_displacement(potential: Potential, row: _Array, alpha: _Array) -> NDArray[np.int_]:
-    """Negative eigenvalues of the tangent stiffness, with the displacement on the row held, at (points, N) amplitudes."""
+    """Negative eigenvalues of the tangent stiffness, at fixed displacement on the row, at (points, N) amplitudes."""
     if alpha.shape[1] == 1:
         return np.zeros(alpha.shape[0], dtype=np.int_)
     free = np.linalg.svd(row[None, :])[2][1:]

@@ -29,7 +29,7 @@ _STRONGEST_COUPLING = 1.0
 
 
 class Harvester:
-    """A circuit of one state beside the beam: a frozen dataclass.
+    """Circuit with one state, coupled to the beam: a frozen dataclass.
 
     With theta the row of the coupling in buckling modes, z what pulls back (the voltage, or the current the other way
     round) and M and rho its inertia and its loss,
@@ -44,9 +44,9 @@ class Harvester:
     noun: ClassVar[str] = "a harvester"
     """In messages."""
     rate_dependent: ClassVar[bool] = True
-    """Whether its force depends on the velocity of the structure."""
+    """True if the force depends on the velocity of the structure."""
     resistance: float
-    """Of the load, ohm."""
+    """Load resistance, ohm."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -92,8 +92,8 @@ class PiezoelectricHarvester(Harvester):
 
         theta_i = Theta [phi_i'(x_2) - phi_i'(x_1)],     C v' = -v/R - theta . alpha',
 
-    with Theta the bending moment per volt.  Their own mass and stiffness are left out.  Of a structure given by matrices
-    theta is Theta times its ``patch_shape``, whatever the locations.
+    with Theta the bending moment per volt.  Their own mass and stiffness are neglected.  Of a structure given
+    by matrices theta is Theta times its ``patch_shape``, for all locations.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ class PiezoelectricHarvester(Harvester):
         return np.ones_like(resistance)
 
     def volts(self, resistance: _Array) -> _Array:
-        """It is the voltage."""
+        """Voltage: the coordinate itself."""
         return np.ones_like(resistance)
 
     def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:
@@ -259,7 +259,7 @@ class ElectromagneticHarvester(Harvester):
 
         L_c i' = K w'(x_c) - (R + R_c) i,     f_c = -K i,
 
-    with the velocity w' relative to the ends.  The magnet's mass is left out.
+    with the velocity w' relative to the ends.  The mass of the magnet is neglected.
 
     Parameters
     ----------

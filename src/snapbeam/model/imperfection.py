@@ -23,7 +23,7 @@ __all__ = ["FORMS", "Imperfection", "perfect_equilibria", "projected"]
 
 
 _POINTS = 16
-"""Of Gauss and Legendre, in each of the panels that a half wave of the last mode has two of."""
+"""Gauss-Legendre points in each panel; a half wave of the last mode has two panels."""
 
 
 def projected(modes: Modes, profile: _Array, symmetric: bool = False) -> _Array:
@@ -88,7 +88,7 @@ class Imperfection:
     shape : {"mode", "sine"}
         Of *midspan_amplitude*: the first buckling mode, or a single half sine, of which the modes take the part that they hold.
     antisymmetric_amplitude : float
-        Greatest height, m, of an initial shape of the form of the second buckling mode, on the left half.
+        Maximum height, m, of an initial shape of the form of the second buckling mode, on the left half.
     profile : array_like of shape (2, points), optional
         A measured initial shape: places over the length, ascending from 0 to 1, and heights, m.  The straight line
         through its ends is taken away.
@@ -128,7 +128,7 @@ class Imperfection:
         short="imperfection_shape",
     )
     antisymmetric_amplitude: float = quantity(
-        "m", "greatest height of the antisymmetric part of the initial shape", default=0.0,
+        "m", "maximum height of the antisymmetric part of the initial shape", default=0.0,
         short="imperfection_antisymmetric_amplitude", plausible=(0.0, 1.0, "mm"),
     )  # fmt: skip
     profile: _Array | None = quantity(
@@ -139,7 +139,7 @@ class Imperfection:
         "N", "constant force at a point", default=0.0, symbol="F", short="imperfection_point_load"
     )
     point_location: float = quantity(
-        "1", "where the constant force acts, over the length", default=0.5, low=0.0, high=1.0,
+        "1", "location of the constant force over the length", default=0.5, low=0.0, high=1.0,
         short="imperfection_point_location",
     )  # fmt: skip
     uniform_load: float = quantity(
@@ -156,7 +156,7 @@ class Imperfection:
 
     @property
     def is_none(self) -> bool:
-        """Whether the beam is perfect after all."""
+        """True if the beam is perfect."""
         profile = self.profile is not None and bool(np.any(self.profile[1] != self.profile[1, 0]))
         loads = (
             self.midspan_amplitude,

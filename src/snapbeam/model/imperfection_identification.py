@@ -31,20 +31,20 @@ def identify_imperfection(
 ) -> ReducedModel:
     """The beam and the imperfection whose first frequencies about the two wells are those that were measured.
 
-    The buckling level, or the axial load of a beam that was given one, and one number of the imperfection are found,
-    two unknowns from two frequencies: which kind of imperfection it is, they do not say.
+    The buckling level, or the axial load of a beam that was given one, and one number of the imperfection are
+    found, two unknowns from two frequencies, which do not determine the type of imperfection.
 
     Parameters
     ----------
     beam : Beam
-        All of it but the load is kept.
+        The load is identified; all other parameters are fixed.
     lower_frequency, upper_frequency : float
         First natural frequency about the lower and about the upper well, Hz.
     kind : {"midspan_amplitude", "point_load", "uniform_load"}
-        What makes the wells unequal.
+        Type of the imperfection.
     modes : int
     imperfection : Imperfection, optional
-        What else is known of the beam.
+        Other known parameters of the beam.
 
     Returns
     -------

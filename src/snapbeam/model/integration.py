@@ -1,4 +1,4 @@
-"""How a system is integrated: for how long, how finely, by which engine."""
+"""Solver settings of a run: duration, step or tolerance, engine."""
 
 from __future__ import annotations
 
@@ -15,28 +15,27 @@ __all__ = ["ACCURACIES", "CYCLES", "ENGINES", "Integration"]
 ACCURACIES = ("standard", "reference")
 ENGINES = ("auto", "cpu", "cuda")
 CYCLES = 200
-"""Cycles of a run unless others are asked for."""
+"""Default number of cycles of a run."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Integration:
-    """How runs are integrated; what is studied is a :class:`~snapbeam.System`.
+    """Solver settings of a run: number of cycles, time step or tolerance, engine.
 
     Parameters
     ----------
     cycles : int, optional
-        Cycles of excitation, at least 1; 200 by default, and with a recorded drive as many as it holds.
+        Number of cycles of excitation, at least 1; default 200, or all cycles of a recorded drive.
     step : float, optional
         Step in free flight, s; steps in contact scale with it.  The default follows from the model and
         the contact; its error is on the docs' page on accuracy.
     accuracy : {"standard", "reference"}
         ``"standard"``: order 4.  ``"reference"``: order 6 and much shorter steps, to check others with.
     tolerance : float, optional
-        Greatest error allowed in the displacement of the contact point and of the centre of one run, in b, from
-        1e-10 to 0.1, as far as the problem's conditioning lets any integrator promise it; in place of *step*
-        and *accuracy*.
+        Requested maximum error of the displacement of the contact point and of mid-span, over b, from 1e-10 to
+        0.1, up to the predictability horizon. Excludes *step* and *accuracy*.
     engine : {"auto", "cpu", "cuda"}
-        What integrates; ``"auto"`` takes the fastest that serves.
+        Solver; ``"auto"`` selects the fastest available one.
     early_termination : bool
         End a run once its response class is certain: the class is the same, statistics other than it stop there.
     threads : int, optional
@@ -44,14 +43,14 @@ class Integration:
     high_frequency_ratio : float
         Multiple of omega_1 above which the energy of a mode counts as high, for ``high_frequency_energy_fraction``.
     max_steps : int, optional
-        Steps that one run may take.  A run whose free flight alone takes more is refused before it begins; one that
-        takes more since it is much in contact ends with the status STEP_LIMIT.  By default what one core does in
-        some hour: 6e9 steps with 1 mode, 7e8 with 64.
+        Maximum number of steps of one run. If free flight alone needs more, an InputError is raised; if
+        contacts need more, the run ends with the status STEP_LIMIT. Default: about one hour on one core, 6e9
+        steps with 1 mode, 7e8 with 64.
 
     Raises
     ------
     InputError
-        For values out of range, or a tolerance beside a step or an accuracy.
+        If a value is out of range, or a tolerance is combined with a step or an accuracy.
 
     Examples
     --------
@@ -67,7 +66,7 @@ class Integration:
     step: float | None = quantity("s", "step in free flight", default=None, low=0.0, optional=True)
     accuracy: str = quantity("1", "accuracy level", default="standard", kind=str, choices=ACCURACIES)
     tolerance: float | None = quantity(
-        "1", "greatest error of the displacement, over b", default=None, low=1e-10, high=0.1, closed="both",
+        "1", "maximum error of the displacement, over b", default=None, low=1e-10, high=0.1, closed="both",
         optional=True,
     )  # fmt: skip
     engine: str = quantity("1", "what integrates", default="auto", kind=str, choices=ENGINES)
@@ -103,5 +102,5 @@ class Integration:
 
     @property
     def cycles_or_default(self) -> int:
-        """The cycles asked for, or 200."""
+        """Number of cycles, 200 by default."""
         return CYCLES if self.cycles is None else self.cycles

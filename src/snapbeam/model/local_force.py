@@ -32,7 +32,7 @@ LOCAL_FORCES: dict[str, type[LocalForce]] = {}
 """Every law of a local force, by the name it has in parameter files."""
 _PLACES = ("location", "coordinate", "shape", "label")
 _PERMITTIVITY = 8.8541878188e-12
-"""Of vacuum, F/m (CODATA 2022)."""
+"""Permittivity of vacuum, F/m (CODATA 2022)."""
 _NEAREST = 0.1
 """Share of the way to the end of the range of a law, from which on the steps of a run do not follow its stiffness."""
 
@@ -41,9 +41,9 @@ _NEAREST = 0.1
 class LocalForce:
     """A law of a force that acts on one point: derive a frozen dataclass from it, with the law's constants as fields.
 
-    The law depends on the displacement u of the point from the straight beam, or on its rotation, and on the rate v of
-    that.  Its physics are scalar functions, which the solver compiles into the time step.  ``law`` stands for the
-    constants, by the names of the fields:
+    The law depends on the displacement u of the point from the straight beam, or on its rotation, and on the
+    rate v of that.  Its physics are scalar functions, which the solver compiles into the time step.  ``law``
+    contains the constants, by the names of the fields:
 
     - ``force(law, displacement)``: conservative force on the beam, N, or moment, N m; positive in the direction of u;
     - ``energy(law, displacement)``: its potential energy, J; the force is minus its derivative.
@@ -61,7 +61,7 @@ class LocalForce:
     location : float, optional
         Of a beam: where the force acts, over the length.
     coordinate : {"displacement", "rotation"}
-        Of a beam: what u is, in m or rad.
+        Of a beam: the coordinate u, in m or rad.
     shape : array_like of shape (N,), optional
         Of a structure given by matrices: u = shape . alpha; its contact point by default.
     label : str, optional
@@ -110,7 +110,7 @@ class LocalForce:
     constant_part: ClassVar[float] = 0.0
     """Part of the force that does not depend on the motion, N."""
     dissipative: ClassVar[bool] = False
-    """Whether the force depends on the velocity too."""
+    """True if the force also depends on the velocity."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -174,17 +174,17 @@ class LocalForce:
 
     @classmethod
     def is_limited(cls) -> bool:
-        """Whether the law is valid for some displacements only."""
+        """Return whether the law is valid only in a range of displacements."""
         return cls.displacement_range is not LocalForce.displacement_range
 
     @property
     def rate_dependent(self) -> bool:
-        """Whether the force depends on the velocity of the structure."""
+        """True if the force depends on the velocity of the structure."""
         return self.dissipative
 
     @property
     def is_conservative(self) -> bool:
-        """Whether the law has a conservative part."""
+        """True if the law has a conservative part."""
         return type(self).force is not LocalForce.force
 
     @classmethod
@@ -231,7 +231,7 @@ class LocalForce:
         return found
 
     def greatest_stiffness(self, largest: float) -> float:
-        """Greatest slope of the conservative force over displacements up to *largest*, by differences; N/m."""
+        """Maximum slope of the conservative force over displacements up to *largest*, by differences; N/m."""
         numbers, (low, high) = self.numbers, self.displacement_range(self.numbers)
         inside = (1.0 - _NEAREST) * low, (1.0 - _NEAREST) * high
         at = np.linspace(max(-largest, inside[0]), min(largest, inside[1]), 401)
@@ -239,7 +239,7 @@ class LocalForce:
         return float(np.abs(np.diff(forces) / np.diff(at)).max())
 
     def greatest_damping(self, largest: float, fastest: float) -> float:
-        """Greatest damping coefficient over displacements and velocities up to *largest* and *fastest*; N s/m."""
+        """Maximum damping coefficient over displacements and velocities up to *largest* and *fastest*; N s/m."""
         numbers, damping = self.numbers, type(self).damping_coefficient
         # dense near 0, where friction changes
         speeds = [0.0, *(fastest * 10.0 ** (-k / 4.0) for k in range(24))]
@@ -336,7 +336,7 @@ class ElectrostaticForce(_TowardsGap):
 
     @staticmethod
     def energy(law: Any, displacement: float) -> float:
-        """Of the electrode and its source, -eps_0 A V^2/(2 |g - u|)."""
+        """Energy of the electrode and its source, -eps_0 A V^2/(2 |g - u|)."""
         return -0.5 * _PERMITTIVITY * law.area * law.voltage * law.voltage / abs(law.gap - displacement)
 
 

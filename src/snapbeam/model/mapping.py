@@ -171,7 +171,7 @@ def _moved(kind: Any, motion: str, values: Mapping[str, Any], section: str) -> A
 
 
 def _taken(values: dict[str, Any], names: Any) -> dict[str, Any]:
-    """Those of *values* that have one of the names, taken out of them."""
+    """Remove and return those of *values* that have one of the names."""
     return {name: values.pop(name) for name in names if name in values}
 
 

@@ -1,4 +1,4 @@
-"""Stiffness and mass matrices: symmetry, coordinates held by a penalty, and eigenvalues with a decision on rigid modes."""
+"""Stiffness and mass matrices: symmetry, coordinates fixed by a penalty, and eigenvalues with a decision on rigid modes."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _ROUNDING = 1e-10
 _SINGLE = float(np.finfo(np.float32).eps)
 """Asymmetry taken for the rounding of single precision."""
 _PENALTY = 1e12
-"""Least ratio of a penalty to every other stiffness, and of the squares of their frequencies."""
+"""Minimum ratio of a penalty to every other stiffness, and of the squares of their frequencies."""
 _HUGE = 1e14
-"""Least penalty: the stiffness of a rigid mode may be rounding, far below those of the other modes."""
+"""Minimum penalty: the stiffness of a rigid mode may be rounding, far below those of the other modes."""
 _WEAK = 1e-8
 """Coupling K_ij^2/(K_ii K_jj) below which a penalty holds its coordinate."""
 
@@ -131,9 +131,9 @@ _DOUBT = 1e6 * _EPS
 _SPREAD = 32.0 * _EPS
 """Error of a Rayleigh quotient, over the root of the sum of the squares of its terms: they round independently."""
 _APART = 100.0
-"""Least ratio of the first eigenvalue that is not 0 to the error of those taken for 0."""
+"""Minimum ratio of the first eigenvalue that is not 0 to the error of those taken for 0."""
 _BESIDE = 10.0
-"""Least ratio of an eigenvalue that is not 0 to its error."""
+"""Minimum ratio of an eigenvalue that is not 0 to its error."""
 _INEXACT = 1e-2
 """Error of an eigenvalue, over the eigenvalue, that is reported."""
 _SMALL = 800
@@ -298,7 +298,7 @@ def _negative(factors: Any) -> int:
 
 
 def is_positive_definite(matrix: Any) -> bool:
-    """Whether a symmetric matrix, dense or sparse, has positive eigenvalues only."""
+    """Return whether a symmetric matrix, dense or sparse, has only positive eigenvalues."""
     if sp.issparse(matrix):
         diagonal = matrix.diagonal()
         if not (diagonal > 0.0).all():

@@ -50,7 +50,7 @@ def spring_natural_frequency(beam: Beam, count: int, reduced: _Array) -> _Array:
     Raises
     ------
     InputError
-        If one is not found where the reduced model says.
+        If one is not found near the value of the reduced model.
     """
     balance = _balance_of(beam)
     found: list[float] = []

@@ -65,7 +65,7 @@ def parse_axis(
         ``0.18``, ``"0.18"``, ``"1/2.1"``, ``"0.1,0.2,0.5"``, or ``"0.1:4:64"`` for 64 points from 0.1 to 4,
         both included.  Numbers of text may have a unit that pint knows: ``"1.9um:2.1um:5"``, ``"1kohm,1Mohm"``.
     whole : bool
-        Whether the numbers are to be whole, as a refusal then says.
+        True if the numbers must be integers, for the error message.
     unit : str
         Unit of the parameter, in which the result is.
 
@@ -141,7 +141,7 @@ class Physical:
     words: str
 
     def unit_of(self, length: float, omega: float) -> float:
-        """What a ratio of 1 is, from the length scale (m) and omega_1 (rad/s); not of a location."""
+        """Value of a normalised parameter of 1, from the length scale (m) and omega_1 (rad/s); not for a location."""
         return {
             "frequency_ratio": omega / (2.0 * math.pi),
             "velocity_amplitude": length * omega,
@@ -167,7 +167,7 @@ PHYSICAL: dict[str, Physical] = {
         "base_excitation.acceleration_amplitude", "g", "acceleration amplitude of the base"
     ),
 }
-"""What may be given instead of a ratio, by dotted name; one unit for each ratio."""
+"""Physical quantities that can replace a normalised parameter, by dotted name; one unit for each."""
 
 
 def physical_name(name: str) -> str | None:
@@ -201,7 +201,7 @@ def parameter_of_axis(name: str) -> Parameter:
 
 
 def unit_of(system: System, name: str) -> float:
-    """What a ratio of 1 is in the physical unit of *name*."""
+    """Value of a normalised parameter of 1 in the physical unit of *name*."""
     scale, row = system.scale, PHYSICAL[name]
     if row.parameter != "contact.location":
         return row.unit_of(scale.length, scale.omega)
@@ -243,7 +243,7 @@ def checked_physical(system: System, name: str, value: float, shown: str) -> flo
     Raises
     ------
     InputError
-        If the ratio is out of its range; the message says both.
+        If the ratio is out of its range; the message contains both.
     """
     ratio, row = float(from_physical(system, name, value)), lookup(PHYSICAL[name].parameter)
     short = split_name(row.name)[1]

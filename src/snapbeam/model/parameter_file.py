@@ -1,4 +1,4 @@
-"""What was given in a parameter file or on a command line: checked, completed from the paper, made into values."""
+"""Parameters from a file or the command line: checks, defaults of the paper, conversion to objects."""
 
 from __future__ import annotations
 
@@ -74,12 +74,12 @@ MATERIALS = {
     "young_modulus": ("Pa", "Young's moduli of sphere and beam", None),
     "poisson_ratio": ("1", "Poisson ratios of sphere and beam", None),
 }
-"""What a Hertzian stiffness may follow from: unit, words and plausible sizes."""
+"""Material parameters from which a Hertzian stiffness follows: unit, long name and plausible range."""
 WANTED = {
     "restitution": ("1", "share of its speed that a free mass keeps, from which the loss follows"),
     "speed": ("m/s", "at which it keeps that share"),
 }
-"""What a loss may follow from: unit and words."""
+"""Parameters from which a damping factor follows: unit and long name."""
 _TELLING = {
     "coefficient": "restitution", "damping_factor": "hunt_crossley", "restitution": "hunt_crossley", "speed": "hunt_crossley",
     "layer_stiffness": "layer", "loading_stiffness": "elastic_plastic", "unloading_stiffness": "elastic_plastic",
@@ -127,7 +127,7 @@ def contact_of(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def contact_rivals() -> list[tuple[set[str], set[str]]]:
-    """What stands for the same thing: giving one set takes the other away."""
+    """Sets of parameters that exclude each other: a value of one set replaces those of the other."""
     sphere, lossy = {"stiffness", *MATERIALS}, {"damping_factor", *WANTED}
     spring, power = {"linear_stiffness", "linear_damping"}, {"force_at_1um", "exponent"}
     pairs = [({"stiffness"}, set(MATERIALS)), ({"damping_factor"}, set(WANTED))]
@@ -259,7 +259,7 @@ def _from_text(name: str, value: Any, unit: str) -> tuple[str, Any]:
 
 
 def _implausible(row: Parameter, name: str, value: float) -> str:
-    """What is said of a number so far from any beam that it must be in another unit; nothing of others."""
+    """Error message for a value outside the plausible range, probably in another unit; otherwise empty."""
     item = row.quantity
     if not item.plausible or value == 0.0 or item.plausible[0] <= abs(value) <= item.plausible[1]:
         return ""
@@ -276,7 +276,7 @@ def _array(name: str, value: Any) -> tuple[str, Any]:
 
 
 def _is_sum(section: str, value: Any) -> bool:
-    """Whether a kind is a sum of drives, such as ``"sine+burst"``, that the section may hold."""
+    """Return whether a type is a sum of drives, such as ``"sine+burst"``, that the section accepts."""
     if not isinstance(value, str) or "+" not in value or value not in DRIVES:
         return False
     return numbered(section)[0] == "drive" or (
@@ -285,7 +285,7 @@ def _is_sum(section: str, value: Any) -> bool:
 
 
 def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
-    """What is in no row: the law, the drive's kind, materials, and physical units."""
+    """Check an entry without a row in the table: law, drive type, materials, physical units."""
     if name == "type":
         known = kinds_of(numbered(section)[0])
         if not isinstance(value, str) or (value not in known and not _is_sum(section, value)):
@@ -357,7 +357,7 @@ def parsed_axis(name: str, value: Any) -> Any:
 
 
 def contradictions(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """What is wrong with values that are each in order."""
+    """Error messages for contradictions between values that are each valid."""
     contact = found.get("contact", {})
     given = [name for name in MATERIALS if name in contact]
     if given and "stiffness" in contact:
@@ -386,7 +386,7 @@ def contradictions(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
 
 
 def with_section(message: str, found: Mapping[str, Mapping[str, Any]]) -> str:
-    """The refusal of a value with the section that it stands in."""
+    """Error message of a value with its section."""
     name = message.partition(" ")[0].rstrip(":")
     for section, values in found.items():
         if name in values:
@@ -408,7 +408,7 @@ Sections = Mapping[str, Mapping[str, Any]]
 
 DEFAULT_DRIVE = {"frequency_ratio": 1.21, "velocity_amplitude": 0.18}
 DEFAULT_AXES = {"drive.frequency_ratio": "0.1:4:64", "drive.velocity_amplitude": "0.01:0.65:40"}
-"""Of a map for which no axis is named."""
+"""Default axes of a map."""
 _AROUND, _STRIKING = (
     ("base_excitation", "axial_load", "force", "harvester"),
     ("contact", "drive"),
@@ -446,7 +446,7 @@ class Config:
         return {"extends": "paper"} if self.extends_paper else {}
 
     def section(self, name: str) -> dict[str, Any]:
-        """What was given of a section."""
+        """Values given in a section."""
         return dict(self.given.get(name, {}))
 
     def resolved(self, name: str) -> str:
@@ -454,7 +454,7 @@ class Config:
         return resolved(name, labels_of(self.given))
 
     def _with_axes(self, name: str) -> dict[str, Any]:
-        """What was given of a section; a key that has an axis only takes the first value of the axis."""
+        """Values given in a section; a key that has only an axis takes the first value of the axis."""
         found, known = self.section(name), parameters()
         kind = law_of(found) if numbered(name)[0] == "contact" else found.get("type", "sine")
         for axis, values in self.section("sweep").items():
@@ -474,7 +474,7 @@ class Config:
 
     @cached_property
     def defaulted(self) -> tuple[str, ...]:
-        """Names of what was not given: the values of the paper's beam beside another beam, and else the default drive."""
+        """Names of values that were not given: those of the paper's beam for another beam, else the default drive."""
         if not self.section("beam"):
             return ()
         found, swept = self._defaults(), self.axes(keep_units=True) if self.section("sweep") else {}
@@ -487,7 +487,7 @@ class Config:
         )
 
     def whole(self, axes: Mapping[str, Any] | None = None) -> Config:
-        """Everything, what was not given too, as a file would hold it: to print, to keep, to start another file from.
+        """All values, defaults included, in the layout of a parameter file.
 
         Parameters
         ----------
@@ -620,7 +620,7 @@ class Config:
         return self._started(system)
 
     def _may_be_axis(self, section: str) -> bool:
-        """Whether a required value of a section may be given by an axis only."""
+        """Return whether a required value of a section may be given by an axis only."""
         return section in _STRIKING or not self.extends_paper
 
     @property
@@ -639,18 +639,18 @@ class Config:
 
     @property
     def _around(self) -> list[str]:
-        """The sections of what acts on the structure beside strikers."""
+        """Sections of excitations other than strikers."""
         return [name for name, values in self.given.items() if numbered(name)[0] in _AROUND and values]
 
     @property
     def _is_unstruck(self) -> bool:
-        """Whether there is no striker: none was given, and the paper's is not added."""
+        """True if there is no striker: none was given, and that of the paper is not added."""
         added = self.extends_paper and not self._is_moved
         return not added and not any(self._with_axes(name) for name in _STRIKING)
 
     @property
     def _stands_still(self) -> bool:
-        """Whether there is a striker beside a base, an axial load or a force, of whose motion nothing was said."""
+        """True if a striker next to a base excitation, an axial load or a force has no drive."""
         return self._is_moved and not self.section("drive")
 
     @property
@@ -662,7 +662,7 @@ class Config:
 
     @property
     def is_complete(self) -> bool:
-        """Whether the same values describe the same system without the paper's."""
+        """True if the values describe the same system without the defaults of the paper."""
         try:
             return bool(Config(self.given, extends_paper=False).system == self.system)
         except InputError:
@@ -670,7 +670,7 @@ class Config:
 
     @property
     def is_static(self) -> bool:
-        """Whether only a beam is described, with the forces on it, and no damping that a motion needs."""
+        """True if the file describes only a beam and forces on it, without the damping that a motion needs."""
         kinds = {numbered(name)[0] for name in self.given}
         damped = "damping_ratio" in self.section("model") and self._around
         return (
@@ -730,7 +730,7 @@ class Config:
 
     @cached_property
     def integration(self) -> Integration:
-        """How runs are integrated."""
+        """Solver settings."""
         return Integration(**self.section("integration"))
 
     def axes(
@@ -774,7 +774,7 @@ class Config:
         return found
 
     def to_mapping(self) -> dict[str, dict[str, Any]]:
-        """What was given, plain, as a file would hold it."""
+        """Given values as a nested dictionary, in the layout of a file."""
         return {section: dict(values) for section, values in self.given.items() if values}
 
 
@@ -792,7 +792,7 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "", *, comple
         Values by section and name.  The paper's values complete them if they contain ``extends = "paper"`` or no section
         of a system.  Sections of commands such as ``probability`` are left out.
     source : str
-        Where they come from, to stand before each refusal.
+        Source of the values, the prefix of each error message.
     complete : bool
         Whether they must describe a system.  If not, each value is checked, but others may complete them.
 
@@ -850,7 +850,7 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]], source: 
 
 
 def same_axis(name: str) -> set[str]:
-    """The dotted names, that in a physical unit among them, of what *name* stands for; none if it is unknown."""
+    """Dotted names of *name*, those in physical units included; empty if it is unknown."""
     try:
         physical = physical_name(name)
         full = lookup(name).name if physical is None else PHYSICAL[physical].parameter
@@ -890,7 +890,7 @@ def system_of_file(path: str | os.PathLike[str]) -> System:
 
 
 def _is_saved_system(sections: Mapping[str, Any]) -> bool:
-    """Whether these are the sections of a system alone, with the names that :meth:`~snapbeam.System.save` writes."""
+    """Return whether the sections are only those of a system, as :meth:`~snapbeam.System.save` writes."""
     sections = flattened(sections)
     contacts = [name for name in sections if numbered(name)[0] == "contact"]
     return all(
@@ -908,7 +908,7 @@ def dump_config(config: Config, path: str | os.PathLike[str], comment: str = "")
     path : path
         Ends in ``.toml``.
     comment : str
-        Lines to stand at the top.
+        Comment lines at the top.
     """
     target = check_writable(path, "path", (".toml",))
     with atomic_path(target) as temporary:
@@ -916,7 +916,7 @@ def dump_config(config: Config, path: str | os.PathLike[str], comment: str = "")
 
 
 def config_text(config: Config, comment: str = "") -> str:
-    """What was given, as the text of a parameter file."""
+    """Text of a parameter file with the given values."""
     instance("config", config, Config, "a Config")
     instance("comment", comment, str, "text")
     lines = [f"# {line}" for line in comment.splitlines()]

@@ -72,12 +72,12 @@ class Parameter:
 
     @property
     def section(self) -> str:
-        """What it is a parameter of."""
+        """Section of the parameter."""
         return numbered(split_name(self.name)[0])[0]
 
     @property
     def is_run(self) -> bool:
-        """Whether it may differ between the runs of one ensemble."""
+        """True if the parameter can differ between the runs of one ensemble."""
         return self.quantity.scope == RUN
 
     @property
@@ -91,7 +91,7 @@ class Parameter:
 
     @property
     def limits(self) -> str:
-        """What is allowed, in words."""
+        """Allowed values, as text."""
         item = self.quantity
         if item.choices:
             return " or ".join(item.choices)
@@ -151,11 +151,11 @@ _AROUND = {
     "force": "",
     "harvester": "",
 }
-"""Sections of what surrounds a beam, whose names in datasets say so, and what words of a drive are said of."""
+"""Sections of base, axial load and forces, with prefixes for dataset names and long names."""
 
 
 def _around(row: Parameter) -> Parameter:
-    """A parameter of what surrounds the beam, told from the striker's of the same name."""
+    """Parameter of base, axial load or a force, with a name distinct from that of the striker."""
     section, name = split_name(row.name)
     of = _AROUND[section]
     words = f"{row.quantity.long_name}, of {of}" if of else row.quantity.long_name
@@ -241,7 +241,7 @@ def short_names() -> dict[str, str]:
 def lookup(name: str) -> Parameter:
     """The row of a parameter, by its dotted name or by the name that datasets use.
 
-    ``initial_state.amplitude[i]`` and ``initial_state.velocity[i]`` stand for every mode i.
+    ``initial_state.amplitude[i]`` and ``initial_state.velocity[i]`` apply to every mode i.
 
     Raises
     ------

@@ -28,7 +28,7 @@ _STARTS = 512
 _ITERATIONS = 200
 _HALVINGS = 40
 _RESIDUAL = 1e-11
-"""Of the sum of the magnitudes of the terms of the gradient."""
+"""Tolerance of the gradient, over the sum of the magnitudes of its terms."""
 _SAME = 1e-6
 """Distance of two solutions that are one, over the largest amplitude."""
 _NEAR = 1e-3
@@ -40,7 +40,7 @@ _TOWARDS = 40
 _FAR = 20.0
 """Amplitudes, over the size, beyond which equilibria may be missing."""
 _REACH = 3.0
-"""Of the region of the starting points, over the largest amplitude of the equilibria without local forces."""
+"""Extent of the region of starting points, over the largest amplitude of the equilibria without local forces."""
 
 
 class Saddle(NamedTuple):
@@ -48,7 +48,7 @@ class Saddle(NamedTuple):
 
     equilibrium: Equilibrium
     wells: tuple[int | None, int | None]
-    """Their numbers, by the height of the centre; None for a descent that leaves the range of a law, such as pull-in."""
+    """Numbers of the wells, by the height of mid-span; None if the descent leaves the range of a law (pull-in)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class Potential:
 
     @property
     def is_of_the_structure_alone(self) -> bool:
-        """Whether no force adds to that of the structure."""
+        """True if no force acts in addition to those of the structure."""
         return not self.local_forces and not self.constant.any()
 
     def energy(self, alpha: ArrayLike) -> _Array:
@@ -287,7 +287,7 @@ class Potential:
         return found
 
     def holds(self, alpha: _Array) -> bool:
-        """Whether the displacement of every local force is within the range of its law."""
+        """Return whether the displacement of every local force is within the range of its law."""
         for row, law in zip(self.rows, self.local_forces, strict=True):
             low, high = law.displacement_range(law.numbers)
             if not low < float(row @ alpha) < high:
@@ -372,7 +372,7 @@ class Potential:
 
     @property
     def force_texts(self) -> list[str]:
-        """The forces that act beside those of the structure, a sentence each."""
+        """Description of the additional forces, one sentence for each."""
         found = [f"with {shown(law)}" for law in self.local_forces]
         return [*found, "with the constant part of the external force"] if self.constant.any() else found
 
@@ -397,7 +397,7 @@ class Potential:
         return own if abs(found - own) <= _SAME * self._length else found
 
     def barrier(self, well: int) -> float:
-        """Energy from a well, by number, to the lowest saddle beside it, J; NaN if there is none."""
+        """Energy from a well, by number, to the lowest adjacent saddle, J; NaN if there is none."""
         if not self.local_forces:
             return self.structure.saddle_energy - self.wells[well].energy if len(self.wells) > 1 else math.nan
         heights = [each.equilibrium.energy for each in self.saddles if well in each.wells]

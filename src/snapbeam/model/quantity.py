@@ -1,4 +1,4 @@
-"""A parameter as a field of a value: its unit, limits, words and scope stand where the value is defined.
+"""A parameter as a field of a value: its unit, limits, long name and scope are part of the definition.
 
 The table of parameters (:mod:`snapbeam.model.parameters`) is gathered from these fields; checks, files,
 the command line, axes of sweeps and labels of pictures read it there.
@@ -51,7 +51,7 @@ STRUCTURE = "structure"
 
 @dataclass(frozen=True)
 class ParameterField:
-    """What one field means.
+    """Description of one field: unit, long name, type, allowed range.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ def quantities(kind: type) -> dict[str, ParameterField]:
 
 
 def check_fields(value: Any) -> None:
-    """Check every quantity of a frozen dataclass, and keep it as a plain number, in its ``__post_init__``."""
+    """Check every quantity of a frozen dataclass, and store it as a plain number, in its ``__post_init__``."""
     for name, item in quantities(type(value)).items():
         object.__setattr__(value, name, item.check(name, getattr(value, name)))
 
@@ -164,7 +164,7 @@ def split_name(name: str) -> tuple[str, str]:
 
 
 def check_label(label: Any) -> None:
-    """Refuse a label that cannot stand in a dotted name in place of a number."""
+    """Raise an error for a label that cannot replace a number in a dotted name."""
     if not isinstance(label, str) or (label and not label.isidentifier()):
         raise InputError(
             f"label = {shown(label)}: must be a name of letters, digits and underscores that begins with a letter"

@@ -215,7 +215,7 @@ def _read_only(omega: _Array, vectors: _Array, parity: NDArray[np.int_]) -> Line
 
 
 class Wells:
-    """What follows from the potential energy of a reduced model."""
+    """Potential energy of a reduced model: wells, stiffness, frequencies."""
 
     stiffness: _Array
     nonlinear_stiffness: float
@@ -302,7 +302,7 @@ class Wells:
 
     @property
     def about_reference_well(self) -> Self:
-        """The model, or its mirror image, whose lower well is the one of least energy: its first frequency normalises."""
+        """The model or its mirror image with the minimum of energy in the lower well, for the normalisation."""
         if self.landscape is None or not self.is_bistable:
             return self
         own, other = (each.energy for each in (self.landscape.lower, self.landscape.upper))
@@ -324,7 +324,7 @@ class Wells:
 
     @property
     def is_bistable(self) -> bool:
-        """Whether the structure has two wells."""
+        """True if the structure has two wells."""
         if self.landscape is not None:
             return self.landscape.is_bistable
         return bool(np.any(self.well_amplitude != 0.0))
@@ -374,7 +374,7 @@ class Wells:
 
     @cached_property
     def two_well_limits(self) -> str:
-        """In words, the nearest imperfection and the least axial load with two wells, of a beam with one; computed.
+        """In words, the nearest imperfection and the minimum axial load with two wells, of a beam with one; computed.
 
         Raises
         ------
@@ -456,14 +456,14 @@ class Wells:
 
 
 _FURTHEST_IMPERFECTION = 100.0
-"""Greatest and, inverted, least factor of the imperfection at which two wells are looked for."""
+"""Maximum and, inverted, minimum factor of the imperfection at which two wells are looked for."""
 _FURTHEST_LOAD = 40.0
 """Over the critical load."""
 _HINT_STEPS = 81
 
 
 def _first_true(holds: Callable[[float], bool], outside: float, inside: float) -> float:
-    """Where *holds* begins, between a value outside and one inside, to 4 digits and inside."""
+    """Boundary of the range in which *holds* is true, between a value outside and one inside, to 4 digits."""
     while abs(inside - outside) > 5e-5 * abs(inside):
         middle = 0.5 * (outside + inside)
         outside, inside = (outside, middle) if holds(middle) else (middle, inside)
@@ -500,7 +500,7 @@ MODEL_QUANTITIES: dict[str, tuple[ParameterField, Any]] = {
         None,
     ),
 }  # fmt: skip
-"""What a reduction takes beside the beam, and its default."""
+"""Parameters of a reduction in addition to the beam, with their defaults."""
 
 _LEAST_COMPLIANCE = 1e-300
 """1/kg, below which the inverse is no number."""
@@ -532,21 +532,21 @@ class ReducedModel(Wells):
         that one, zeros if it is perfect.
     length_scale : float or None
         Length that normalises displacements, m: the buckling level b; of a beam that the load alone would not buckle
-        the height of the centre in the well of least energy; None for a straight beam.
+        the height of the centre in the well of minimum energy; None for a straight beam.
     damping_ratio : array of shape (N,)
         Damping ratio of each linear mode about a well, by ascending frequency.
     midspan_shape : array of shape (N,)
-        phi_i at the centre, whose displacement tells the wells apart.
+        phi_i at mid-span, whose displacement distinguishes the wells.
     contact_shape : array of shape (N,) or None
         phi_i at the shaker if it does not depend on the location (given by matrices).
     beam : Beam or None
-        What the model was reduced from.
+        Beam from which the model was reduced.
     given_reference_frequency : float or None
         Frequency to normalise with, Hz, if it is not the first natural frequency.
     transverse_force : array of shape (N,) or None
         B, of a structure whose wells are unequal.
     imperfection : Imperfection or None
-        What B follows from.
+        Imperfection from which B follows.
     base_shape : array of shape (N,) or None
         Displacement of each coordinate per unit of the base's, of a structure given by matrices.
     elongation_matrix : array of shape (N, N) or None
@@ -616,10 +616,10 @@ class ReducedModel(Wells):
             Damping ratio of the linear modes about a well, each in [0, 1).
         reference_frequency : float, optional
             Frequency that normalises the excitation, Hz; the first natural frequency by default, of unequal wells about
-            the one of least energy.
+            the one of minimum energy.
         imperfection : Imperfection, optional
-            What makes the wells unequal; one that is nothing is left out.  Damping is that of the linear modes about
-            the well that the striker pushes away from, and the same matrix everywhere.
+            Imperfection, which makes the wells unequal; a zero one is ignored.  Damping is that of the linear
+            modes about the well that the striker pushes away from, and the same matrix everywhere.
 
         Raises
         ------
@@ -710,7 +710,7 @@ class ReducedModel(Wells):
         contact_shape : array of shape (N,)
             Displacement under the shaker per unit of each coordinate.
         midspan_shape : array of shape (N,), optional
-            The same for the point whose sign tells the wells apart; the contact point if not given.
+            Shape values at the point whose sign distinguishes the wells; by default the contact point.
         nonlinear_stiffness : float
             gamma of the term gamma (alpha . alpha) alpha, at least 0.
         well_amplitude : array of shape (N,), optional
@@ -777,7 +777,7 @@ class ReducedModel(Wells):
     def shape_at(self, location: ArrayLike) -> _Array:
         """phi_i at a location x_s in [0, 1] of the length, or at each of several; shape (..., N), m^0.5.
 
-        A model given by matrices has its one contact point and returns it whatever the location.
+        A model given by matrices has one contact point, and returns it for every location.
         """
         at: Any = location if isinstance(location, (int, float)) else finite_array("location", location)
         if np.ndim(at) == 0:
@@ -792,7 +792,7 @@ class ReducedModel(Wells):
 
     @cached_property
     def lightest_contact_mass(self) -> float:
-        """Least :meth:`contact_mass` between 2 % and half of the span, kg, looked for at 25 places.
+        """Minimum :meth:`contact_mass` between 2 % and half of the span, kg, looked for at 25 places.
 
         The other half of a beam is the mirror image of the first.
         """

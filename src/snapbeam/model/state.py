@@ -1,4 +1,4 @@
-"""Where a run stands: everything that its future depends on."""
+"""State of a run: all quantities that determine its future."""
 
 from __future__ import annotations
 
@@ -215,7 +215,7 @@ class State:
         Raises
         ------
         InputError
-            If modes that move would be left out.
+            If moving modes would be discarded.
         """
         if modes == self.modes:
             return self
@@ -234,7 +234,7 @@ class State:
 
 
 def _finite_where_known(name: str, value: ArrayLike, passed: Mapping[str, _Array] | None) -> _Array:
-    """Numbers that are finite, but for states that were not reached, as their status says."""
+    """Finite numbers, except for states that were not reached according to their status."""
     status = None if passed is None else mapping("statistics", passed).get("status")
     if status is None:
         return finite_array(name, value)

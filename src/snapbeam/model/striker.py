@@ -24,7 +24,7 @@ SIDES = ("below", "above")
 
 @dataclass(frozen=True, kw_only=True)
 class Striker:
-    """A tip at one place of the beam, on one side of it, and how it moves.
+    """Striker: a tip at one location, on one side of the beam, with its motion.
 
     Parameters
     ----------
@@ -39,9 +39,9 @@ class Striker:
         Distance, m, between the mid-position and the beam at rest in the well that a run begins in; negative
         presses.  By default the tip touches the beam at the start, wherever the beam then is.
     mass : float, optional
-        Mass of the striker, kg; infinite by default: the tip moves as its drive says, whatever it strikes.  With a
-        mass the drive is the motion that the tip has as long as nothing touches it, and the contact force moves the
-        body from it: m_s x'' + c_s x' + k_s x = -f.
+        Mass of the striker, kg; infinite by default: the tip follows its drive exactly.  With a mass the drive
+        is the motion that the tip has as long as nothing touches it, and the contact force moves the body from
+        it: m_s x'' + c_s x' + k_s x = -f.
     suspension_stiffness : float
         Stiffness k_s of its suspension, N/m; 0 is a free flying mass.
     suspension_damping : float
@@ -102,7 +102,7 @@ class Striker:
 
     @property
     def damping_ratio(self) -> float:
-        """Of the suspension, c_s/(2 sqrt(k_s m_s)); infinite for a damper without a spring."""
+        """Damping ratio of the suspension, c_s/(2 sqrt(k_s m_s)); infinite for a damper without a spring."""
         if self.mass is None or self.suspension_damping == 0.0:
             return 0.0
         return (

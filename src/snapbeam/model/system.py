@@ -55,12 +55,12 @@ _A: dict[str, tuple[Any, str]] = {
     "base_excitation": (BaseExcitation, "a BaseExcitation(motion=AccelerationSine(...))"),
     "axial_load": (AxialLoadModulation, "an AxialLoadModulation(motion=HarmonicLoad(...))"),
 }
-"""Parts of a system beside its model: their classes, and words for them."""
+"""Parts of a system other than the model: their classes and names."""
 
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """A structure, what strikes it and how they touch: what is studied, frozen, described, hashed and saved.
+    """Model of an experiment: structure, strikers, contacts, excitation and initial state.
 
     Parameters
     ----------
@@ -72,9 +72,9 @@ class System:
         A :class:`~snapbeam.LocalForce` depends on the displacement and velocity of one point, an
         :class:`~snapbeam.ExternalForce` on time.
     base_excitation : BaseExcitation, optional
-        The motion of what both ends of the beam are mounted on.
+        Motion of the base on which both ends of the beam are mounted.
     axial_load : AxialLoadModulation, optional
-        How the axial load changes in time.
+        Change of the axial load in time.
     harvesters : sequence of PiezoelectricHarvester or ElectromagneticHarvester, optional
         Circuits that turn motion into power in a resistor.
     initial_state : State, optional
@@ -87,8 +87,8 @@ class System:
 
     Notes
     -----
-    A system may have more than the solver can integrate, which a run then refuses; its potential energy and what follows
-    from that are found nevertheless.
+    A system may have parts that the solver cannot integrate; a run then raises an error; its potential energy
+    and what follows from that are found nevertheless.
 
     Examples
     --------
@@ -226,9 +226,9 @@ class System:
 
     @property
     def moving(self) -> tuple[tuple[str, Drive], ...]:
-        """What moves as prescribed, by the section that its parameters stand in; the first one's cycle counts.
+        """Prescribed motions with the names of their sections; one cycle of the first is a cycle of excitation.
 
-        A striker that stands still moves nothing where a base or an axial load does.
+        A stationary striker counts only if neither a base nor an axial load moves.
         """
         around = (self.base_excitation, self.axial_load, *self.external_forces)
         drives = [
@@ -274,13 +274,13 @@ class System:
 
     @property
     def surroundings(self) -> tuple[Any, ...]:
-        """Parts that act on the structure beside strikers: forces, a moving base, a changing axial load, harvesters."""
+        """Parts other than strikers that act on the structure: forces, base, axial load, harvesters."""
         parts = (*self.forces, self.base_excitation, self.axial_load, *self.harvesters)
         return tuple(each for each in parts if each is not None)
 
     @property
     def primary_excitation(self) -> tuple[str, Drive] | None:
-        """That of which one cycle is a cycle of excitation, with its section; None where nothing moves."""
+        """Drive whose cycle is the cycle of excitation, with its section; None if nothing moves."""
         return self.moving[0] if self.moving else None
 
     @cached_property
@@ -384,7 +384,7 @@ class System:
     # ------------------------------------------------------------------ identity and files
 
     def to_mapping(self) -> dict[str, dict[str, Any]]:
-        """The system as sections of plain values, as a parameter file holds them."""
+        """System as sections of plain values, as in a parameter file."""
         return parts_to_mapping(self)
 
     @classmethod

@@ -6,8 +6,8 @@ A recipe computes its data by the public interface alone and draws them:
 >>> figure = paper.fig2()  # doctest: +SKIP
 >>> paper.fig6.write("out", size="quick")  # doctest: +SKIP
 
-``size="quick"`` is a sketch for tests (small grids, few modes, few cycles), ``"full"`` what the
-documentation shows. :func:`snapbeam.paper.claims.measure_claims` measures what the paper says.
+``size="quick"`` is a sketch for tests (small grids, few modes, few cycles), ``"full"`` what the documentation
+shows. :func:`snapbeam.paper.claims.measure_claims` measures the statements of the paper.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ fig6 = Recipe("fig6", "response over frequency and amplitude after 200 cycles, 1
 fig7 = Recipe("fig7", "response over frequency and amplitude after 1000 cycles, 1 and 32 modes")
 fig8 = Recipe("fig8", "response over location and amplitude, 1 and 32 modes")
 figA9 = Recipe("figA9", "error of the natural frequencies over the number of modes")
-figB10 = Recipe("figB10", "greatest displacement over frequency at two drives, 1 and 32 modes")
+figB10 = Recipe("figB10", "maximum displacement over frequency at two drives, 1 and 32 modes")
 si5 = Recipe("si5", "response over location and amplitude as modes are added (animation)")
 
 low_frequency = Recipe("low_frequency", "threshold over the quasi-static one at low frequency", "studies")
@@ -100,4 +100,4 @@ FIGURES: dict[str, Recipe] = {
         notch, two_tips, switch, harvesting,
     )
 }  # fmt: skip
-"""Every recipe by name: the figures of the paper, its fifth video, and those that its claims need beside."""
+"""Every recipe by name: the figures of the paper, its fifth video, and further runs of its claims."""

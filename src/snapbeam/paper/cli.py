@@ -32,7 +32,8 @@ def reproduce(
     full: Annotated[
         bool,
         typer.Option(
-            "--full/--quick", help="At the size of the paper, some up to an hour, or as a sketch in seconds."
+            "--full/--quick",
+            help="Size of the computation: that of the paper, up to about an hour, or a sketch in seconds.",
         ),
     ] = False,
     output: Annotated[
@@ -41,8 +42,7 @@ def reproduce(
     data: Annotated[
         Path | None,
         typer.Option(
-            help="Folder of data computed before (fig6.nc, ...), to draw and measure from; what is not "
-            "there is computed.",
+            help="Folder of stored data (fig6.nc, ...) to draw and measure from; missing data are computed.",
             metavar="DIR",
         ),
     ] = None,
@@ -50,14 +50,14 @@ def reproduce(
         bool,
         typer.Option(
             "--stored",
-            help="For claims: the full-size data of --data where there are any, sketches elsewhere; each row "
-            "says which.",
+            help="For claims: use the full-size data of --data if available, otherwise sketches, which each row "
+            "marks.",
         ),
     ] = False,
     measurements: opt.Measurements = None,
     measured: Annotated[
         list[Path] | None,
-        typer.Option(help="NetCDF file of a measured run, three times, for fig4.", metavar="FILE"),
+        typer.Option(help="NetCDF file of a measured run, for fig4; give it three times.", metavar="FILE"),
     ] = None,
 ) -> None:
     """Compute and draw a figure of the paper, or measure its claims.

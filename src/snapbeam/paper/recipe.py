@@ -31,21 +31,21 @@ class MissingResults(InputError):
 
 
 class Results:
-    """The data of recipes, by name: read if they are stored, computed otherwise, and kept.
+    """Data of recipes, by name: read if stored, otherwise computed and cached.
 
     Parameters
     ----------
     size : {"quick", "full"}
         Small grids, few modes and few cycles, or those of the paper.
     read : path, optional
-        Folder of stored data (``fig6.nc``, ...).  Data of another size there are refused; what is not there
-        is computed.
+        Folder of stored data (``fig6.nc``, ...).  Data of another size raise an error; missing data are
+        computed.
     write : path, optional
         Folder to which computed data are written.
     progress : callable, optional
         Called as ``progress(what, done, total)``.
     compute : bool
-        Whether to compute what is not stored; if not, asking for it raises :class:`MissingResults`.
+        True to compute missing data; otherwise they raise :class:`MissingResults`.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Results:
 
     @property
     def is_full(self) -> bool:
-        """Whether the size is that of the paper."""
+        """True if the size is that of the paper."""
         return self.size == "full"
 
     def pick(self, quick: Any, full: Any) -> Any:
@@ -78,7 +78,7 @@ class Results:
         return full if self.is_full else quick
 
     def progress(self, what: str) -> Callable[[int, int], object]:
-        """What a map reports its progress to."""
+        """Progress function of a map."""
         return lambda done, total: self._progress(what, done, total) if self._progress is not None else None
 
     def __getitem__(self, name: str) -> dict[str, xr.Dataset]:
@@ -116,7 +116,7 @@ class Results:
 def shared_results() -> Results:
     """Full-size results stored in the folder that SNAPBEAM_PAPER_DATA names, or quick ones if it names none.
 
-    One object a process, so that figures drawn after each other share what they need.
+    Results of this process, which several figures share.
     """
     folder = os.environ.get(DATA_VARIABLE)
     return Results("full", read=folder) if folder else Results("quick")
@@ -124,7 +124,7 @@ def shared_results() -> Results:
 
 @dataclass(frozen=True)
 class Recipe:
-    """One figure of the paper, or a study beside them: how its data are computed and how they are drawn.
+    """Recipe of a figure of the paper or of a further study: computation and drawing of its data.
 
     ``recipe()`` draws it, ``recipe.compute()`` gives the data, ``recipe.write(folder)`` writes the figure as
     PDF and PNG (and the video, for ``si5``) with the data.
@@ -133,7 +133,7 @@ class Recipe:
     name: str
     about: str
     folder: str = "recipes"
-    """Where its module stands: ``recipes`` for a figure of the paper, ``studies`` for what claims need beside."""
+    """Subpackage of its module: ``recipes`` for figures of the paper, ``studies`` for further runs of the claims."""
 
     def __call__(
         self,

@@ -22,8 +22,7 @@ __all__ = ["load_results", "save_results"]
 def save_results(results: Mapping[str, xr.Dataset], path: Path, size: str) -> Path:
     """Write datasets, by name, with 32-bit floats; coordinates keep their 64 bits.
 
-    Every dataset keeps the attributes that say what it was computed from and by what; the file says which engine
-    it was, by its fingerprint.
+    Every dataset contains its provenance attributes; the file contains the solver fingerprint.
     """
     from snapbeam.util.datasets import xr
 

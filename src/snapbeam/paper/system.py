@@ -1,4 +1,4 @@
-"""What several recipes share: the paper's model, its maps and its shapes."""
+"""Common parts of the recipes: the paper's model, its maps and its shapes."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ __all__ = [
 _Array = NDArray[np.float64]
 
 TOLERANCE = 1e-5
-"""What a run that is shown may be wrong by, in b: far below the width of a line."""
+"""Tolerance of a plotted run, in b: far below the width of a line."""
 KEPT = ("response_class", "status", "zero_crossings", "final_well_proven", "early_stop_time")
-"""What is kept of a map that is run for its classes."""
+"""Variables that are stored from a map of classes."""
 
 
 def paper_model(modes: int, damping_ratio: ArrayLike = DAMPING_RATIO) -> sb.ReducedModel:

@@ -1,4 +1,4 @@
-"""How sure the class of each point of a map is: paler where its repeats disagree."""
+"""Certainty of the response classes of a map: paler colours where replicates disagree."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def draw_agreement(
 ) -> Patch:
     """Lay white over the cells of a map, the more the fewer repeats have the class of the cell's own run.
 
-    Returns what a legend needs to say so: a scale of the shades.
+    Returns the scale of the shades, for the legend.
     """
     share = dataset["class_fraction"].squeeze().transpose(dims[1], dims[0], "class_code")
     kinds = dataset["response_class"].squeeze().transpose(dims[1], dims[0]).values

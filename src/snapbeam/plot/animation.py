@@ -225,7 +225,7 @@ def _span(dataset: xr.Dataset, window: tuple[float, float] | None) -> tuple[floa
 def _hardest_impact(
     dataset: xr.Dataset, time: _Array, start: float, stop: float
 ) -> tuple[float, float] | None:
-    """From half its length before the impact with the greatest force to half its length after."""
+    """From half its length before the impact with the maximum force to half its length after."""
     if "contact_force" not in dataset:
         return None
     force = np.where((time >= start) & (time <= stop), dataset["contact_force"].values, 0.0)

@@ -1,4 +1,4 @@
-"""Axes of pictures over any parameter: what stands along them, and how their points are spread."""
+"""Axes of pictures over any parameter: labels, and spacing of the points."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ AXIS_LABELS = {
 _LONGEST = 44
 """Characters of a line along an axis of a picture of one column."""
 _SMALL, _LARGE = 0.01, 1e4
-"""Between these the greatest number along an axis is shown as it is."""
+"""Between these the maximum number along an axis is shown as it is."""
 _PREFIXES = {
     "m": ((-3, "m"), (-6, "µ")),
     "Pa": ((9, "G"), (6, "M"), (3, "k")),
@@ -53,11 +53,11 @@ _PREFIXES = {
 }
 """Powers of ten, from great to small, that have a prefix before a unit."""
 _DECADES = 10.0
-"""Greatest over least value, from which points in geometric progression are drawn on an axis of powers."""
+"""Ratio of the maximum to the minimum above which geometric points have a logarithmic axis."""
 
 
 def axis_label(dataset: xr.Dataset, name: str) -> str:
-    """What stands along an axis of a picture: words, symbol and unit of the parameter, in lines that fit."""
+    """Label of an axis: long name, symbol and unit of the parameter, wrapped to fit."""
     if name in AXIS_LABELS:
         return AXIS_LABELS[name]
     row = _parameter(dataset, name)
@@ -133,7 +133,7 @@ def _parameter(dataset: xr.Dataset, name: str) -> Parameter | None:
 
 
 def positions(dataset: xr.Dataset, name: str) -> tuple[_Array, list[str] | None]:
-    """Where the points of an axis are drawn; words and whole numbers stand side by side, with their names."""
+    """Coordinates of the points of an axis; words and integers are equally spaced, with their names."""
     values = np.asarray(dataset[name].values)
     if values.dtype.kind in "fc":
         return values.astype(np.float64), None
@@ -141,7 +141,7 @@ def positions(dataset: xr.Dataset, name: str) -> tuple[_Array, list[str] | None]
 
 
 def is_geometric(points: _Array) -> bool:
-    """Whether points follow each other by a factor, over a power of ten or more."""
+    """Return whether points form a geometric sequence over a decade or more."""
     if points.size < 3 or points[0] <= 0.0 or points[-1] < _DECADES * points[0]:
         return False
     factors = points[1:] / points[:-1]

@@ -60,12 +60,12 @@ def plot_diagram(
     branches : sequence of xarray.Dataset
         Of :meth:`snapbeam.dynamics.Branch.to_dataset`: stable solid, unstable dashed, special points as markers.
     variable : str
-        What is drawn of the diagram; branches have ``midspan_displacement`` alone, at every return.
+        Variable to draw; branches have ``midspan_displacement`` alone, at every return.
 
     Raises
     ------
     InputError
-        If there is nothing to draw, or branches are asked for beside another variable.
+        If there is nothing to draw, or branches are combined with another variable.
 
     Examples
     --------
@@ -196,7 +196,7 @@ def plot_lifetimes(
     Raises
     ------
     InputError
-        If the dataset holds no lifetimes over one or two parameters.
+        If the dataset contains no lifetimes over one or two parameters.
 
     Examples
     --------

@@ -23,7 +23,7 @@ __all__ = ["plot_equilibrium_branches", "plot_force_displacement"]
 _STABLE, _HELD, _UNSTABLE = "#16245E", "#B03A27", "#9A9A9A"
 _STYLES: dict[str, tuple[str, Any, float]] = {
     "stable": (_STABLE, "-", 1.6),
-    "stable only if the displacement is held": (_HELD, "--", 1.2),
+    "stable under displacement control only": (_HELD, "--", 1.2),
     "unstable": (_UNSTABLE, ":", 0.9),
 }
 _MARKERS = {"limit": ("o", "limit point"), "bifurcation": ("D", "bifurcation point")}

@@ -62,7 +62,7 @@ UPWARD = ("velocity_amplitude", "location")
 _CURVES = ("min_midspan_displacement", "max_midspan_displacement")
 """Drawn over the classes of a map over one axis."""
 _LONGEST = 38
-"""Characters of a line beside a map of one column."""
+"""Characters of a line next to a map of one column."""
 _NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
 
 
@@ -75,7 +75,7 @@ def plot_response_map(
     quasi_static_line: bool = False,
     legend: bool = True,
 ) -> Axes:
-    """Draw the response class of every run of a map as one cell; over one axis, with how far the centre moves.
+    """Draw the response class of each run of a map; over one axis, with the range of the mid-span displacement.
 
     Cell borders lie midway between the points of an axis, the outermost as far out as the next one in (but
     not below zero, nor beyond the end of the beam).  Cells of a map with repeats are the paler the fewer
@@ -189,7 +189,7 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
 
 
 def _draw_line(ax: Axes, dataset: xr.Dataset, name: str) -> None:
-    """Draw classes along the axis *name*, with the least and the greatest displacement of the centre above them."""
+    """Draw classes along the axis *name*, with the minimum and the maximum displacement of the centre above them."""
     points, _ = positions(dataset, name)
     edges = edges_of(dataset, name)
     kinds = dataset["response_class"].squeeze().values[None, :]
@@ -203,7 +203,7 @@ def _draw_line(ax: Axes, dataset: xr.Dataset, name: str) -> None:
         ax.plot(points, curve, color="white", linewidth=2.0)
         ax.plot(points, curve, ".-", color="black", linewidth=0.8, markersize=2.5)
     dress(ax.xaxis, dataset, name)
-    ax.set_ylabel("Centre displacement $w/b$,\nleast and greatest")
+    ax.set_ylabel("Mid-span displacement $w/b$,\nminimum and maximum")
     ax.set(xlim=edges[[0, -1]], ylim=(low - pad, high + pad))
 
 
@@ -259,7 +259,7 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     Parameters
     ----------
     kinds : int8 array, optional
-        Classes of runs, whose shares then stand beside the names; classes without runs are left out.
+        Classes of runs, whose fractions are then shown with the names; classes without runs are omitted.
 
     Examples
     --------
@@ -360,7 +360,7 @@ def draw_measurements(
 
 
 _DECADES = 300.0
-"""Greatest over least value, from which colours go by powers of ten."""
+"""Ratio of the maximum to the minimum above which the colour scale is logarithmic."""
 
 
 @checked
@@ -468,7 +468,7 @@ def _swept(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, name: str) -> None
 
 
 def scaled_values(dataset: xr.Dataset, name: str) -> tuple[_Array, str]:
-    """Values of a variable in a unit that suits them, and what stands beside them."""
+    """Values of a variable in a suitable unit, and their label."""
     values = dataset[name].values.astype(np.float64)
     factor, label = _label(dataset, name, values)
     scaled: _Array = values / factor
@@ -476,14 +476,14 @@ def scaled_values(dataset: xr.Dataset, name: str) -> tuple[_Array, str]:
 
 
 def wants_powers(values: _Array) -> bool:
-    """Whether values span so much that colours go by powers of ten: none negative, more than two of them."""
+    """Return whether values need a logarithmic colour scale: none is negative, and they span over two decades."""
     good = values[np.isfinite(values)]
     positive = good[good > 0.0]
     return bool(positive.size and (good >= 0.0).all() and positive.max() > _DECADES * positive.min())
 
 
 def _label(dataset: xr.Dataset, name: str, values: np.ndarray) -> tuple[float, str]:
-    """What values are divided by, and what stands beside them."""
+    """Divisor of the values, and the label of the colour bar."""
     attrs = dataset[name].attrs
     row = STATISTICS.get(name)
     words = str(attrs.get("long_name", row.long_name if row else name))
@@ -523,7 +523,7 @@ def plot_points(
     quasi_static_line: bool = False,
     legend: bool = True,
 ) -> Axes:
-    """Draw the response class, or a statistic, of each point of a list where its own values stand.
+    """Draw the response class, or a statistic, of each point of a list at its parameter values.
 
     Parameters
     ----------
@@ -650,7 +650,7 @@ def _along(dataset: xr.Dataset, across: str | None, upward: str | None) -> tuple
 
 
 def _place(axis: Axis, dataset: xr.Dataset, name: str) -> NDArray[np.float64]:
-    """Where the points stand along an axis, which is labelled; words stand side by side."""
+    """Coordinates of the points along an axis, which gets its label; words are equally spaced."""
     values = dataset[name].values
     axis.set_label_text(axis_label(dataset.drop_vars("point", errors="ignore"), name))
     if values.dtype.kind in "fiu":

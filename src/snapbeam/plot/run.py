@@ -316,10 +316,10 @@ def plot_run(
 ) -> Axes:
     """Draw the displacements, the penetration and the contact force of a run, and its hardest impact closer.
 
-    Left, over cycles of excitation: the whole run or a window.  More than 100 cycles are drawn by the range, minimum to
-    maximum, in intervals of whole cycles; choose a window to see each cycle.  Right, over time: the samples about
-    the greatest contact force within the window, from a little before the contact to a little after it.  A
-    measured run, which has no force, is drawn without what it lacks.
+    Left, over cycles of excitation: the whole run or a window.  More than 100 cycles are drawn by the range,
+    minimum to maximum, in intervals of whole cycles; choose a window to see each cycle.  Right, over time: the
+    samples about the maximum contact force within the window, from a little before the contact to a little
+    after it.  A measured run has no force, and is drawn without it.
 
     Parameters
     ----------
@@ -328,7 +328,7 @@ def plot_run(
     window : pair of float, optional
         First and last cycle to draw; everything by default.
     ax : matplotlib.axes.Axes, optional
-        Where to draw the displacements alone; by default a new figure of two columns holds everything.
+        Axes for the displacements alone; by default a new figure of two columns shows everything.
 
     Returns
     -------
@@ -338,7 +338,7 @@ def plot_run(
     Raises
     ------
     InputError
-        If the dataset is no run or the window holds less than two samples.
+        If the dataset is not a run, or the window contains fewer than two samples.
 
     Examples
     --------
@@ -413,7 +413,7 @@ def _alone(ax: Axes, part: xr.Dataset, x: np.ndarray, label: str) -> Axes:
 
 
 def _from(first: float, last: float) -> float:
-    """Where an axis begins: a little before the start of a run, so that an impact that begins at once is seen."""
+    """Lower limit of a time axis, slightly before the start of a run so that an immediate impact is visible."""
     return first if first > 0.0 else first - 0.01 * (last - first)
 
 

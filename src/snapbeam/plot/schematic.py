@@ -117,7 +117,7 @@ def _layers(ax: Axes, piezo: PiezoelectricHarvester, x: _Array, w: _Array, sign:
 
 
 def _coil(ax: Axes, coil: ElectromagneticHarvester, x: _Array, w: _Array, sign: float, wide: float) -> None:
-    """A magnet on the beam and the windings beside it."""
+    """Draw a magnet on the beam and the coil next to it."""
     at = coil.location * wide
     there = float(np.interp(at, x, w))
     edge = there + 0.03 * sign
@@ -163,7 +163,7 @@ def _ohms(value: float) -> str:
 _Array = NDArray[np.float64]
 _POINTS = 201
 _RADIUS = 0.10
-"""Of the tip, in units of the picture: b upwards, L/7 sideways."""
+"""Radius of the tip, in units of the picture: b upwards, L/7 sideways."""
 _WIDE = 7.0
 """Length of the beam in those units."""
 _LAWS = {
@@ -181,7 +181,7 @@ _LOAD_COLOR = CENTER_COLOR
 
 @checked
 def plot_system(system: System, title: str = "") -> Figure:
-    """Draw a system: the beam in the well that it rests in and, dashed, in the other, what strikes it, and its drive.
+    """Draw a system: the beam in its initial well and, dashed, in the other, the strikers and the drive.
 
     Heights are to the scale of the buckling level, and so is the gap; lengths along the beam are to the scale of its
     length.  Masses, springs and dampers are signs.
@@ -368,7 +368,7 @@ def _draw_striker(ax: Axes, system: System, striker: Striker, contact: ContactLa
 def _caption(
     ax: Axes, at: float, sign: float, contact: ContactLaw, striker: Striker, gap: float, number: int
 ) -> None:
-    """What the signs do not say, beside the striker and clear of the beam."""
+    """Write the contact law, gap and mass next to the striker, clear of the beam."""
     law = _LAWS.get(contact.name, contact.name)
     lines = [f"striker {number}: {law}" if number else f"contact: {law}"]
     if gap != 0.0:
@@ -392,7 +392,7 @@ def _rod(ax: Axes, x: float, one: float, other: float) -> None:
 
 
 def _block(ax: Axes, x: float, edge: float, sign: float, words: str, moves: bool = True) -> None:
-    """What moves as the drive says."""
+    """Draw a body with prescribed motion."""
     corner = (x - 0.34, min(edge, edge - sign * 0.22))
     ax.add_patch(Rectangle(corner, 0.68, 0.22, facecolor=SHAKER_COLOR, alpha=0.25, lw=0))
     if moves:

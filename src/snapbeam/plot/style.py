@@ -215,7 +215,7 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
 
 
 def beam_text(attrs: Any) -> str:
-    """The beam in a few words, from the attributes of a file; empty if they say nothing of one."""
+    """Short description of the beam from the attributes of a file; empty without one."""
     if not {"beam_length", "beam_thickness"} <= set(attrs):
         return ""
     words = [f"beam {prefixed(attrs['beam_length'], 'm')} × {prefixed(attrs['beam_thickness'], 'm')}"]
@@ -226,7 +226,7 @@ def beam_text(attrs: Any) -> str:
 
 
 def caption(dataset: xr.Dataset, lines: int = 1) -> str:
-    """Beam, modes, drive and class of a run or a map, as far as its attributes say them, in one line or two."""
+    """Beam, modes, drive and class of a run or a map from its attributes, in one or two lines."""
     attrs = dataset.attrs
     what, how = [beam_text(attrs)], []
     if "modes" in attrs:
@@ -290,7 +290,7 @@ _Array = NDArray[np.float64]
 
 
 def panel_letters(axes: Iterable[Axes], first: str = "A", *, offset: float = -16.0) -> None:
-    """Write a bold capital beside the upper left corner of each of *axes*, *offset* points to its right."""
+    """Write a bold capital next to the upper left corner of each of *axes*, *offset* points to its right."""
     for at, ax in enumerate(axes):
         ax.annotate(
             chr(ord(first) + at),

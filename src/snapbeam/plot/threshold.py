@@ -33,11 +33,11 @@ def plot_threshold(
 ) -> Axes:
     """Draw the result of :func:`snapbeam.threshold`.
 
-    The line is the lowest value that makes an interwell response.  The shade reaches up to the value above which
-    every run is interwell, or to the end of the range if the highest run is intrawell.  A point without drawn
-    neighbours has a marker.  A triangle at the top means that no run is interwell.  Hatching marks the points
-    whose outcome is ``not_searched`` or ``undecided``.  A dotted line at a point shows how far failed runs
-    leave the threshold open.
+    The line is the lowest value that makes an interwell response.  The shade reaches up to the value above
+    which every run is interwell, or to the end of the range if the highest run is intrawell.  A point without
+    drawn neighbours has a marker.  A triangle at the top means that no run is interwell.  Hatching marks the
+    points whose outcome is ``not_searched`` or ``undecided``.  A dotted line at a point shows the range in
+    which failed runs leave the threshold open.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def plot_threshold(
     Raises
     ------
     InputError
-        If the dataset holds no threshold curve.
+        If the dataset contains no threshold curve.
 
     Examples
     --------
@@ -179,7 +179,7 @@ def _mark_no_threshold(ax: Axes, curves: list[xr.Dataset], x: _Array, edges: _Ar
 
 
 def _label(dataset: xr.Dataset, curve: xr.Dataset, others: list[str], raised: str) -> str:
-    """What one curve is called."""
+    """Legend label of a curve."""
     if others:
         value = curve[others[0]].item()
         text = str(value) if isinstance(value, (int, str)) else f"{value:.4g}"

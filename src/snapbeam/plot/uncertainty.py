@@ -33,7 +33,7 @@ _TRIED, _BROKEN = "#4C97C8", "0.8"
 _STATES = (("violated", "X", "#B03A27"), ("undecided", "D", "#C3DD8A"), ("satisfied", "o", "#16245E"))
 _OBJECTIVE = "tried_objective_"
 _DECADE = 10.0
-"""Greatest over least value from which an axis is one of powers."""
+"""Ratio of the maximum to the minimum above which an axis is logarithmic."""
 
 
 def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None = None) -> Axes:
@@ -139,7 +139,8 @@ def plot_probability(
     """Draw a probability map of one outcome.
 
     Over two parameters colours say the probability, in tenths, and lines where it passes *levels*; points whose
-    interval is wider than was asked for have a small cross.  Over one parameter the line has its interval as a band.
+    interval is wider than requested have a small cross.  Over one parameter the line has its interval as a
+    band.
 
     Parameters
     ----------
@@ -191,7 +192,12 @@ def _line(data: xr.Dataset, ax: Axes, name: str, outcome: str, levels: tuple[flo
     share = 100.0 * float(data.attrs.get("confidence", 0.95))
     ax.fill_between(x, low, high, color="#16245E", alpha=0.25, linewidth=0.0, label=f"{share:g} % interval")
     ax.plot(
-        x, data["probability"].values, color="#16245E", marker="o", markersize=2.2, label="share of the runs"
+        x,
+        data["probability"].values,
+        color="#16245E",
+        marker="o",
+        markersize=2.2,
+        label="fraction of the runs",
     )
     ax.set(ylim=(-0.02, 1.02), ylabel=_WORDS.get(outcome, outcome))
     ax.legend(loc="best")
@@ -350,8 +356,9 @@ _UP, _DOWN, _TOTAL = "#B03A27", "#16245E", "#70BBF0"
 def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Draw the result of :func:`snapbeam.uncertainty.sensitivity`: a bar for each parameter, with intervals.
 
-    Locally, bars reach from the mean answer to those with the parameter one standard score down and up; how much that
-    is in the parameter's own unit stands beside its name.  Of indices, the first order and, if there is one, the total.
+    Locally, bars reach from the mean answer to those with the parameter one standard score down and up; how
+    much that is in the unit of the parameter is next to its name.  Of indices, the first order and, if there is
+    one, the total.
 
     Raises
     ------
@@ -418,7 +425,7 @@ def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
 
 
 def _name(data: xr.Dataset, at: int, local: bool) -> str:
-    """What stands beside a bar: the parameter and, locally, how much it is moved by, in its own unit."""
+    """Label of a bar: the parameter and, for a local analysis, its step with unit."""
     name = str(data["parameter"].values[at])
     row = lookup(name)
     section, text = split_name(name)

@@ -83,7 +83,7 @@ def advance(
     Raises
     ------
     InputError
-        For bad input; for more periods than a recorded motion has.
+        If the state has another number of modes, or a number of periods is not positive or exceeds the recorded motion.
 
     Examples
     --------
@@ -159,7 +159,7 @@ def tangent_obstacle(system: System) -> str | None:
 _STENCIL = np.array(((3.0 / 4.0, -3.0 / 20.0, 1.0 / 60.0), (2.0 / 3.0, -1.0 / 12.0, 0.0)))
 """Weights of central differences of order six and four, over one, two and three steps."""
 _STEP = 2e-4
-"""Their step at first, in units of the well's amplitude."""
+"""Initial step, in units of the well's amplitude."""
 _SHRINKINGS = 7
 """Times that it is quartered at most."""
 _CLOSE = 1e-8

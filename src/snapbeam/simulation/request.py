@@ -21,7 +21,7 @@ def checked_request(system: Any, integration: Any) -> tuple[System, Integration]
     ----------
     system : System
     integration : Integration or None
-        None stands for the default integration.
+        None selects the default settings.
 
     Raises
     ------

@@ -208,7 +208,7 @@ def prepared(system: System, integration: Integration, sample_times: ArrayLike |
     Raises
     ------
     InputError
-        For bad input.
+        If the sample times are not increasing times within the run.
     """
     tell(system.diagnostics())
     plan, accuracy = plans_of(system, integration, run_columns(system, {}))[0], None
@@ -409,8 +409,8 @@ def simulate(
     Raises
     ------
     InputError
-        For bad input, and for a run whose samples need more than 4 GiB.  A run that fails numerically does not
-        raise: ``run.summary.status`` gives the reason.
+        If the sample times are not increasing within the run, or the samples need more than 4 GiB.  A run that fails
+        numerically does not raise: ``run.summary.status`` gives the reason.
 
     Examples
     --------

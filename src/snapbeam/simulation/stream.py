@@ -32,7 +32,7 @@ __all__ = ["simulate_to_file"]
 
 
 _KEPT_BACK = 4096
-"""Samples of a piece that are held back, because the next piece may contain earlier ones."""
+"""Samples of a piece that are not written yet, because the next piece may contain earlier ones."""
 _CHUNK = 2**16
 """Numbers in a chunk of a variable."""
 
@@ -71,7 +71,7 @@ def simulate_to_file(
     Raises
     ------
     InputError
-        For bad input.
+        If the sample times are not increasing times within the run.
     NoRoomError
         If the disk is full.
 

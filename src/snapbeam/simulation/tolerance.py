@@ -76,7 +76,7 @@ class ErrorEstimate:
     perturbation_growth: float
     """Maximum change of the displacement during the run, in units of b, for a relative change of the drive by 1e-13."""
     reached: bool
-    """Whether the estimate is within the tolerance up to the predictability horizon."""
+    """True if the estimated error is within the tolerance up to the predictability horizon."""
     step: float
     """Step in free flight, s."""
     order: int
@@ -120,7 +120,7 @@ def perturbation_growth(
     Raises
     ------
     InputError
-        For bad input.
+        If the perturbation is not positive, or the accuracy level does not exist.
 
     Examples
     --------

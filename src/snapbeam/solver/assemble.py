@@ -54,7 +54,7 @@ __all__ = [
 def others_of(
     system: System, structure: Structure, columns: Mapping[str, _Array], runs: int, since: _Array
 ) -> FurtherContactTable | None:
-    """Where they are and what they touch by; their motions are in the ensemble's drive.
+    """Rows, laws and numbers of the further strikers of each run; None if there is at most one striker.
 
     A striker stands where its tip touches the beam at rest in the first well, or its gap away from that.  *since* holds
     the contact time of every striker, shape (runs or 1, strikers).
@@ -90,7 +90,7 @@ def others_of(
 
 
 def _begun(drive: Drive, columns: Mapping[str, _Array], section: str, system: System, runs: int) -> _Array:
-    """How far the tip is from its mid-position at the start, m."""
+    """Displacement of the tip from its mid-position at the start, m, shape (runs,)."""
     own = _own(columns, section, runs)
     phase = columns.get(f"{section}.phase", np.zeros(runs))
     if not phase.any():
@@ -104,7 +104,7 @@ def _begun(drive: Drive, columns: Mapping[str, _Array], section: str, system: Sy
 
 
 def _speed(drive: Drive, columns: Mapping[str, _Array], section: str, system: System, runs: int) -> _Array:
-    """Greatest speed of the tip in the frame of the ends, m/s."""
+    """Maximum speed of the tip in the frame of the ends, m/s."""
     speed = drive.bounds(_own(columns, section, runs), system.scale)[1]
     base = system.base_excitation
     if base is not None and not base.striker_on_base:
@@ -117,12 +117,12 @@ def _speed(drive: Drive, columns: Mapping[str, _Array], section: str, system: Sy
 
 
 class Driven(NamedTuple):
-    """What the drive is, for every run."""
+    """Drive of the first striker: its type, and its numbers for each run."""
 
     kind: type[Drive]
     numbers: _Array
     period: _Array
-    """Of one cycle, s."""
+    """Period of one cycle, s."""
     highest: _Array
     """From the mid-position, m."""
     speed: _Array
@@ -240,7 +240,7 @@ def _samples(system: System, section: str, drive: Drive) -> _Array:
 
 
 def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
-    """Greatest angular frequency of the base, the axial load and external forces, rad/s; 0 without them."""
+    """Maximum angular frequency of the base, the axial load and external forces, rad/s; 0 without them."""
     found = np.zeros(runs)
     for section, drive in system.moving:
         if _is_around(section):
@@ -296,7 +296,7 @@ def _motion_at(ensemble: Ensemble, system: System, section: str, drive: Drive, t
 
 
 def begun_at(driven: Driven, phase: _Array) -> _Array:
-    """How far the tip is from its mid-position at the start, m."""
+    """Displacement of the tip from its mid-position at the start, m, shape (runs,)."""
     if driven.kind.harmonic:
         amplitude = driven.numbers[:, driven.kind.number_names.index("amplitude")]
         return np.where(phase == 0.0, 0.0, amplitude * np.sin(phase))
@@ -316,7 +316,7 @@ _Integers = NDArray[np.int64]
 
 
 def _is_around(section: str) -> bool:
-    """Whether a section is of what acts on the structure itself."""
+    """Return whether the parameters of a section act on the structure itself: base, axial load or local force."""
     return section in ("base_excitation", "axial_load") or numbered(section)[0] == "force"
 
 
@@ -762,7 +762,7 @@ def _decisions(
     location: _Array,
     highest: _Array,
 ) -> None:
-    """When a run may end early."""
+    """Set the criteria of early termination of each run: crossings, energy and reach of the tip."""
     table["decide_crossings"], table["decide_energy"] = -1, -math.inf
     properties = system.contact_law is None or system.contact_law.properties.energy_bound
     if not integration.early_termination or not properties or len(system.contacts) > 1 or system.local_forces:

@@ -1,4 +1,4 @@
-"""How kernels are compiled, and how the compiled code is kept between runs.
+"""Compilation of kernels, and the cache of compiled code on disk.
 
 Functions are compiled into the kernel that calls them, across files and with the law of contact and the drive that
 it integrates; a kernel is what is kept on disk.  Numba alone would keep it until the file that it stands in changes.
@@ -59,7 +59,7 @@ _IDLE = frozenset({"inline_inlinables", "inline_overloads", "nopython_rewrites",
 
 
 class _Nobody:
-    """Of what a code generator is asked for about a part: nothing, since a part is never called by itself."""
+    """Placeholder for the code library of a part, which is never called on its own."""
 
     def set_env(self, name: str, env: Any) -> None:
         """Nowhere to put it."""
@@ -90,7 +90,7 @@ def pipeline() -> dict[str, Any]:
             module.data_layout = self._codegen._data_layout
 
         def finalize(self) -> None:
-            """Nothing is linked in here: a part of parts would carry all of them, and its callers again."""
+            """Link nothing: a part of parts would contain all of them, and their callers again."""
             self._raise_if_finalized()
             for library in self._linking_libraries:
                 self._reload_init.update(library._reload_init)
@@ -281,7 +281,7 @@ class _KeptCode(FunctionCache):
     def __init__(self, function: Callable[..., Any], mark: str, alone: bool) -> None:
         super().__init__(function)
         self._alone = alone
-        """Whether the code calls nothing of Numba's runtime, so that it can be loaded by itself."""
+        """True if the code calls no function of the Numba runtime, so that it can be loaded without it."""
         self._cache_file = _CheckedFiles(
             cache_path=self._cache_path,
             filename_base=f"{self._impl.filename_base}-{mark}",
@@ -336,7 +336,7 @@ class _CheckedFiles(IndexDataCacheFile):
 
     @staticmethod
     def _read(path: str) -> bytes | None:
-        """What a file holds; None if it is not there or not what was written."""
+        """Content of a cache file; None if the file is missing or its check sum is wrong."""
         try:
             held = Path(path).read_bytes()
         except OSError:
@@ -371,7 +371,7 @@ def _package_mark() -> str:
 
 @cache
 def fingerprint(kinds: tuple[type, ...]) -> str | None:
-    """Of everything that a kernel for these laws and drives bakes in, in 20 hexadecimal digits.
+    """Fingerprint of everything that a kernel for these laws and drives contains, 20 hexadecimal digits.
 
     That is every file of the engines, the codes, the versions of Python, Numba and NumPy, and of each law and drive
     its plain attributes and its static methods, with all that those call and every constant that they read.  None if
@@ -388,7 +388,7 @@ def fingerprint(kinds: tuple[type, ...]) -> str | None:
 
 
 def _marks_of_class(kind: type) -> Iterable[str]:
-    """Of a class that anybody can import by its name."""
+    """Fingerprint of a class that can be imported by name."""
     module = sys.modules.get(kind.__module__)
     if kind.__module__ == "__main__" or getattr(module, kind.__qualname__, None) is not kind:
         raise _Unknown(kind.__qualname__)
@@ -404,12 +404,12 @@ def _marks_of_class(kind: type) -> Iterable[str]:
 
 
 def _is_names(value: Any) -> bool:
-    """Whether it is a tuple of names, as those of a drive's numbers and of the times of its jumps."""
+    """Return whether a value is a tuple of names, such as the numbers of a drive or the times of its jumps."""
     return isinstance(value, tuple) and all(isinstance(name, str) for name in value)
 
 
 def _marks(value: Any, seen: set[int]) -> Iterable[str]:
-    """Of a function with all that it refers to, of a constant, of a module or what is built into one."""
+    """Fingerprint of a function with all its references, of a constant, of a module or of a builtin."""
     if isinstance(value, _CONSTANTS):
         yield repr(value)
     elif isinstance(value, tuple):
@@ -454,7 +454,7 @@ INLINE_HERE: dict[str, Any] = {**INLINE, **_PART}
 
 
 def overloaded(function: Any) -> Callable[[Any], Any]:
-    """As :func:`numba.extending.overload`, inlined on every engine, and on the processor as a part of its kernel."""
+    """Decorate as :func:`numba.extending.overload`; inlined by every solver."""
 
     def register(implementation: Any) -> Any:
         overload(function, jit_options=INLINE)(implementation)
@@ -489,7 +489,7 @@ def compiled(function: Callable[..., Any], **options: Any) -> Any:
 
 
 def called(function: Callable[..., Any]) -> Any:
-    """As :func:`compiled`, for what is long and rarely needed: never forced into its callers.
+    """Compile as :func:`compiled`, without inlining, for long and rarely needed functions.
 
     What is merely compiled is written into a caller that is inlined itself, since Numba's options pass on from there.
     """
@@ -497,7 +497,7 @@ def called(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """As :func:`compiled`, and always written into its callers."""
+    """Compile as :func:`compiled`, always inlined."""
     return compiled(function, forceinline=True)
 
 
@@ -522,7 +522,7 @@ class _Telling(event.Listener):
             _LOG.info("compiling %s, once on this machine: 10 to 20 s on a free core", self.name)
 
     def on_end(self, event: Any) -> None:
-        """Nothing to say."""
+        """Do nothing."""
 
 
 def is_compiled(march: Any, *arguments: Any) -> bool:

@@ -90,7 +90,7 @@ def _contact_slope(law, penetration):
 
 
 def peak_force(law: Any, deepest: float) -> float:
-    """Greatest force of a contact, N, from what a record of accumulators calls the deepest point of it.
+    """Maximum force of a contact, N, from what a record of accumulators calls the deepest point of it.
 
     That is the maximum penetration, or, under a law whose impacts last no time or whose force is not maximum where
     the penetration is, the maximum force while the bodies stay together.
@@ -108,7 +108,7 @@ def _peak_force(law, deepest):
 
 
 def is_impulsive(law: Any) -> bool:
-    """Whether impacts under the law last no time."""
+    """Return whether impacts under the law have zero duration."""
     return bool(type(law).owner.impulsive)
 
 

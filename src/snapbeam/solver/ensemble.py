@@ -1,4 +1,4 @@
-"""What an engine is asked for: many runs of one structure, in no engine's layout."""
+"""Input of every solver: many runs of one structure, independent of the memory layout."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class CircuitCoupling(NamedTuple):
     """A harvester's circuit, for every run, arrays of shape (runs,)."""
 
     rate: _Array
-    """Of loss, 1/s; without inertia what the coordinate is of the coupling's velocity."""
+    """Decay rate, 1/s; without inertia, the ratio of the coordinate to the velocity of the coupling."""
     share: _Array
-    """Of the loss, that ends in the load."""
+    """Fraction of the loss that is dissipated in the load."""
     volts: _Array
     """Across the load, V, per unit of the circuit's coordinate."""
     unit: float
@@ -42,7 +42,7 @@ class FurtherContactTable:
 
     laws: tuple[type[ContactLaw], ...]
     numbers: _Array
-    """Where each is and what it touches by, shape (runs, strikers, 32), in the order of the engine's blocks."""
+    """Position and contact parameters, shape (runs, strikers, 32), in the order of the solver's blocks."""
     places: _Integers
     """Which row each has, shape (runs, strikers)."""
     rows: _Array
@@ -56,7 +56,7 @@ class Ensemble:
     structure: Structure
     scale: Scale
     order: int
-    """Of the composition."""
+    """Order of the composition."""
     law: type[ContactLaw]
     drive: type[Drive]
     runs: NDArray[Any]
@@ -81,7 +81,7 @@ class Ensemble:
     cycles: float
     """Cycles of excitation of each run."""
     circuits: tuple[CircuitCoupling, ...] = ()
-    """Of the harvesters."""
+    """Circuits of the harvesters."""
     others: FurtherContactTable | None = None
 
     @property
@@ -91,7 +91,7 @@ class Ensemble:
 
     @property
     def has_striker(self) -> bool:
-        """Whether there is a striker."""
+        """Return whether the ensemble has a striker."""
         return bool((self.runs["offset"] > FAR_AWAY).any())
 
     @property
@@ -126,7 +126,7 @@ class Ensemble:
 
     @property
     def fastest(self) -> float:
-        """Greatest angular frequency of a mode or a drive, rad/s."""
+        """Maximum angular frequency of a mode or a drive, rad/s."""
         names = self.drive.number_names
         rate = names.index("fastest") if "fastest" in names else 0
         return max(float(self.structure.omega.max()), float(self.drive_numbers[:, rate].max()))

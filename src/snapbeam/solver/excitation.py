@@ -161,7 +161,7 @@ def kind_motion(kind: Any) -> Any:
 
 
 def kind_acceleration(kind: Any) -> Any:
-    """Its acceleration, m/s^2."""
+    """Acceleration of a drive by type, m/s^2."""
     return _of_kind(kind, "acceleration")
 
 
@@ -362,7 +362,7 @@ def _tip_acceleration(drive, memory, argument):
 def turned_motion(
     drive: Any, memory: Any, argument: float, sine: float, cosine: float
 ) -> tuple[float, float]:
-    """As :func:`tip_motion`, for a caller that knows the sine and cosine of the argument, or else the argument."""
+    """Motion as :func:`tip_motion`, from sine and cosine of the argument, or from the argument."""
     if type(drive).owner.harmonic:
         motion: tuple[float, float] = shaker_motion.py_func(drive.amplitude, drive.omega, sine, cosine)
         return motion
@@ -404,7 +404,7 @@ def _sums_of_sines(memory, table, t, low, width):
 
 
 def drive_rate(drive: Any) -> float:
-    """Greatest angular frequency of a drive's motion, rad/s."""
+    """Maximum angular frequency of a drive's motion, rad/s."""
     return float(drive.fastest if "fastest" in drive._fields else drive.omega)
 
 

@@ -61,7 +61,7 @@ __all__ = [
 
 _SEPARATOR = "__"
 NUMBERS = 40
-"""Of a striker in memory, a block of whole registers."""
+"""Numbers of a striker in memory, a block of whole registers."""
 # given
 OFFSET, REST, SIGN, SPEED = 0, 1, 2, 3
 # as they stand
@@ -82,7 +82,7 @@ LAW = 32
 
 
 class Several:
-    """What the strikers beside the first one touch by; subclasses are made by :func:`several`, one for each mixture."""
+    """Contact laws of the further strikers; :func:`several` makes one subclass for each combination."""
 
     laws: tuple[type[ContactLaw], ...] = ()
 
@@ -177,9 +177,9 @@ count_of = _of_laws(len)
 any_damped = _of_laws(lambda laws: any(law.rate_dependent for law in laws))
 any_jumps = _of_laws(lambda laws: any(begins_with_jump(law) for law in laws))
 damped_at = _of_each_law(lambda law: bool(law.rate_dependent))
-"""Whether the law of a striker loses energy."""
+"""True if the contact law of a striker dissipates energy."""
 breaks_at = _of_each_law(lambda law: bool(law.rate_dependent or law.memory))
-"""Whether its force is not smooth within a contact (:func:`force_break`)."""
+"""True if its force is not smooth within a contact (:func:`force_break`)."""
 memory_place = _of_each_law(lambda law: LAW + len(law.numbers_type()._fields) - 1 if law.memory else -1)
 """Place of the residual indentation among the numbers of a striker, or -1."""
 

@@ -29,7 +29,7 @@ _OVERSHOOT = 0.15
 
 @inlined
 def hermite_overshoot_bound(v0, v1, h):
-    """How far the cubic can at most pass the greater and the lesser of its end values."""
+    """Upper bound of the overshoot of the cubic beyond the maximum and minimum of its end values."""
     return _OVERSHOOT * h * (abs(v0) + abs(v1))
 
 
@@ -48,7 +48,7 @@ def _at(c0, c1, c2, c3, s):
 
 @called
 def turning_point(u0, v0, u1, v1, h):
-    """Where in (0, 1) the cubic turns, given slopes of opposite sign; -1 if they are not."""
+    """Location in (0, 1) of the turning point of the cubic for end slopes of opposite sign; otherwise -1."""
     if not v0 * v1 < 0.0:
         return -1.0
     _, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
@@ -97,7 +97,7 @@ def root(c0, c1, c2, c3, low, high):
 
 @inlined
 def first_upcrossing(u0, v0, u1, v1, h):
-    """Where in [0, 1] the cubic first rises through zero, starting at or below it; -1 if nowhere."""
+    """Location in [0, 1] of the first upcrossing of zero by the cubic from a value <= 0; -1 if there is none."""
     if max(u0, u1) + hermite_overshoot_bound(v0, v1, h) <= 0.0:
         return -1.0
     c0, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
@@ -118,7 +118,7 @@ def first_upcrossing(u0, v0, u1, v1, h):
 
 @inlined
 def first_downcrossing(u0, v0, u1, v1, h):
-    """Where in (0, 1) the cubic first falls through zero, given that it starts above and ends at or below."""
+    """Location in (0, 1) of the first downcrossing of zero by the cubic, from a start > 0 to an end <= 0."""
     c0, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
     return root(c0, c1, c2, c3, 0.0, 1.0)
 

@@ -37,7 +37,7 @@ _HALF_PI_3 = 2.0222662487959506e-21
 
 @inlined
 def tension_factors(gamma, gq, qr):
-    """How much of g and of r = Gq the midplane stretching pulls with.
+    """Factors of g and of r = Gq in the force of the midplane stretching.
 
     ``gq = g.q`` and ``qr = q.Gq``; the squared slopes of the beam are those of the well plus
     ``2 gq + qr``.

@@ -13,7 +13,7 @@ __all__ = ["Extras", "extras_of_table", "observe"]
 
 
 class Extras:
-    """What a kernel updates beside its own columns; subclasses stand for lists of statistics."""
+    """Additional statistics that a kernel updates; subclasses represent lists of statistics."""
 
     rows: tuple[Statistic, ...] = ()
 

@@ -30,7 +30,7 @@ Progress = Callable[[int, int], object]
 
 
 class Engine(Protocol):
-    """What every engine can do, or refuses by name."""
+    """Interface of a solver; unsupported operations raise an error with a reason."""
 
     def run_ensemble(
         self, ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None
@@ -41,7 +41,7 @@ class Engine(Protocol):
     def integrate_with_output_states(
         self, ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None
     ) -> OutputStates:
-        """As :meth:`run_ensemble`, and the states at every output time."""
+        """Integrate as :meth:`run_ensemble`, with the states at every output time."""
         ...
 
     def integrate_tangents(
@@ -51,7 +51,7 @@ class Engine(Protocol):
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> tuple[OutputStates, NDArray[np.float64]]:
-        """As :meth:`integrate_with_output_states`, with small changes of the states carried along."""
+        """Integrate as :meth:`integrate_with_output_states`, with tangents."""
         ...
 
     def record(

@@ -325,7 +325,7 @@ class _MaskModel(models.PrimitiveModel):
 
 @intrinsic
 def less(typingctx: Any, a: Any, b: Any) -> Any:
-    """Where ``a < b``; nowhere beside what is no number."""
+    """Mask of the lanes with ``a < b``; False for NaN."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.fcmp_ordered("<", *wide(builder, signature, args))
@@ -400,7 +400,7 @@ def vmax(typingctx: Any, a: Any, b: Any) -> Any:
 
 @intrinsic
 def both(typingctx: Any, a: Any, b: Any) -> Any:
-    """Where both masks are true."""
+    """Mask of the lanes in which both masks are True."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.and_(args[0], args[1])
@@ -461,7 +461,7 @@ def _power_of_two(exponent):
 
 
 def halvings(much: Any, little: Any) -> Any:
-    """How often *much* > 0 must be halved until it is at most *little* >= 0; negative: so often it may be doubled."""
+    """Number of halvings of *much* > 0 to at most *little* >= 0; negative: number of possible doublings."""
     raise TypeError("halvings runs in compiled code only")
 
 

@@ -30,7 +30,7 @@ class Stages(NamedTuple):
     flows: int
     """Flows of a step; there is one kick more."""
     flow: int
-    """Where the flow weights begin."""
+    """Memory offset of the flow weights."""
     kick: int
     elapsed: int
 
@@ -92,6 +92,6 @@ def _general_sixth() -> Composition:
 
 
 COMPOSITIONS = {4: _fourth(), 6: _sixth()}
-"""Of kicks that depend on position alone, by order."""
+"""Compositions for kicks that depend on position only, by order."""
 GENERAL = {4: COMPOSITIONS[4], 6: _general_sixth()}
-"""Of kicks that may depend on velocity too."""
+"""Compositions for kicks that may also depend on velocity, by order."""

@@ -57,7 +57,7 @@ class CompletedStep(NamedTuple):
     """At its beginning, s."""
     length: float
     displacement: tuple[float, float]
-    """Of the beam at the striker's location, at the two ends of the step."""
+    """Displacement of the beam at the striker's location, at the two ends of the step."""
     velocity: tuple[float, float]
     midspan_displacement: tuple[float, float]
     midspan_velocity: tuple[float, float]
@@ -113,7 +113,7 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
 
 
 OTHER_IMPACTS, OTHER_PEAK, OTHER_IMPULSE, OTHER_WORK = range(4)
-"""What is kept of each striker beside the first."""
+"""Columns of the statistics of each striker after the first."""
 
 
 @dataclass(frozen=True)
@@ -129,15 +129,15 @@ class Statistic:
         As UDUNITS knows it; ``"1"`` for displacements over b and velocities over b omega_1.
     long_name : str
     value : callable
-        From a :class:`~snapbeam.solver.statistics.Reading` of many runs to an array of shape (runs,).  With *update*:
-        from the reading and the array of what *update* left.
+        From a :class:`~snapbeam.solver.statistics.Reading` of many runs to an array of shape (runs,).  With
+        *update*: from the reading and the array of results of *update*.
     update : callable, optional
         ``update(held, step) -> held``, a scalar function of numbers that kernels compile; *step* is a
         :class:`CompletedStep`.
     start : float
-        What *update* begins with.
+        Initial value of *update*.
     comment : str
-        Relative error of the integration over time, beside the error of the run.
+        Relative error of the integration over time, in addition to the error of the run.
 
     Examples
     --------
@@ -167,7 +167,7 @@ def _seen(column: str, factor: Callable[[Reading], float] = lambda _: 1.0) -> Ca
 
 
 def _low_high(low: str, high: str, greatest: bool) -> Callable[[Reading], Values]:
-    """Least or maximum displacement over b, in the signs of space."""
+    """Minimum or maximum displacement over b, in the signs of space."""
 
     def value(reading: Reading) -> Values:
         upward = reading.sign > 0.0
@@ -323,22 +323,22 @@ _ROWS = (
     ),
     Statistic("peak_force", "float64", "N", "peak contact force", lambda reading: reading.peak_force),
     Statistic("impacts", "int32", "1", "impacts", _plain("impacts")),
-    Statistic("contact_time_fraction", "float64", "1", "share of time in contact", _contact_share),
+    Statistic("contact_time_fraction", "float64", "1", "fraction of time in contact", _contact_share),
     Statistic("early_stop_time", "float64", "s", "time at which the class became certain", _plain("early_stop_time")),
     Statistic(
-        "peak_displacement", "float64", "1", "greatest distance of the contact point from the straight beam, over b",
+        "peak_displacement", "float64", "1", "maximum distance of the contact point from the straight beam, over b",
         _peak("min_displacement", "max_displacement"),
     ),
     Statistic(
-        "peak_midspan_displacement", "float64", "1", "greatest distance of the centre from the straight beam, over b",
+        "peak_midspan_displacement", "float64", "1", "maximum distance of mid-span from the straight beam, over b",
         _peak("min_center", "max_center"),
     ),
     Statistic(
-        "peak_velocity", "float64", "1", "greatest speed of the contact point at the end of a step, over b omega_1",
+        "peak_velocity", "float64", "1", "maximum speed of the contact point at the end of a step, over b omega_1",
         _seen("peak_velocity", lambda reading: 1.0 / reading.speed),
     ),
     Statistic(
-        "peak_midspan_velocity", "float64", "1", "greatest speed of the centre at the end of a step, over b omega_1",
+        "peak_midspan_velocity", "float64", "1", "maximum speed of mid-span at the end of a step, over b omega_1",
         _seen("peak_midspan_velocity", lambda reading: 1.0 / reading.speed),
     ),
     Statistic(
@@ -370,7 +370,7 @@ _ROWS = (
     ),
     Statistic("energy_lost_contact", "float64", "J", "energy lost in contact", _seen("lost")),
     Statistic(
-        "high_frequency_energy_fraction", "float64", "1", "share of the modal energy above a multiple of omega_1, over time",
+        "high_frequency_energy_fraction", "float64", "1", "fraction of the modal energy above a multiple of omega_1, over time",
         _high_share, comment=_SHARE,
     ),
     *(Statistic(name, "float64", "J", long_name, _seen(name)) for name, long_name in WORKS.items()),
@@ -458,7 +458,7 @@ def unregister_statistic(name: str) -> None:
 
 
 CIRCUIT_LOSS, CIRCUIT_LATE_LOSS, CIRCUIT_PEAK = range(3)
-"""Of each circuit: energy lost, J, load included; that in the last quarter; maximum of its coordinate at ends of steps."""
+"""Columns of each circuit: energy lost, J, with load; that in the last quarter; maximum of its coordinate."""
 
 
 def accumulators_dtype(others: int = 0, circuits: int = 0) -> np.dtype[Any]:
@@ -472,7 +472,7 @@ def accumulators_dtype(others: int = 0, circuits: int = 0) -> np.dtype[Any]:
 
 
 ACCUMULATORS = accumulators_dtype()
-"""Of the package's own statistics."""
+"""Data type of the accumulators of the package's own statistics."""
 
 
 def empty_accumulators(runs: int, others: int = 0, circuits: int = 0) -> Any:
@@ -502,7 +502,7 @@ _EACH = {
     "impulse": (OTHER_IMPULSE, "impulse on the beam, all impacts"),
     "striker_work": (OTHER_WORK, "work done"),
 }
-"""What each of several has: where the others' is kept, and words."""
+"""Statistics of each of several strikers: column of the further strikers, and long name."""
 
 
 def rows_for(strikers: int) -> dict[str, Statistic]:
@@ -520,7 +520,7 @@ def of_one_named(name: str) -> Statistic | None:
 
 
 def _of_one(name: str, number: int) -> Statistic:
-    """Of one striker, the first being 1."""
+    """Value of one striker, counted from 1."""
     whole, (column, words) = STATISTICS[name], _EACH[name]
     words = f"{words}, contact {number}"
     return Statistic(
@@ -556,12 +556,12 @@ class Reading:
 
     @property
     def length(self) -> float:
-        """What displacements are normalised by, m."""
+        """Length that normalises displacements, m."""
         return self.ensemble.scale.length
 
     @property
     def speed(self) -> float:
-        """What velocities are normalised by, m/s."""
+        """Speed that normalises velocities, m/s."""
         return self.ensemble.scale.length * self.ensemble.scale.omega
 
     @property
@@ -571,7 +571,7 @@ class Reading:
 
     @cached_property
     def status(self) -> NDArray[np.int64]:
-        """How each run ended; what ended with more energy than it was given is unbalanced.
+        """Status of each run; ENERGY_ERROR if a run gained more energy than the work done on it.
 
         Damping, and a contact with losses, only take energy.
         """
@@ -601,7 +601,7 @@ class Reading:
 
     @property
     def others(self) -> NDArray[np.float64]:
-        """What is kept of each striker beside the first, shape (runs, strikers, kinds)."""
+        """Statistics of each striker after the first, shape (runs, strikers, kinds)."""
         if self.ensemble.others is None:
             return np.zeros((self.accumulators.size, 0, 4))
         return np.asarray(self.accumulators["others"])
@@ -620,7 +620,7 @@ class Reading:
 
     @property
     def peak_force(self) -> NDArray[np.float64]:
-        """Of the law's force, the maximum of any striker; NaN where an impact lasts no time."""
+        """Peak force of any striker; NaN if impacts have zero duration."""
         force = self.seen("peak_force")
         if self.ensemble.others is not None:
             return np.maximum(force, self.others[:, :, OTHER_PEAK].max(axis=1))
@@ -702,27 +702,27 @@ class OutputStates(NamedTuple):
     """Linear modes about the current well, shape (runs, output states, N)."""
     p: _Array
     well_sign: NDArray[np.int64]
-    """That well: +1 the first, -1 the other, shape (runs, output states)."""
+    """Current well: +1 first, -1 second, shape (runs, output states)."""
     contact_ticks: NDArray[np.int64]
     """Ticks since the present contact of each striker began, -1: apart, shape (runs, output states, strikers)."""
 
 
 class Last(NamedTuple):
-    """Where a recorded run stands at its end."""
+    """Final state of a recorded run."""
 
     q: _Array
     """Linear modes about the current well, shape (N,)."""
     p: _Array
     well_sign: int
     contact_ticks: NDArray[np.int64]
-    """Of each striker, shape (strikers,)."""
+    """Contact ticks of each striker, shape (strikers,)."""
 
 
 class Recorded(NamedTuple):
     """A piece of a recorded run."""
 
     times: _Array
-    """When each sample was taken, s, shape (samples,)."""
+    """Times of the samples, s, shape (samples,)."""
     q: _Array
     """Linear modes about the first well, shape (samples, N)."""
     p: _Array

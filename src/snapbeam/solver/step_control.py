@@ -46,7 +46,7 @@ class Clock(NamedTuple):
     step: int
     """Flight step."""
     period: int
-    """Of the drive's argument."""
+    """Period of the drive's argument, ticks."""
     output_interval: int
     """Between two output states."""
     end: int
@@ -182,7 +182,7 @@ def contact_halvings(clock, elapsed, d, dv):
 
 @inlined
 def time_beyond(time, crossing, step):
-    """How long before *time* the centre last crossed the border of the wells; 0 if that is not one of the last steps."""
+    """Time since the last zero crossing of mid-span, if it is less than two steps before *time*; otherwise 0."""
     span = time - crossing
     return select_less(span, 2.0 * step, span, 0.0 * step)
 
@@ -200,7 +200,7 @@ def flight_halvings(clock, stretch, stretch_at_rest):
 
 @compiled
 def first_contact_onset(inner_samples, subintervals, subinterval):
-    """When the penetration first becomes positive inside a step that was sampled; -1 if it does not."""
+    """Time of the first positive penetration inside a sampled step; -1 if there is none."""
     for i in range(subintervals):
         rise = first_upcrossing(
             inner_samples[i, 0],
@@ -216,7 +216,7 @@ def first_contact_onset(inner_samples, subintervals, subinterval):
 
 @compiled
 def refine_onset(clock, event_ticks, whole, kinematics, smallest_correction):
-    """Where a step of *whole* ticks should end that was shortened to *event_ticks* and did not end at the onset.
+    """Refined end of a step of *whole* ticks that was shortened to *event_ticks* but did not end at the onset.
 
     The samples inside the step follow from a linear flow with a tension that varies linearly; a step that ends there
     is more accurate.  *smallest_correction* is the smallest correction, s, that is made.

@@ -1,4 +1,4 @@
-"""How finely to step: the default from the model and the contact, and what a user asks for instead."""
+"""Choice of the step size: the default from model and contact, or the user's request."""
 
 from __future__ import annotations
 
@@ -60,9 +60,9 @@ _STARTS = ((0.15, 1.0 / 60.0, 2.0, 0.3), (10.0, 1.0 / 160.0, 1.0, 1.0))
 steps that are tried over the flight step, and the error allowed over the limit: a beam that rings in its well, and one
 after a strong impulse.  The first may ring for many cycles, so that steps of twice the length must serve."""
 _SHORT_IMPACT = 1.0 / 150.0
-"""Of the period of the first mode: impacts that are shorter excite higher modes, and the error allowed falls with them."""
+"""Impact duration over the period of the first mode, below which higher modes reduce the error limit."""
 _STRUCK = 0.46
-"""Where, over the length of the beam: no mode has a node there that its neighbours do not have near it."""
+"""Relative location on the beam of a reference striker: no mode has an isolated node near it."""
 _PERIODS = 2.0
 _MOST_SLOPE = 1e5
 _NEIGHBOUR = 1e-9
@@ -84,7 +84,7 @@ def flight_step(model: ReducedModel, order: int, limit: float, impact: float = m
     order : int
         Of the composition.
     limit : float
-        Greatest error of a displacement, over the buckling level, after two periods of the first mode; where the
+        Maximum error of a displacement, over the buckling level, after two periods of the first mode; where the
         start is sensitive, that many times the displacement's relative slope along the velocity at the start.
     impact : float
         Duration of an impact, s: the impulses that are tried last no longer, and of impacts shorter than 1/150 of the
@@ -202,7 +202,7 @@ class _Bench:
         return float(counts[-1])
 
     def _errors(self, counts: _Array) -> _Array:
-        """Greatest error of each number of flight steps, over what each start is allowed."""
+        """Maximum error of each number of flight steps, over what each start is allowed."""
         worst = np.zeros(counts.size)
         for velocity, (_, _, longer, share) in zip(self.starts, _STARTS, strict=True):
             own = np.ceil(_PERIODS * counts / longer)
@@ -259,12 +259,12 @@ def _march(counts, flows, kicks, columns, well, gamma, start, work, out):
 # Free flight: the error allowed a step, as it is measured on the structure, by level of accuracy.
 _LIMIT = {"standard": 2.5e-7, "reference": 2e-11}
 _LIMIT_OF_HITS = {"standard": 1e-9, "reference": 1e-13}
-"""Where impacts last no time: no contact steps share the error, and there is one mode only."""
+"""Error limit of impacts of zero duration: there are no contact steps to share the error, and only one mode."""
 _ORDER = {"standard": 4, "reference": 6}
 _FREE_TURN = 4.0
-"""Of the fastest mode in a flight step of level "reference", rad."""
+"""Maximum phase of the fastest mode in a flight step of level "reference", rad."""
 _MOST_DECAY = 1.8
-"""Of the mode that decays fastest, in a flight step."""
+"""Maximum decay of the fastest decaying mode in a flight step."""
 # Contact: longest step over the time of an impact at the speed 0.2 b omega_1, by level, and how many
 # halvings below it the shortest step is, by order.
 _CONTACT_SHARE = {"standard": 1.0 / 8.0, "reference": 1.0 / 32.0}
@@ -272,8 +272,7 @@ _CONTACT_SPEED = 0.2
 _HALVINGS = {4: 4, 6: 10}
 _MOST_HALVINGS = {"standard": 5, "reference": 7}
 _CONTACT_TURN = math.pi
-"""Of the fastest mode in the longest contact step, rad: the contact moves every mode, and beyond half a turn
-its kicks come in step with the fastest ones."""
+"""Maximum phase of the fastest mode in the longest contact step, rad; beyond half a turn, kicks are in resonance."""
 
 
 class Plan(NamedTuple):
@@ -350,7 +349,7 @@ _FEWEST_CLOCK = 4.0
 
 
 class Clocked(NamedTuple):
-    """How long runs last."""
+    """Duration of runs and time grid."""
 
     cycles: float
 
@@ -458,7 +457,7 @@ def require_resolved(system: System, integration: Integration, cycle: _Array) ->
 
 
 def seconds_of(steps: float, modes: int) -> float:
-    """What so many steps take on one core, s, to a factor of two or three."""
+    """Estimated time of a number of steps on one core, s, within a factor of two or three."""
     return steps * (_STEP_COST + _MODE_COST * modes)
 
 

@@ -27,7 +27,7 @@ _Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class UnequalWells:
-    """What unequal wells add: about the mirror image of the first well the beam is the same, but for a constant force.
+    """Terms of unequal wells: a constant force about the mirror image of the first well.
 
     With B the side force and a the first well, K0 a + gamma (a . a) a = B.  At alpha = -a + V q the same linear modes
     and the same tension terms, g negated, hold exactly, and 2 V^T B is left over: the origin of q on the far side is
@@ -73,7 +73,7 @@ class StrikerBody:
     """A striker with mass."""
 
     contact: int
-    """Of which contact, from 0."""
+    """Number of the contact, from 0."""
     mass: float
     """kg."""
     sign: float
@@ -116,16 +116,16 @@ class Structure:
     """alpha in the well, as it is in space."""
     model: ReducedModel
     unequal_wells: UnequalWells | None = None
-    """Of unequal wells."""
+    """Terms of unequal wells."""
     base_load: _Array | None = None
-    """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi)."""
+    """Load vector of a moving base for an upward acceleration, -V^T rho S integral(phi)."""
     force_rows: tuple[_Array, ...] = ()
-    """Of each external force F(t) along a row h: V^T h."""
+    """Row V^T h of each external force F(t) along a row h."""
     local_forces: tuple[LocalForceRow, ...] = ()
     circuits: tuple[CircuitRow, ...] = ()
-    """Of harvesters.  The modes of their charges come last."""
+    """Circuits of harvesters; the modes of their charges are last."""
     bodies: tuple[StrikerBody, ...] = ()
-    """Of strikers with mass, whose own modes follow those of the beam."""
+    """Strikers with mass, whose modes follow those of the beam."""
     indentations: tuple[int, ...] = ()
     """Contacts, from 0, whose residual indentation is the displacement of a mode of its own, behind those of the bodies."""
     strikers: int = 0
@@ -156,7 +156,7 @@ class Structure:
 
     @property
     def wells_are_mirror_images(self) -> bool:
-        """Whether the two wells are; also of a structure with one."""
+        """True if the two wells are mirror images, or if there is only one."""
         return self.unequal_wells is None
 
     @property
@@ -339,7 +339,7 @@ def _local_force(model: ReducedModel, equilibrium: _Array, local_force: LocalFor
 
 
 def _uneven(model: ReducedModel, sign: float, dividing_height: float | None) -> UnequalWells | None:
-    """What unequal wells add, of a model that is positive as the striker pushes."""
+    """Terms of unequal wells for a model that is positive in the direction of the striker; None if there are none."""
     if not model.is_bistable:
         return None
     level = model.dividing_height if dividing_height is None else sign * dividing_height

@@ -142,7 +142,7 @@ _GONE = (OSError, TimeoutError, asyncio.TimeoutError, CancelledError, asyncio.Ca
 
 
 class TaskResult(NamedTuple):
-    """Results of a task and their provenance; None stands for this process."""
+    """Results of a task and their provenance; None for this process."""
 
     columns: ResultTable
     provenance: Provenance | None = None

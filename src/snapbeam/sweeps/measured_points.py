@@ -95,9 +95,9 @@ def read_measured_points(
 
     Columns: ``frequency_ratio`` or ``frequency_hz``; ``velocity_amplitude`` (V) or ``velocity_m_s`` (the
     amplitude in m/s); ``location`` (x_s, may be left out); ``response_class``, one of intrawell, transient 1,
-    transient 2, continuous, unknown, or the number of the class; and those beside which
-    ``snapbeam process-tests`` writes.  Cells are separated by commas, semicolons or tabs; with the latter two the
-    decimal sign may be a comma.  Lines that start with ``#`` are comments.
+    transient 2, continuous, unknown, or the number of the class; and those next to which ``snapbeam
+    process-tests`` writes.  Cells are separated by commas, semicolons or tabs; with the latter two the decimal
+    sign may be a comma.  Lines that start with ``#`` are comments.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def read_measured_points(
     Raises
     ------
     InputError
-        Names the file, the line and the column of what cannot be used.
+        If the file has an invalid entry; the message names file, line and column.
 
     Examples
     --------

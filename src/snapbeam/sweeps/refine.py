@@ -36,7 +36,7 @@ class RefinedRows:
     def __init__(self, columns: ResultTable, computed: _Mask) -> None:
         self.columns = columns
         self.computed = computed
-        """Whether each point was run, shape of the grid."""
+        """True for each point that was run, shape of the grid."""
 
     def read(self, start: int, stop: int) -> ResultTable:
         """Return the rows *start* to *stop*."""

@@ -41,7 +41,7 @@ def sweep(
     Parameters
     ----------
     system : System
-        The model; parameters that are not swept keep its values.
+        Nominal system; parameters that are not swept have its values.
     axes : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
         A mapping from parameters to values defines a grid with one dimension for each parameter.  Names are those of
         :func:`snapbeam.model.parameters`, dotted (``"beam.thickness"``) or short (``"frequency_ratio"``); values
@@ -75,8 +75,8 @@ def sweep(
     Raises
     ------
     InputError
-        For bad input, and for a checkpoint of another sweep.  Runs that fail numerically do not raise: their class is
-        UNKNOWN, and their ``status`` gives the reason.
+        If an axis is not valid, or the checkpoint belongs to another sweep.  Runs that fail numerically do not raise:
+        their class is UNKNOWN, and their ``status`` gives the reason.
     CheckpointError
         If the checkpoint is in use, cannot be written or is damaged beyond repair.
 

@@ -65,7 +65,7 @@ def threshold(
     Parameters
     ----------
     system : System
-        The model; parameters that are not in `axes` keep their values.
+        Nominal system; parameters that are not in *axes* have its values.
     parameter : str
         Parameter to raise, such as ``"velocity_amplitude"``: one that may differ between the runs of an ensemble.
     values : array_like
@@ -73,7 +73,7 @@ def threshold(
     axes : mapping of str to array_like
         Axes of the threshold, as in :func:`snapbeam.sweep`.
     integration : Integration, optional
-        Solver settings.  Every run ends as soon as its response class is certain, whatever `early_termination` is.
+        Solver settings.  Early termination is always used, also if ``integration.early_termination`` is False.
     progress : callable, optional
         Function that receives ``(done, total)``, numbers of runs; True writes a line to standard error.
 
@@ -100,8 +100,8 @@ def threshold(
     Raises
     ------
     InputError
-        For bad input, such as a parameter that belongs to the model and cannot differ between the runs of an
-        ensemble.
+        If the parameter belongs to the model and cannot differ between the runs of an ensemble, or there are fewer
+        than two values.
 
     Examples
     --------

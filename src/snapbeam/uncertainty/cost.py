@@ -42,9 +42,9 @@ class CostEstimate:
     Attributes
     ----------
     runs, max_runs : int
-        Runs, as far as a trial can tell, and at most.
+        Estimated number of runs, and the maximum.
     seconds : float
-        Of this machine, with the threads asked for; kernels that must be compiled are not counted.
+        Seconds on this machine with the given threads, without compilation.
     memory, disk : float
         Bytes, the second in a checkpoint.
     trial_runs : int
@@ -77,7 +77,7 @@ class CostEstimate:
 
     @property
     def is_long(self) -> bool:
-        """Whether it takes more than ten minutes."""
+        """True if the estimate exceeds ten minutes."""
         return self.seconds > LONG
 
     def __str__(self) -> str:
@@ -109,7 +109,7 @@ def estimate_cost(
     Raises
     ------
     InputError
-        For a function without a cost estimate, and for bad input of the question.
+        If the function has no cost estimate, or its own arguments are not valid.
 
     Examples
     --------
@@ -176,7 +176,7 @@ def _of_probability(
 
 
 def _needed(share: float, allocation: SamplingPlan) -> int:
-    """Runs after which a probability is known as narrowly as asked."""
+    """Runs after which a probability is known as narrowly as requested."""
     assert allocation.half_width is not None
     n = allocation.initial_runs
     while n < allocation.max_runs:

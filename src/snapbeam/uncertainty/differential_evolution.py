@@ -1,4 +1,4 @@
-"""Differential evolution for one objective or several under constraints, asked for designs and told what they are worth.
+"""Differential evolution for one objective or several under constraints, in ask-and-tell form.
 
 Generalised differential evolution (GDE3; Kukkonen and Lampinen, IEEE Congress on Evolutionary Computation 2005, 443):
 DE/rand/1/bin, in which a design that satisfies its constraints beats one that does not, of two that do not the one that breaks
@@ -21,7 +21,7 @@ _Array = NDArray[np.float64]
 
 
 class DifferentialEvolution:
-    """A population that is asked for designs and told their objectives and violations.
+    """Differential evolution in ask-and-tell form: a population of designs with objectives and violations.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class DifferentialEvolution:
         self._asked: _Array | None = None
 
     def ask(self) -> _Array:
-        """The designs to be looked at next, of shape (population, variables)."""
+        """Designs to evaluate next, of shape (population, variables)."""
         if self._asked is None:
             generator = np.random.default_rng(np.random.SeedSequence([self.seed, self.generation]))
             unit = self._first(generator) if self.generation == 0 else self._offspring(generator)
@@ -78,12 +78,12 @@ class DifferentialEvolution:
         return self._asked.copy()
 
     def tell(self, objectives: ArrayLike, violation: ArrayLike) -> None:
-        """What the designs last asked for are worth.
+        """Set the objectives and constraint violations of the last designs.
 
         Parameters
         ----------
         objectives : array_like of shape (population, objectives)
-            To be made small; what is not known is infinite.
+            Minimised; infinite if unknown.
         violation : array_like of shape (population,)
             0 where all constraints are satisfied.
         """
@@ -143,7 +143,7 @@ class DifferentialEvolution:
 
 
 def dominates(one: _Array, other: _Array) -> bool:
-    """Whether objectives are nowhere worse and somewhere better."""
+    """Return whether objectives are nowhere worse and somewhere better (Pareto dominance)."""
     return bool((one <= other).all() and (one < other).any())
 
 

@@ -53,7 +53,7 @@ class Distribution:
         raise NotImplementedError
 
     def describe(self) -> dict[str, Any]:
-        """Its kind and its numbers, plain."""
+        """Type and parameters of the distribution as plain values."""
         return {"type": self.kind, **self.__dict__}
 
 
@@ -127,7 +127,7 @@ class UniformTolerance(Distribution):
 
 @dataclass(frozen=True)
 class LogNormal(Distribution):
-    """The nominal value times exp(sigma z), z standard normal: for what is positive and known to a factor.
+    """Nominal value times exp(sigma z), z standard normal: for positive quantities known to a factor.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ class LogNormal(Distribution):
 
 @dataclass(frozen=True)
 class UniformRange(Distribution):
-    """Uniformly distributed between two values, whatever the nominal value: for example an uncontrolled phase.
+    """Uniform distribution between two values, independent of the nominal value: for example an uncontrolled phase.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ class UniformRange(Distribution):
 
 @dataclass(frozen=True)
 class Empirical(Distribution):
-    """As something was seen to be distributed, whatever the nominal value.
+    """Empirical distribution of observed values, independent of the nominal value.
 
     Parameters
     ----------
@@ -352,12 +352,12 @@ class ParameterUncertainty:
 
     @property
     def is_empty(self) -> bool:
-        """Whether all samples are equal."""
+        """True if all samples are equal."""
         return not self.of and self.displacement == 0.0
 
     @property
     def moves_start(self) -> bool:
-        """Whether runs begin in another state or phase, so that the tip must be held in space."""
+        """True if runs have different initial states or phases, so that the tip must be fixed in space."""
         return self.displacement > 0.0 or "drive.phase" in self.of
 
     def normals(self, numbers: NDArray[np.int64]) -> _Array:
@@ -390,9 +390,9 @@ class ParameterUncertainty:
 def uncertainty_from_mapping(given: Mapping[str, Any], name: str = "uncertainty") -> ParameterUncertainty:
     """Read the uncertainty from a section of a parameter file.
 
-    Each parameter stands with a table that names one distribution: ``{normal = 0.02, relative = true}``,
-    ``{uniform = 1e-5}``, ``{lognormal = 0.3}`` or ``{range = [3.14, 6.28]}``; further keys are ``displacement``,
-    ``phase``, ``hold_fixed`` and ``seed``.
+    Each parameter has a table that names one distribution: ``{normal = 0.02, relative = true}``, ``{uniform =
+    1e-5}``, ``{lognormal = 0.3}`` or ``{range = [3.14, 6.28]}``; further keys are ``displacement``, ``phase``,
+    ``hold_fixed`` and ``seed``.
 
     Raises
     ------

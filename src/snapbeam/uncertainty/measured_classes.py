@@ -27,7 +27,7 @@ _KINDS = (
     ResponseClass.CONTINUOUS,
 )
 _PRIOR = 0.5
-"""Of each class, added to its runs (Jeffreys): a class that no run had is unlikely, not impossible."""
+"""Pseudocount of each class (Jeffreys): a class without runs is unlikely, not impossible."""
 _COORDINATES = ("frequency_ratio", "velocity_amplitude", "location")
 
 
@@ -51,7 +51,7 @@ def score_measurements(
     samples: int = 10_000,
     rng: int | np.random.Generator | None = 0,
 ) -> xr.Dataset:
-    """How likely a probability map makes measured responses, one by one and all together.
+    """Likelihood of measured response classes under a probability map, for each and for all together.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def score_measurements(
             "most_likely": (
                 "measurement", np.array(_KINDS, dtype=np.int8)[best], labels | {"long_name": "most likely class"} | flags
             ),
-            "best": ("measurement", share[rows, best], labels | {"long_name": "its probability"}),
+            "best": ("measurement", share[rows, best], labels | {"long_name": "probability of the most likely class"}),
         },
         {name: ("measurement", getattr(measurements, name)[known]) for name in _COORDINATES},
         {

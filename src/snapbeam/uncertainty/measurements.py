@@ -1,4 +1,4 @@
-"""What a laboratory measures of its beam, and how it is written down: the input of a calibration."""
+"""Measurements of a beam, and their file format: the input of a calibration."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ HERTZ_TIME = 2.943275  # contact time over d/v for a force k d^1.5: 2 int_0^1 dx
 class ContactTest:
     """One collision of the shaker's tip: closing speed, and two of duration, peak force, effective mass.
 
-    For a force k d^1.5 between two bodies of effective mass m that close at v (Hertz): greatest penetration
+    For a force k d^1.5 between two bodies of effective mass m that close at v (Hertz): maximum penetration
     d = (5 m v^2/(4 k))^0.4, peak force k d^1.5, duration 2.943 d/v.  The bodies are rigid but for the
     contact: a test on a block or a heavy clamp, not on the limp beam.
 
@@ -83,10 +83,10 @@ class ContactTest:
 
 @dataclass(frozen=True, kw_only=True)
 class Measurements:
-    """What was measured of one beam.
+    """Measurements of one beam: frequencies, damping, geometry and contact tests.
 
-    Frequencies stand in the order of the modes.  A standard error may be one number or one for each; where
-    none is given, half a percent is assumed and said.
+    Frequencies are in the order of the modes. A standard error may be one number or one for each; the default
+    is 0.5 %, with a diagnostic.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Measurements:
     lower_well_shape, upper_well_shape : sequence of str, optional
         "symmetric" or "antisymmetric" for each frequency about a well.  Where given, frequencies are matched
         to the model's modes of that shape in their order; else to all modes in their order, which at a
-        buckling level of some 6 radii of gyration changes.
+        buckling level of about 6 radii of gyration changes.
     damping_ratio : sequence of float
         From free decays.
     damping_ratio_se : float or sequence of float, optional
@@ -183,17 +183,17 @@ def load_measurements(path: str | os.PathLike[str]) -> tuple[Measurements, dict[
     """Read measurements from a TOML file.
 
     The section ``[measured]`` has the names of :class:`Measurements`; each ``[[measured.contact]]`` is a
-    :class:`ContactTest`.  A section ``[beam]`` as in a parameter file may give what is known of the beam.
+    :class:`ContactTest`.  A section ``[beam]`` as in a parameter file may give the nominal beam.
 
     Returns
     -------
     (Measurements, dict)
-        The dictionary holds the other sections.
+        The dictionary contains the other sections.
 
     Raises
     ------
     InputError
-        If the file cannot be read, or holds an unknown or unusable entry; the message names file and entry.
+        If the file cannot be read, or has an unknown or invalid entry; the message names file and entry.
 
     Examples
     --------

@@ -48,7 +48,7 @@ _Numbers = NDArray[np.int64]
 
 _Made = dict[tuple[Any, ...], System]
 _KEPT = 4096
-"""Systems that are kept at most."""
+"""Maximum number of cached systems."""
 
 
 def _made(made: _Made, system: System, changes: dict[str, Any]) -> System:
@@ -68,7 +68,7 @@ class _DrawnSetup(SweepSetup):
     made: _Made = field(default_factory=dict)
 
     def neighbour(self, changes: dict[str, Any]) -> tuple[System, Integration]:
-        """As of any sweep."""
+        """Neighbour of a point, as in any sweep."""
         if any(name.startswith("integration.") for name in changes):
             return super().neighbour(changes)
         return _made(self.made, self.system, changes), self.integration
@@ -76,20 +76,21 @@ class _DrawnSetup(SweepSetup):
 
 @dataclass
 class Trials:
-    """Samples of a system, run where they are asked for.
+    """Monte Carlo samples of a system, run on demand.
 
-    What a run gives hangs on its point and the number of its sample alone.  Rounds are kept in a folder each of the
-    store, in the order in which they are asked for: a question that asks the same again reads them instead.
+    The result of a run depends only on its point and the number of its sample.  Rounds are kept in a folder
+    each of the store, in the order in which they are asked for: a question that asks the same again reads them
+    instead.
     """
 
     system: System
-    """With its tip held in space if starts differ."""
+    """System, with the tip fixed in space if initial states differ."""
     integration: Integration
     uncertainty: ParameterUncertainty
     keeping: CheckpointOptions = field(default_factory=CheckpointOptions)
     cluster: str | None = None
     runs: int = 0
-    """Runs asked for so far."""
+    """Number of requested runs."""
     rounds: int = 0
     made: dict[tuple[Any, ...], System] = field(default_factory=dict, repr=False)
     """Systems of the structures that were sampled so far."""
@@ -205,7 +206,7 @@ class Trials:
         return np.asarray(1.0 / (ratio * self._units(columns, ["drive.frequency_hz"], size)[:, 0]))
 
     def _units(self, columns: Columns, names: list[str], size: int) -> NDArray[np.float64]:
-        """What a ratio of 1 is in physical units, for every run, of shape (runs, names)."""
+        """Physical value of a ratio of 1 for every run, shape (runs, names)."""
         units = np.empty((size, len(names)))
         for system, which in self._structures(columns, size):
             units[which] = [unit_of(system, name) for name in names]
@@ -378,7 +379,7 @@ OUTCOMES: dict[str, Event] = {
 
 
 def reached(found: Statistics) -> NDArray[np.bool_]:
-    """Whether runs came to an end that says their class."""
+    """Mask of the runs with a known response class."""
     return np.isin(found["status"], _REACHED)
 
 

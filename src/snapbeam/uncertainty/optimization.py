@@ -109,7 +109,7 @@ def _settled(_: System, values: Values) -> _Array:
 
 
 CYCLE = "cycle"
-"""Seconds of a cycle, beside the statistics of a run."""
+"""Key of the seconds of a cycle, in addition to the statistics of a run."""
 
 
 OWN: dict[str, DesignQuantity] = {
@@ -121,7 +121,7 @@ OWN: dict[str, DesignQuantity] = {
         DesignQuantity("cycles_to_settle", "1", "cycles to the last snap", "run", _settled),
     )
 }
-"""Quantities beside statistics, outcomes and parameters; the first three are of a sine."""
+"""Quantities in addition to statistics, outcomes and parameters; the first three are of a sine."""
 
 
 def quantity_of(name: str) -> DesignQuantity:
@@ -168,7 +168,7 @@ class Objective:
         ``"peak_force_contact_2"``, a parameter, ``"speed"``, ``"stroke"``, ``"acceleration"`` or
         ``"cycles_to_settle"``.
     quantile : float, optional
-        Of a statistic, in (0, 1): what is exceeded by no more than the rest of the runs; its mean by default.
+        Quantile of a statistic, in (0, 1), to optimise; its mean by default.
     maximize : bool
         Whether it is to be large.
 
@@ -195,18 +195,18 @@ class Objective:
 
     @property
     def _quantity(self) -> DesignQuantity:
-        """What it is of."""
+        """Quantity of interest."""
         return quantity_of(self.quantity)
 
     @property
     def label(self) -> str:
-        """Its name in datasets."""
+        """Name in datasets."""
         name = self.quantity.replace(".", "_")
         return name if self.quantile is None else f"{name}_q{100.0 * self.quantile:g}".replace(".", "_")
 
     @property
     def long_name(self) -> str:
-        """What is made small or large."""
+        """Quantity that is minimised or maximised."""
         quantity = self._quantity
         if quantity.kind == "outcome":
             return f"probability that {quantity.long_name}"
@@ -248,7 +248,7 @@ def _quantile(ordered: _Array, share: float, confidence: float) -> tuple[float, 
 
 @dataclass(frozen=True, kw_only=True)
 class Constraint:
-    """Something to keep.
+    """Constraint of a design, with a probability.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ class Constraint:
     lower, upper : float, optional
         One of them at least.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
     probability : float
-        Of a statistic of runs: share of all systems that must keep it, in (0, 1).
+        Of a statistic of runs: required fraction of all systems that satisfy it, in (0, 1).
 
     Examples
     --------
@@ -291,21 +291,21 @@ class Constraint:
 
     @property
     def _quantity(self) -> DesignQuantity:
-        """What it is of."""
+        """Quantity of interest."""
         return quantity_of(self.quantity)
 
     @property
     def label(self) -> str:
-        """Its name in datasets."""
+        """Name in datasets."""
         return self.quantity.replace(".", "_")
 
     @property
     def required(self) -> float:
-        """Share of the runs that must keep it."""
+        """Required fraction of the runs that satisfy it."""
         return float(self.lower) if self._quantity.kind == "outcome" else self.probability  # type: ignore[arg-type]
 
     def kept(self, values: NDArray[Any]) -> NDArray[np.bool_]:
-        """Which runs keep it."""
+        """Mask of the runs that satisfy it."""
         if self._quantity.kind == "outcome":
             return np.asarray(values, dtype=bool)
         low = -np.inf if self.lower is None else self.lower
@@ -313,7 +313,7 @@ class Constraint:
         return np.asarray((values >= low) & (values <= high))
 
     def excess(self, values: _Array) -> _Array:
-        """By how much designs break it, over its size; 0 where they keep it."""
+        """Constraint violation of designs, over its size; 0 if satisfied."""
         size = positive("size", max(abs(self.lower or 0.0), abs(self.upper or 0.0), 1e-300))
         low = -np.inf if self.lower is None else self.lower
         high = np.inf if self.upper is None else self.upper
@@ -349,26 +349,26 @@ def require_kinds(objectives: Any, constraints: Any) -> tuple[tuple[Objective, .
 
 
 _SURE = 0.99
-"""Of the interval by which a design is dropped after a quarter of its runs."""
+"""Confidence level at which a design is discarded after a quarter of its runs."""
 
 
 class Worth(NamedTuple):
-    """What some designs are worth, by the runs that were made of them."""
+    """Objectives and constraint violations of designs, from their runs."""
 
     objectives: _Array
-    """Of shape (designs, objectives), to be made small: maxima are negated; infinite where not known."""
+    """Objectives to minimise, shape (designs, objectives): maxima are negated; infinite if unknown."""
     violation: _Array
-    """Of shape (designs,): 0 where every constraint is kept by the share of the runs that it asks for, and a margin."""
+    """Violation of the constraints, shape (designs,): 0 if all are satisfied with a margin."""
     runs: NDArray[np.int64]
 
 
 class Estimate(NamedTuple):
-    """What one design is worth on independent validation samples, with intervals."""
+    """Estimate of one design from independent validation samples, with intervals."""
 
     objectives: _Array
     """Value, lower and upper limit, of shape (objectives, 3), in their own signs."""
     constraints: _Array
-    """Share of the runs that keep each constraint with its interval, of shape (constraints, 3)."""
+    """Fraction of the runs that satisfy each constraint, with its interval, shape (constraints, 3)."""
     runs: int
     failed: int
 
@@ -382,7 +382,7 @@ class DesignProblem:
 
     trials: Trials
     bounds: dict[str, tuple[float, float]]
-    """By dotted name."""
+    """Bounds of the variables, by dotted name."""
     objectives: tuple[Objective, ...]
     constraints: tuple[Constraint, ...]
     samples: int = 64
@@ -399,7 +399,7 @@ class DesignProblem:
         return tuple(self.bounds)
 
     def evaluate(self, designs: ArrayLike) -> Worth:
-        """What designs are worth on the common samples 0, 1, ..., the same for each.
+        """Evaluate designs on common random samples 0, 1, ....
 
         A design that breaks a constraint by what it is itself is not run.  Of the others a quarter of the runs is made
         first, and the rest of those that may still keep every constraint.
@@ -442,7 +442,7 @@ class DesignProblem:
         return Worth(objectives, violation, runs)
 
     def estimate(self, design: ArrayLike, numbers: NDArray[np.int64], confidence: float = 0.95) -> Estimate:
-        """What one design is worth on the samples of the given numbers, with intervals."""
+        """Estimate the objectives and constraints of one design from the given samples, with intervals."""
         x = finite_array("design", design, 1)[None]
         found = self.runs_of(x, numbers)[0]
         good = reached(found)
@@ -543,7 +543,7 @@ class DesignProblem:
         return np.where(np.isfinite(signed), signed, np.inf)
 
     def _missing(self, found: dict[str, NDArray[Any]], *, hopeful: bool = False) -> float:
-        """By how much the shares of runs that keep the constraints are too small; failed runs keep none.
+        """Deficit of the fractions of runs that satisfy the constraints; failed runs satisfy none.
 
         *hopeful*: by how much they are too small even if they are as great as the runs let hope, without a margin.
         """
@@ -575,7 +575,7 @@ def _joined(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
 def problem_of(
     trials: Trials, variables: Any, objectives: Any, constraints: Any, samples: int, validation_samples: int
 ) -> DesignProblem:
-    """Check what may be chosen and what is asked of it.
+    """Check variables, objectives and constraints.
 
     Raises
     ------
@@ -630,7 +630,7 @@ SATISFIED = ("violated", "undecided", "satisfied")
 
 @dataclass(frozen=True, kw_only=True)
 class OptimizerSettings:
-    """How long a design is sought.
+    """Settings of the optimiser: generations, population, samples and validation.
 
     Parameters
     ----------
@@ -639,15 +639,15 @@ class OptimizerSettings:
     population : int
         Designs of a generation, at least 6.
     samples : int
-        Runs of a design while it is sought, at least 8.
+        Runs of a design during the search, at least 8.
     validation_samples : int
         Validation samples of a design that is checked, and again of one of a front that is reported.  A single design
         is reported from four times as many.
     candidates : int
-        Designs that are checked at most, the best first, until one holds.
+        Maximum number of designs to validate, the best first, until one satisfies the constraints.
     refinements : int
-        Further designs that are checked at most, between the one that holds and better ones that do not: they bring
-        the design to its constraints.
+        Maximum number of further designs to validate, between the feasible one and better infeasible ones; they
+        bring the design to its constraints.
     confidence : float
     seed : int
 
@@ -776,25 +776,26 @@ def optimize_design(
     settings : OptimizerSettings, optional
     integration : Integration, optional
     checkpoint : path or CheckpointOptions, optional
-        Folder that keeps the runs; one that exists is resumed.
+        Checkpoint folder; an existing one is resumed.
     progress : callable, optional
         Called as ``progress(done, total)`` with generations; True writes a line to standard error.
 
     Returns
     -------
     xarray.Dataset
-        Along ``design``, one, or a front by its first objective: a variable a parameter; ``objective_...`` with ``_low`` and
-        ``_high`` and, as the search saw it, ``_sought``; ``satisfied_...``, the fraction of systems that satisfy
-        a constraint, with ``_low`` and ``_high``, and ``required_...``; ``constraints_satisfied``: whether every lower
-        limit is at least the required fraction, some upper limit is less, or neither is known; ``distance_...``: that of
-        the fraction from the required one, or of a quantity of the design from its limit.  Along ``tried``: every design
-        that was looked at, its objectives and ``violation``.  The attribute ``termination_reason`` says why the search
-        and the refinement stopped.
+        Along ``design``, one, or a front by its first objective: a variable a parameter; ``objective_...`` with
+        ``_low`` and ``_high`` and, as the search saw it, ``_sought``; ``satisfied_...``, the fraction of
+        systems that satisfy a constraint, with ``_low`` and ``_high``, and ``required_...``;
+        ``constraints_satisfied``: whether every lower limit is at least the required fraction, some upper limit
+        is less, or neither is known; ``distance_...``: that of the fraction from the required one, or of a
+        quantity of the design from its limit.  Along ``tried``: every design that was evaluated, its objectives
+        and ``violation``. The attribute ``termination_reason`` gives the reason why the search and the
+        refinement stopped.
 
     Raises
     ------
     InputError
-        For bad input, and if no design that was tried keeps the constraints.
+        If an argument is out of range, or no tested design satisfies the constraints.
 
     Examples
     --------
@@ -869,7 +870,7 @@ def optimize_design(
 
 
 def _improved(search: DifferentialEvolution, before: tuple[float, _Array]) -> bool:
-    """Whether a generation made progress: of one objective the best design, of several any of the population."""
+    """Return whether a generation improved: the best design (one objective), or any of the population (several)."""
     violation, objectives = before
     if search.violation[0] != violation:
         return True
@@ -880,7 +881,7 @@ def _improved(search: DifferentialEvolution, before: tuple[float, _Array]) -> bo
 
 
 def _early(objectives: Any, constraints: Any) -> bool:
-    """Whether runs may end once their class is certain: not where a statistic of theirs is asked for."""
+    """Return whether early termination is allowed: not if a statistic of the runs is requested."""
     listed = [*([objectives] if isinstance(objectives, (str, Objective)) else objectives)]
     listed += [constraints] if isinstance(constraints, Constraint) else list(constraints)
     made = [Objective(quantity=each) if isinstance(each, str) else each for each in listed]
@@ -928,7 +929,7 @@ def _refined(
     numbers = np.arange(CHECK, CHECK + effort.validation_samples)
 
     def check(design: _Array) -> tuple[bool, float, float]:
-        """Whether a design holds, its signed objective, and what its constraints lack."""
+        """Return whether a design satisfies the constraints, its signed objective, and the constraint deficit."""
         found = problem.estimate(design, numbers, effort.confidence)
         state, short = _holds(problem, found)
         return state == 2, sign * float(found.objectives[0, 0]), short
@@ -990,7 +991,7 @@ def _refined(
 
 
 def _holds(problem: DesignProblem, found: Estimate) -> tuple[int, float]:
-    """Whether constraints hold for certain (2), fail for certain (0) or neither (1), and by how much they may lack."""
+    """Status of the constraints: satisfied (2), violated (0) or undecided (1); and the largest possible deficit."""
     required = np.array([constraint.required for constraint in problem.constraints])
     own = np.array([constraint._quantity.kind == "design" for constraint in problem.constraints], dtype=bool)
     wanted = np.where(own, 1.0, required)

@@ -98,11 +98,11 @@ class Forward:
 
     @property
     def errors(self) -> _Array:
-        """Their standard errors, Hz."""
+        """Standard errors of the frequencies, Hz."""
         return self._listed("_se")
 
     def frequencies(self, beam: Beam) -> _Array:
-        """Those of a beam, Hz."""
+        """Frequencies of a beam, Hz."""
         found = []
         for state in _STATES:
             count = len(getattr(self.measured, f"{state}_frequencies"))
@@ -139,10 +139,10 @@ _SEEN = {"striker": "displacement_at_striker", "midspan": "midspan_displacement"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Waveform:
-    """A measured motion of a struck beam, to be given to :func:`snapbeam.uncertainty.estimate_posterior`.
+    """Measured motion of a beam under impact, for :func:`snapbeam.uncertainty.estimate_posterior`.
 
     It counts up to its **horizon**: the time until which the response to a relative change of the drive by
-    *drive_error* stays below the standard error.  Beyond it nothing that is measured says anything of the beam.
+    *drive_error* stays below the standard error.  Beyond it, the measurement contains no information about the beam.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ class Waveform:
     at : {"striker", "midspan"}
         Where it was measured.
     drive_error : float
-        Relative error of what is known of the drive's amplitude.
+        Relative standard error of the amplitude of the drive.
 
     Examples
     --------
@@ -211,7 +211,7 @@ class Waveform:
     def from_dataset(
         cls, dataset: xr.Dataset, system: System, standard_error: float, *, at: str = "striker", **more: Any
     ) -> Waveform:
-        """That of a tracked or simulated run, whose displacements are over the system's own buckling level.
+        """Waveform from a tracked or simulated run with displacements over the buckling level of the system.
 
         *standard_error* is in m; *more* are other arguments.
         """
@@ -227,7 +227,7 @@ class Waveform:
 
     @property
     def period(self) -> float:
-        """Of the drive, s."""
+        """Period of the drive, s."""
         assert self.system.striker is not None
         ratio = float(self.system.striker.drive.frequency_ratio)  # type: ignore[attr-defined]
         return 1.0 / (ratio * unit_of(self.system, "drive.frequency_hz"))
@@ -256,7 +256,7 @@ class Waveform:
     def misfit(self, values: Mapping[str, Any]) -> _Array:
         """(model - measured)/standard error of every sample that counts, of the system with other parameters.
 
-        *values* are by dotted name; the drive keeps its Hz and m/s.
+        *values* are by dotted name; the drive has constant Hz and m/s.
         """
         times = np.asarray(self.time)[self.used]
         seen = np.asarray(self.displacement)[self.used]
@@ -278,7 +278,7 @@ class Waveform:
 
 @contextmanager
 def _untold() -> Iterator[None]:
-    """What is doubtful of a system was said when it was made; not of each of its neighbours."""
+    """Suppress diagnostics of neighbouring systems; they were reported for the first one."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiagnosticWarning)
         yield
@@ -299,7 +299,7 @@ _BEAM = ("thickness", "young_modulus", "density", "length", "buckling_level")
 _STEP = 2e-5
 """Relative step of the logarithms by which runs are compared: beyond what steps in time make of them."""
 _BESIDE = {"damping_ratio": "model.damping_ratio", "contact_stiffness": "contact.stiffness"}
-"""What a waveform says of beside the beam."""
+"""Parameters in addition to the beam that a waveform determines."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,7 +315,7 @@ class Posterior:
     weights : array of shape (samples,)
         Add up to 1.
     termination_reason : str
-        Why the search for the most likely beam stopped, and how many samples the weighted ones are worth.
+        Reason why the search for the most likely beam stopped, and the effective sample size.
 
     Examples
     --------
@@ -344,7 +344,7 @@ class Posterior:
 
     @property
     def is_doubtful(self) -> bool:
-        """Whether too few samples carry the weight for an interval to be trusted."""
+        """True if the effective sample size is too small for reliable intervals."""
         return self.effective_sample_size < _FEWEST
 
     def interval(self, confidence: float = 0.95) -> dict[str, tuple[float, float, float]]:
@@ -367,7 +367,7 @@ class Posterior:
         }
 
     def updated(self, log_likelihood: ArrayLike) -> Posterior:
-        """The same samples, weighed by what another measurement says of each.
+        """Posterior with the same samples, weighted by the likelihood of another measurement.
 
         Parameters
         ----------
@@ -394,7 +394,7 @@ class Posterior:
     def uncertainty(self, **more: Any) -> ParameterUncertainty:
         """Return the parameter uncertainty: the distributions of the samples, with the correlations of their ranks.
 
-        *more* are other arguments of :class:`snapbeam.uncertainty.ParameterUncertainty`; distributions in *of* stand beside.
+        *more* are other arguments of :class:`snapbeam.uncertainty.ParameterUncertainty`; distributions in *of* are added.
         """
         even = self.resampled(max(2000, len(self.values)))
         beside = dict(more.pop("of", {}))
@@ -440,19 +440,19 @@ def estimate_posterior(
     rng: int | np.random.Generator | None = 0,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> Posterior:
-    """What measured frequencies, decays, collisions and waveforms say of a beam, beside what was known before.
+    """Posterior of beam parameters from frequencies, decays, collisions and waveforms, with a prior.
 
     Parameters
     ----------
     measured : Measurements or None
         Frequencies with their standard errors; damping ratios and contact tests, if any, are known by themselves.
     beam : Beam
-        The middle of what was known before.
+        Median of the prior.
     prior : mapping of str to float
-        What is sought, among thickness, young_modulus, density, length and buckling_level, and how well it was known:
-        the standard deviation of its logarithm.  A parameter that the data say nothing of stays as it was.  With
-        waveforms also damping_ratio and contact_stiffness, about those of the first waveform's system, unless
-        *measured* knows them.
+        Parameters to estimate, among thickness, young_modulus, density, length and buckling_level, with the
+        standard deviation of the logarithm of each. A parameter without information in the data keeps its
+        prior.  With waveforms also damping_ratio and contact_stiffness, about those of the first waveform's
+        system, unless *measured* knows them.
     waveforms : Waveform or sequence of them
         Tracked motions of the beam under a striker; each counts up to its predictability horizon.
     modes : int
@@ -472,7 +472,7 @@ def estimate_posterior(
     Raises
     ------
     InputError
-        For values out of range, nothing measured, and parameters that cannot be sought.
+        If a value is out of range, there are no measurements, or a parameter cannot be estimated.
 
     Notes
     -----
@@ -672,9 +672,9 @@ def class_likelihood(
 ) -> _Array:
     """Log likelihood of measured classes under every sample of a posterior, for :meth:`Posterior.updated`.
 
-    The class of a measured point is one outcome of *runs* and one more sample from the same unknown chances: with c of m runs of its
-    class, a Dirichlet-multinomial of Jeffreys' prior gives it (c + 1/2)/(m + 2).  So a class that no run had is
-    unlikely, not impossible, and few runs say little.
+    The class of a measured point is one outcome of *runs* and one more sample from the same unknown chances:
+    with c of m runs of its class, a Dirichlet-multinomial of Jeffreys' prior gives it (c + 1/2)/(m + 2).  So a
+    class that no run had is unlikely, not impossible, and few runs give little information.
 
     Parameters
     ----------
@@ -683,9 +683,10 @@ def class_likelihood(
     system : System
         The nominal one, by which Omega and V of the measurements are normalised.
     measurements : MeasuredPoints
-        Struck with the same Hz and m/s whatever the sample; those of unknown class are left out.
+        Excitation in Hz and m/s, the same for every sample; points of unknown class are omitted.
     uncertainty : ParameterUncertainty
-        What differs from test to test, such as ``ParameterUncertainty(displacement=3.5e-6)``: no parameter of the posterior.
+        Uncertainty from test to test, such as ``ParameterUncertainty(displacement=3.5e-6)``, without parameters
+        of the posterior.
     runs : int
         Of each measured point and sample, the same random samples for all.
     integration, checkpoint, progress
@@ -698,7 +699,7 @@ def class_likelihood(
     Raises
     ------
     InputError
-        For bad input, an uncertainty with a parameter of the posterior, and measurements without a class.
+        If the uncertainty contains a parameter of the posterior, or no measurement has a response class.
 
     Examples
     --------

@@ -40,7 +40,7 @@ Ask = Callable[[_Index, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]
 
 @dataclass(frozen=True, kw_only=True)
 class SamplingPlan:
-    """How runs are spent on the points of a probability map.
+    """Allocation of runs to the points of a probability map.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class SamplingPlan:
         Half the width of the interval of *outcome* that every point is to reach, in (0, 0.5); None: *initial_runs* runs for
         every point.
     outcome : str
-        Whose interval is looked at: ``"snap"``, ``"continuous"``, ``"first_well"`` or ``"other_well"``.
+        Outcome whose interval is used: ``"snap"``, ``"continuous"``, ``"first_well"`` or ``"other_well"``.
     initial_runs : int
         Runs that every point has to begin with, at least 8 where more follow.
     max_runs : int
@@ -62,7 +62,7 @@ class SamplingPlan:
     Raises
     ------
     InputError
-        For values out of range, and names of outcomes or intervals that there are not.
+        If a value is out of range, or an outcome or interval does not exist.
 
     Examples
     --------
@@ -98,12 +98,12 @@ class SamplingPlan:
 
 @dataclass
 class Counts:
-    """What happened at every point."""
+    """Counts of outcomes at every point."""
 
     hits: _Index
-    """Of shape (outcomes, points)."""
+    """Hits of each outcome, shape (outcomes, points)."""
     runs: _Index
-    """That came to an end."""
+    """Completed runs."""
     failed: _Index
     rounds: int = 0
     open: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
@@ -179,7 +179,7 @@ def _lacking(counts: Counts, allocation: SamplingPlan, watched: int) -> _Index:
 
 
 def _affordable(counts: Counts, wanted: _Index, allocation: SamplingPlan, made: int, watched: int) -> _Index:
-    """What of the runs wanted the total allows, the widest intervals first."""
+    """Runs within the total limit, points with the widest intervals first."""
     if allocation.total_runs is None or made + wanted.sum() <= allocation.total_runs:
         return wanted
     order = np.argsort(-_half_widths(counts, allocation, watched), kind="stable")
@@ -211,7 +211,8 @@ def probability_map(
 ) -> xr.Dataset:
     """Compute the probability of each outcome at every point under parameter uncertainty.
 
-    Sample s is the same at every point.  Runs are spent where the interval is widest, until each is as narrow as asked.
+    Sample s is the same at every point.  Points with the widest intervals get further runs, until each interval has the
+    requested width.
 
     Parameters
     ----------
@@ -223,12 +224,12 @@ def probability_map(
     uncertainty : ParameterUncertainty
         Uncertain parameters and initial state.
     runs : SamplingPlan or int, optional
-        How runs are spent, or the same number of runs for every point; by default until the half width of the 95 %
+        Sampling plan, or the same number of runs for every point; by default until the half width of the 95 %
         interval of P(snap) is 0.05 everywhere.
     integration : Integration, optional
-        Runs end once their class is certain, whatever it says.
+        Early termination is always used, also if ``integration.early_termination`` is False.
     checkpoint : path or CheckpointOptions, optional
-        Folder that keeps the runs; one that exists is resumed.
+        Checkpoint folder; an existing one is resumed.
     cluster, progress
         As in :func:`snapbeam.sweep`; progress counts runs, of which the total grows.
 
@@ -242,7 +243,7 @@ def probability_map(
     Raises
     ------
     InputError
-        For bad input, an uncertainty without uncertain parameters, and for a checkpoint of another computation.
+        If no parameter is uncertain, an axis is not valid, or the checkpoint belongs to another computation.
     CheckpointError
         If the checkpoint is in use, cannot be written or is damaged beyond repair.
 
@@ -279,7 +280,7 @@ def probability_map(
 
 
 def allocation_of(runs: SamplingPlan | int | None) -> SamplingPlan:
-    """How runs are spent, from what was given.
+    """Sampling plan from the argument *runs*.
 
     Raises
     ------
@@ -322,7 +323,7 @@ def _counted(
 
 
 def _reason(counts: Counts, allocation: SamplingPlan) -> str:
-    """Why no further runs were made."""
+    """Reason why the sampling stopped."""
     still = int(counts.open.sum())
     if allocation.half_width is None:
         return f"{allocation.initial_runs} runs of every point, as given"
@@ -370,7 +371,7 @@ def _dataset(setup: SweepSetup, trials: Trials, counts: Counts, allocation: Samp
             counts.failed,
             "runs that failed; the intervals hold for whatever they might have done",
         ),
-        "reached": (~counts.open, "whether the interval is as narrow as asked"),
+        "reached": (~counts.open, "true where the interval has the requested width"),
     }
     for name, (values, text) in plain.items():
         dataset[name] = (points.dims, points.arranged(values), {"units": "1", "long_name": text})

@@ -74,14 +74,14 @@ _TABLE = {
 
 
 class Crossing(NamedTuple):
-    """Where a probability passes a value."""
+    """Value at which a probability curve crosses a given probability."""
 
     value: float
     """Midway where the isotonic regression is less and where it is more; infinite where it never is."""
     low: float
-    """-inf where no run says that it lies higher."""
+    """-inf if no run bounds it from below."""
     high: float
-    """inf where no run says that it lies lower."""
+    """inf if no run bounds it from above."""
 
 
 def isotonic(hits: ArrayLike) -> _Array:
@@ -110,7 +110,7 @@ def critical(confidence: float) -> float:
 
 
 def crossing(values: ArrayLike, hits: ArrayLike, probability: float, confidence: float = 0.95) -> Crossing:
-    """Where the probability of a hit passes *probability*, if it does not fall along *values*.
+    """Value at which a nondecreasing hit probability crosses *probability*.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def crossing(values: ArrayLike, hits: ArrayLike, probability: float, confidence:
 
 
 def _constrained(hits: _Array, at: int, q: float) -> float:
-    """Minus the greatest log likelihood if the probability passes *q* before coin *at*."""
+    """Minus the maximum log likelihood if the probability passes *q* before coin *at*."""
     total = 0.0
     if at > 0:
         total += float(np.sum(_losses(hits[:at], np.minimum(isotonic(hits[:at]), q))))
@@ -206,7 +206,7 @@ _STEPS, _SMALL = 60, 1e-9
 def local_crossing(
     values: _Array, hits: NDArray[Any], probability: float, low: float, high: float, reach: float = 2.0
 ) -> float:
-    """Where a logistic curve, fitted to the runs about an interval, passes *probability*.
+    """Value at which a local logistic regression about an interval crosses *probability*.
 
     Runs count by the tricube of their distance from the middle of the interval over *reach* times its half width.
     The fit is Firth's (Biometrika 80 (1993) 27), whose bias is of second order and which is finite for separated
@@ -254,13 +254,13 @@ _Index = NDArray[np.int64]
 Ask = Callable[[_Index, _Array, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]
 """Given columns, values and numbers of samples: which runs hit, and which failed."""
 _WIDER = 0.5
-"""Of an interval, by which the next round reaches beyond it on either side."""
+"""Fraction of an interval by which the next round extends it on either side."""
 _SURE = 0.99
 
 
 @dataclass(frozen=True, kw_only=True)
 class QuantileSearchSettings:
-    """How quantile thresholds are sought.
+    """Settings of the adaptive search for threshold quantiles.
 
     Parameters
     ----------
@@ -275,7 +275,7 @@ class QuantileSearchSettings:
     seed : int
         Chooses the values at which runs are made.
     outcome : str
-        What the probability is of, as in :class:`SamplingPlan`.
+        Outcome of the probability, as in :class:`SamplingPlan`.
 
     Examples
     --------
@@ -306,7 +306,7 @@ class QuantileSearchSettings:
 
 @dataclass
 class Runs:
-    """What was run in one column."""
+    """Runs of one column."""
 
     values: _Array = field(default_factory=lambda: np.empty(0))
     hits: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
@@ -404,11 +404,12 @@ def quantile_threshold(
 ) -> xr.Dataset:
     """Find the values of a parameter at which the probability of snap-through has given values, with intervals.
 
-    Every run has a value of its own.  The first round covers the range, each later one what is left open.  The
-    interval is that of the isotonic regression, of which nothing but a rise is assumed (Banerjee and Wellner, Ann.
-    Stat. 29 (2001) 1699); within it the threshold is where a logistic curve fitted to the runs about it passes the
-    value.  Where the probability is seen to fall, which fractal borders do, ``is_monotonic`` is False and the interval
-    reaches from the first value at which the probability may be so great to the last at which it may be so small.
+    Every run has its own value. The first round covers the range, each later one the remaining intervals.  The
+    interval is that of the isotonic regression, of which nothing but a rise is assumed (Banerjee and Wellner,
+    Ann.  Stat. 29 (2001) 1699); within it the threshold is where a logistic curve fitted to the runs about it
+    passes the value.  Where the probability is seen to fall, which fractal borders do, ``is_monotonic`` is
+    False and the interval reaches from the first value at which the probability may be so great to the last at
+    which it may be so small.
 
     Parameters
     ----------
@@ -417,32 +418,32 @@ def quantile_threshold(
     parameter : str
         Parameter to raise, such as ``"velocity_amplitude"``: a number that may differ between the runs of an ensemble.
     bounds : tuple of two floats
-        Range in which it is sought.
+        Range of the search.
     axes : mapping of str to array_like, optional
-        Axes, as in :func:`snapbeam.sweep`; one point, the system as it stands, by default.
+        Axes, as in :func:`snapbeam.sweep`; by default one point, the system itself.
     uncertainty : ParameterUncertainty, optional
         Uncertain parameters.  Without uncertainty all quantiles are one threshold.
     options : QuantileSearchSettings, optional
         Probabilities, runs and rounds.
     integration : Integration, optional
-        Runs end once their class is certain, whatever it says.
+        Early termination is always used, also if ``integration.early_termination`` is False.
     checkpoint : path or CheckpointOptions, optional
-        Folder that keeps the runs; one that exists is resumed.
+        Checkpoint folder; an existing one is resumed.
     progress : callable, optional
         Called as ``progress(done, total)`` with runs; True writes a line to standard error.
 
     Returns
     -------
     xarray.Dataset
-        ``threshold`` with ``threshold_low`` and ``threshold_high`` over the axes and ``quantile``; infinite limits
-        where no run bounds it, NaN where ``outcome_of_search`` says why.  ``is_fitted``: whether the threshold is that
-        of the fitted curve, and not of the isotonic regression alone.  ``is_monotonic``, with the probability
-        ``monotonicity_p_value`` of so much falling if it rises; ``runs``, ``runs_failed``.
+        ``threshold`` with ``threshold_low`` and ``threshold_high`` over the axes and ``quantile``; infinite
+        limits where no run bounds it, NaN if ``outcome_of_search`` gives a reason. ``is_fitted``: true if the
+        threshold is that of the fitted curve, and not of the isotonic regression alone.  ``is_monotonic``, with
+        the probability ``monotonicity_p_value`` of so much falling if it rises; ``runs``, ``runs_failed``.
 
     Raises
     ------
     InputError
-        For bad input, such as a parameter that needs another structure, and for a checkpoint of another computation.
+        If the parameter changes the structure, bounds are out of range, or the checkpoint belongs to another computation.
 
     Examples
     --------
@@ -563,7 +564,7 @@ def _column(runs: Runs, options: QuantileSearchSettings, bounds: tuple[float, fl
 
 
 def _is_step(runs: Runs) -> bool:
-    """Whether every run that hit lies above every run that did not."""
+    """Return whether every hit is above every miss."""
     return bool(runs.values[~runs.hits].max(initial=-np.inf) < runs.values[runs.hits].min(initial=np.inf))
 
 
@@ -590,7 +591,7 @@ def _labelled(
     dataset["outcome_of_search"] = (
         (*points.dims, LEVEL),
         codes,
-        {"units": "1", "long_name": "what was found"} | flags,
+        {"units": "1", "long_name": "status of the search"} | flags,
     )
     dataset["is_fitted"] = (
         (*points.dims, LEVEL),

@@ -80,9 +80,10 @@ def sobol_indices_from_samples(
 ) -> Indices:
     """First-order indices Var(E[y | x_j])/Var(y) of a sample, however it was sampled, of correlated inputs too.
 
-    Inputs are cut into bins of equal numbers of runs; the index is the variance of the means of the bins over that of
-    the output, less what chance alone makes of it: Kelley's epsilon squared (Plischke, Borgonovo and Smith, Eur. J.
-    Oper. Res. 226 (2013) 536, on estimates from bins).  The interval is that of a jackknife over twenty groups of runs.
+    Inputs are cut into bins of equal numbers of runs; the index is the variance of the means of the bins over
+    that of the output, less the contribution of chance: Kelley's epsilon squared (Plischke, Borgonovo and
+    Smith, Eur. J.  Oper. Res. 226 (2013) 536, on estimates from bins).  The interval is that of a jackknife
+    over twenty groups of runs.
 
     Parameters
     ----------
@@ -90,7 +91,7 @@ def sobol_indices_from_samples(
     output : array_like of shape (runs,)
     confidence : float
     bins : int, optional
-        By default one for forty runs, 5 to 100: what varies within a bin is lost to the index.
+        By default one for forty runs, 5 to 100; the index does not contain the variation within a bin.
     rng : int, numpy.random.Generator or None
         A seed; a generator, which gives one; None takes one from the system.
         Chooses the groups.
@@ -191,9 +192,9 @@ def sobol_indices(
 ) -> Sobol:
     """Sobol's indices by Saltelli's estimator (``scipy.stats.sobol_indices``), over scrambled Sobol sequences.
 
-    A sequence is so even that resampling its points says too much of the error; *replicates* sequences, each scrambled
-    by itself, are independent, and their scatter is the error (Owen's scrambling; Student's interval of their mean).
-    At equal cost, few long sequences have a smaller error than many short ones.
+    A sequence is so uniform that resampling its points overestimates the error; *replicates* sequences, each
+    scrambled by itself, are independent, and their scatter is the error (Owen's scrambling; Student's interval
+    of their mean).  At equal cost, few long sequences have a smaller error than many short ones.
 
     Parameters
     ----------
@@ -211,7 +212,7 @@ def sobol_indices(
     Raises
     ------
     InputError
-        For bad input, a result of another shape, or one that is constant up to rounding.
+        If a number is out of range, or the result has another shape or is constant up to rounding.
 
     Examples
     --------
@@ -329,12 +330,12 @@ class StatisticQoI:
 
     @property
     def unit(self) -> str:
-        """Of the statistic."""
+        """Unit of the statistic."""
         return STATISTICS[self.name].unit if self.name in STATISTICS else "1"
 
     @property
     def long_name(self) -> str:
-        """What it is."""
+        """Long name of the quantity."""
         return STATISTICS[self.name].long_name if self.name in STATISTICS else OUTCOMES[self.name].long_name
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
@@ -347,7 +348,7 @@ class StatisticQoI:
 
 @dataclass(frozen=True, kw_only=True)
 class ThresholdQoI:
-    """The least value of a parameter at which a sample snaps, on a row of values and then by halving.
+    """The minimum value of a parameter at which a sample snaps, on a row of values and then by halving.
 
     Parameters
     ----------
@@ -359,7 +360,7 @@ class ThresholdQoI:
     halvings : int
         Of the step below the lowest that snaps.
     at : mapping of str to float, optional
-        Other parameters, as they are meant to be.
+        Other parameters, at nominal values.
 
     Examples
     --------
@@ -385,13 +386,13 @@ class ThresholdQoI:
 
     @property
     def unit(self) -> str:
-        """Of the parameter."""
+        """Unit of the parameter."""
         return lookup(self.parameter).quantity.unit
 
     @property
     def long_name(self) -> str:
-        """What it is."""
-        return f"least {lookup(self.parameter).quantity.long_name} that snaps"
+        """Long name of the quantity."""
+        return f"minimum {lookup(self.parameter).quantity.long_name} for snap-through"
 
     @property
     def error(self) -> float:
@@ -424,7 +425,7 @@ class ThresholdQoI:
 
 @dataclass(frozen=True, kw_only=True)
 class NotchQoI:
-    """Where the threshold is lowest along a parameter, or how low it is there.
+    """Position of the minimum of the threshold along a parameter, or its value there.
 
     Parameters
     ----------
@@ -434,7 +435,7 @@ class NotchQoI:
         Its values, strictly increasing, at least 3; the place is that of the parabola through the lowest three.
     threshold : ThresholdQoI
     depth : bool
-        Whether the threshold there is meant, and not the place.
+        True for the threshold at the minimum, False for its position.
 
     Examples
     --------
@@ -454,14 +455,14 @@ class NotchQoI:
 
     @property
     def unit(self) -> str:
-        """Of what it is along, or of the threshold."""
+        """Unit of the parameter, or of the threshold."""
         return self.threshold.unit if self.depth else lookup(self.parameter).quantity.unit
 
     @property
     def long_name(self) -> str:
-        """What it is."""
+        """Long name of the quantity."""
         place = lookup(self.parameter).quantity.long_name
-        return f"lowest threshold over {place}" if self.depth else f"{place} at which the threshold is lowest"
+        return f"minimum threshold over {place}" if self.depth else f"{place} of the minimum threshold"
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
         """A threshold at every value."""
@@ -499,7 +500,7 @@ def _vertex(x: _Array, y: _Array) -> tuple[float, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class LifetimeQoI:
-    """How long snapping lasts, from many starts of each sample, in cycles.
+    """Mean lifetime of snapping, from many initial conditions of each sample, in cycles.
 
     Parameters
     ----------
@@ -524,7 +525,7 @@ class LifetimeQoI:
 
     @property
     def long_name(self) -> str:
-        """What it is."""
+        """Long name of the quantity."""
         return "lifetime of snapping, in cycles"
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
@@ -608,7 +609,7 @@ def sensitivity(
     confidence : float
     integration : Integration, optional
     checkpoint : path or CheckpointOptions, optional
-        Folder that keeps the runs of all quantities except lifetimes; one that exists is resumed.
+        Checkpoint folder of the runs of all quantities except lifetimes; an existing one is resumed.
     progress : callable, optional
         Called as ``progress(done, total)`` with runs of each round; lifetimes report nothing; True writes a line to standard error.
 
@@ -622,8 +623,8 @@ def sensitivity(
     Raises
     ------
     InputError
-        For bad input, a quantity that is missing for some samples, such as a threshold out of range, correlated
-        parameters with Sobol's indices, and a quantity that does not vary.
+        If the quantity is missing for some samples, such as a threshold out of range, or does not vary, or if parameters
+        are correlated with Sobol's indices.
 
     Examples
     --------
@@ -746,9 +747,9 @@ _WORDS = {
     "derivative": "change of the quantity for a unit of the parameter",
     "quantity_minus": "mean quantity at the score -1",
     "quantity_plus": "mean quantity at the score +1",
-    "step": "half of what the parameter differs by between the scores -1 and +1, in its unit",
+    "step": "half the difference of the parameter between the scores -1 and +1, in its unit",
     "first_order": "share of the variance of the quantity that the parameter makes by itself",
-    "total_order": "share of the variance of the quantity that the parameter has a part in",
+    "total_order": "fraction of the variance of the quantity to which the parameter contributes",
 }
 
 

@@ -1,4 +1,4 @@
-"""Diagnostics: what is doubtful about an input or a result, as data; and the ways they are told, kept and refused."""
+"""Diagnostics: findings about an input or a result, as data; printing, storing and raising them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ __all__ = [
 
 
 class DiagnosticWarning(UserWarning):
-    """Something that can be computed but is probably not what was meant.
+    """Warning about an input that is valid but probably not intended.
 
     Examples
     --------
@@ -44,11 +44,10 @@ class DiagnosticWarning(UserWarning):
 
 
 class Severity(StrEnum):
-    """How much a diagnostic takes from a result.
+    """Severity of a diagnostic.
 
-    INFO: worth knowing, the numbers stand.  WARNING: the numbers may not be what was meant, or be off by more than
-    their standard errors, which were widened where that could be told.  ERROR: the numbers contradict something
-    known and cannot be right as they are.
+    INFO: information only. WARNING: the numbers may not be what you intended, or the errors may exceed the
+    standard errors, which are increased where possible. ERROR: the numbers contradict known facts.
 
     Examples
     --------
@@ -64,7 +63,7 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """One thing that is doubtful: what the numbers of an input or a result do not say by themselves.
+    """One finding about an input or a result that needs attention.
 
     Attributes
     ----------
@@ -72,11 +71,11 @@ class Diagnostic:
         Short name, stable over versions, such as ``"first-mode-antisymmetric"`` or ``"camera.gamma"``, by which
         programs tell diagnostics apart.
     message : str
-        What was found and what to do about it.
+        Cause and remedy.
     numbers : mapping of str to float
         The figures behind the words, by name.
     severity : Severity
-        How much it takes from the result; its name does, too.
+        Severity of the diagnostic, or its name.
 
     Examples
     --------
@@ -98,11 +97,11 @@ class Diagnostic:
 
     @property
     def is_warning(self) -> bool:
-        """Whether the result should not be used without a look: all but notes."""
+        """True if the result needs a check before use: every severity except INFO."""
         return self.severity is not Severity.INFO
 
     def plain(self) -> dict[str, Any]:
-        """The diagnostic as plain words and numbers; what is not finite becomes None."""
+        """Diagnostic as plain text and numbers; a nonfinite number becomes None."""
         numbers = {
             name: float(value) if math.isfinite(value) else None for name, value in self.numbers.items()
         }
@@ -218,7 +217,7 @@ _Shares = Callable[[float], object]
 
 
 class _Line:
-    """What is said, at most five times a second, on standard error."""
+    """Progress line on standard error, updated at most five times per second."""
 
     def __init__(self, what: str) -> None:
         self.what = what
@@ -241,7 +240,7 @@ class _Line:
 
 
 def counting(progress: _Counts | bool | None, what: str, noun: str = "points") -> _Counts | None:
-    """What a computation reports ``(done, total)`` to; True stands for a line on standard error.
+    """Function to which a computation reports ``(done, total)``; True selects a line on standard error.
 
     Raises
     ------
@@ -261,7 +260,7 @@ def counting(progress: _Counts | bool | None, what: str, noun: str = "points") -
 
 
 def sharing(progress: _Shares | bool | None, what: str) -> _Shares | None:
-    """As :func:`counting`, of what is reported as a share."""
+    """Progress function as :func:`counting`, for progress as a fraction."""
     if progress is None or progress is False:
         return None
     if progress is True:

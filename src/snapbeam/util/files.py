@@ -43,7 +43,7 @@ __all__ = [
 VERSION = "snapbeam_version"
 """Name of the attribute of NetCDF files and of the key of JSON files."""
 MADE_BY = f"made by snapbeam {__version__}"
-"""What pictures and animations say of themselves."""
+"""Provenance text in pictures and animations."""
 _MARK = b"made by snapbeam "
 _LOOKED_AT = 1 << 16  # bytes, at each end
 
@@ -56,7 +56,7 @@ _HASHED = 64 * 2**20
 
 @dataclass
 class _Guard:
-    """The files that a command names, those that it may write to, and what it was asked for."""
+    """Input files, output files and arguments of a command."""
 
     named: tuple[Path, ...]
     defaults: tuple[Path, ...]
@@ -169,7 +169,7 @@ def refuse_foreign(target: Path, name: str, begin: str = "") -> None:
 
 
 def is_ours(path: str | os.PathLike[str], begin: str = "") -> bool:
-    """Whether a file says that snapbeam made it; an empty one may be anybody's.
+    """Return whether snapbeam made a file; True for an empty file.
 
     Parameters
     ----------
@@ -263,12 +263,12 @@ def check_writable(
 
 
 class NoRoomError(OSError):
-    """A file that could not be written since the disk is full: the message says how much room is needed."""
+    """Error if the disk is full; the message states the required size."""
 
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary path beside *path* to write to, and rename it to *path* if all went well.
+    """Provide a temporary path next to *path* to write to, and rename it to *path* if all went well.
 
     If the block raises, an interrupt included, the temporary file is removed and *path* is left as it was.  What a
     process that was killed left of its own is removed by the next that writes there.
@@ -306,7 +306,7 @@ _HERE = hashlib.sha256(platform.node().encode()).hexdigest()[:6]
 
 
 def _sweep(target: Path) -> None:
-    """Remove what killed processes of this machine left beside *target*."""
+    """Remove temporary files next to *target* of killed processes of this machine."""
     if os.name == "nt":
         return
     begin = f".{target.stem}.{_HERE}-"
@@ -319,7 +319,7 @@ def _sweep(target: Path) -> None:
 
 
 def lives(process: int) -> bool:
-    """Whether a process of this machine is there."""
+    """Return whether a process exists on this machine."""
     if os.name == "nt":
         return True
     try:

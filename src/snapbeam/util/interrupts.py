@@ -39,7 +39,7 @@ class _State:
     number = 0
     """The signal that arrived."""
     in_command = False
-    """Whether a command runs, which closes its files and reports what is finished when it is interrupted."""
+    """True while a command runs, which closes its files and reports finished work when it is interrupted."""
     heard = threading.Event()
     held: _Held | None = None
 
@@ -90,7 +90,7 @@ def held_back() -> Iterator[set[Path]]:
 
 
 def raise_held() -> None:
-    """Handle a signal that is held back: a place of the block where an exception may be raised."""
+    """Handle a deferred signal, at a point of the block where an exception may be raised."""
     if _State.held is not None and threading.current_thread() is threading.main_thread():
         _handle(_State.held)
 

@@ -161,7 +161,7 @@ def write_netcdf(
     InputError
         If *data* are no datasets, or nothing can be written to *path*, which ends in ``.nc``.
     NoRoomError
-        If there is no room for the file; it says how much is needed, and where the file is kept instead.
+        If there is no room for the file; the message states the required size, and the location of the file.
 
     Examples
     --------

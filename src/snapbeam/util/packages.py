@@ -1,4 +1,4 @@
-"""The text that says how to install a package that is missing."""
+"""Instructions to install a missing package."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What made a file: the version, the libraries, the command and the parameters; not whose machine.
+"""Provenance of a file: version, libraries, command and parameters, without data about the machine.
 
 Attributes made here go into every file the package writes, so that a result can be traced to the
 numbers it came from.  They hold no host name, no user name and no directory.
@@ -168,7 +168,7 @@ def array_hash(values: Any) -> str:
 
 
 def made_by(parameters: Any = None, *, command: str | None = None) -> dict[str, str]:
-    """Return the attributes that say what made a file.
+    """Return the provenance attributes of a file.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ class ResponseClass(IntEnum):
 
     @property
     def is_interwell(self) -> bool:
-        """Whether the beam snapped through at least once."""
+        """True if the beam snapped through at least once."""
         return self in (ResponseClass.TRANSIENT_1, ResponseClass.TRANSIENT_2, ResponseClass.CONTINUOUS)
 
 
@@ -54,7 +54,7 @@ _LABELS = {
 
 
 class RunStatus(IntEnum):
-    """How a run ended.  All but ``OK``, ``EARLY_STOP`` and ``FILLED`` leave the response class unknown.
+    """Status of a run.  All but ``OK``, ``EARLY_STOP`` and ``FILLED`` leave the response class unknown.
 
     Examples
     --------
@@ -74,7 +74,7 @@ class RunStatus(IntEnum):
 
     @property
     def advice(self) -> str:
-        """What happened and what to do about it."""
+        """Cause of the status, and the remedy."""
         return _ADVICE[self]
 
 
@@ -148,7 +148,7 @@ def classify(
 
 
 def class_of(total: Any, last: Any, duration: Any, side: Any) -> NDArray[np.int8]:
-    """As :func:`classify`, of what an engine has counted: unchecked, and without meaning for a run that failed."""
+    """Response class as :func:`classify`, from counts of the solver: unchecked, and undefined for a failed run."""
     result = np.where(side > 0, ResponseClass.TRANSIENT_2, ResponseClass.TRANSIENT_1)
     result = np.where(last * 20 > duration, ResponseClass.CONTINUOUS, result)
     result = np.where(total == 0, ResponseClass.INTRAWELL, result)

@@ -31,8 +31,8 @@ def _registry() -> Any:
 def conversion_factor(given: str, unit: str) -> float | None:
     """Factor from one unit to another; None if they do not fit, or differ by more than a factor.
 
-    An angular frequency in rad/s or a speed in rpm is no frequency in Hz.  Where an acceleration is asked for, g is the
-    standard acceleration of free fall.
+    An angular frequency in rad/s or a speed in rpm is not a frequency in Hz. Where an acceleration is expected,
+    g is the standard acceleration of free fall.
 
     Examples
     --------

@@ -49,7 +49,7 @@ __all__ = [
 
 
 class InputError(ValueError):
-    """A parameter that cannot be used: the message names it, its value and what is allowed.
+    """Invalid parameter; the message names the parameter, its value and the allowed values.
 
     Examples
     --------
@@ -194,7 +194,7 @@ def integer(name: str, value: Any, low: int, high: int | None = None) -> int:
 
 
 def seed_of(rng: int | np.random.Generator | None) -> int:
-    """Return the seed that *rng* stands for: itself, a number that the generator draws, or one from the system (SPEC 7)."""
+    """Return the seed of *rng*: itself, a number that the generator draws, or one from the system (SPEC 7)."""
     if rng is None:
         rng = np.random.default_rng()
     if isinstance(rng, np.random.Generator):
@@ -296,7 +296,7 @@ def mapping(name: str, value: Any) -> Mapping[Any, Any]:
 
 
 def parsed_json(text: Any, name: str) -> dict[str, Any]:
-    """The object that a JSON text holds; refused, by the name of where it stands, if it is damaged."""
+    """Object of a JSON text; raises an error with the name of the source if it is damaged."""
     try:
         found = json.loads(text)
     except (TypeError, ValueError, RecursionError) as error:
@@ -347,7 +347,7 @@ class _Names(dict[str, Any]):
 
 
 def _kinds(function: Callable[..., Any]) -> dict[str, Any]:
-    """What each parameter may be, as far as its annotation can be read."""
+    """Allowed types of each parameter, as far as its annotation can be read."""
     found = {}
     package = ".".join(function.__module__.split(".")[:2])
     for each in inspect.signature(function).parameters.values():
@@ -371,7 +371,7 @@ def _members(annotation: Any) -> list[Any]:
 
 
 def _suits(value: Any, kind: Any) -> bool:
-    """If *value* may be of a kind; whatever cannot be told is left to the function."""
+    """Return whether *value* can be of a type; True where the type cannot be checked."""
     origin = typing.get_origin(kind) or kind
     if kind is Any or kind is object:
         return True
@@ -416,7 +416,7 @@ def _words(kinds: list[Any]) -> str:
 
 
 def checked(function: _F) -> _F:
-    """Refuse arguments of another kind than *function*'s annotations say, before it begins.
+    """Raise an error for arguments of another type than the annotations of *function*, before it begins.
 
     What is a number, a flag, a dataset, a system or a sequence is decided here; which numbers and words are allowed is
     the function's to say.
@@ -465,7 +465,7 @@ class NamedTable(dict[str, Kind]):
     Parameters
     ----------
     find : callable
-        What has a name that is not listed, or None if there is no such thing.
+        Function that returns the object of an unlisted name, or None.
     listed : pairs, optional
         Of name and thing.
     """
@@ -484,5 +484,5 @@ class NamedTable(dict[str, Kind]):
         return isinstance(name, str) and (super().__contains__(name) or self._find(name) is not None)
 
     def get(self, name: str, default: Any = None) -> Any:
-        """As of any mapping."""
+        """Return the value of a key, as for any mapping."""
         return self[name] if name in self else default

@@ -34,7 +34,7 @@ class WorkRate:
 
     @property
     def per_second(self) -> float | None:
-        """What is done in a second; None before the second report."""
+        """Work done per second; None before the second report."""
         if not self._marks or self._marks[-1][1] <= self._marks[0][1]:
             return None
         (begin, before), (end, done) = self._marks[0], self._marks[-1]

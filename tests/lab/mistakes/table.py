@@ -16,7 +16,7 @@ from mistakes.case import KINDS, Case, Outcome, looked
 
 FILE = Path(__file__).parents[3] / "docs" / "data" / "mistakes.md"
 CASES = (*scenes.CASES, *drives.CASES, *decays.CASES, *others.CASES)
-HEAD = "| What is wrong | What comes of it | What it sees | What it says |\n|---|---|---|---|\n"
+HEAD = "| Introduced error | Result | Criterion | Diagnostic |\n|---|---|---|---|\n"
 
 
 def row(case: Case, outcome: Outcome) -> str:

@@ -1,4 +1,4 @@
-"""``snapbeam calibrate``: the model's beam from measured frequencies, decays and collisions."""
+"""``snapbeam calibrate``: calibrate the beam model with measured frequencies, decays and collisions."""
 
 from __future__ import annotations
 
@@ -51,22 +51,27 @@ def _list_option(about: str) -> Any:
 
 Measurements = Annotated[
     Path | None,
-    typer.Argument(help="TOML file with a section named measured.", metavar="[MEASUREMENTS]"),
+    typer.Argument(help="TOML file with a section [measured].", metavar="[MEASUREMENTS]"),
 ]
 Straight = Annotated[str | None, _list_option("Natural frequencies without load, Hz.")]
 LowerWell = Annotated[
-    str | None, _list_option("About the lower well, Hz; 81.3s or 159a says symmetric or antisymmetric.")
+    str | None,
+    _list_option(
+        "Natural frequencies about the lower well, Hz; suffix s or a: symmetric or antisymmetric (81.3s,159a)."
+    ),
 ]
-UpperWell = Annotated[str | None, _list_option("About the upper well, Hz, likewise.")]
-Damping = Annotated[str | None, _list_option("Damping ratios from free decays.")]
+UpperWell = Annotated[
+    str | None, _list_option("Natural frequencies about the upper well, Hz, in the same form.")
+]
+Damping = Annotated[str | None, _list_option("Damping ratios of free decays.")]
 FrequencySe = Annotated[
     float | None, opt.number_option("Standard error of these frequencies, Hz (0.5 %).", _MEASURED)
 ]
 MeasuredThickness = Annotated[
-    float | None, opt.number_option("Thickness by gauge, m, to compare with.", _MEASURED)
+    float | None, opt.number_option("Thickness by gauge, m, for comparison.", _MEASURED)
 ]
 MeasuredBucklingLevel = Annotated[
-    float | None, opt.number_option("Buckling level by gauge, m, to compare with.", _MEASURED)
+    float | None, opt.number_option("Buckling level by gauge, m, for comparison.", _MEASURED)
 ]
 Impacts = Annotated[
     Path | None,
@@ -77,17 +82,18 @@ Impacts = Annotated[
     ),
 ]
 EffectiveMass = Annotated[
-    float | None, opt.number_option("1/(1/m1 + 1/m2) of the two bodies of --impacts, kg.", _MEASURED)
+    float | None,
+    opt.number_option("Effective mass 1/(1/m1 + 1/m2) of the two bodies of --impacts, kg.", _MEASURED),
 ]
 Config = Annotated[
     Path | None,
-    typer.Option("--config", "-c", help="TOML file of parameters of the beam and the model.", metavar="FILE"),
+    typer.Option("--config", "-c", help="TOML file with the parameters of beam and model.", metavar="FILE"),
 ]
 Fit = Annotated[
     str | None,
     typer.Option(
-        help="What to fit, among thickness, young_modulus, density, length, buckling_level; by default "
-        "what the measurements ask for.",
+        help="Parameters to fit: thickness, young_modulus, density, length, buckling_level; by default "
+        "those that the measurements determine.",
         metavar="NAME,NAME",
         rich_help_panel=_FIT,
     ),
@@ -95,7 +101,7 @@ Fit = Annotated[
 Imperfection = Annotated[
     str | None,
     typer.Option(
-        help="What makes the wells unequal, fitted to the first frequencies about both: midspan_amplitude, point_load or "
+        help="Imperfection, fitted to the first frequencies about both wells: midspan_amplitude, point_load or "
         "uniform_load.",
         rich_help_panel=_FIT,
     ),
@@ -106,7 +112,7 @@ Output = Annotated[
     typer.Option(
         "--output",
         "-o",
-        help="TOML file for snapbeam map --config to write.",
+        help="TOML file to write, for snapbeam map --config.",
         metavar="FILE",
         rich_help_panel="Output",
     ),
@@ -136,9 +142,9 @@ def calibrate(
     plot: opt.Plot = None,
     strict: lab.Strict = False,
 ) -> None:
-    """Fit thickness and buckling level to natural frequencies, and report what the data leave open.
+    """Fit thickness and buckling level to natural frequencies, and report parameters that the data do not determine.
 
-    Parameters that are not fitted come from --config, or from the measurements' own section beam, or are the
+    Parameters that are not fitted come from --config, or from the section [beam] of the measurements, or are the
     paper's.
 
     Example: snapbeam calibrate --straight 80,221 --lower-well 81.3 --upper-well 80.5 --measured-thickness
@@ -231,7 +237,7 @@ def calibrate(
 
 
 def _shapes(text: str) -> tuple[str, tuple[str, ...]]:
-    """Numbers without the letters behind them, and the shapes that these say: ``159a,165s``."""
+    """Frequencies and mode shapes of text such as ``159a,165s``."""
     words = {"s": "symmetric", "a": "antisymmetric"}
     parts = [part.strip() for part in text.split(",")]
     if not any(part[-1:] in words for part in parts):
@@ -244,7 +250,7 @@ def _shapes(text: str) -> tuple[str, tuple[str, ...]]:
 def _contact_tests(
     path: Path, effective_mass: float
 ) -> tuple[tuple[ContactTest, ...], tuple[Diagnostic, ...]]:
-    """The contact stiffness of tracked impacts as one test, and what is to be said of it."""
+    """Contact stiffness from tracked impacts as one test, with its diagnostics."""
     from snapbeam.cli.console import open_result
     from snapbeam.lab.calibration import stiffness_from_impacts
     from snapbeam.lab.tracking.track import contact_onsets

@@ -40,12 +40,10 @@ def compare(
     ],
     frequency: Annotated[float | None, opt.number_option("Excitation frequency, Hz.", _RUN)] = None,
     start: Annotated[float | None, opt.number_option("Start of the excitation, s.", _RUN)] = None,
-    cycles: Annotated[
-        int, opt.count_option("Cycles of excitation the response class is asked for (200).", _RUN)
-    ] = 200,
+    cycles: Annotated[int, opt.count_option("Number of cycles for the response class (200).", _RUN)] = 200,
     at: Annotated[
         str,
-        typer.Option(help="striker or midspan: where the displacement was measured.", rich_help_panel=_RUN),
+        typer.Option(help="Location of the measured displacement: striker or midspan.", rich_help_panel=_RUN),
     ] = "striker",
     channel: lab.Channel = None,
     units: lab.Units = None,
@@ -58,7 +56,7 @@ def compare(
         bool,
         typer.Option(
             "--overlay",
-            help="Draw both waveforms of --plot over each other, and their difference.",
+            help="Superimpose the waveforms of --plot, and draw their difference.",
             rich_help_panel="Output",
         ),
     ] = False,
@@ -66,9 +64,9 @@ def compare(
 ) -> None:
     """Compare measured responses with a simulated map, or a measured waveform with a simulated one.
 
-    A CSV table of responses is laid on a map: the share that agrees and a table of measured against simulated
-    classes.  A tracked run is put beside a simulated one, aligned by the shaker's phase; the signal of a displacement
-    sensor is aligned by --start, the time at which the shaker starts.
+    With a CSV table of responses and a map, the command prints the fraction that agrees and a table of measured against
+    simulated classes.  With a tracked run, it aligns the simulated run by the phase of the shaker.  With the signal of a
+    displacement sensor, it aligns the run by --start, the time at which the shaker starts.
 
     Example: snapbeam compare laser.csv run.nc --at midspan --frequency 100 --start 0.2 --plot waves.png
     """

@@ -33,34 +33,42 @@ __all__ = [
 _DECAY = "Decay"
 
 
-Modes = Annotated[int, opt.count_option("How many modes to look for (1).", _DECAY)]
+Modes = Annotated[int, opt.count_option("Number of modes to fit (1).", _DECAY)]
 Frequencies = Annotated[
     str | None,
     typer.Option(
-        help="Rough frequencies of the modes, Hz, instead of --modes.",
+        help="Approximate frequencies of the modes, Hz, instead of --modes.",
         metavar="F,F",
         rich_help_panel=_DECAY,
     ),
 ]
-Method = Annotated[str, typer.Option(help="fit, hilbert, log_decrement, or all.", rich_help_panel=_DECAY)]
+Method = Annotated[
+    str, typer.Option(help="Method: fit, hilbert, log_decrement, or all.", rich_help_panel=_DECAY)
+]
 Start = Annotated[float | None, opt.number_option("Start of the free decay, s.", _DECAY)]
 Stop = Annotated[float | None, opt.number_option("End of the free decay, s.", _DECAY)]
 Soften = Annotated[
     bool,
-    typer.Option("--soften/--linear", help="Let frequency depend on amplitude.", rich_help_panel=_DECAY),
+    typer.Option(
+        "--soften/--linear", help="Fit the dependence of frequency on amplitude.", rich_help_panel=_DECAY
+    ),
 ]
 BucklingLevel = Annotated[
     float | None,
-    opt.number_option("b, m: hold the softening near that of one mode, 0.75 (a/b)^2.", _DECAY),
+    opt.number_option(
+        "Buckling level b, m, for a prior of the softening near that of one mode, 0.75 (a/b)^2.", _DECAY
+    ),
 ]
 ExponentialWindow = Annotated[
     float | None,
-    opt.number_option("T, s: undo a window exp(-t/T) by which an analyser multiplied the record.", _DECAY),
+    opt.number_option(
+        "Time constant T, s, of an exponential window exp(-t/T) of the analyser, to correct.", _DECAY
+    ),
 ]
 MirrorChannel = Annotated[
     str | None,
     typer.Option(
-        help="Channel of a second sensor at the mirror place: tells symmetric modes from antisymmetric ones.",
+        help="Channel of a second sensor at the mirror location, to distinguish symmetric from antisymmetric modes.",
         metavar="NAME",
         rich_help_panel=_DECAY,
     ),
@@ -68,7 +76,7 @@ MirrorChannel = Annotated[
 Stabilisation = Annotated[
     Path | None,
     typer.Option(
-        help="Picture of the stabilisation diagram from which modes were read.",
+        help="Figure of the stabilisation diagram to write.",
         metavar="FILE",
         rich_help_panel="Output",
     ),
@@ -101,7 +109,7 @@ def fit_decay(
 ) -> None:
     """Fit frequency, damping ratio and softening to a free decay, with standard errors.
 
-    The frequency is that of vanishing amplitude: about a well a buckled beam softens.
+    The frequency is the limit at zero amplitude, because a buckled beam softens about a well.
 
     Example: snapbeam fit-decay decay.csv --start 0.12 --method all --plot decay.png --json lower.json
     """

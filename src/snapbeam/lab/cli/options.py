@@ -1,4 +1,4 @@
-"""What the laboratory commands share: the options of a signal file, and diagnostics."""
+"""Common parts of the lab commands: options of signal files, and diagnostics."""
 
 from __future__ import annotations
 
@@ -48,20 +48,18 @@ Channel = Annotated[
 ]
 Units = Annotated[
     str | None,
-    typer.Option(
-        help="Unit of the numbers where the file does not say, such as mm/s.", rich_help_panel=_SIGNAL
-    ),
+    typer.Option(help="Unit of the values if the file has none, such as mm/s.", rich_help_panel=_SIGNAL),
 ]
 Sensitivity = Annotated[
     str | None,
     typer.Option(
-        help="What a volt, or full scale (FS) of a sound file, stands for: '125 mm/s/V', '100 mV/g', '0.5 m/s/FS'.",
+        help="Sensitivity of the sensor, per volt or per full scale (FS) of a sound file: '125 mm/s/V', '100 mV/g', '0.5 m/s/FS'.",
         rich_help_panel=_SIGNAL,
     ),
 ]
 SamplingFreq = Annotated[
     float | None,
-    opt.number_option("Samples per second, Hz, where the file does not say.", _SIGNAL),
+    opt.number_option("Sampling frequency, Hz, if the file has none.", _SIGNAL),
 ]
 Columns = Annotated[
     str | None,
@@ -75,7 +73,7 @@ Strict = Annotated[
     bool,
     typer.Option(
         "--strict",
-        help="Refuse a result with any diagnostic that makes it doubtful; write none.",
+        help="Treat warnings as errors: write no result.",
         rich_help_panel=_OUTPUT,
     ),
 ]
@@ -107,7 +105,7 @@ def open_signal(
 
 
 def print_diagnostics(console: Console, diagnostics: Iterable[Diagnostic]) -> None:
-    """Print diagnostics, the gravest first, each with its code."""
+    """Print diagnostics with their codes, the most severe first."""
     order = {"error": 0, "warning": 1, "info": 2}
     style = {"error": "bold red", "warning": "yellow", "info": "dim"}
     for one in sorted(diagnostics, key=lambda diagnostic: order[diagnostic.severity.value]):

@@ -1,4 +1,4 @@
-"""``snapbeam process-tests``: every test of a folder, to one table, thumbnails and a comparison with a map."""
+"""``snapbeam process-tests``: process all tests of a folder to a table, thumbnails and a comparison with a map."""
 
 from __future__ import annotations
 
@@ -28,37 +28,37 @@ def process_tests(
     table: Annotated[
         Path | None,
         typer.Option(
-            help="Table of tests: test, recording, vibrometer, frequency_hz, velocity_m_s, location; without it "
-            "files are paired by their names.",
+            help="Table of tests: test, recording, vibrometer, frequency_hz, velocity_m_s, location; by default, "
+            "files are paired by name.",
             metavar="FILE", rich_help_panel=_TESTS,
         ),
     ] = None,
     settings: Annotated[
         Path | None,
         typer.Option(
-            help="TOML file with sections camera, tracking, signal and test_series, as for Python.", metavar="FILE",
+            help="TOML file with the sections [camera], [tracking], [signal] and [test_series].", metavar="FILE",
             rich_help_panel=_TESTS,
         ),
     ] = None,
     cycles: Annotated[
-        int | None, opt.count_option("Cycles that the response class is asked for (200).", _TESTS)
+        int | None, opt.count_option("Number of cycles for the response class (200).", _TESTS)
     ] = None,
-    buckling_level: Annotated[float | None, opt.number_option("b, m.", _TESTS)] = None,
-    location: Annotated[float | None, opt.number_option("x_s, location of the contact.", _TESTS)] = None,
+    buckling_level: Annotated[float | None, opt.number_option("Buckling level b, m.", _TESTS)] = None,
+    location: Annotated[float | None, opt.number_option("Location of the contact over the length (x_s).", _TESTS)] = None,
     beam_thickness: Annotated[
-        float | None, opt.number_option("Thickness of the beam by gauge, m, to check by.", _TESTS)
+        float | None, opt.number_option("Thickness of the beam by gauge, m, for a check.", _TESTS)
     ] = None,
-    frame_rate: Annotated[float | None, opt.number_option("Frames per second, Hz.", _CAMERA)] = None,
-    pixel_size: Annotated[float | None, opt.number_option("Metres per pixel.", _CAMERA)] = None,
+    frame_rate: Annotated[float | None, opt.number_option("Frame rate, Hz.", _CAMERA)] = None,
+    pixel_size: Annotated[float | None, opt.number_option("Pixel size, m.", _CAMERA)] = None,
     side: Annotated[
-        str | None, typer.Option(help="Side of the beam the shaker stands on.", rich_help_panel=_CAMERA)
+        str | None, typer.Option(help="Side of the beam on which the shaker is.", rich_help_panel=_CAMERA)
     ] = None,
     units: lab.Units = None,
     sensitivity: lab.Sensitivity = None,
     sampling_frequency: lab.SamplingFreq = None,
     simulated: Annotated[
         Path | None,
-        typer.Option("--map", help="Map to lay the responses on.", metavar="FILE", rich_help_panel=_OUTPUT),
+        typer.Option("--map", help="Map to compare the responses with.", metavar="FILE", rich_help_panel=_OUTPUT),
     ] = None,
     output: Annotated[
         Path | None,
@@ -69,11 +69,11 @@ def process_tests(
     ] = None,
     strict: lab.Strict = False,
 ) -> None:  # fmt: skip
-    """Track, align and class every test of a folder, and write one table of them.
+    """Track, align and classify every test of a folder, and write a table.
 
-    Each test is kept as soon as it is measured; begun again, the test series goes on where it was, and measures
-    only what has changed.  A test that cannot be measured is a row that says why.  With --strict a test with
-    any doubtful diagnostic counts as spoiled.
+    The command stores each test when it is finished.  If you repeat the command, it continues with the next test, and
+    repeats only tests whose input changed.  A test that cannot be measured has a row with the reason.  With --strict a
+    test with any warning counts as failed.
 
     Example: snapbeam process-tests tests/ --buckling-level 0.331e-3 --location 0.47619 --pixel-size 12e-6 --map
     map.nc
@@ -146,7 +146,7 @@ def _tell(done: int, total: int, result: Any) -> None:
 
 
 def _on_map(target: Path, simulated: Path) -> Path:
-    """The responses on a map; the share that agrees is printed."""
+    """Draw the responses on a map, and print the fraction that agrees."""
     from snapbeam.cli.console import open_result
     from snapbeam.lab.map_comparison import compare_measured_points
     from snapbeam.lab.plot.comparison import plot_map_comparison

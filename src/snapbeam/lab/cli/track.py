@@ -66,11 +66,13 @@ RecordingFile = Annotated[
 ]
 FrameRate = Annotated[
     float | None,
-    typer.Option(help="Frames per second, Hz; needed for videos and images.", rich_help_panel=_CAMERA),
+    typer.Option(help="Frame rate, Hz; required for videos and images.", rich_help_panel=_CAMERA),
 ]
 PixelSize = Annotated[
     float | None,
-    typer.Option(help="Metres per pixel, such as 12e-6; needed unless in the file.", rich_help_panel=_CAMERA),
+    typer.Option(
+        help="Pixel size, m, such as 12e-6; required if the file has none.", rich_help_panel=_CAMERA
+    ),
 ]
 Region = Annotated[
     str | None,
@@ -79,24 +81,26 @@ Region = Annotated[
 Side = Annotated[
     str,
     typer.Option(
-        help="Side of the beam the shaker stands on: below, above, left or right.",
+        help="Side of the beam on which the shaker is: below, above, left or right.",
         rich_help_panel=_SCENE,
     ),
 ]
 Objects = Annotated[
     str,
-    typer.Option(help="bright or dark against the background, or auto.", rich_help_panel=_SCENE),
+    typer.Option(
+        help="Brightness of the objects against the background: bright, dark or auto.", rich_help_panel=_SCENE
+    ),
 ]
 Threshold = Annotated[
     float | None,
-    typer.Option(help="Grey level to binarise at; Otsu's by default.", rich_help_panel=_SCENE),
+    typer.Option(help="Grey level of the binarisation threshold; Otsu's by default.", rich_help_panel=_SCENE),
 ]
 ContactColumn = Annotated[
     float | None,
-    typer.Option(help="Column of the contact; found from the tip by default.", rich_help_panel=_SCENE),
+    typer.Option(help="Column of the contact; by default, that of the tip.", rich_help_panel=_SCENE),
 ]
 Shaker = Annotated[
-    bool, typer.Option("--shaker/--no-shaker", help="Follow the shaker too.", rich_help_panel=_SCENE)
+    bool, typer.Option("--shaker/--no-shaker", help="Track the shaker too.", rich_help_panel=_SCENE)
 ]
 Marker = Annotated[
     bool,
@@ -104,20 +108,28 @@ Marker = Annotated[
 ]
 TipDistance = Annotated[
     float | None,
-    typer.Option(help="From the shaker's tip to the sticker's nearer edge, m.", rich_help_panel=_SCENE),
+    typer.Option(
+        help="Distance from the tip of the shaker to the nearer edge of the sticker, m.",
+        rich_help_panel=_SCENE,
+    ),
 ]
 BeamThickness = Annotated[
     float | None,
-    typer.Option(help="Thickness of the beam by gauge, m, to check by.", rich_help_panel=_SCENE),
+    typer.Option(help="Thickness of the beam by gauge, m, for a check.", rich_help_panel=_SCENE),
 ]
-Columns = Annotated[int, typer.Option(help="Columns to fit the beam's edge in.", rich_help_panel=_SCENE)]
+Columns = Annotated[
+    int,
+    typer.Option(help="Number of columns in which the edge of the beam is fitted.", rich_help_panel=_SCENE),
+]
 BlurLimit = Annotated[
     float | None,
-    typer.Option(help="Edge width, px, from which a frame is flagged as blurred.", rich_help_panel=_SCENE),
+    typer.Option(help="Edge width, px, above which a frame is flagged as blurred.", rich_help_panel=_SCENE),
 ]
 Gamma = Annotated[
     float,
-    typer.Option(help="Exponent of grey level over light, to undo.", rich_help_panel=_CAMERA),
+    typer.Option(
+        help="Gamma of the camera (exponent of grey level over light), to correct.", rich_help_panel=_CAMERA
+    ),
 ]
 Background = Annotated[
     Path | None,
@@ -130,8 +142,8 @@ Background = Annotated[
 FixedMark = Annotated[
     list[str] | None,
     typer.Option(
-        help="Part of the region that shows something that stands still; the camera's drift against it is "
-        "taken out. May be repeated.",
+        help="Part of the region with a stationary object; snapbeam subtracts the camera drift measured "
+        "there. May be repeated.",
         metavar="ROW:ROW,COLUMN:COLUMN",
         rich_help_panel=_CAMERA,
     ),
@@ -147,17 +159,20 @@ ScaleMarks = Annotated[
 RestFrames = Annotated[
     str | None,
     typer.Option(
-        help="Frames at rest: how many at the start, or FIRST:LAST+1; negative from the end.",
+        help="Frames at rest: number at the start, or FIRST:LAST+1; negative numbers count from the end.",
         metavar="N or A:B",
         rich_help_panel=_SCENE,
     ),
 ]
 BucklingLevel = Annotated[
     float | None,
-    typer.Option(help="b, m, to normalise by; millimetres only by default.", rich_help_panel=_SCENE),
+    typer.Option(
+        help="Buckling level b, m, for normalised displacements; by default in mm only.",
+        rich_help_panel=_SCENE,
+    ),
 ]
 Location = Annotated[
-    float, typer.Option(help="x_s, location of the contact over length.", rich_help_panel=_SCENE)
+    float, typer.Option(help="Location of the contact over the length (x_s).", rich_help_panel=_SCENE)
 ]
 RestDisplacement = Annotated[
     float | None,
@@ -172,19 +187,25 @@ Output = Annotated[
 ]
 Picture = Annotated[
     Path | None,
-    typer.Option(help="Picture of a frame with its edges.", metavar="FILE", rich_help_panel=_OUTPUT),
+    typer.Option(
+        help="Figure of a frame with the fitted edges to write.", metavar="FILE", rich_help_panel=_OUTPUT
+    ),
 ]
-Frame = Annotated[int, typer.Option(help="Number of the frame in --picture.", rich_help_panel=_OUTPUT)]
+Frame = Annotated[int, typer.Option(help="Number of the frame of --picture.", rich_help_panel=_OUTPUT)]
 Report = Annotated[
     Path | None,
-    typer.Option(help="Picture of the quality over time.", metavar="FILE", rich_help_panel=_OUTPUT),
+    typer.Option(
+        help="Figure of the tracking quality over time to write.", metavar="FILE", rich_help_panel=_OUTPUT
+    ),
 ]
 Video = Annotated[
     Path | None,
-    typer.Option(help="Annotated video, .mp4, .mov or .avi.", metavar="FILE", rich_help_panel=_OUTPUT),
+    typer.Option(
+        help="Annotated video to write, .mp4, .mov or .avi.", metavar="FILE", rich_help_panel=_OUTPUT
+    ),
 ]
 VideoEvery = Annotated[
-    int, typer.Option(help="Show every so many-th frame in --video.", rich_help_panel=_OUTPUT)
+    int, typer.Option(help="Interval of the frames shown in --video.", rich_help_panel=_OUTPUT)
 ]
 
 
@@ -225,9 +246,9 @@ def track(
 ) -> None:
     """Track beam and shaker in every frame of a high-speed recording.
 
-    Finds the beam, the shaker and a sticker on it, fits their edges to a fraction of a pixel, and writes the
-    displacements with standard errors and flags to a NetCDF file.  What could not be measured is flagged and
-    left out, never filled in.  What makes the result doubtful is said, and under --strict refused.
+    The command finds the beam, the shaker and a sticker on it, fits their edges to a fraction of a pixel, and writes the
+    displacements with standard errors and flags to a NetCDF file.  Frames without a valid edge are NaN and have a flag.
+    Diagnostics report doubtful results; with --strict they are errors.
 
     Example: snapbeam track test.cihx --pixel-size 12e-6 --buckling-level 0.335e-3 -o test.nc --picture
     frame.png --report quality.png
@@ -304,7 +325,7 @@ def track(
 
 
 def _rest(text: str | None) -> int | tuple[int, int] | None:
-    """Frames at rest from "20" or "-40:0"."""
+    """Return the frames at rest from "20" or "-40:0"."""
     if text is None:
         return None
     if ":" in text:
@@ -320,7 +341,7 @@ def _opened(
     region: tuple[int, ...] | None,
     scale_marks: str | None,
 ) -> Recording:
-    """Open a recording, its pixel size taken from two marks if they are given."""
+    """Open a recording, with the pixel size from two marks if they are given."""
     from snapbeam.lab.camera import open_recording, pixel_size_from_marks
     from snapbeam.util.validation import InputError
 
@@ -346,7 +367,7 @@ def _opened(
 
 
 def _picture(path: Path, recording: Recording) -> Any:
-    """A picture of the empty scene, cut to the region of a recording."""
+    """Image of the empty scene, cropped to the region of a recording."""
     from snapbeam.lab.image_sources import load_image
     from snapbeam.util.validation import InputError
 

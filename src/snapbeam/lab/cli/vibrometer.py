@@ -30,15 +30,15 @@ __all__ = [
 
 
 Frequency = Annotated[
-    float | None, opt.number_option("Excitation frequency as set, Hz, as a guess.", "Drive")
+    float | None, opt.number_option("Set excitation frequency, Hz, as the initial guess.", "Drive")
 ]
 SnrLimit = Annotated[
-    float | None, opt.number_option("Least ratio of sine to all else, dB, to accept (15).", "Drive")
+    float | None, opt.number_option("Minimum signal-to-noise ratio (SINAD) to accept, dB (15).", "Drive")
 ]
 Camera = Annotated[
     Path | None,
     typer.Option(
-        help="NetCDF file of the tracked recording of the same test, to align with.",
+        help="NetCDF file of the tracked recording of the same test, for the alignment.",
         metavar="FILE",
         rich_help_panel="Drive",
     ),
@@ -46,28 +46,31 @@ Camera = Annotated[
 Polarity = Annotated[
     int | None,
     typer.Option(
-        help="1 or -1: whether vibrometer and camera count the same direction as positive; found from the start.",
+        help="Polarity of the vibrometer relative to the camera, 1 or -1; by default from the onset of the motion.",
         rich_help_panel="Drive",
     ),
 ]
 Near = Annotated[
     float | None,
-    opt.number_option("Delay of the camera's clock, s, known to half a cycle, as from a trigger.", "Drive"),
+    opt.number_option(
+        "Approximate delay of the camera's clock, s, to half a cycle, such as from a trigger.", "Drive"
+    ),
 ]
-Amplitude = Annotated[float | None, opt.number_option("Amplitude as set, m/s (or m), to check by.", "Drive")]
+Amplitude = Annotated[float | None, opt.number_option("Set amplitude, m/s (or m), for a check.", "Drive")]
 AmplitudeFrom = Annotated[
-    str, typer.Option(help="vibrometer or camera: whose amplitude the drive has.", rich_help_panel="Drive")
+    str,
+    typer.Option(help="Source of the amplitude of the drive: vibrometer or camera.", rich_help_panel="Drive"),
 ]
 DriveOutput = Annotated[
     Path | None,
     typer.Option(
-        help="NetCDF file of the drive, drift-free and resampled, to write.",
+        help="NetCDF file of the drive to write, drift-free and resampled.",
         metavar="FILE",
         rich_help_panel="Output",
     ),
 ]
 DriveSamplingFreq = Annotated[
-    float | None, opt.number_option("Samples per second of --drive-output, Hz (100000).", "Output")
+    float | None, opt.number_option("Sampling frequency of --drive-output, Hz (100000).", "Output")
 ]
 
 
@@ -96,9 +99,9 @@ def vibrometer(
 ) -> None:
     """Measure the motion of the shaker from a vibrometer signal, and check whether the test is acceptable.
 
-    Fits the steady sine with standard errors, tells noise from distortion, finds and describes the start-up
-    transient, and on request aligns the record with a tracked recording and writes the measured drive for use
-    in the model.
+    The command fits the steady sine with standard errors, separates noise from distortion, and describes the start-up
+    transient.  With --camera it aligns the signal with a tracked recording; with --drive-output it writes the measured
+    drive for simulations.
 
     Example: snapbeam vibrometer velocity.csv --frequency 100 --plot drive.png --json drive.json
     """

@@ -60,7 +60,7 @@ def fit_decay(
     units : str
         Unit of the signal; tells displacement from velocity.
     soften : bool
-        Whether frequencies may depend on amplitude.
+        True if frequencies may depend on amplitude.
     known : (float, float), optional
         Softening kappa of the first mode and its standard deviation, known beforehand.
     law : DampingLaw, optional
@@ -156,7 +156,7 @@ def fit_decay(
 
 
 def explain(samples: SignalSamples, modes: list[ModeEstimate], units: str, soften: bool) -> FitResult:
-    """What given modes leave of a signal, their amplitudes and phases fitted, all else kept."""
+    """Fit amplitudes and phases of given modes to a signal, with all other parameters fixed."""
     t = samples.time - samples.time[0]
     first = modes[0].amplitude ** 2
     value = {name: mean for name, (mean, _) in law_priors(units).items()}
@@ -239,7 +239,7 @@ def _first_envelope(
 
 
 def _alone(design: _Array, solution: _Array, rest: _Array, columns: list[int]) -> _Array:
-    """What is left of a record without all modes but the first."""
+    """Signal after subtraction of all modes but the first."""
     first = np.ones(solution.size, dtype=bool)
     for column in columns[1:]:
         first[column : column + 2] = False

@@ -64,10 +64,10 @@ def identify_decay(
         Displacement [m or b], velocity, acceleration or voltage, evenly sampled, with its mean position of no
         concern.
     modes : int
-        How many modes to look for, strongest first, by the matrix pencil (see
-        :mod:`snapbeam.lab.decay.poles`); with the method ``"fit"`` all are fitted together.
+        Number of modes, strongest first, by the matrix pencil (see :mod:`snapbeam.lab.decay.poles`); with the
+        method ``"fit"`` all are fitted together.
     frequencies : array_like, optional
-        Rough frequencies [Hz] of the modes, to ten percent, instead of *modes*.
+        Approximate frequencies [Hz] of the modes, within 10 %, instead of *modes*.
     method : {"fit", "hilbert", "log_decrement"}
         Nonlinear least squares on the signal itself; regression on amplitude and phase of the analytic
         signal; regression on height and time of the maxima.
@@ -75,20 +75,20 @@ def identify_decay(
         The part of the signal [s] that decays freely.  The start is found if left out: where the motion sets
         in, and where its tops are no longer cut off; a second hit ends the decay.
     soften : bool
-        Whether frequencies may depend on amplitude.
+        True if frequencies may depend on amplitude.
     buckling_level : float, optional
-        b [m], for the centre's displacement or velocity: the softening is then held near 0.75 (a/b)^2, that
-        of one mode, within 10 %, which narrows the frequency of a short decay.
+        b [m], for the displacement or velocity of mid-span: the softening then has a prior near 0.75 (a/b)^2,
+        that of one mode, within 10 %, which narrows the frequency of a short decay.
     exponential_window : float, optional
-        Time constant T [s] of a window exp(-t/T) by which an analyser has multiplied the record; undone.
+        Time constant T [s] of a window exp(-t/T) of the analyser, to correct.
 
     Returns
     -------
     DecayFit
-        The truth is the frequency of vanishing amplitude, and the viscous damping ratio: where the amplitude
-        of the first mode shows dry friction or quadratic drag beside it, its strength is fitted too.
-        Standard errors follow the noise near each mode and include what is not known of the law of softening;
-        where the fit leaves more than noise, they hold what parts of the decay differ by, and a diagnostic says so.
+        Frequencies at zero amplitude, and viscous damping ratios. If the amplitude of the first mode shows dry
+        friction or quadratic drag in addition, its strength is fitted too. Standard errors follow the noise
+        near each mode and include the uncertainty of the softening law. If the residual exceeds the noise, they
+        include the differences between parts of the decay, and a diagnostic reports it.
 
     Raises
     ------

@@ -158,7 +158,7 @@ def _group_fit(
 
 
 def _apart(samples: SignalSamples, pole: Pole, modes: list[ModeEstimate]) -> bool:
-    """Whether a pole lies so far from all modes that it is none of the poles into which one that softens splits."""
+    """Return whether a pole is too far from all modes to be a side pole of a softening mode."""
     span = samples.values.size / samples.sampling_frequency
     return all(
         abs(pole.frequency - mode.natural_frequency)

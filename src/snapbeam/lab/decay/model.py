@@ -1,4 +1,4 @@
-"""What a decay identification returns, and the law of a softening mode it rests on.
+"""Results of a decay identification, and the amplitude-frequency law of a softening mode.
 
 With linear damping the action of a free oscillation falls as exp(-2 zeta omega_0 t).  A mode about a well
 of a bistable beam softens: at amplitude a its frequency is
@@ -454,7 +454,7 @@ def mode_shapes(first: xr.DataArray, second: xr.DataArray, fit: DecayFit) -> tup
     first, second : xarray.DataArray
         The two records, of one length and rate.
     fit : DecayFit
-        What :func:`snapbeam.lab.identify_decay` made of the first.
+        Result of :func:`snapbeam.lab.identify_decay` for the first signal.
 
     Raises
     ------
@@ -524,7 +524,7 @@ class WellComparison:
 
     @property
     def agree(self) -> bool | None:
-        """Whether the difference is within two standard errors; None if none were given."""
+        """True if the difference is within two standard errors; None if standard errors are missing."""
         return None if self.difference_se is None else abs(self.difference) <= 2.0 * self.difference_se
 
     @property

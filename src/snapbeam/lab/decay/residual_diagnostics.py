@@ -1,4 +1,4 @@
-"""What a fit leaves of a decay, and what that does to its standard errors."""
+"""Residual of a decay fit, and its effect on the standard errors."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _APART = 6.0  # standard errors by which two halves of a decay may differ
 
 
 class Misfit(NamedTuple):
-    """What a fit leaves near its first mode: over what noise explains (``ratio``), and over the amplitude."""
+    """Residual near the first mode: relative to the noise (``ratio``), and to the amplitude (``share``)."""
 
     ratio: float
     share: float
 
 
 def misfit_of(samples: SignalSamples, residual: _Array, modes: list[ModeEstimate]) -> Misfit:
-    """What is left within a narrow band about the first mode, against the noise beside that band.
+    """Residual in a narrow band about the first mode, relative to the noise next to that band.
 
     The band is that of the decay itself, at least some lines of the spectrum wide.
     """
@@ -153,7 +153,7 @@ def _halves(
 
 
 def sampled_diagnostics(modes: tuple[ModeEstimate, ...], sampling_frequency: float) -> list[Diagnostic]:
-    """What is to be said of modes above the band that filters against aliasing keep clean."""
+    """Diagnostics for modes above the band that is free of aliasing."""
     limit = sampling_frequency / _BAND
     return [
         KINDS_DECAY["above_band"].found(
@@ -189,7 +189,7 @@ def widened(modes: tuple[ModeEstimate, ...], drift: float, added: float) -> tupl
 def diagnostics_about(
     samples: SignalSamples, modes: tuple[ModeEstimate, ...], noise: float, soften: bool
 ) -> list[Diagnostic]:
-    """What the numbers of a decay alone make doubtful."""
+    """Diagnostics from the numbers of one decay alone."""
     told = []
     span = samples.values.size / samples.sampling_frequency
     first = modes[0]

@@ -74,7 +74,7 @@ class AmplitudeJump(NamedTuple):
 
 
 def find_release(samples: SignalSamples, frequency: float) -> int:
-    """First sample of the free decay: where its swing, seen over a period, is the greatest.
+    """First sample of the free decay: where its swing, seen over a period, is the maximum.
 
     0 where the record begins with it.  The swing is that of the rate of change, so that the deflection before
     a release, a constant, is none.
@@ -105,9 +105,9 @@ def find_release(samples: SignalSamples, frequency: float) -> int:
 
 
 def find_ceiling(samples: SignalSamples, frequency: float) -> Ceiling | None:
-    """Whether the first cycles of a decay are cut off, and until where.
+    """Detect clipping of the first cycles of a decay, and its end.
 
-    Either the record hits its greatest or least value in runs of equal samples, or the maxima of at least four
+    Either the record hits its maximum or minimum value in runs of equal samples, or the maxima of at least four
     cycles stay level, and flat, where the later ones fall.
     """
     values = samples.values
@@ -185,7 +185,7 @@ _LEVEL = 0.08  # of that by which the bottoms may change
 
 
 def one_sided(samples: SignalSamples, frequency: float) -> bool:
-    """Whether the tops of a decay fall towards bottoms that stay level, as of a rectified or squared signal."""
+    """Return whether only the maxima or only the minima decay, as in a rectified or squared signal."""
     width = round(_SPAN * samples.sampling_frequency / frequency)
     count = samples.values.size // width
     if count < 3:
@@ -210,7 +210,7 @@ _SECOND = 2.0  # times the square of the softening that its next order may be, t
 
 
 def frequency_drift(cycles: Cycles, frequency: float) -> float:
-    """By what share a frequency changes over a decay with time alone; 0 if by no more than its error.
+    """Relative change of a frequency over a decay with time alone; 0 if it is within its error.
 
     The phase of the cycles is a line, the integrals of a^2 and a^4 (softening, a the amplitude of the cycles as it is;
     the second is held to the size that goes with the first) and, where the frequency drifts at a steady rate, t^2: a
@@ -284,7 +284,7 @@ class Decay:
 
 
 def dominant(samples: SignalSamples, low: float = 0.0, high: float | None = None) -> float:
-    """Frequency [Hz] of the strongest decaying sine, under a window that is greatest at the start.
+    """Frequency [Hz] of the strongest decaying sine, under a window that is maximum at the start.
 
     A window that rises from zero would hide what decays fast.
 
@@ -321,7 +321,7 @@ def prepared(samples: SignalSamples, start: float | None, stop: float | None) ->
     samples
         The record.
     start, stop
-        The part [s] that decays freely, as far as a person says so.
+        Part [s] of the free decay, as far as the user gives it.
 
     Raises
     ------
@@ -403,7 +403,7 @@ def _below_ceiling(samples: SignalSamples, frequency: float) -> tuple[SignalSamp
 
 
 def _decay_rate(samples: SignalSamples, frequency: float) -> float:
-    """A rough rate of decay [1/s] of the strongest mode, 0 where none can be told."""
+    """Approximate decay rate [1/s] of the strongest mode; 0 if unknown."""
     try:
         cycles = hilbert_cycles(samples, frequency, noise_level(samples))
         mode = regress(cycles, float(samples.time[0]), "1", "hilbert", soften=False)
@@ -519,7 +519,7 @@ def find_centres(decay: Decay, count: int, asked: list[float] | None) -> Centres
 
 
 def unexplained(residual: NDArray[np.float64], sampling_frequency: float) -> bool:
-    """Whether what a fit leaves still holds an oscillation that noise would not make."""
+    """Return whether a residual contains an oscillation that noise does not explain."""
     n = residual.size
     window = np.cos(0.5 * math.pi * np.arange(n) / n) ** 2
     power = np.abs(np.fft.rfft(residual * window)) ** 2
@@ -532,7 +532,7 @@ def unexplained(residual: NDArray[np.float64], sampling_frequency: float) -> boo
 
 
 def _is_mode(pole: Pole, span: float) -> bool:
-    """Whether a pole is a mode: above the noise, decaying, and seen for eight cycles."""
+    """Return whether a pole is a mode: above the noise, decaying, and eight or more cycles long."""
     return pole.energy > ENERGY and pole.damping_ratio > -1e-3 and pole.frequency * span >= 8.0
 
 

@@ -235,7 +235,7 @@ _RARE = 0.05  # share of frames that may jump or be distorted without more than 
 
 @dataclass(frozen=True)
 class SeenMotion:
-    """What the diagnostics of a tracked recording are drawn from, beside the scene.
+    """Input of the diagnostics of a tracked recording, in addition to the scene.
 
     ``penetration`` [px] of the tip into the beam, NaN where unknown, and that while they ``touch``; ``scale``
     [mm/px]; ``drift`` [px] of the camera, the largest; ``fields`` of interlaced video; ``order`` of the
@@ -256,7 +256,7 @@ class SeenMotion:
 def tracking_diagnostics(
     scene: Scene, seen: SeenMotion, settings: TrackingSettings, offset_mm: float, rate: float
 ) -> tuple[Diagnostic, ...]:
-    """What a tracked recording says against itself.
+    """Diagnostics of a tracked recording.
 
     *offset_mm* is the error of the rest position, *rate* that of the frames [Hz].
     """
@@ -279,7 +279,7 @@ def tracking_diagnostics(
 
 
 def contact_shift(touch: Touch, known: float) -> float:
-    """By how much [px] shaker and beam are shifted against each other, as far as their contact tells; 0 if not.
+    """Offset [px] between shaker and beam from their contact; 0 if it cannot be determined.
 
     *known* is the standard error [px] of where tip and beam are, which explains as much.
     """
@@ -296,7 +296,7 @@ def rounding_shift(beam: BeamView) -> float:
 
 
 def never_touching(penetration: np.ndarray, rows: TrackedRows) -> float:
-    """Least gap [px] between tip and beam if the beam moves without ever being touched; else 0."""
+    """Minimum gap [px] between tip and beam if the beam moves without ever being touched; else 0."""
     row = rows.row
     known, seen = np.isfinite(penetration), np.isfinite(row)
     if not known.any() or not seen.any() or np.ptp(np.percentile(row[seen], (0.5, 99.5))) <= 2.0:
@@ -329,7 +329,7 @@ def _of_the_beam(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> 
 
 
 def _of_the_motion(seen: SeenMotion, settings: TrackingSettings, rate: float) -> list[Diagnostic]:
-    """Whether beam or shaker go further or faster than they can."""
+    """Diagnostics for a beam or shaker motion beyond plausible displacement or speed."""
     told = []
     if settings.buckling_level is not None:
         sign = 1.0 if settings.side in ("below", "left") else -1.0

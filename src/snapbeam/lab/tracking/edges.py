@@ -153,7 +153,7 @@ def width_calibration(width: float, rows: int) -> tuple[Floats, Floats]:
 
 
 def edge_noise(width: float, noise: float, contrast: float) -> float:
-    """Least standard deviation [px] of the row of one edge in white noise: sqrt(2 sqrt(pi) s) n/c; 0 if not known.
+    """Minimum standard deviation [px] of the row of one edge in white noise: sqrt(2 sqrt(pi) s) n/c; 0 if not known.
 
     Parameters
     ----------

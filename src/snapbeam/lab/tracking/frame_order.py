@@ -42,7 +42,7 @@ class FrameOrder(NamedTuple):
 
 
 def find_order(row: Floats, shaker: Floats, penetration: Floats) -> FrameOrder:
-    """Where frames are lost or shown twice.
+    """Detect lost and repeated frames.
 
     Parameters
     ----------

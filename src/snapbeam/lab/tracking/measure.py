@@ -188,7 +188,7 @@ def wanderings(rows: Floats, lost: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def distortion(
     thickness: Floats, residual: Floats, width: Floats, usual_width: float
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """By how much the beam looks thicker or thinner than usual [px], and which frames are distorted.
+    """Deviation of the beam thickness from the usual value [px], and the distorted frames.
 
     A frame is distorted if that exceeds five robust standard deviations and 0.06 px, if the mean over 32 frames about
     it is as far off (faint light that lasts), or if its edges are no steps: fits that leave three times as much as
@@ -214,7 +214,7 @@ def distortion(
 
 
 def _lasting(miss: Floats) -> Floats:
-    """How far off the thickness is on average over any stretch that a frame is in, where that is no chance; else 0.
+    """Mean deviation of the thickness over the stretch around each frame, if it is significant; otherwise 0.
 
     What chance does is told by the steps from frame to frame: light that lasts over a good part of the recording
     widens the scatter of all frames together, but not these.
@@ -244,7 +244,7 @@ def pooled(error: Floats) -> Floats:
 
 
 def unexplained_blur(row: Floats, width: Floats, usual: float) -> Floats:
-    """By how much [px] edges are wider than lens and motion explain, over the frames; 0 where they are not.
+    """Excess of the edge width over lens and motion blur [px], over the frames; otherwise 0.
 
     An exposure is no longer than a frame, so motion smears an edge over no more than the step from frame to
     frame, with a standard deviation of that over the root of 12.
@@ -294,7 +294,7 @@ def find_rest(row: Floats, error: Floats, shaker: Floats, given: tuple[int, int]
 
 
 def _beside(values: Floats, used: NDArray[np.intp], noise: float) -> float:
-    """By how many standard errors the row strays from few frames at rest over the frames before or behind them.
+    """Deviation of the row from few frames at rest to the neighbouring frames, in standard errors.
 
     A few frames say nothing of motion themselves; at rest those of one side are at the same place.
     """
@@ -624,7 +624,7 @@ class TrackedRows:
     hollow: float = 0.0
 
     def flagged(self, flag: FrameFlag) -> int:
-        """How many frames carry a flag."""
+        """Number of frames with a flag."""
         return int(np.count_nonzero(self.flags & int(flag)))
 
 
@@ -636,7 +636,7 @@ class Drift(NamedTuple):
 
 
 class Follower:
-    """Collects the measurements of batch after batch and says what is wrong with each frame."""
+    """Collect the measurements of all batches, and flag invalid frames."""
 
     def __init__(self, scene: Scene, blur_limit: float | None) -> None:
         self.scene = scene
@@ -754,7 +754,7 @@ class Follower:
         return (strip == before).all((1, 2))
 
     def _leaving(self, name: str, rows: Floats, height: int) -> NDArray[np.bool_]:
-        """Whether the last position before each frame was near the border of the region."""
+        """Mask of the frames whose preceding valid position was near the border of the region."""
         near = np.where(np.isfinite(rows), (rows < BORDER) | (rows > height - 1 - BORDER), False)
         known = np.isfinite(rows)
         last = np.maximum.accumulate(np.where(known, np.arange(rows.size), -1))
@@ -764,7 +764,7 @@ class Follower:
 
 
 def _lasting_hollow(hollow: Floats) -> float:
-    """By how much the edge is hollow in all frames [px]; 0 where that is less than what surfaces do."""
+    """Curvature of the edge in all frames [px]; 0 if it is below that of real surfaces."""
     known = hollow[np.isfinite(hollow)]
     middle = float(np.median(known)) if known.size else 0.0
     return abs(middle) if abs(middle) > _HOLLOW else 0.0
@@ -822,7 +822,7 @@ def seen_fields(
     rows: TrackedRows,
     along_rows: bool,
 ) -> VideoFields:
-    """What a tracked recording shows of fields; *along_rows* if the beam lies along the picture's rows.
+    """Signs of interlaced fields in a tracked recording; *along_rows*: the beam is along image rows.
 
     *prepare* turns frames as they were tracked.
     """
@@ -836,7 +836,7 @@ def fields_apart(
     rows: TrackedRows,
     along_rows: bool,
 ) -> float:
-    """By what share of the step from frame to frame odd and even rows of the picture differ; 0 where they do not.
+    """Difference between odd and even rows, as a fraction of the step between frames; 0 if there is none.
 
     In the fastest frames the edge is sought in odd and in even rows: with d_k the difference and v_k the step a frame,
     the share is the slope of d over v through 0.  Rows taken together differ by nothing, fields half a frame apart by
@@ -928,7 +928,7 @@ def image_lag(row: Floats, width: Floats, exposure: float) -> float:
 
 
 def alternation(row: Floats) -> float:
-    """By how much every other frame is shifted [px]; 0 if by no more than chance.
+    """Shift of every other frame [px]; 0 if it is not significant.
 
     Each frame against the mean of its neighbours, with turning sign: no motion that a camera can follow does that.
     """

@@ -1,4 +1,4 @@
-"""How a recording is to be tracked: every choice in one frozen value, checked when it is made."""
+"""Settings of the tracking, in one frozen and checked object."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ HOT = 0.25  # share of saturated pixels, beyond the usual, from which an edge is
 
 @dataclass(frozen=True)
 class Orientation:
-    """The side of the beam on which the shaker stands, and the turn that brings it below."""
+    """Side of the beam on which the shaker is, and the rotation that brings it below."""
 
     side: str
     shape: tuple[int, int]
@@ -106,7 +106,7 @@ def spread_columns(low: int, high: int, count: int) -> NDArray[np.intp]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrackingSettings:
-    """What a person knows of a recording, and how to look at it.
+    """Settings of the tracking of a recording: geometry of the scene, thresholds, reference frames.
 
     Attributes
     ----------
@@ -119,13 +119,13 @@ class TrackingSettings:
         Unless given, the well that faces the shaker: -(b/2)(1 - cos 2 pi x_s/L), of opposite sign for a
         shaker above; 0 without ``buckling_level``.
     rest_frames
-        Frames in which the beam is at rest: how many at the start, or (first, one past the last), negative
-        numbers counted from the end.  Unless given, the first half of those before it first departs from
-        their mean by three standard errors.
+        Frames in which the beam is at rest: their number at the start, or (first, one past the last), negative
+        numbers counted from the end.  Unless given, the first half of those before it first departs from their
+        mean by three standard errors.
     beam_thickness
-        Thickness of the beam as measured with a gauge [m], to check what was found and the pixel size.
+        Thickness of the beam as measured with a gauge [m], to check the tracked thickness and the pixel size.
     side
-        Side of the beam on which the shaker stands: "below", "above", "left" or "right".  Up (or right) is
+        Side of the beam on which the shaker is: "below", "above", "left" or "right".  Up (or right) is
         positive.
     objects
         "bright" or "dark" against the background, or "auto": unlike the rows beyond the beam.
@@ -148,7 +148,7 @@ class TrackingSettings:
         Edge width [px] beyond which a frame is flagged as blurred; 2.5 times the usual plus 0.5 unless given.
     fixed_marks
         Parts of the picture, each (first row, last row + 1, first column, last column + 1), that show
-        something which stands still; their motion is the camera's and is taken out.
+        stationary objects; their motion is that of the camera and is subtracted.
 
     Examples
     --------
@@ -208,7 +208,7 @@ class TrackingSettings:
             object.__setattr__(self, name, check(value))
 
     def changed(self, **changes: Any) -> TrackingSettings:
-        """These settings with some changed, by name.
+        """Copy of the settings with some changed, by name.
 
         Raises
         ------
@@ -220,7 +220,7 @@ class TrackingSettings:
         return dataclasses.replace(self, **changes)
 
     def checked_for(self, shape: tuple[int, int], frames: int) -> TrackingSettings:
-        """These settings, if they fit a recording of *frames* frames of *shape*.
+        """Settings, checked for a recording of *frames* frames of *shape*.
 
         Raises
         ------
@@ -379,7 +379,7 @@ class ShakerView:
 
     @property
     def mark(self) -> str:
-        """What is followed: "sticker" or "tip"."""
+        """Tracked object: "sticker" or "tip"."""
         return "tip" if self.sticker is None else "sticker"
 
     @property
@@ -433,7 +433,7 @@ class NoiseShape:
 
     @property
     def factor(self) -> float:
-        """By how much errors are larger than neighbouring columns seem to say, as their noise is alike."""
+        """Factor between the true errors and those from neighbouring columns, because their noise is correlated."""
         return math.sqrt((1.0 + self.along) / (1.0 - self.along))
 
     @property
@@ -518,7 +518,7 @@ class FrameFlag(IntFlag):
 
     @property
     def advice(self) -> str:
-        """What happened and what to do about it, for each reason in turn."""
+        """Cause and remedy of each flag."""
         return "; ".join(text for flag, text in _ADVICE.items() if flag in self) or "measured"
 
 

@@ -191,7 +191,7 @@ def _still_bands(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _peaks(share: NDArray[np.floating]) -> NDArray[np.intp]:
-    """Middle of each stretch of rows at which an edge stands in most of the sample."""
+    """Middle of each range of rows with an edge in most of the sample."""
     still = share >= _STILL
     steps = np.diff(np.concatenate([[0], still.astype(np.int8), [0]]))
     middle: NDArray[np.intp] = (np.flatnonzero(steps == 1) + np.flatnonzero(steps == -1) - 1) // 2
@@ -199,7 +199,7 @@ def _peaks(share: NDArray[np.floating]) -> NDArray[np.intp]:
 
 
 def _moving_beam(mask: NDArray[np.bool_], edge: NDArray[np.intp] | None = None) -> bool:
-    """Whether what is left of a mask holds an object that crosses the picture, ends within it and moves.
+    """Return whether the rest of a mask contains a moving object that crosses the image and ends within it.
 
     Against *edge*, rows (frames, columns), if given.
     """
@@ -313,7 +313,7 @@ def _light(y: Floats, error: Floats, gamma: float, ratio: float, sign: float) ->
 
 
 def _asymmetry(x: Floats, light: Floats, error: Floats) -> tuple[float, float]:
-    """Chi-square of an edge turned about its centre against itself, least over the centre, and the centre."""
+    """Chi-square of an edge turned about its centre against itself, minimum over the centre, and the centre."""
     away = np.arange(0.5, 4.0 / _STEP) * _STEP
 
     def chi(centre: float) -> float:
@@ -586,7 +586,7 @@ def saturation_level(frames: NDArray[np.integer], max_value: float, noise: float
 
 
 def _whole_bits(level: int) -> bool:
-    """Whether a level is the largest of 10, 12 or 14 bits, at either end of 16."""
+    """Return whether a level is full scale of 10, 12 or 14 bits, at either end of 16."""
     return any(level in (2**bits - 1, (2**bits - 1) << (16 - bits)) for bits in (10, 12, 14))
 
 
@@ -772,7 +772,7 @@ def tip_outline(rows: Floats, good: NDArray[np.bool_], reference: Floats) -> tup
 
 
 class Apex(NamedTuple):
-    """Where the tip comes nearest to the beam: its row, the row's standard error, its column from the contact's."""
+    """Point of the tip nearest to the beam: row, standard error of the row, column from the contact."""
 
     row: float
     error: float
@@ -829,7 +829,7 @@ _CLEAR = 4.0  # rows from the beam within which a mark that stands alone may be 
 
 
 class Wanted(NamedTuple):
-    """What a person asks of the shaker: to look for a sticker, where its tip is [px], to keep the column.
+    """Settings of the shaker: search for a sticker, tip location [px], fixed column.
 
     ``head`` counts the frames at the start of the sample that are neighbours.
     """
@@ -905,7 +905,7 @@ def shaker_view(
 
 
 def _stands_alone(bands: BeamBands, middle: NDArray[np.intp], near: Floats) -> bool:
-    """Whether all that is seen below the beam is a band of one height that never comes near it.
+    """Return whether only a separate band of constant height appears below the beam.
 
     So a bright sticker on a shaker as dark as the background looks; a bright shaker reaches the border.
     """

@@ -255,8 +255,7 @@ def track(
     recording
         An open recording.
     settings
-        What is known of the recording and how to look at it; the defaults of :class:`TrackingSettings`
-        unless given.
+        Settings of the tracking; by default those of :class:`TrackingSettings`.
     progress
         Called with (frames done, frames in all).
     **changes
@@ -265,15 +264,14 @@ def track(
     Returns
     -------
     xarray.Dataset
-        Over ``time`` [s]: ``displacement_at_striker``, ``striker_displacement``,
-        ``penetration_normalised`` in b and, with
-        ``_mm``, in mm; ``displacement_stderr_mm`` and ``shaker_stderr_mm`` from the scatter of the columns,
-        the rest position and what the diagnostics widen; ``confidence`` from 0 to 1; ``flags``
+        Over ``time`` [s]: ``displacement_at_striker``, ``striker_displacement``, ``penetration_normalised`` in
+        b and, with ``_mm``, in mm; ``displacement_stderr_mm`` and ``shaker_stderr_mm`` from the scatter of the
+        columns, the rest position and the increase by diagnostics; ``confidence`` from 0 to 1; ``flags``
         (:class:`FrameFlag`); ``valid``; ``edge_width`` [px]; and, for drawing, ``beam_row``, ``beam_slope``,
         ``tip_row``, ``marker_row`` [px, turned picture], with the noise of the first and third in
-        ``beam_row_stderr`` and ``tip_row_stderr``.  What could not be measured is NaN and flagged, never
-        filled in; frames missing from the numbering appear so.  The attribute ``diagnostics`` holds what makes
-        the result doubtful; :func:`snapbeam.lab.diagnostics_of` reads it.
+        ``beam_row_stderr`` and ``tip_row_stderr``.  Frames without a valid edge, and frames missing from the
+        numbering, are NaN and have a flag. The attribute ``diagnostics`` contains the diagnostics;
+        :func:`snapbeam.lab.diagnostics_of` reads it.
 
     Raises
     ------
@@ -342,7 +340,7 @@ def _sample(recording: Recording) -> tuple[NDArray[np.integer], int]:
 
 
 class _Prepare:
-    """Turn a batch of frames so that the shaker stands below, undo the camera's curve, take the background out."""
+    """Rotate a batch of frames so that the shaker is below, linearise grey levels, subtract the background."""
 
     def __init__(
         self, recording: Recording, turn: Orientation, settings: TrackingSettings, saturated: float
@@ -545,11 +543,11 @@ def contact_onsets(
 ) -> xr.Dataset:
     """Impacts in a tracked recording: where the tip reaches the beam and leaves it again.
 
-    Contact begins when the penetration rises above ``-tolerance`` and ends when it falls below twice that,
-    which keeps noise from cutting one contact into many.  The instant follows from a straight line through
-    the last frames of the approach (and the first of the parting), continued to zero; a frame stands for
-    the middle of its exposure where that is known.  Frames that were not
-    measured end what is known: a contact that begins or ends in such a gap has ``bounded`` = 0.
+    Contact begins when the penetration rises above ``-tolerance`` and ends when it falls below twice that, so
+    that noise does not split one contact into several.  The instant follows from a straight line through the
+    last frames of the approach (and the first of the parting), continued to zero; the time of a frame is the
+    middle of its exposure, if known. A contact that begins or ends in a gap of unmeasured frames has
+    ``bounded`` = 0.
 
     Parameters
     ----------
@@ -570,7 +568,7 @@ def contact_onsets(
     Raises
     ------
     InputError
-        If the dataset holds no penetration.
+        If the dataset contains no penetration.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What every law of contact says of itself, and the laws by name."""
+"""Base class of contact laws, and the laws by name."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ __all__ = ["LAWS", "ContactLaw", "LawProperties", "hertzian_time"]
 LAWS: dict[str, type[ContactLaw]] = {}
 """Every law by the name it has in parameter files."""
 _HERTZ_PHASE = 4.03026
-"""Phase of the linear oscillator with the greatest slope of Hertz's contact during an impact: (4/5) B(2/5, 1/2) sqrt(15/8)."""
+"""Phase of a linear oscillator with the maximum slope of an impact under Hertz's law: (4/5) B(2/5, 1/2) sqrt(15/8)."""
 
 
 def hertzian_time(slope: float, mass: float) -> float:
-    """How long an impact under Hertz's law lasts whose greatest *slope* (N/m) a *mass* (kg) meets, s.
+    """Duration of an impact of *mass* (kg) under Hertz's law with a maximum *slope* of the force (N/m), s.
 
     A force that begins softly and becomes steep is resolved by this, not by the longer time that it lasts.
     """
@@ -31,7 +31,7 @@ def hertzian_time(slope: float, mass: float) -> float:
 
 @dataclass(frozen=True)
 class LawProperties:
-    """What a law of contact leaves intact; what it does not is refused, or switched off, where it is needed."""
+    """Properties that a contact law preserves; functions that need a missing one raise an error or switch it off."""
 
     mirror: bool = True
     """The mirror image of a run is a run."""
@@ -46,8 +46,8 @@ class LawProperties:
 class ContactLaw:
     """A law of contact between the striker's tip and the beam: a frozen dataclass in a file of its own.
 
-    Its fields are quantities of scope *run*, each a positive number or zero.  Its physics are scalar functions of
-    numbers that every engine compiles for itself; ``law`` stands for the numbers, by the names of the fields:
+    Its fields are quantities of scope *run*, each a positive number or zero.  Its physics are scalar functions
+    of numbers, which every solver compiles; ``law`` contains the numbers, by the names of the fields:
 
     - ``force(law, penetration)``: force on both, N, for a penetration > 0 (m);
     - ``energy(law, penetration)``: energy stored in the contact, J, whose derivative is the force;
@@ -78,13 +78,13 @@ class ContactLaw:
     """In parameter files and attributes."""
     properties: ClassVar[LawProperties] = LawProperties()
     impulsive: ClassVar[bool] = False
-    """Whether an impact lasts no time: a jump of the velocity instead of a force."""
+    """True if an impact has zero duration: a jump of the velocity instead of a force."""
     rate_dependent: ClassVar[bool] = False
-    """Whether the force depends on the rate of penetration too."""
+    """True if the force also depends on the rate of penetration."""
     memory: ClassVar[str] = ""
     """Name of a residual indentation that is a part of the state; it is the last of the law's numbers."""
     vectorizable: ClassVar[bool] = False
-    """Whether its force is plain arithmetic and square roots, without branches, so that eight are computed at once."""
+    """True if the force needs only arithmetic and square roots, without branches: eight runs are computed at once."""
     max_modes: ClassVar[int | None] = None
     """Modes of a model that may be struck under this law."""
 
@@ -122,14 +122,14 @@ class ContactLaw:
 
     @property
     def is_dissipative(self) -> bool:
-        """Whether contacts under it may lose energy."""
+        """True if contacts under the law can dissipate energy."""
         return self.impulsive or self.rate_dependent or bool(self.memory)
 
     def impact_duration(self, mass: float, velocity: float) -> float:
         """Duration, s, of the impact of a free *mass* (kg) that arrives with *velocity* (m/s); 0 if it is never stopped.
 
-        Of the force without what it loses: 2 times the integral of 1/sqrt(v^2 - 2 E/m) over the penetration, from 0 to
-        the greatest, where the energy E of the law is m v^2/2.
+        Duration for the force without dissipation: 2 times the integral of 1/sqrt(v^2 - 2 E/m) over the
+        penetration, from 0 to the maximum, where the energy E of the law is m v^2/2.
         """
         depth = self._greatest_penetration(mass, velocity)
         if depth == 0.0:

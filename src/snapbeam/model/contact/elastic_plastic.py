@@ -105,7 +105,7 @@ class ElasticPlasticContact(ContactLaw):
 
     @property
     def restitution(self) -> float:
-        """Share of its speed that a free mass keeps at the first impact, at any speed."""
+        """Coefficient of restitution of a free mass at the first impact, at any speed."""
         return math.sqrt(self.loading_stiffness / self.unloading_stiffness)
 
     def impact_duration(self, mass: float, velocity: float) -> float:

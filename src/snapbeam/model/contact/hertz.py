@@ -90,7 +90,7 @@ class HertzContact(ContactLaw):
         return cls(stiffness=4.0 / 3.0 * math.sqrt(radius) / compliance)
 
     def max_penetration(self, mass: float, velocity: float) -> float:
-        """Greatest penetration, m, when a free *mass* (kg) meets a rigid wall at a *velocity* (m/s).
+        """Maximum penetration, m, when a free *mass* (kg) meets a rigid wall at a *velocity* (m/s).
 
         All the kinetic energy is in the contact: (2/5) k_c d^(5/2) = m v^2 / 2.
         """

@@ -88,21 +88,21 @@ class HuntCrossley(ContactLaw):
         speed : float
             m/s.
         preset : {"exact", "hunt-crossley", "lankarani-nikravesh", "gonthier", "flores"}
-            A published shortcut in place of the exact relation; :meth:`restitution` of what it returns says what it
-            really gives (for e = 0.5: 0.663, 0.725, 0.488 and 0.470).
+            A published approximation in place of the exact relation; :meth:`restitution` of the result shows
+            what it really gives (for e = 0.5: 0.663, 0.725, 0.488 and 0.470).
         """
         return cls(stiffness, preset_loss(restitution, speed, preset))
 
     def restitution(self, speed: float) -> float:
-        """Share of its speed that a free mass keeps when it arrives with *speed* (m/s)."""
+        """Coefficient of restitution of a free mass that arrives with *speed* (m/s)."""
         return restitution_of_loss(self.damping_factor * positive("speed", speed, "m/s"))
 
     def speed_for(self, restitution: float) -> float:
-        """The speed, m/s, at which a free mass keeps the share *restitution* of it; infinite without loss."""
+        """Impact speed, m/s, for which the coefficient of restitution is *restitution*; infinite without loss."""
         return math.inf if self.damping_factor == 0.0 else loss_number(restitution) / self.damping_factor
 
     def impact_duration(self, mass: float, velocity: float) -> float:
-        """As of Hertz's law, s: a loss shortens the approach and lengthens the departure."""
+        """Duration under Hertz's law, s: dissipation shortens the approach and lengthens the departure."""
         return HertzContact(self.stiffness).impact_duration(mass, velocity)
 
     def time_scale(self, mass: float, velocity: float) -> float:

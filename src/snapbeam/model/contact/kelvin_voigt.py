@@ -21,8 +21,8 @@ class KelvinVoigt(ContactLaw):
 
         e = exp(-2 zeta arccos(zeta)/sqrt(1 - zeta^2)),
 
-    and the continuation of the same to zeta >= 1; it leaves when the force has gone, before the spring is slack.
-    What the spring still holds then is lost.  The force begins with a jump, c v.
+    and the continuation of the same to zeta >= 1; it leaves when the force has gone, before the spring is
+    slack.  The remaining energy of the spring is dissipated.  The force begins with a jump, c v.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class KelvinVoigt(ContactLaw):
 
     @classmethod
     def from_restitution(cls, linear_stiffness: float, restitution: float, mass: float) -> KelvinVoigt:
-        """The law under which a free *mass* (kg) keeps the share *restitution* (in (0, 1]) of its speed.
+        """Law with the coefficient of restitution *restitution* (in (0, 1]) for a free *mass* (kg).
 
         Of a beam the mass that counts is the one met at the contact, ``model.contact_mass(location)``.
         """
@@ -102,12 +102,12 @@ class KelvinVoigt(ContactLaw):
         return cls(linear_stiffness, 2.0 * float(zeta) * math.sqrt(linear_stiffness * mass))
 
     def restitution(self, mass: float) -> float:
-        """Share of its speed that a free *mass* (kg) keeps, at any speed."""
+        """Coefficient of restitution of a free *mass* (kg), at any speed."""
         mass = positive("mass", mass, "kg")
         return _restitution(self.linear_damping / (2.0 * math.sqrt(self.linear_stiffness * mass)))
 
     def impact_duration(self, mass: float, velocity: float) -> float:
-        """Half a period of the undamped mass on its spring, s, shorter where the damper is what stops it."""
+        """Half a period of the undamped mass on its spring, s, shorter if the damper stops it."""
         half = math.pi * math.sqrt(mass / self.linear_stiffness)
         if self.linear_damping == 0.0:
             return half

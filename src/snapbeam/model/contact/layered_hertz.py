@@ -103,7 +103,7 @@ class LayeredHertz(ContactLaw):
         return cls(stiffness=stiffness, layer_stiffness=math.pi * radius * confined / thickness)
 
     def max_penetration(self, mass: float, velocity: float) -> float:
-        """Greatest penetration, m, of a free *mass* (kg) that arrives with *velocity* (m/s)."""
+        """Maximum penetration, m, of a free *mass* (kg) that arrives with *velocity* (m/s)."""
         from scipy.optimize import brentq
 
         wanted, law = 0.5 * mass * velocity**2, self.numbers_type()(self.stiffness, self.layer_stiffness)
@@ -112,7 +112,7 @@ class LayeredHertz(ContactLaw):
         return float(brentq(lambda d: self.energy(law, d) - wanted, 1e-6 * most, most, xtol=1e-12 * most))
 
     def impact_duration(self, mass: float, velocity: float) -> float:
-        """Duration of a free impact, s: 2 int dd/v(d) to the greatest, by Gauss's rule in x, d = d_max (1 - x^2)."""
+        """Duration of a free impact, s: 2 int dd/v(d) to the maximum, by Gauss's rule in x, d = d_max (1 - x^2)."""
         law = self.numbers_type()(self.stiffness, self.layer_stiffness)
         most, total = self.max_penetration(mass, velocity), 0.0
         for node, weight in zip(0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS, strict=True):
@@ -121,7 +121,7 @@ class LayeredHertz(ContactLaw):
         return 2.0 * total
 
     def time_scale(self, mass: float, velocity: float) -> float:
-        """The duration, or that of Hertz's contact with the same greatest slope, which is less."""
+        """The duration, or that of Hertz's contact with the same maximum slope, which is less."""
         law = self.numbers_type()(self.stiffness, self.layer_stiffness)
         slope = self.slope(law, self.max_penetration(mass, velocity))
         return min(self.impact_duration(mass, velocity), hertzian_time(slope, mass))

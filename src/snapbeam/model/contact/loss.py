@@ -1,4 +1,4 @@
-"""How much a contact loses: restitution and damping, made into each other without shortcuts."""
+"""Energy loss of a contact: exact conversion between coefficient of restitution and damping factor."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PRESETS: dict[str, Preset] = {
     ),
     "flores": Preset(lambda e: 1.6 * (1.0 - e) / e, "Flores et al., Multibody Syst. Dyn. 25 (2011)"),
 }
-"""By name.  None of them gives the restitution that it is asked for: :func:`restitution_of_loss` says what it gives."""
+"""Published approximations by name; :func:`restitution_of_loss` gives the restitution that results."""
 
 _SMALL = 1e-3
 
@@ -76,7 +76,7 @@ def _expanded(e: float, d: float) -> float:
 
 
 def restitution_of_loss(loss: float) -> float:
-    """What share of its speed a free mass keeps under a loss number D = chi v, exactly.
+    """Coefficient of restitution of a free mass with loss number D = chi v, exact.
 
     Parameters
     ----------

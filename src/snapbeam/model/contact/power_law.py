@@ -71,7 +71,7 @@ class PowerLaw(ContactLaw):
         return cls(positive("stiffness", stiffness, "N/m^p") * _MICROMETRE**p, p)
 
     def max_penetration(self, mass: float, velocity: float) -> float:
-        """Greatest penetration, m, of a free *mass* (kg) that arrives with *velocity* (m/s): f d/(p + 1) = m v^2/2."""
+        """Maximum penetration, m, of a free *mass* (kg) that arrives with *velocity* (m/s): f d/(p + 1) = m v^2/2."""
         n = self.exponent + 1.0
         at_one = self.force_at_1um * _MICROMETRE
         return float(_MICROMETRE * (0.5 * n * mass * velocity**2 / at_one) ** (1.0 / n))
@@ -83,7 +83,7 @@ class PowerLaw(ContactLaw):
         return 2.0 * self.max_penetration(mass, velocity) / velocity * beta / n
 
     def time_scale(self, mass: float, velocity: float) -> float:
-        """The duration, or, of an exponent above 3/2, that of Hertz's contact with the same greatest slope."""
+        """The duration, or, of an exponent above 3/2, that of Hertz's contact with the same maximum slope."""
         law = self.numbers_type()(self.force_at_1um, self.exponent)
         slope = self.slope(law, self.max_penetration(mass, velocity))
         return min(self.impact_duration(mass, velocity), hertzian_time(slope, mass))

@@ -1,4 +1,4 @@
-"""What a contact does to the materials: Hertz's pressure, the onset of yield, bending of the beam."""
+"""Contact stress: Hertzian pressure, onset of yield, bending of the beam."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ __all__ = ["HertzStress", "bending_stress", "hertz_stress"]
 
 _Array = NDArray[np.float64]
 _YIELD = 1.60
-"""Greatest pressure over the yield stress at which a sphere on a flat first yields, below the surface (nu = 0.3)."""
+"""Maximum pressure over the yield stress at which a sphere on a flat first yields, below the surface (nu = 0.3)."""
 
 
 @dataclass(frozen=True)
 class HertzStress:
-    """What a sphere does to a flat at a force.
+    """Stress state of a sphere pressed on a flat by a given force.
 
     Attributes
     ----------
     pressure : float
-        Greatest pressure p_0, in the middle of the contact, Pa.
+        Maximum pressure p_0, in the middle of the contact, Pa.
     contact_radius : float
         Of the circle of contact, m.
     yield_force : float or None
@@ -50,7 +50,7 @@ class HertzStress:
     force: float
 
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """That the elastic law is left, if it is."""
+        """Diagnostic if the force exceeds the elastic limit."""
         if self.yield_force is None or self.force <= self.yield_force:
             return ()
         return (
@@ -110,9 +110,9 @@ def hertz_stress(
 
 @checked
 def bending_stress(model: Any, amplitude: ArrayLike, count: int = 201) -> _Array:
-    """Greatest bending stress along the beam, E (h/2) max abs(w''), Pa, of amplitudes of shape (..., N), shape (...).
+    """Maximum bending stress along the beam, E (h/2) max abs(w''), Pa, of amplitudes of shape (..., N), shape (...).
 
-    The stress of the shape itself is meant, that of a beam made straight; the axial stress is not in it.
+    Bending stress of a beam made straight; the axial stress is not included.
     """
     if not hasattr(model, "beam"):
         raise InputTypeError(f"model = {shown(model)}: must be a ReducedModel")

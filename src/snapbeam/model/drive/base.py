@@ -1,4 +1,4 @@
-"""What every drive says of itself, and the drives by name."""
+"""Base class of drives, and the drives by name."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ DRIVES: dict[str, type[Drive]] = NamedTable(_sum_named)
 
 
 class Scale(NamedTuple):
-    """What normalised quantities of a drive are multiplied by."""
+    """Scales of the normalised quantities of a drive."""
 
     length: float
     """Length that normalises displacements, m: the buckling level b."""
@@ -44,7 +44,7 @@ class Scale(NamedTuple):
 
 
 SCALAR: list[Callable[..., Any]] = []
-"""Functions of numbers that motions share; kernels compile them as they stand."""
+"""Scalar functions that motions share; kernels compile them unchanged."""
 
 
 def scalar(function: _Scalar) -> _Scalar:
@@ -71,10 +71,10 @@ def sincos(angle: float) -> tuple[float, float]:
 class Drive:
     """A prescribed motion of the striker's tip about its mid-position: a frozen dataclass in a file of its own.
 
-    Kernels see its motion as a function of one argument that grows by ``omega`` radians a second.  A drive
-    that is not a sine brings ``motion(drive, memory, argument)``, a scalar function of numbers that every engine
-    compiles for itself and that returns displacement (m) and velocity (m/s), and ``acceleration`` likewise (m/s^2);
-    ``drive`` stands for its numbers and ``memory[drive.table:]`` for its samples.
+    Kernels see its motion as a function of one argument that grows by ``omega`` radians a second.  A drive that
+    is not a sine brings ``motion(drive, memory, argument)``, a scalar function of numbers that every engine
+    compiles for itself and that returns displacement (m) and velocity (m/s), and ``acceleration`` in the same
+    way (m/s^2); ``drive`` contains its numbers and ``memory[drive.table:]`` its samples.
 
     Examples
     --------
@@ -86,9 +86,9 @@ class Drive:
     name: ClassVar[str] = ""
     """In parameter files and attributes."""
     harmonic: ClassVar[bool] = False
-    """Whether it is the sine that engines know by themselves."""
+    """True for the sine, which is built into the solver."""
     is_periodic: ClassVar[bool] = True
-    """Whether the motion repeats after a turn of its argument; if not, that turn is longer than any run."""
+    """True if the motion repeats after one turn of its argument; otherwise one turn is longer than any run."""
     recorded: ClassVar[bool] = False
     """True for a record of a certain ``duration``."""
     integrated_as: ClassVar[type[Drive] | None] = None
@@ -103,7 +103,7 @@ class Drive:
     discontinuities: ClassVar[tuple[str, ...]] = ()
     """Numbers that are times at which the velocity or one of its derivatives jumps, s since the drive began: steps end there."""
     registry: ClassVar[dict[str, type[Drive]]] = DRIVES
-    """Where it is entered by its name."""
+    """Registry of the class, by name."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -143,24 +143,24 @@ class Drive:
         return [2.0 * math.pi / self.cycle(columns, scale)] if self.is_periodic else None
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """Highest displacement (m) from the mid-position and greatest speed (m/s) ever, shape (runs,)."""
+        """Highest displacement (m) from the mid-position and maximum speed (m/s) ever, shape (runs,)."""
         raise NotImplementedError
 
     def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """As the first of :meth:`bounds`, of the mirror image of the motion; the same unless it is lopsided."""
+        """Bound of the displacement of the mirrored motion; differs from :meth:`bounds` if asymmetric."""
         return self.bounds(columns, scale)[0]
 
     @classmethod
     def can_excite_base(cls) -> bool:
-        """Whether a base may move so: its acceleration has a known bound."""
+        """Return whether a base may have this motion: its acceleration has a known bound."""
         return cls.peak_acceleration is not Drive.peak_acceleration
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """Greatest acceleration (m/s^2) ever, shape (runs,): of a motion that a base may have."""
+        """Maximum acceleration (m/s^2) ever, shape (runs,): of a motion that a base may have."""
         raise NotImplementedError
 
     def samples(self) -> _Array:
-        """What kernels look up, as one row; empty for a formula."""
+        """Table of samples for the kernels, one row; empty for a formula."""
         return np.empty(0)
 
     def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:
@@ -187,7 +187,7 @@ class Timed(Drive):
     is_periodic = False
 
     def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
-        """The numbers beside ``omega``."""
+        """Numbers in addition to ``omega``."""
         raise NotImplementedError
 
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:

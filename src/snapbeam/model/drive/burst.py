@@ -19,9 +19,9 @@ __all__ = ["Burst"]
 
 _Array = NDArray[np.float64]
 _STEEPEST = 1.875
-"""Greatest slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""
+"""Maximum slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""
 _SHARPEST = 5.7736
-"""Its greatest curvature, 10/sqrt(3)."""
+"""Maximum curvature of that polynomial, 10/sqrt(3)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,7 @@ class Burst(Timed):
     ramp_up_cycles, ramp_down_cycles : float
         Cycles that they take, each greater than 0, together at most *duration_cycles*.
     retraction : float
-        How far the tip withdraws in the cycle after the burst, over b: a beam released after so many cycles.
+        Withdrawal of the tip in the cycle after the burst, over b; it releases the beam.
 
     Examples
     --------
@@ -109,7 +109,7 @@ class Burst(Timed):
         return found["amplitude"], speed
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """That of the sine with the steepest and the sharpest envelope, and that of the retreat."""
+        """Bound of the acceleration: the sine with the steepest envelope, plus the retraction."""
         found = self.shape_numbers(columns, scale)
         rate, shortest = found["rate"], np.minimum(found["risen"], found["ended"] - found["falling"])
         shape = rate**2 + 2.0 * rate * _STEEPEST / shortest + _SHARPEST / shortest**2

@@ -79,7 +79,7 @@ class Chirp(Timed):
         }
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """The amplitude of the slowest sine, and the velocity amplitude with what its change adds."""
+        """Amplitude of the slowest sine, and the velocity amplitude plus the effect of its change."""
         found = self.shape_numbers(columns, scale)
         slowest = np.minimum(found["first"], found["last"])
         highest = found["speed"] / slowest
@@ -88,7 +88,7 @@ class Chirp(Timed):
         return highest, found["speed"] + highest * np.maximum(linear, relative)
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """That of the fastest sine, with what the change of the frequency adds."""
+        """Bound of the acceleration: the fastest sine, plus the effect of the frequency change."""
         found = self.shape_numbers(columns, scale)
         slowest, fastest = np.minimum(found["first"], found["last"]), found["fastest"]
         linear = np.abs(found["last"] - found["first"]) / found["duration"]

@@ -27,7 +27,7 @@ class Joined(Drive):
     """
 
     alone: ClassVar[bool] = False
-    """Whether one part alone moves, and the argument is its own."""
+    """True if only one part moves, with its own argument."""
 
 
 def joined(kinds: Mapping[str, type[Drive]]) -> type[Joined]:

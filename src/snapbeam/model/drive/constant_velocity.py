@@ -55,7 +55,7 @@ class ConstantVelocity(Timed):
         return {"fastest": nothing, "speed": columns["speed"] * scale.length * scale.omega}
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """It goes on and on."""
+        """Bounds of displacement and velocity: the displacement is unbounded."""
         speed = columns["speed"] * scale.length * scale.omega
         return np.where(speed > 0.0, np.inf, 0.0), speed
 

@@ -21,7 +21,7 @@ _Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class FixedStop(Drive):
-    """No motion: a stop.  A cycle is a period of the first mode.
+    """Fixed stop, without motion.  A cycle is a period of the first mode.
 
     Examples
     --------
@@ -48,6 +48,6 @@ class FixedStop(Drive):
         return []
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """It stays where it is."""
+        """Bounds of displacement and velocity: zero."""
         nothing = np.zeros(next(iter(columns.values())).size)
         return nothing, nothing

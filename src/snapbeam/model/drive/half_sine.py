@@ -68,7 +68,7 @@ class HalfSine(Timed):
         return {"fastest": math.pi / duration, "amplitude": amplitude, "duration": duration}
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """Its amplitudes."""
+        """Amplitudes of displacement and velocity."""
         found = self.shape_numbers(columns, scale)
         return found["amplitude"], found["amplitude"] * found["fastest"]
 
@@ -83,7 +83,7 @@ class HalfSine(Timed):
 
     @staticmethod
     def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """Of half a sine, then none."""
+        """Acceleration of half a sine, then zero."""
         t = argument / drive.omega
         if t >= drive.duration:
             return 0.0

@@ -23,7 +23,7 @@ LINES = 32
 _LOW_BITS = np.uint64(0xFFFFFFFF)
 _STEEPEST = 1.875
 _SHARPEST = 5.7736
-"""Greatest curvature of x^3 (10 - 15 x + 6 x^2) on [0, 1], 10/sqrt(3)."""
+"""Maximum curvature of x^3 (10 - 15 x + 6 x^2) on [0, 1], 10/sqrt(3)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +119,7 @@ class BandLimitedNoise(Timed):
         return highest, LINES * found["strength"] + highest * _STEEPEST / found["risen"]
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """All sines at their hardest at once, with what the envelope adds."""
+        """Bound of the acceleration: the sum of all amplitudes, plus the effect of the envelope."""
         found = self.shape_numbers(columns, scale)
         parts = ((np.arange(LINES) + 1) / LINES)[:, None]
         fastest = found["low"] + parts * (found["high"] - found["low"])

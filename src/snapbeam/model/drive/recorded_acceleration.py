@@ -160,7 +160,7 @@ class RecordedAcceleration(Timed):
         return np.full(next(iter(columns.values())).size, peak)
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """Bounds on displacement and speed: those at the samples, and what half an interval can add."""
+        """Bounds of displacement and speed: the samples, plus the possible change within half an interval."""
         return self._bound(columns, scale, 1.0)
 
     def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:

@@ -22,7 +22,7 @@ __all__ = ["RecordedMotion"]
 
 _Array = NDArray[np.float64]
 _SPEED_MARGIN = 1.5
-"""Greatest speed of the cubic through a record over the greatest recorded one, at most."""
+"""Upper bound of the ratio of the speed of the interpolating cubic to the recorded speed."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,11 +37,11 @@ class RecordedMotion(Drive):
     displacement, velocity : array_like of shape (samples,)
         Displacement (m) and velocity (m/s), positive towards the beam's upper well; they must belong
         together: over each interval the displacement changes by the velocities' mean, within a tenth
-        of the greatest change.
+        of the maximum change.
     sampling_frequency : float
         Samples per second, Hz.
     frequency : float
-        Nominal frequency of the excitation, Hz: what a cycle is.
+        Nominal frequency of the excitation, Hz, which defines a cycle.
 
     Examples
     --------
@@ -73,7 +73,7 @@ class RecordedMotion(Drive):
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> RecordedMotion:
-        """A drive from what :func:`snapbeam.lab.recorded_drive` returns, or from a file of it.
+        """Drive from the result of :func:`snapbeam.lab.recorded_drive`, or from its file.
 
         *dataset* has ``displacement`` (m) and ``velocity`` (m/s) over an even ``time`` (s), and the nominal
         ``frequency`` (Hz) among its attributes.
@@ -143,14 +143,14 @@ class RecordedMotion(Drive):
         return
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """What was recorded, with a margin for what lies between the samples."""
+        """Bounds of the recorded displacement and velocity, with a margin for motion between the samples."""
         runs = next(iter(columns.values())).size
         speed = _SPEED_MARGIN * float(np.abs(self.velocity).max())
         highest = float((self.displacement - self.displacement[0]).max()) + speed / self.sampling_frequency
         return np.full(runs, highest), np.full(runs, speed)
 
     def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """What was recorded in the other direction."""
+        """Bound of the recorded displacement in the opposite direction."""
         runs = next(iter(columns.values())).size
         speed = _SPEED_MARGIN * float(np.abs(self.velocity).max())
         lowest = float((self.displacement - self.displacement[0]).min()) - speed / self.sampling_frequency

@@ -34,9 +34,9 @@ class Shock(Timed):
         haversine   A (1 - cos(2 pi t/D))/2
         trapezoid   A t/r,  A,  A (D - t)/r,   with the rise time r at both ends
 
-    and zero afterwards.  What moves then goes on at the velocity that the pulse has given it: 2 A D/pi, A D/2 and
-    A (D - r).  Use it as the motion of a base; displacements are in the frame of the base.  A cycle is a period of the
-    first mode.
+    and zero afterwards.  The body then continues at the velocity that the pulse has given it: 2 A D/pi, A D/2
+    and A (D - r).  Use it as the motion of a base; displacements are in the frame of the base.  A cycle is a
+    period of the first mode.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class Shock(Timed):
         }
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """It goes on and on, at its last velocity."""
+        """Bounds of displacement and velocity: the motion continues at its last velocity."""
         found = self.shape_numbers(columns, scale)
         mean = {"half_sine": 2.0 / math.pi, "haversine": 0.5}
         length = found["fall"] if self.shape == "trapezoid" else mean[self.shape] * found["duration"]
@@ -131,7 +131,7 @@ class Shock(Timed):
         return np.where(speed > 0.0, np.inf, 0.0), speed
 
     def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """It never goes the other way."""
+        """Bound of the displacement in the opposite direction: zero."""
         return np.zeros(next(iter(columns.values())).size)
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:

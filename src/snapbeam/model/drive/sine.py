@@ -79,7 +79,7 @@ class Sine(Drive):
         return period
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """Its amplitudes."""
+        """Amplitudes of displacement and velocity."""
         numbers = self.numbers(columns, scale)
         return numbers["amplitude"], numbers["amplitude"] * numbers["omega"]
 
@@ -137,7 +137,7 @@ class _OwnAmplitude(Drive):
         return np.asarray(2.0 * math.pi / (columns["frequency_ratio"] * scale.omega))
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """Its amplitudes."""
+        """Amplitudes of displacement and velocity."""
         numbers = self.numbers(columns, scale)
         return numbers["amplitude"], numbers["amplitude"] * numbers["omega"]
 

@@ -76,7 +76,7 @@ class SumDrive(Timed):
 
     @property
     def parts_of_sum(self) -> list[Drive]:
-        """Its terms."""
+        """Terms of the sum."""
         return [
             kind(**{name: getattr(self, f"{name}_{i}") for name in _names(kind)})
             for i, kind in enumerate(self.terms, 1)
@@ -88,7 +88,7 @@ class SumDrive(Timed):
 
     @classmethod
     def can_excite_base(cls) -> bool:
-        """Whether every term has a bounded acceleration."""
+        """Return whether every term has a bounded acceleration."""
         return all(kind.can_excite_base() for kind in cls.terms)
 
     def _each(self, columns: Mapping[str, _Array]) -> list[tuple[int, Drive, dict[str, _Array]]]:
@@ -100,12 +100,12 @@ class SumDrive(Timed):
         return found
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """That of the first term."""
+        """Cycle of the first term."""
         _, drive, own = self._each(columns)[0]
         return drive.cycle(own, scale)
 
     def _begun(self, drive: Drive, own: Mapping[str, _Array], scale: Scale) -> _Array:
-        """Where a term begins: a sine with a phase is not at its middle, all others are."""
+        """Initial displacement of a term: nonzero only for a sine with a phase."""
         runs = next(iter(own.values())).size
         if not drive.harmonic or "phase" not in own:
             return np.zeros(runs)
@@ -127,11 +127,11 @@ class SumDrive(Timed):
         return found | {"fastest": fastest}
 
     def samples(self) -> _Array:
-        """Those of every term, in their order."""
+        """Samples of every term, in their order."""
         return np.concatenate([drive.samples() for drive in self.parts_of_sum])
 
     def frequencies(self, columns: Mapping[str, _Array], scale: Scale) -> list[_Array] | None:
-        """Those of every term; None if one of them does not repeat."""
+        """Frequencies of every term; None if one of them is not periodic."""
         found: list[_Array] = []
         for _, drive, own in self._each(columns):
             of_term = drive.frequencies(own, scale)

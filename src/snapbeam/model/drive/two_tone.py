@@ -94,7 +94,7 @@ class TwoTone(Timed):
         }
 
     def frequencies(self, columns: Mapping[str, _Array], scale: Scale) -> list[_Array]:
-        """Those of the two sines."""
+        """Frequencies of the two sines."""
         return [columns["frequency_ratio"] * scale.omega, columns["second_ratio"] * scale.omega]
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:

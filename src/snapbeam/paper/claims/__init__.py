@@ -57,7 +57,8 @@ def measure_claims(results: Results, sketch: Results | None = None) -> list[Clai
         The data of the recipes, stored or computed; their size is the size of the measurement.  Verdicts of
         the size ``"quick"`` exercise the rules and mean nothing else.
     sketch : Results, optional
-        What to measure a claim on if *results* lack its data and do not compute them; each row says its size.
+        Results for a claim whose data are missing in *results* and not computed there; each row contains its
+        size.
     """
     rows: list[Claim] = []
     for name in TOPICS:

@@ -25,7 +25,7 @@ __all__ = [
 VERDICTS = ("holds", "in part", "fails", "open")
 
 Number = float | int | tuple[float, ...] | tuple[tuple[float, ...], ...]
-"""What stands in the text beside quantities: settings, cuts, lists of numbers or of rows of them."""
+"""Settings, sections, lists of numbers or lists of rows, which appear in the text next to quantities."""
 
 
 class Quantity(NamedTuple):
@@ -36,7 +36,7 @@ class Quantity(NamedTuple):
 
 
 class Check(NamedTuple):
-    """Whether a condition is met: by every value within the uncertainty, by the measured one, by any."""
+    """Result of a condition: true for all values within the uncertainty, for the measured one, for any."""
 
     must: bool
     does: bool
@@ -54,19 +54,19 @@ FAIL = Check(False, False, False)
 
 
 def above(value: Quantity | float, limit: float) -> Check:
-    """Whether a value is above a limit; a number that is not finite is above none."""
+    """Check that a value is above a limit; a nonfinite value never is."""
     middle, spread = value if isinstance(value, Quantity) else (value, 0.0)
     return Check(middle - spread > limit, middle > limit, middle + spread > limit)
 
 
 def below(value: Quantity | float, limit: float) -> Check:
-    """Whether a value is below a limit, or on it."""
+    """Check that a value is at most a limit."""
     middle, spread = value if isinstance(value, Quantity) else (value, 0.0)
     return Check(middle + spread <= limit, middle <= limit, middle - spread <= limit)
 
 
 def near(value: Quantity | float, target: float, allowed: float) -> Check:
-    """Whether a value is within *allowed* of a target."""
+    """Check that a value is within *allowed* of a target."""
     middle, spread = value if isinstance(value, Quantity) else (value, 0.0)
     # a slack of rounding, so that "within a step of the grid" holds a step of the grid
     off, allowed = abs(middle - target), allowed * (1.0 + 1e-9)

@@ -26,9 +26,10 @@ _PLACEHOLDER = re.compile(r"<([a-z][a-z0-9_]*)(\.u)?(?::([^<>]+)|\?([^<>|]*)\|([
 class Entry:
     """The words of one row, with placeholders where measured numbers go.
 
-    ``says``: the statement.  ``paper``: its number, in the paper's words.  ``source``: where it stands there.
+    ``says``: the statement.  ``paper``: its number, in the paper's words.  ``source``: its location there.
     ``measured``, ``uncertainty``: what was found and how well it is known.  ``rule``: what the verdict follows
-    from.  ``fails``: what would have failed it.  ``figure``: the recipe that shows it.  ``note``: what to make of it.
+    from.  ``fails``: what would have failed it.  ``figure``: the recipe that shows it.  ``note``: what to make
+    of it.
     """
 
     says: str

@@ -26,11 +26,11 @@ BEGINS = {"claims.md": "**Of ", "claims.csv": "number,topic,says,paper,", "claim
 
 @dataclass(frozen=True)
 class Claim:
-    """What the paper says, what was measured by which rule, and whether they agree.
+    """Statement of the paper, the measured value with its rule, and the verdict.
 
-    ``verdict``: ``holds``, ``in part``, ``fails``, or ``open`` for what the paper does not say and whose
-    influence is measured instead.  ``close``: whether it would be another within the uncertainty.  ``size``:
-    whether it was measured at the size of the paper or on a sketch.
+    ``verdict``: ``holds``, ``in part``, ``fails``, or ``open`` for properties that the paper does not specify
+    and whose influence is measured instead.  ``close``: whether it would be another within the uncertainty.
+    ``size``: whether it was measured at the size of the paper or on a sketch.
     """
 
     number: str
@@ -54,15 +54,15 @@ class Claim:
 
 
 def summary(claims: Sequence[Claim]) -> str:
-    """How many statements hold, hold in part and fail, how many of these are close, how many questions are open."""
+    """Summary of the verdicts: numbers of statements that hold, hold in part, fail, are close or open."""
     counts = Counter(claim.verdict for claim in claims)
     close = sum(claim.close for claim in claims if claim.verdict != "open")
     total = len(claims) - counts["open"]
     sketched = sum(claim.size != "full" for claim in claims)
     return (
         f"Of {total} statements {counts['holds']} hold, {counts['in part']} hold in part and {counts['fails']} fail; "
-        f"{close} of these verdicts (†) would be another within the uncertainty. {counts['open']} questions that "
-        "the paper leaves open are measured apart."
+        f"{close} of these verdicts (†) could change within the uncertainty. {counts['open']} properties "
+        "that the paper does not specify are measured separately."
         + (f" {sketched} rows (*) are measured on sketches." if sketched else "")
     )
 
@@ -110,7 +110,7 @@ def _table(rows: Iterable[Claim], is_open: bool) -> list[str]:
         lines = ["| # | question | measured | for comparison | shown in |", "|---|---|---|---|---|"]
     else:
         lines = [
-            "| # | the paper says | number in the paper | measured | uncertainty | verdict | shown in |",
+            "| # | statement of the paper | value in the paper | measured | uncertainty | verdict | shown in |",
             "|---|---|---|---|---|---|---|",
         ]
     for row in rows:

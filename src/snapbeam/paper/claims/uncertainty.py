@@ -1,4 +1,4 @@
-"""How well a number read off maps or runs is known: sampling, the grid, and what chaos alone changes."""
+"""Uncertainty of numbers from maps or runs: sampling, grid, sensitivity to perturbations."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def mean_of(values: NDArray[np.float64], *more: float) -> Quantity:
 
 
 def median_of(values: NDArray[np.float64], *more: float) -> Quantity:
-    """Their median, those that are not a number left out, by :func:`resampled`."""
+    """Median of the finite values, with its uncertainty by :func:`resampled`."""
     known = values[~np.isnan(values)]
     return resampled(lambda at: float(np.median(known[at])), known.size, *more)
 
@@ -86,7 +86,7 @@ def _named(modes: int, variant: str, *, long: bool) -> str:
 def chaos(
     results: Results, number: Callable[[xr.Dataset], float], modes: int, *, long: bool = False
 ) -> float:
-    """How far a number read off a map moves with a change of 1e-9 in the drive, or with half the step.
+    """Change of a number from a map when the drive changes by 1e-9, or the step is halved.
 
     Both are measured on the smaller map of the sensitivity study, with 1 mode or many; the *long* one, of 1000
     cycles, only with the changed drive.

@@ -87,7 +87,7 @@ def _choose(searched: xr.Dataset, modes: int, cycles: int) -> dict[str, tuple[fl
     """Omega and V of each kind, by a rule.
 
     At each frequency: the smallest V that snaps through exactly once; the smallest above it that changes wells at
-    least three times, both settled in the second well within the cycles shown; and of the three greatest intrawell
+    least three times, both settled in the second well within the cycles shown; and of the three largest intrawell
     V below the threshold the one that repeats itself worst.  The frequency is the one at which that is worst.
     """
     best: tuple[float, dict[str, tuple[float, float]]] | None = None
@@ -122,7 +122,7 @@ def _choose(searched: xr.Dataset, modes: int, cycles: int) -> dict[str, tuple[fl
 
 
 def _swings(modes: int, omega: float, drive: float) -> int:
-    """How often the beam changes wells within the cycles shown; 0 if it has not settled by four fifths of them.
+    """Number of snap-throughs within the cycles shown; 0 if the beam has not settled by 80 % of them.
 
     A well is reached half way from the straight beam, so that grazing zero is no snap-through.
     """
@@ -147,7 +147,7 @@ def _scatter(modes: int, omega: float, drive: float, cycles: int) -> float:
 
 
 def _recorded(run: xr.Dataset) -> xr.Dataset:
-    """What a camera would have recorded of a run, tracked."""
+    """Tracked synthetic camera recording of a run."""
     from snapbeam.lab.camera import open_recording
     from snapbeam.lab.synthetic import SyntheticCamera, render_run
     from snapbeam.lab.tracking.track import track

@@ -42,7 +42,7 @@ _Array = NDArray[np.float64]
 FREQUENCY_RATIOS = (0.05, 0.625, 1.625)
 OPTIONS = ("measurements",)
 _SHARES = {0.625: 0.2, 1.625: 0.05}
-"""Share of V_QS1 that the paper's dash-dot line stands at."""
+"""Fraction of V_QS1 of the paper's dash-dot line."""
 _STARTS = (0.1, 0.25, LOCATION)
 
 

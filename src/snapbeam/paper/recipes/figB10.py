@@ -1,4 +1,4 @@
-"""Fig. B.10: greatest displacement at the contact over frequency, at two drives, for 1 and 32 modes."""
+"""Fig. B.10: maximum displacement at the contact over frequency, at two drives, for 1 and 32 modes."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ __all__ = ["LEVELS", "compute", "draw", "maxima"]
 LEVELS = (0.005, 0.02)
 """Low and moderate drive; the paper does not give its own.  Neither snaps through."""
 _FOOT = -1.01
-"""Where the frequencies of the lower drive's maxima stand, below all curves."""
+"""Ordinate of the markers of the maxima at the lower drive, below all curves."""
 _STYLES = (("#2E7EBB", "-"), ("#B03A27", "-"))
 
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
-    """Greatest displacement at the contact over a sweep of frequency."""
+    """Maximum displacement at the contact over a sweep of frequency."""
     ratio = results.pick(np.linspace(0.5, 4.0, 36), np.linspace(0.25, 4.0, 151))
     found = {}
     for modes in (1, results.pick(4, 32)):
@@ -56,7 +56,7 @@ def maxima(ds: xr.Dataset, level: int, prominence: float = 0.1) -> list[tuple[fl
 
 
 def draw(results: Results) -> Figure:
-    """One panel a model, with the greatest two maxima of each drive marked."""
+    """One panel a model, with the two largest maxima of each drive marked."""
     data = results["figB10"]
     with figure_style():
         figure = new_figure("double", 62.0)
@@ -86,7 +86,7 @@ def draw(results: Results) -> Figure:
                         )  # fmt: skip
             ax.set(xlabel=r"Excitation frequency $\Omega$", xlim=(0.0, 4.0))
             ax.set_title(f"$N$ = {int(ds.attrs['modes'])}, {int(ds.attrs['cycles'])} cycles", loc="left")
-        axes[0].set_ylabel(r"Greatest displacement $w_\mathrm{b}(x_\mathrm{s})$")
+        axes[0].set_ylabel(r"Maximum displacement $w_\mathrm{b}(x_\mathrm{s})$")
         low, high = axes[0].get_ylim()
         axes[0].set_ylim(min(low, _FOOT - 0.06), high + 0.08 * (high - low))
         axes[0].legend(loc="upper left")

@@ -1,4 +1,4 @@
-"""What small disturbances do: a start-up transient of the shaker, a start off the well, an impact without ripples.
+"""Effect of small perturbations: start-up transient of the shaker, initial offset, impact without ripples.
 
 Each of many random points of Fig. 6 is run with the shaker's first cycles larger than the steady state, with
 the beam starting 1e-3 b off its rest, and, as the measure for both, with V changed by 1e-9.  And impacts of many
@@ -32,7 +32,7 @@ __all__ = ["EXCESS", "OFFSET", "VARIANTS", "compute", "draw"]
 _Array = NDArray[np.float64]
 
 EXCESS, OFFSET = 0.2, 1e-3
-"""How much larger the shaker sets out, falling by e a cycle; and how far off its rest the beam starts, in b."""
+"""Initial excess of the shaker amplitude, falling by e per cycle; and initial offset of the beam, in b."""
 VARIANTS = {
     "perturbed": "$V$ times\n$1 + 10^{-9}$",
     "offset": "start $10^{-3} b$\noff the well",
@@ -69,7 +69,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 
 
 def _variants(model: sb.ReducedModel, omega: float, drive: float, cycles: int) -> dict[str, dict[str, Any]]:
-    """What each run is given.  All shakers are records, so that they differ in nothing else."""
+    """Contacts and initial state of each variant; all drives are recordings, so that nothing else differs."""
     rest = model.well_amplitude
     steady = _record(model, omega, drive, cycles)
     return {
@@ -104,7 +104,7 @@ def _record(
 
 
 def _at_border(model: sb.ReducedModel, omega: float, drive: float, cycles: int) -> bool:
-    """Whether a neighbour, a cell of Fig. 6 away, has another class."""
+    """Return whether a neighbouring point, one cell of Fig. 6 away, has another class."""
     around = paper_map(
         model, frequency_ratio=omega + _NEIGHBOUR[0] * np.array([-1.0, 0.0, 1.0]),
         velocity_amplitude=drive + _NEIGHBOUR[1] * np.array([-1.0, 0.0, 1.0]),
@@ -127,7 +127,7 @@ def _impacts(results: Results, model: sb.ReducedModel, points: _Array) -> _Array
 def _repeat(model: sb.ReducedModel, omega: float, drive: float) -> list[float] | None:
     """Impulse and work within a quarter of the first period, and the time of the next impact, of both repetitions.
 
-    The impact is the one of the greatest impulse after four periods of the first mode; None if there is none.
+    The impact is the one of the maximum impulse after four periods of the first mode; None if there is none.
     """
     first = 1.0 / model.reference_frequency
     shaker = sb.Shaker(frequency_ratio=omega, velocity_amplitude=drive, location=LOCATION)

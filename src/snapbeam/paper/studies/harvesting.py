@@ -80,7 +80,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     ds = xr.Dataset(
         {
             "power": (dims, found[..., 0], {"units": "W", "long_name": "mean power in the load, second half"}),
-            "share_above": (dims, found[..., 1], {"units": "1", "long_name": "share of it above 5 omega_1"}),
+            "share_above": (dims, found[..., 1], {"units": "1", "long_name": "fraction of it above 5 omega_1"}),
             "kind": (dims, found[..., 2].astype(np.int8), {"units": "1", "long_name": "response class"}),
             "whole_power": (dims, found[..., 3], {"units": "W", "long_name": "mean power of the whole run"}),
         },
@@ -105,7 +105,7 @@ def draw(results: Results) -> Figure:
         norm = LogNorm(max(float(power.max()) * 1e-4, 1e-12), float(power.max()))
         for ax, values, how, words in (
             (axes[0], power, {"cmap": cm.lajolla_r, "norm": norm}, "Power (µW)"),
-            (axes[1], share, {"cmap": cm.davos_r, "vmin": 0.0}, r"Share above $5\,\omega_1$ (%)"),
+            (axes[1], share, {"cmap": cm.davos_r, "vmin": 0.0}, r"Fraction above $5\,\omega_1$ (%)"),
         ):
             mesh = ax.pcolormesh(
                 ds.frequency_ratio, ds.velocity_amplitude, values.T, shading="nearest", rasterized=True, **how
@@ -119,7 +119,7 @@ def draw(results: Results) -> Figure:
                 power[own], share[own], "o", markersize=2.5, markeredgecolor="0.3", markeredgewidth=0.3,
                 color=CLASS_COLORS[response], label=response.label,
             )  # fmt: skip
-        axes[2].set(xscale="log", xlabel="Power (µW)", ylabel=r"Share above $5\,\omega_1$ (%)")
+        axes[2].set(xscale="log", xlabel="Power (µW)", ylabel=r"Fraction above $5\,\omega_1$ (%)")
         axes[2].set_ylim(0.0)
         handles, labels = axes[2].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))

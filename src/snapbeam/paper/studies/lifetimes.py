@@ -27,14 +27,14 @@ __all__ = ["ENDLESS", "LONGEST", "POINTS", "compute", "draw"]
 
 
 POINTS = {"frequency_ratio": (1.21, 1.625, 2.5, 3.5), "velocity_amplitude": (0.25, 0.3, 0.55, 0.6)}
-"""Where 32 modes have many starts."""
+"""Points at which 32 modes have many initial conditions."""
 ENDLESS = (1.625, 0.3)
-"""Where one mode snaps on in many runs; its exponents are measured with 32 modes."""
+"""Point at which one mode snaps through in many runs without end; its exponents use 32 modes."""
 LONGEST = (0.75, 0.58)
-"""Where 32 modes snap longest."""
+"""Point of the longest lifetime of 32 modes."""
 _SEED = 118291
 _SCALE = (5.0, 5000.0)
-"""Of the colours, cycles."""
+"""Limits of the colour scale, cycles."""
 _APART = 1.0
 """Cycles by which the ends of two runs must differ."""
 

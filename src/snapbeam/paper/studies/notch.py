@@ -1,4 +1,4 @@
-"""Why the measured notch is at Omega = 1.4: how far each thing that the model leaves out moves it.
+"""Position of the notch, measured at Omega = 1.4: shift by each effect that the model neglects.
 
 The threshold over frequency, as in Fig. 6, of the paper's beam with one thing changed at a time: the shaker's mass and
 suspension, its start-up, the ends, unequal wells, the contact, and dimensions as they were measured.
@@ -32,7 +32,7 @@ _Array = NDArray[np.float64]
 WINDOW = (1.0, 1.6)
 """Omega between which the notch is looked for."""
 MEASURED = 1.4
-"""Where the paper's experiment has it."""
+"""Position of the notch in the paper's experiment."""
 BASE = "the model"
 _CYCLES = 120
 _UNIT = BEAM.bending_stiffness / BEAM.length
@@ -114,7 +114,7 @@ VARIANTS: dict[str, tuple[str, Callable[[int], sb.System]]] = {
         "beam", lambda n: _system(n, BEAM.replace(thickness=0.44e-3, buckling_level=0.5e-3))
     ),
 }  # fmt: skip
-"""What is changed, with what it belongs to; each builds its system from a number of modes."""
+"""Variants and the group of each; each builds its system from a number of modes."""
 
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
@@ -173,7 +173,7 @@ def _dip(ratio: _Array, row: _Array, step: float) -> Notch:
 
 
 def moved(ds: xr.Dataset, variant: str) -> tuple[float, float, float]:
-    """Where the notch is (Omega, the median over the tip's places), and the least and greatest that the data allow."""
+    """Position of the notch (Omega, median over tip locations), and its lower and upper bound from the data."""
     found = notches(ds, variant)
     at = float(np.median([each.position for each in found]))  # NaN if a place has none
     return at, min(each.low for each in found), max(each.high for each in found)

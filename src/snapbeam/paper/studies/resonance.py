@@ -1,6 +1,6 @@
-"""How the resonance of the intrawell response moves as the drive grows, up to the notch of the threshold.
+"""Resonance of the intrawell response against the drive, up to the notch of the threshold.
 
-The greatest displacement at the contact over frequency, as in Fig. B.10, at many drives: the frequency of its
+The maximum displacement at the contact over frequency, as in Fig. B.10, at many drives: the frequency of its
 maximum falls with the drive (softening), and where it ends the beam snaps through.
 """
 
@@ -31,7 +31,7 @@ WINDOW = (0.8, 2.2)
 
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
-    """Greatest displacement over frequency and drive, for 1 and 32 modes."""
+    """Maximum displacement over frequency and drive, for 1 and 32 modes."""
     ratio = np.round(np.arange(WINDOW[0], WINDOW[1] + 1e-9, results.pick(0.1, 0.02)), 6)
     found = {}
     for modes, top in ((1, 0.064), (results.pick(4, 32), 0.16)):
@@ -45,7 +45,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 
 
 def ridge(ds: xr.Dataset) -> tuple[_Array, _Array]:
-    """The drives at which no frequency of the window snaps, and Omega of the greatest displacement at each."""
+    """The drives at which no frequency of the window snaps, and Omega of the maximum displacement at each."""
     calm = ~is_interwell(ds.response_class.values).any(axis=0)
     # the lowest drives only: above the first that snaps somewhere the maximum is that of what is left
     count = int(np.argmin(calm)) if not calm.all() else calm.size
@@ -68,7 +68,7 @@ def draw(results: Results) -> Figure:
                 rasterized=True, shading="nearest",
             )  # fmt: skip
             drives, ratios = ridge(ds)
-            ax.plot(ratios, drives, "o-", color=SHAKER_COLOR, markersize=2.5, label="greatest displacement")
+            ax.plot(ratios, drives, "o-", color=SHAKER_COLOR, markersize=2.5, label="maximum displacement")
             ax.plot(
                 whole.frequency_ratio, interwell_threshold(whole), color=BEAM_COLOR,
                 label="threshold of Fig. 6",
@@ -77,7 +77,7 @@ def draw(results: Results) -> Figure:
             ax.set_ylim(0.0, float(ds.velocity_amplitude[-1]))
             ax.set_title(f"$N$ = {int(ds.attrs['modes'])}", loc="left")
         axes[0].set_ylabel("Velocity amplitude $V$")
-        figure.colorbar(mesh, ax=list(axes), label=r"Greatest displacement $w_\mathrm{b}(x_\mathrm{s})$")
+        figure.colorbar(mesh, ax=list(axes), label=r"Maximum displacement $w_\mathrm{b}(x_\mathrm{s})$")
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2)
         fix_ticks(*axes)

@@ -1,4 +1,4 @@
-"""How the map of 32 modes changes with what the paper leaves open, and with the numerics.
+"""Sensitivity of the map of 32 modes to unspecified parameters and to the numerics.
 
 Variants of one map after 200 cycles: an excitation changed by 1e-9 (what chaos alone does), half the step,
 the contact stiffness that common values of the stated materials give, damping applied to the buckling modes

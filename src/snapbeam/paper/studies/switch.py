@@ -30,7 +30,7 @@ OMEGA = 1.2
 _SHARES = (0.0, 0.3, 0.6, 0.8)
 """Bias over the load at which the lower well is gone."""
 _OFF = {"velocity_amplitude": 0.01, "frequency_ratio": 0.01, "location": 0.002}
-"""How well each is known: standard deviations, relative but for the place."""
+"""Standard deviations of the parameters, relative except for the location."""
 
 
 def _model(modes: int, load: float) -> sb.ReducedModel:
@@ -139,7 +139,7 @@ def draw(results: Results) -> Figure:
             )
             ax.set_xlabel("Velocity $V$")
         axes[0].set_ylabel("Length of the burst (cycles)")
-        figure.colorbar(mesh, ax=list(axes[:count]), label="Share that switches", pad=0.02)
+        figure.colorbar(mesh, ax=list(axes[:count]), label="Fraction that switches", pad=0.02)
         last = axes[count]
         found = [cheapest(ds, float(bias)) for bias in ds.bias.values]
         last.plot(

@@ -1,4 +1,4 @@
-"""What still changes after the 1000 cycles of Fig. 7: its map on a coarser grid, three times as long."""
+"""Changes after the 1000 cycles of Fig. 7: its map on a coarser grid, three times as long."""
 
 from __future__ import annotations
 

@@ -39,18 +39,17 @@ _ALONE = (0.453, 0.487, 0.5)
 _LEFT, _RIGHT = np.linspace(0.213, 0.463, 6), (0.503, 0.513, 0.533, 0.573)
 """Places over the length that are tried at every buckling level: of a single tip, and of both of a pair."""
 _FIRM, _STEPS, _STRIDE = 2e5, 5000, 0.03
-"""Stiffness of a creeping beam's tips over the beam's greatest; its steps at most, and how long one is over b."""
+"""Stiffness of a creeping beam's tips over the beam's maximum; its steps at most, and how long one is over b."""
 
 
 @dataclass(frozen=True)
 class Pushed:
-    """What became of a beam under tips that rise together."""
+    """Result of a beam under tips that rise together."""
 
     height: float
-    """Of the tips over b when the beam snapped; NaN if it still rests on them when they reach
-    the upper of the shapes that it has by itself."""
+    """Height of the tips over b at the snap; NaN if the beam reaches its upper equilibrium in contact."""
     tips: int
-    """How many of them still pressed just before; fewer than there are, if it had left the others before."""
+    """Number of tips in contact just before the snap; fewer than all if the beam had left the others."""
     amplitude: _Array
     """Modal amplitudes just before, over b."""
     path: _Array
@@ -87,13 +86,13 @@ class _Press:
         return a, force
 
     def lowest(self, a: _Array, active: list[int]) -> tuple[float, _Array]:
-        """Least curvature of the energy along what the active tips leave free, and where it is."""
+        """Minimum curvature of the energy along what the active tips leave free, and where it is."""
         free = scipy.linalg.null_space(self.rows[active])
         values, vectors = scipy.linalg.eigh(free.T @ self.tangent(a) @ free)
         return float(values[0]), free @ vectors[:, 0]
 
     def settled(self, a: _Array, heights: _Array) -> _Array:
-        """Where the beam creeps to from a state, against tips that are nearly rigid and can only push.
+        """Equilibrium that the beam approaches from a state, against nearly rigid tips that can only push.
 
         Implicit Euler's steps down the gradient of the energy, so short that they leave a saddle as the flow does.
         """

@@ -110,7 +110,7 @@ def passages(alpha: _Array, time: _Array) -> _Array:
 
 
 def _shares(run: sb.Run, modes: int) -> tuple[dict[str, Any], _Array]:
-    """How long |alpha_1| is in each bin, how long the other modes exceed it there, and the peak of each mode."""
+    """Histograms of |alpha_1|, and of |alpha_1| where the other modes exceed it, and the peak of each mode."""
     rest = abs(float(paper_model(modes).well_amplitude[0]))
     alpha = run.dataset.modal_amplitude.values.astype(float) / rest
     first = np.abs(alpha[:, 0])
@@ -136,7 +136,7 @@ def _run_table(points: _Array, rows: list[dict[str, Any]], attrs: dict[str, Any]
             ("run", "bin"),
             "of these, with the norm of the antisymmetric ones above it",
         ),
-        "peak_amplitude": (("run", "mode"), "greatest |alpha_i| over alpha_1 at rest"),
+        "peak_amplitude": (("run", "mode"), "maximum |alpha_i| over alpha_1 at rest"),
     }
     data: dict[str, Any] = {
         name: (dims, np.stack([row[name] for row in rows]), {"units": "1", "long_name": text})
@@ -211,7 +211,7 @@ def _dominance(ax: Axes, runs: xr.Dataset) -> None:
         share = runs[name].values.sum(axis=0) / np.maximum(total, 1)
         ax.stairs(share, BIN_EDGES, color=color, label=words)
     ax.axhline(0.5, color="0.7", linewidth=0.5, zorder=0)
-    ax.set(xlabel=r"$|\alpha_1|$ / its value at rest", ylabel=r"Share of time above $|\alpha_1|$")
+    ax.set(xlabel=r"$|\alpha_1|$ / its value at rest", ylabel=r"Fraction of time above $|\alpha_1|$")
     ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02))
     ax.legend(loc="upper right")
 
@@ -224,7 +224,7 @@ def _antisymmetry(ax: Axes, snaps: xr.Dataset) -> None:
         ordered = np.sort(snaps[name].values)
         ax.step(ordered, np.arange(1, ordered.size + 1) / max(ordered.size, 1), color=color, label=words)
     ax.axvline(0.1, color="0.7", linewidth=0.5, zorder=0)
-    ax.set(xlabel=r"Norm where $\alpha_1 = 0$ / $|\alpha_1|$ at rest", ylabel="Share of snap-throughs")
+    ax.set(xlabel=r"Norm where $\alpha_1 = 0$ / $|\alpha_1|$ at rest", ylabel="Fraction of snap-throughs")
     ax.set(xlim=(0.0, None), ylim=(0.0, 1.02))
     ax.legend(loc="lower right")
 
@@ -242,6 +242,6 @@ def _peaks(ax: Axes, runs: xr.Dataset) -> None:
     low, middle, high = np.quantile(peak, (0.05, 0.5, 0.95), axis=0)
     ax.fill_between(mode, low, high, color="0.85", linewidth=0, label="90 % of the runs")
     ax.semilogy(mode, middle, ".-", color=BEAM_COLOR, markersize=3, label="median")
-    ax.set(xlabel="Buckling mode $i$", ylabel=r"Greatest $|\alpha_i|$ / $|\alpha_1|$ at rest")
+    ax.set(xlabel="Buckling mode $i$", ylabel=r"Maximum $|\alpha_i|$ / $|\alpha_1|$ at rest")
     ax.set_xlim(0.5, mode[-1] + 0.5)
     ax.legend(loc="upper right")

@@ -1,4 +1,4 @@
-"""What follows a step, by the law of contact: a force that is integrated, or a jump."""
+"""Acceptance of a step by type of contact law: integrated force or jump of the velocity."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def accept_step_by_law(
     kernel_input: Any,
     outputs: Any,
 ) -> Any:
-    """Where a run stands after a step, and the step that was taken; *outputs* are what is recorded, or None."""
+    """State of a run after a step, and the step taken; *outputs* receives the recording, or is None."""
     raise TypeError("accept_step_by_law runs in compiled code only")
 
 

@@ -49,7 +49,7 @@ _ASKING = Lock()
 _POLL = 0.2
 """Seconds after which an interrupt is heard."""
 _SLICE_STEPS = 200_000
-"""Steps of a recorded run between two checks for a stop or full buffers: some 0.1 s."""
+"""Steps of a recorded run between two checks for a stop or full buffers: about 0.1 s."""
 _SLICE_BYTES = 32 * 2**20
 """Size of a slice's buffers, at most."""
 
@@ -128,7 +128,7 @@ def run_ensemble(
 def integrate_with_output_states(
     ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
 ) -> OutputStates:
-    """As :func:`run_ensemble`, and the states at every output time."""
+    """Integrate as :func:`run_ensemble`, with the states at every output time."""
     output_states = int(-(-ensemble.runs["end"][0] // ensemble.runs["output_interval"][0]))
     return _march(ensemble, threads, progress, output_states)
 
@@ -139,7 +139,7 @@ def integrate_tangents(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> tuple[OutputStates, _Array]:
-    """As :func:`integrate_with_output_states`, with tangents carried along to the end.
+    """Integrate as :func:`integrate_with_output_states`, with tangents.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def _march(
 
 
 def _few_modes_pay(ensemble: Ensemble, packed: Packed) -> bool:
-    """Whether to integrate eight runs in a register: where that is faster and, once compiled, worth it.
+    """Return whether the run-lane layout is faster than the mode-lane layout, compile time included.
 
     Both layouts give the same bits, so that how much was asked for before may decide.
     """
@@ -328,7 +328,7 @@ def _last(
 
 
 class _Buffers(NamedTuple):
-    """How much a slice of a recorded run holds."""
+    """Capacity of the buffers of one slice of a recorded run."""
 
     samples: int
     impacts: int
@@ -345,7 +345,7 @@ def _buffers(ensemble: Ensemble, times: _Array, size: int) -> _Buffers:
 
 
 def _beside(ensemble: Ensemble) -> int:
-    """How many strikers there are beside the first."""
+    """Number of strikers in addition to the first."""
     return 0 if ensemble.others is None else len(ensemble.others.laws)
 
 

@@ -319,7 +319,7 @@ _DIVERGED, _STEP_LIMIT = int(RunStatus.DIVERGED), int(RunStatus.STEP_LIMIT)
 
 
 class ContactEvent(NamedTuple):
-    """Whether contact begins or ends in a step, where the step then ends, and how its inside was sampled."""
+    """Onset or release of contact in a step: end of the shortened step, and the samples inside it."""
 
     event: bool
     event_ticks: int
@@ -343,7 +343,7 @@ def shortened_step(step, run, ticks, length):
 
 @inlined
 def detect_contact_event(memory, layout, run, now, tip, step, kinematics1, scratch):
-    """Whether and where a step enters or leaves the contact."""
+    """Detect an onset or release of contact within a step, and the time at which the step must end."""
     kinematics, clock, tick = now.kinematics, run.clock, run.clock.tick
     safe_gap, safe_center = now.control.safe_gap, now.control.safe_center
     event, event_ticks, onset_time, subintervals, subinterval = False, step.ticks, -1.0, 0, 0.0

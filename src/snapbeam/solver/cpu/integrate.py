@@ -65,9 +65,9 @@ class KernelOutput(NamedTuple):
     states: Any
     """Output states, q and p about the well at hand, shape (runs, output states, 2 rows); none if of length 0."""
     contacts: Any
-    """That well, and for each striker the ticks since its contact began (-1: apart), shape (runs, output states, 1 + strikers)."""
+    """Current well, and ticks since contact onset of each striker (-1: apart), shape (runs, output states, 1 + strikers)."""
     stop_flag: Any
-    """Not 0: stop."""
+    """Stop flag: the integration stops if it is not 0."""
 
 
 @inlined

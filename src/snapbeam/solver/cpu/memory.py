@@ -46,7 +46,7 @@ class Packed(NamedTuple):
     members: tuple[int, ...]
     """Modes of each block."""
     own: tuple[dict[str, int], ...]
-    """Of each term in the layout, the lengths of what every run has for itself."""
+    """Lengths of the run-specific data of each term in the layout."""
 
     def spread(self, values: _Array) -> _Array:
         """Numbers of modes, shape (..., N), as padded rows, shape (..., rows)."""
@@ -237,7 +237,7 @@ class Memory(NamedTuple):
     """Two places that share the rows of the structure."""
     stages: Stages
     drive_numbers: _Array
-    """With the place of the drive's samples in memory."""
+    """Numbers of the drive, with the memory offset of its samples."""
 
 
 def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:

@@ -60,7 +60,7 @@ WORK_ROWS = 11
 
 
 class Layout(NamedTuple):
-    """Where a structure's rows begin in memory, and the two numbers that are no rows."""
+    """Memory offsets of the rows of a structure, and its two scalars."""
 
     size: int
     """Length of a row."""
@@ -92,16 +92,15 @@ class Layout(NamedTuple):
     terms: Any
     """The terms of the structure, a tuple (:mod:`snapbeam.solver.terms`)."""
     indentation: Any
-    """Of a first contact whose law has a residual indentation, the element of a row that holds it; else None."""
+    """Row element with the residual indentation of the first contact; None without one."""
     others: Any
-    """Of several strikers, an :class:`~snapbeam.solver.cpu.terms.further_contacts.FurtherContacts`; else None."""
+    """Further strikers (:class:`~snapbeam.solver.cpu.terms.further_contacts.FurtherContacts`); None without any."""
     body: Any
     """Element of a row that holds the mode of the first striker; None if it has no mass."""
     bodies: Any
-    """Those of all strikers with mass, a tuple; None without any."""
+    """Bodies of all strikers with mass, a tuple; None without any."""
     velocity_block: Any
-    """Of forces that depend on velocities, a
-    :class:`~snapbeam.solver.cpu.terms.velocity_block.VelocityBlock`; else None."""
+    """Velocity-dependent forces (:class:`~snapbeam.solver.cpu.terms.velocity_block.VelocityBlock`); None without any."""
 
 
 @inlined
@@ -264,7 +263,7 @@ def modal_energy(memory, layout, q, p):
 
 @inlined
 def modal_energies(memory, layout, q, near, p, k, force):
-    """As :func:`modal_energy` of *near*, the part of it in the modes above a frequency, and the rates of both.
+    """Modal energies as in :func:`modal_energy`, the part above a frequency, and the rates of both.
 
     *q* is measured from the origin at hand, which the acceleration *k* belongs to; *force* is that of the contact.
     """

@@ -49,7 +49,7 @@ class Outputs(NamedTuple):
     times: Any
     """Instants to record, s, ascending."""
     at: Any
-    """When each sample was taken, s; those of one step in any order."""
+    """Times of the samples, s; not ordered within a step."""
     rows: Any
     """q about the first well, then p, shape (samples, 2 rows)."""
     values: Any
@@ -64,27 +64,27 @@ class Outputs(NamedTuple):
     most: int
     """Instants that one step may hold."""
     in_contact: bool
-    """Whether the ends of steps in contact are recorded too."""
+    """True if the ends of steps in contact are recorded too."""
 
 
 @inlined
 def has_room(now, accumulators, outputs):
-    """Whether another step's samples and impact fit."""
+    """Return whether the buffers have room for the samples and the impact of another step."""
     rows = now.sample + outputs.most + 3 <= outputs.at.size
     return rows and accumulators.impacts - outputs.marks[1] < outputs.most_impacts
 
 
 class _Instant(NamedTuple):
-    """What a sample is of."""
+    """State at the time of a sample."""
 
     when: float
     """s."""
     q: int
-    """Where the state stands in memory."""
+    """Memory offset of the state."""
     p: int
     kinematics: ContactKinematics
     energy: float
-    """Of the beam, J."""
+    """Energy of the beam, J."""
 
 
 class _Sums(NamedTuple):
@@ -94,14 +94,14 @@ class _Sums(NamedTuple):
     dissipated: float
     lost: float
     works: Any
-    """Of the terms, a tuple."""
+    """Work of the terms, a tuple."""
     within: float
     """1 with what a part of a step gave, 0 without."""
 
 
 @inlined
 def _sums(terms, accumulators):
-    """As a run's record of accumulators has them."""
+    """Sums from a record of accumulators."""
     return _Sums(
         accumulators.work,
         accumulators.dissipated,
@@ -184,7 +184,7 @@ def record_instants(memory, blocks, layout, stages, run, tip, now, step, accumul
 
 @inlined
 def record_held(memory, blocks, layout, run, tip, now, step, accumulators, outputs):
-    """As :func:`record_instants`, of a step in which the tip carries a single mode."""
+    """Record as :func:`record_instants`, for a step in which the tip carries a single mode."""
     clock, sample, size, done = run.clock, now.sample, layout.size, outputs.marks[0]
     times, q2, p2 = outputs.times, run.spare, run.spare + size
     while done < times.size:
@@ -251,7 +251,7 @@ def record_contact(memory, layout, run, tip, now, step, done, kinematics1, sampl
 
 @compiled
 def save_state(now, marks, reals):
-    """Where a run stands, written down."""
+    """Save the integrator state of a run to *marks* and *reals*."""
     rows, kinematics, control = now.rows, now.kinematics, now.control
     marks[0], marks[1], marks[2], marks[3] = now.t, now.sample, now.stored_states, now.status
     marks[4], marks[5], marks[6] = rows.q, rows.p, rows.k

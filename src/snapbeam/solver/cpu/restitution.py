@@ -66,7 +66,7 @@ _BISECTIONS = 60
 
 @inlined
 def _release_between(memory, blocks, layout, run, tip, phase, source, low, high):
-    """Where between *low* (pushing) and *high* (pulling), s after *phase*, the force vanishes."""
+    """Time of zero constraint force between *low* (pushing) and *high* (pulling), s after *phase*, by bisection."""
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high:
@@ -80,7 +80,7 @@ def _release_between(memory, blocks, layout, run, tip, phase, source, low, high)
 
 @compiled
 def _release(memory, blocks, layout, run, tip, phase, source, length):
-    """When within *length* the force first has to pull, s; negative if it does not.
+    """Time of the first change of the force to tension within *length*, s; negative if there is none.
 
     The force is evaluated in *PANELS* panels; where it dips between them, its minimum is located.
     """
@@ -197,7 +197,7 @@ def _further_step(memory, blocks, workspace, run, tip, rest, done):
 
 @inlined
 def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators, kernel_input, outputs):
-    """Where a run stands after a step in which the tip carries the beam, up to the release if there is one.
+    """Integrate one step of sustained contact (sticking), up to the release if there is one.
 
     Returns that and the step.
     """
@@ -303,9 +303,9 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
 _LOCATIONS = 24
 """Newton steps in which a hit is located, at most."""
 _NOISE = 1e-12
-"""Of the tip's speed: relative velocities that are rounding."""
+"""Relative velocities below this multiple of the tip's speed are rounding."""
 _SOON = 0.05
-"""Of the shortest period: how long the rest of a chatter may last to be taken as complete."""
+"""Maximum remaining duration of a chatter that is completed at once, over the shortest period."""
 
 
 @inlined
@@ -371,7 +371,7 @@ def _stuck(memory, workspace, run, kinematics, p, accumulators):
 
 @compiled
 def _rises(inner_samples, subintervals, subinterval, still, still_speed):
-    """When the penetration first becomes positive in a step that begins in touch; -1 if it does not.
+    """Time of the first positive penetration in a step that begins in touch; -1 if there is none.
 
     As long as the gap is rounding (*still*) nothing has happened yet: the bodies part more slowly than can be resolved.
     """
@@ -415,7 +415,7 @@ def _mend(inner_samples, subintervals, length, observed):
 
 @inlined
 def _turns(u0, v0, u1, v1, h):
-    """Where in [0, 1] the cubic has its minimum and its maximum between two falls; -1 and -1 if it only falls."""
+    """Locations in [0, 1] of the minimum and maximum of a cubic between two falls; -1 and -1 if it only falls."""
     _, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
     inside = c2 * c2 - 3.0 * c1 * c3
     if not (c3 < 0.0 and inside > 0.0):
@@ -428,7 +428,7 @@ def _turns(u0, v0, u1, v1, h):
 
 @compiled
 def _rise(u0, v0, u1, v1, h):
-    """As first_rise, and where the signal falls at both ends and has risen between them."""
+    """Upcrossing as first_rise, also if the signal decreases at both ends and increases between them."""
     rise = first_upcrossing(u0, v0, u1, v1, h)
     if rise >= 0.0 or v0 > 0.0 or v1 > 0.0:
         return rise
@@ -443,7 +443,7 @@ def _rise(u0, v0, u1, v1, h):
 
 @compiled
 def _onset_time(inner_samples, subintervals, subinterval):
-    """When the penetration first becomes positive; -1 if it does not."""
+    """Time of the first positive penetration; -1 if there is none."""
     for i in range(subintervals):
         rise = _rise(
             inner_samples[i, 0],
@@ -459,7 +459,7 @@ def _onset_time(inner_samples, subintervals, subinterval):
 
 @compiled
 def _top(inner_samples, subintervals, subinterval, onset_time):
-    """When the penetration is maximum first after *onset_time*; the end of the step if it only grows."""
+    """Time of the first maximum of the penetration after *onset_time*; the end of the step if it only grows."""
     for i in range(min(int(onset_time / subinterval), subintervals - 1), subintervals):
         v0, v1 = inner_samples[i, 1], inner_samples[i + 1, 1]
         if v1 < 0.0:
@@ -562,7 +562,7 @@ def _moved_on(memory, blocks, workspace, run, tip, step, done, q, p, k, after, p
 def accept_step_restitution(
     memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, outputs
 ):
-    """As :func:`snapbeam.solver.cpu.events.accept_step`, of a run whose impacts last no time."""
+    """Accept a step as :func:`snapbeam.solver.cpu.events.accept_step`, for impacts of zero duration."""
     layout, clock, tick = workspace.layout, run.clock, run.clock.tick
     tip = tip_about_well(run.tip, now.well_sign, run.rest_contact)
     rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center

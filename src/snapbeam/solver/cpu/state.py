@@ -76,7 +76,7 @@ _TWO_PI = 2.0 * math.pi
 
 
 class KernelInput(NamedTuple):
-    """What is asked of the runs of an ensemble."""
+    """Input of a kernel: runs, contact laws, drives and initial states of an ensemble."""
 
     runs: Any
     law_numbers: Any
@@ -87,7 +87,7 @@ class KernelInput(NamedTuple):
     """Any numbers of the law, for their type; so is the drive's."""
     drive: Any
     other_numbers: Any
-    """Of the strikers beside the first, shape (runs, strikers, numbers); so are the places of their rows."""
+    """Numbers of the further strikers, shape (runs, strikers, numbers)."""
     other_places: Any
     other_rows: Any
     circuit_rates: Any
@@ -96,25 +96,25 @@ class KernelInput(NamedTuple):
     """Statistics that were registered, by type."""
     max_steps: int
     high: bool
-    """Whether some modes count as high."""
+    """True if some modes count as high."""
 
 
 class Workspace(NamedTuple):
-    """Where in memory a run is integrated."""
+    """Memory layout and composition stages of a run."""
 
     layout: Layout
     stages: Stages
 
 
 class Scratch(NamedTuple):
-    """What a thread works in beside memory: the samples inside a step, and partial sums."""
+    """Scratch arrays of a thread outside memory: samples inside a step, and partial sums."""
 
     inner_samples: Any
     parts: Any
 
 
 class Rows(NamedTuple):
-    """Where the state stands, q, p and the tension's acceleration k, and where a step puts the next."""
+    """Memory offsets of the state (q, p, acceleration k of the tension), and of the state after the step."""
 
     q: int
     p: int
@@ -139,7 +139,7 @@ class StepControl(NamedTuple):
 
 
 class Run(NamedTuple):
-    """What stays the same in a run."""
+    """Constants of a run."""
 
     tip: Tip
     """The tip relative to the well from which the run's displacements are measured."""
@@ -153,11 +153,11 @@ class Run(NamedTuple):
     shortest_subinterval: float
     """Longest subinterval in which a step is sampled, s."""
     step_subintervals: int
-    """Such subintervals in a flight step."""
+    """Number of such subintervals in a flight step."""
     step_time: float
-    """Of the flight step, s."""
+    """Duration of the flight step, s."""
     coefficients: int
-    """Where the prepared steps begin, one for each number of halvings from 0 on."""
+    """Memory offset of the prepared steps, one for each number of halvings from 0 on."""
     slot: int
     """Length of one."""
     spare: int
@@ -165,11 +165,11 @@ class Run(NamedTuple):
     lowest: float
     """Height of a flight that is too low to be resolved, m: under Newton's law, where chatter ends."""
     high: bool
-    """Whether some modes count as high, so that the energy of the modes is added up."""
+    """True if some modes count as high, so that the modal energies are summed."""
 
 
 class IntegratorState(NamedTuple):
-    """Where a run stands."""
+    """State of the integrator within a run."""
 
     t: int
     """Ticks."""
@@ -189,13 +189,13 @@ class IntegratorState(NamedTuple):
 
 @inlined
 def variable_slot(run):
-    """Where a step of any other length is prepared."""
+    """Memory offset of the prepared step of variable length."""
     return run.coefficients + (run.clock.max_halvings + 1) * run.slot
 
 
 @inlined
 def sampling_slot(run):
-    """Where the flow over one subinterval of a flight step stands, and after it that over any other subinterval."""
+    """Memory offset of the flows over one subinterval of a flight step and over any other subinterval."""
     return variable_slot(run) + run.slot
 
 
@@ -207,7 +207,7 @@ def phase_at(run, t):
 
 @inlined
 def run_of(memory, layout, stages, kernel_input, i):
-    """What stays the same in run *i*; its prepared steps go into memory."""
+    """Constants of run *i*; its prepared steps are written to memory."""
     record = kernel_input.runs[i]
     size, work = layout.size, layout.work
     tip = Tip(

@@ -82,7 +82,7 @@ class Step(NamedTuple):
 
     ticks: int
     at: int
-    """Where what :func:`prepare` wrote for this length begins."""
+    """Memory offset of the coefficients that :func:`prepare` wrote for this length."""
     length: float
     """Seconds."""
     phase: float
@@ -107,13 +107,13 @@ class StepIncrement(NamedTuple):
     qr: float
     impulse: float
     work: float
-    """Of the strikers."""
+    """Work of the strikers."""
     gross: float
     lost: float
     """In the contact."""
     dissipated: float
     external: ExternalWork
-    """Of the terms."""
+    """Work of the terms."""
 
 
 @inlined
@@ -124,7 +124,7 @@ def nothing_done(layout):
 
 @called
 def prepare(memory, layout, stages, drive, length, at):
-    """What a step of *length* needs, from *at* on: its distinct flows and the drive's turn at each kick."""
+    """Prepare a step of *length* at offset *at*: its distinct flows, and the rotation of the drive at each kick."""
     size = layout.size
     for i in range((stages.flows + 1) // 2):
         flow_coefficients(memory, layout, memory[stages.flow + i] * length, at)
@@ -186,7 +186,7 @@ class StepData(NamedTuple):
     gamma: float
     in_contact: bool
     sine: float
-    """Of the phase of the drive at the beginning, if in contact."""
+    """Sine of the phase of the drive at the beginning, if in contact."""
     cosine: float
 
 

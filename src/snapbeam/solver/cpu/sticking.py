@@ -24,7 +24,7 @@ __all__ = ["PANELS", "constraint_force", "held_for", "hold"]
 
 
 PANELS = 8
-"""Of a step: the force is integrated over each by Simpson's rule, and checked for a release."""
+"""Panels of a step: in each, the force is integrated by Simpson's rule and checked for a release."""
 
 
 @inlined

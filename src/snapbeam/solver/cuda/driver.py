@@ -53,7 +53,7 @@ SLICE_STEPS = (500, 10**8)
 
 
 def _unusable() -> str | None:
-    """Why no CUDA device can be used, or None if one can."""
+    """Reason why no CUDA device can be used; None if one can."""
     if find_spec("numba_cuda") is None:
         return "the package numba-cuda is not installed (pip install 'snapbeam[cuda]')"
     from numba import cuda
@@ -67,14 +67,14 @@ def _unusable() -> str | None:
 
 
 def simulated() -> bool:
-    """Whether Numba's simulator stands in for a device: for tests, and thousands of times slower."""
+    """Return whether the Numba simulator replaces a device: for tests only, thousands of times slower."""
     from numba import config
 
     return bool(config.ENABLE_CUDASIM)
 
 
 def refusal(modes: int, law: type[ContactLaw] | None = None, drive: type[Drive] = Sine) -> str | None:
-    """Why such runs cannot be integrated on a device here, or None if they can."""
+    """Reason why such runs cannot be integrated on a device; None if they can."""
     if law is not None and law.impulsive:
         return f"the law of contact {law.name!r}, whose impacts last no time, is integrated by the CPU engine alone"
     if law is not None and law.rate_dependent:
@@ -97,14 +97,14 @@ def _most_subintervals(ensemble: Ensemble) -> int:
 
 
 class Options(NamedTuple):
-    """What a benchmark or a test may set; only *fewest_threads* touches results, in their last bits."""
+    """Options of benchmarks and tests; only *fewest_threads* changes results, in their last bits."""
 
     most_blocks: int | None = None
     """Runs integrated at a time; as many as the device holds by default."""
     first_budget: int = 1000
     """Steps of the first slice; later ones last about 0.4 s."""
     fewest_threads: int | None = None
-    """Of a block: 16 on a device by default, where fewer leave lanes idle all the same."""
+    """Minimum threads of a block: 16 on a device by default, because fewer leave lanes idle."""
     warps: int | None = None
     """Warps that a multiprocessor is to hold; see :data:`snapbeam.solver.cuda.layout.RESIDENT_WARPS`."""
 
@@ -149,7 +149,7 @@ class _Launch:
         self.kernel_output, self.work = self._room()
 
     def _room(self) -> tuple[Any, Any]:
-        """What blocks keep of their own: marks and state of the run laid down, and work arrays."""
+        """Allocate the memory of each block: marks and state of the interrupted run, and work arrays."""
         from numba import cuda
 
         from snapbeam.solver.cuda.integrate import DeviceState, DeviceWorkspace

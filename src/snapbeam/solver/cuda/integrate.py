@@ -33,7 +33,7 @@ _RUNNING = int(RunStatus.INTERRUPTED)
 
 
 class DeviceInput(NamedTuple):
-    """What is asked of the runs of an ensemble, on the device."""
+    """Input of a kernel on the device."""
 
     runs: Any
     law_numbers: Any
@@ -46,11 +46,11 @@ class DeviceInput(NamedTuple):
     stretch: float
     max_steps: int
     high: bool
-    """Whether some modes count as high."""
+    """True if some modes count as high."""
 
 
 class DeviceState(NamedTuple):
-    """What blocks keep of the runs that they interrupted."""
+    """States of the runs that each block interrupted."""
 
     slots: Any
     """Run of each block, or -1."""
@@ -60,7 +60,7 @@ class DeviceState(NamedTuple):
 
 
 class DeviceWorkspace(NamedTuple):
-    """What blocks work in."""
+    """Work arrays of a block."""
 
     flows: Any
     turns: Any

@@ -1,4 +1,4 @@
-"""How a structure, and what a kernel is given, lie on a CUDA device."""
+"""Memory layout of a structure and of the kernel input on a CUDA device."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ MOST_MODES = 128
 """Modes, and threads of a block, that the kernel is built for."""
 WARP = 32
 FEWEST_THREADS = 16
-"""Of a block on a device, where fewer would leave lanes of the warp idle all the same."""
+"""Minimum threads of a block on a device, because fewer leave lanes of the warp idle."""
 STRUCTURE = ("omega", "omega_squared", "omega_damped", "damping", "g", "center", "shift", "high")
 """Rows of the structure."""
 MARKS = 6
@@ -78,7 +78,7 @@ class DeviceStructure(NamedTuple):
     coupling: _Array
     """Column j: G's entries between mode j and the modes coupled to it, shape (columns, threads)."""
     places: _Integers
-    """Where each mode stands in shared memory, and the first that it is coupled to, shape (2, threads)."""
+    """Location of each mode in shared memory, and first mode coupled to it, shape (2, threads)."""
 
     def across(self, values: _Array) -> _Array:
         """Numbers of modes, shape (..., N), as threads hold them, shape (..., threads)."""
@@ -87,7 +87,7 @@ class DeviceStructure(NamedTuple):
         return out
 
     def back(self, values: _Array) -> _Array:
-        """What threads hold, shape (..., threads), as numbers of modes, shape (..., N)."""
+        """Convert values of threads, shape (..., threads), to values of modes, shape (..., N)."""
         out = np.empty((*values.shape[:-1], self.order.size))
         out[..., self.order] = values[..., : self.order.size]
         return out
@@ -143,7 +143,7 @@ def device_structure(ensemble: Ensemble, fewest_threads: int = FEWEST_THREADS) -
 
 
 SIMULATED = bool(config.ENABLE_CUDASIM)
-"""Whether Numba's simulator stands in for a device."""
+"""True if the Numba simulator replaces a device."""
 PARTS = 4
 """Partial sums that every thread adds up for itself at the end of a sum over the block."""
 
@@ -168,7 +168,7 @@ def stride_of(threads: int) -> int:
 
 
 class Block(NamedTuple):
-    """What the threads of a block have in common, and each one's place in it."""
+    """Data shared by the threads of a block, and the location of each thread in it."""
 
     lane: int
     terms: Any
@@ -182,7 +182,7 @@ class Block(NamedTuple):
     near: Any
     """Shared: q of the modes that the tension couples to this one."""
     coupling: Any
-    """This mode's column of G, over the modes it is coupled to; in registers."""
+    """Column of G of this mode, over the modes coupled to it; in registers."""
     flows: Any
     """Flows of all modes over the parts of each length of step, shape (flows, 4, threads)."""
     turns: Any

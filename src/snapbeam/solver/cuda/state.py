@@ -39,7 +39,7 @@ _clock_of, _tip_about_well = shared(clock_of), shared(tip_about_well)
 
 
 class Fixed(NamedTuple):
-    """What stays the same in a run."""
+    """Constants of a run."""
 
     tip: Tip
     clock: Clock
@@ -52,18 +52,18 @@ class Fixed(NamedTuple):
     step_time: float
     mode: Mode
     g: float
-    """Of this thread's mode, in the first well."""
+    """Element of g of this thread's mode, in the first well."""
     shift: float
     gamma: float
     rest_stretch: float
     variable_slot: int
     step_sampling_slot: int
     high: bool
-    """Whether some modes count as high, so that the energy of the modes is added up."""
+    """True if some modes count as high, so that the modal energies are summed."""
 
 
 class Standing(NamedTuple):
-    """What belongs to a thread's mode, and the tension's sums."""
+    """State of the mode of a thread, and the sums of the tension."""
 
     q: float
     p: float
@@ -73,7 +73,7 @@ class Standing(NamedTuple):
 
 
 class Held(NamedTuple):
-    """Where a run stands."""
+    """State of the integrator within a run."""
 
     t: int
     well_sign: float
@@ -117,7 +117,7 @@ def _run_constants_function(functions: Functions, threads: int, max_halvings: in
 
     @device
     def run_constants_of(block, structure, kernel_input, i, fresh):
-        """What stays the same in run *i*; its prepared steps, if it is *fresh*."""
+        """Constants of run *i*, and its prepared steps if it is *fresh*."""
         lane, record = block.lane, kernel_input.runs[i]
         mode = Mode(
             structure[0, lane], structure[1, lane], structure[2, lane], structure[3, lane],
@@ -221,7 +221,7 @@ def _save_and_restore_functions() -> tuple[Any, Any]:
 
     @device
     def restore_state(block, index, kernel_output, accumulators):
-        """Where a run stood when it was laid down."""
+        """Restore the state of an interrupted run."""
         lane, marks, reals, modes = block.lane, kernel_output.marks, kernel_output.reals, kernel_output.modes
         own = Standing(
             modes[index, 0, lane],

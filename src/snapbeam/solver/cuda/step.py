@@ -33,7 +33,7 @@ __all__ = ["Functions", "Mode", "functions"]
 
 
 class Mode(NamedTuple):
-    """What a thread knows of its mode."""
+    """Coefficients of the mode of a thread."""
 
     omega: float
     omega_squared: float
@@ -61,13 +61,13 @@ class StepData(NamedTuple):
     tip: Any
     in_contact: bool
     g: float
-    """Of this thread's mode, in the well at hand."""
+    """Element of g of this thread's mode, in the current well."""
     contact: float
     slot: int
     """Which of the prepared lengths of step this one has."""
     length: float
     sine: float
-    """Of the phase of the drive at the beginning, if in contact."""
+    """Sine of the phase of the drive at the beginning, if in contact."""
     cosine: float
     q: float
     p: float
@@ -248,7 +248,7 @@ def functions(order: int, threads: int, columns: int) -> Functions:
 
     @device
     def sample_inside_step(block, mode, tip, at, subintervals, subinterval, phase, q, p, k, k1):
-        """As :func:`snapbeam.solver.cpu.events.sample_inside_step`; *at* is the flow over one subinterval."""
+        """Sample as :func:`snapbeam.solver.cpu.events.sample_inside_step`; *at* is the flow over one subinterval."""
         contact0, contact1, center0, center1 = sum_four(
             block, mode.contact * k, mode.contact * k1, mode.center * k, mode.center * k1
         )

@@ -38,7 +38,7 @@ class AxialLoad(NamedTuple):
 
     @staticmethod
     def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
-        """Of a drive whose motions include the load's."""
+        """Build the term if the motions include that of the axial load."""
         if not any(part == "load" for part, _ in drive.parts):
             return []
         return [TermMemory({}, {"change": np.zeros(WIDTH)}, {})]

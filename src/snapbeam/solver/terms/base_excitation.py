@@ -38,7 +38,7 @@ class BaseExcitation(ForceOfTime):
 
     @staticmethod
     def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
-        """Of a drive whose motions include the base's."""
+        """Build the term if the motions include that of the base."""
         if not any(part == "base" for part, _ in drive.parts):
             return []
         return [TermMemory({"row": padded(structure.base_load)}, {"coefficient": np.zeros(WIDTH)}, {})]

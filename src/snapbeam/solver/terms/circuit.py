@@ -45,13 +45,13 @@ class Circuit(NamedTuple):
     along_p: int
     state: int
     number: int
-    """Of which harvester, from 0."""
+    """Number of the harvester, from 0."""
     own: int
     """Element of a row that holds Q."""
 
     @staticmethod
     def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
-        """Of the circuits of a structure that have inertia."""
+        """Build the terms of circuits with inertia."""
         unit = np.eye(structure.omega.size)
         return [
             TermMemory(
@@ -201,7 +201,7 @@ class ResistiveCircuit(NamedTuple):
 
     @staticmethod
     def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
-        """Of the circuits of a structure that have none."""
+        """Build the terms of circuits without inertia."""
         return [
             TermMemory({"row": padded(each.row)}, {"state": np.zeros(WIDTH)}, {"number": number})
             for number, each in enumerate(structure.circuits)
@@ -227,7 +227,7 @@ class ResistiveCircuit(NamedTuple):
     @staticmethod
     @inlined
     def add_to_speed_bound(memory, size, term, drive, along, q, p, energy, horizon, bound):
-        """As of a circuit with inertia, with |y| at most rate |t| times the root of twice the energy."""
+        """Add to the speed bound as for a circuit with inertia, with |y| <= rate |t| sqrt(2 E)."""
         gain, square = splat(0.0), splat(0.0)
         for row in range(0, size, WIDTH):
             t = load(memory, term.row + row)

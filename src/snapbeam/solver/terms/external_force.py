@@ -45,7 +45,7 @@ class ExternalForce(ForceOfTime):
 
     @staticmethod
     def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
-        """Of every external force, in their order."""
+        """Build a term for every external force, in their order."""
         return [
             TermMemory({"row": padded(row)}, {"coefficient": np.zeros(WIDTH)}, {"number": i})
             for i, row in enumerate(structure.force_rows)
@@ -60,7 +60,7 @@ class ExternalForce(ForceOfTime):
     @staticmethod
     @inlined
     def add_to_speed_bound(memory, size, term, drive, along, q, p, energy, horizon, bound):
-        """As of a base, with max|F|."""
+        """Add to the speed bound as for a base, with max|F|."""
         greatest = _greatest_force(drive, memory, term.number)
         return bound + absolute_product(memory, size, term.row, along) * greatest * horizon
 

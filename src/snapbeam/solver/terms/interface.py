@@ -1,4 +1,4 @@
-"""What a term can add to the equation of motion, and where the solver asks for it.
+"""Interface of terms of the equation of motion, and the operations at which the solver calls them.
 
 A *term* is a force or a coupling beside linear modes and tension: one class in one file of this folder.  The class is a
 named tuple.  Its fields are numbers and places in memory; its static methods are the operations below, each under the
@@ -89,7 +89,7 @@ class ExternalWork(NamedTuple):
     """Work of the terms on the beam within a step, J."""
 
     works: Any
-    """Of each term, a tuple; 0 of those that do none."""
+    """Work of each term, a tuple; 0 if a term does none."""
     gross: float
     """Sum of the absolute values of the works in the kicks."""
 
@@ -310,7 +310,7 @@ def center_from_barrier(terms: Any, center: Any) -> Any:
 
 @operation()
 def has_crossed(terms: Any, center: float, well_sign: float, crossed: Any) -> Any:
-    """Whether the centre has come to the side of the other well."""
+    """Return whether mid-span has crossed to the side of the other well."""
     raise _of_kernels()
 
 
@@ -345,22 +345,22 @@ def _write_flag(attribute: str) -> Callable[[list[Any]], tuple[list[str], dict[s
 
 
 def does_work(terms: Any) -> bool:
-    """Whether a term does work on the beam; known when the kernel is compiled, as are the next ones."""
+    """Return whether a term does work on the beam; known at compile time, as are the next ones."""
     raise _of_kernels()
 
 
 def needs_tension_product(terms: Any) -> bool:
-    """Whether the work of a term needs r = G q at every kick."""
+    """Return whether the work of a term needs r = G q at every kick."""
     raise _of_kernels()
 
 
 def wells_differ(terms: Any) -> bool:
-    """Whether the two wells are not mirror images."""
+    """Return whether the two wells are not mirror images."""
     raise _of_kernels()
 
 
 def may_hide_onset(terms: Any) -> bool:
-    """Whether a term may change the motion so much within a step that the interval without contact misses one."""
+    """Return whether a term can change the motion within a step so much that an onset of contact is missed."""
     raise _of_kernels()
 
 
@@ -383,7 +383,7 @@ _compiled_for_terms(has_state, _write_flag("after_flow"))
 
 
 def no_external_work(terms: Any) -> ExternalWork:
-    """Of a step that has not begun."""
+    """Zero work of all terms."""
     raise _of_kernels()
 
 
@@ -394,7 +394,7 @@ _compiled_for_terms(
 
 
 def total_work(terms: Any, one: ExternalWork, two: ExternalWork) -> ExternalWork:
-    """Of two parts of a step."""
+    """Sum of the work of two parts of a step."""
     raise _of_kernels()
 
 

@@ -87,7 +87,7 @@ class LocalForce(NamedTuple):
     row: int
     """r, a row."""
     state: int
-    """What a run keeps."""
+    """State that a run stores."""
     rest: float
     """u in the first well."""
     law: Any
@@ -95,7 +95,7 @@ class LocalForce(NamedTuple):
 
     @staticmethod
     def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
-        """Of the local forces whose laws depend on the displacement alone."""
+        """Build the terms of local forces that depend on the displacement alone."""
         return _built(structure, padded, dissipative=False)
 
     @staticmethod
@@ -134,7 +134,7 @@ class DampedLocalForce(LocalForce):
 
     @staticmethod
     def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
-        """Of the local forces whose laws have a damping part."""
+        """Build the terms of local forces with damping."""
         return _built(structure, padded, dissipative=True)
 
     @staticmethod

@@ -36,7 +36,7 @@ class SecondWell(NamedTuple):
 
     @staticmethod
     def build(structure: Any, drive: Any, size: int, padded: Any) -> list[TermMemory]:
-        """Of a structure whose wells are no mirror images."""
+        """Build the term if the wells are not mirror images."""
         wells = structure.unequal_wells
         if wells is None:
             return []

@@ -293,7 +293,7 @@ class JoinedRows:
 
 
 def is_growth(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
-    """Whether the parameters *wanted* differ from *held* only by additional values of some axes."""
+    """Return whether the parameters *wanted* differ from *held* only by additional values of some axes."""
     there, here = held.get("points"), wanted.get("points")
     if not isinstance(there, dict) or not isinstance(here, dict) or there == here:
         return False
@@ -447,7 +447,7 @@ class Checkpoint:
         refuse_foreign(self.path)
         self._lock = CheckpointLock(self.path / "lock")
         self.read_only = False
-        """Whether the file system is read-only."""
+        """True if the file system is read-only."""
         try:
             self._take_lock()
             refuse_links(self.path, sweep=not self.read_only)

@@ -88,7 +88,7 @@ def half_the_modes(results: Results) -> ClaimResult:
 
 @cache
 def _antinode() -> tuple[float, float]:
-    """Where the second buckling mode, and the second dynamic mode, is greatest, in the first half."""
+    """Location of the maximum of the second buckling mode, and of the second dynamic mode, in the first half."""
     model, x = paper_model(MODES), np.linspace(0.01, 0.49, 961)
     phi = np.array([model.shape_at(float(at)) for at in x])
     dynamic = phi @ model.linear_modes[:, 1]

@@ -28,7 +28,7 @@ _MOST = 3000.0
 
 
 def _rounding(of: Callable[[sb.Beam], ArrayLike], beam: sb.Beam) -> _Array:
-    """How far numbers move as the length and the buckling level go through what their last digits leave open."""
+    """Change of results within the rounding of the printed length and buckling level."""
     changes = [("length", 5e-4)] + ([("buckling_level", 5e-7)] if beam.is_buckled else [])
     moved = np.zeros_like(np.asarray(of(beam), dtype=float))
     for name, half in changes:
@@ -48,7 +48,7 @@ def _freq(beam: sb.Beam) -> _Array:
 
 
 def _agree(values: list[Quantity], printed: tuple[float, ...], digits: tuple[float, ...]) -> Check:
-    """Whether each value is within half of its last digit, and its uncertainty, of the printed one."""
+    """Check that each value agrees with the printed one within half of its last digit and the uncertainty."""
     checks = [
         near(value.value, target, 0.5 * digit + value.uncertainty)
         for value, target, digit in zip(values, printed, digits, strict=True)

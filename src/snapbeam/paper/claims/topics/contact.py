@@ -29,7 +29,7 @@ _TIP_RADIUS = 2.5e-3
 _STRENGTH = (50e6, 60e6, 70e6)
 """Yield stress of polylactic acid, low, middle and high among common grades, Pa."""
 _ONSET = 1.6
-"""Greatest Hertzian pressure at the onset of yield over the yield stress (Johnson, Contact Mechanics, 1985, 4.2)."""
+"""Maximum Hertzian pressure at the onset of yield over the yield stress (Johnson, Contact Mechanics, 1985, 4.2)."""
 _SHORT = 0.1
 
 
@@ -127,7 +127,7 @@ def shallow(results: Results) -> ClaimResult:
 
 
 def elastic(results: Results) -> ClaimResult:
-    """22c: the greatest contact pressure against the onset of yield of the tip."""
+    """22c: the maximum contact pressure against the onset of yield of the tip."""
     force = part(results, "waveforms", "impacts").peak_force.values
     # E* from the printed stiffness, k_c = 4/3 E* sqrt(R), which is what the model has
     modulus = 0.75 * CONTACT.stiffness / math.sqrt(_TIP_RADIUS)

@@ -1,4 +1,4 @@
-"""Section 4.3: where to strike, for the least velocity and for a transient response."""
+"""Section 4.3: where to strike, for the minimum velocity and for a transient response."""
 
 from __future__ import annotations
 
@@ -68,14 +68,14 @@ def _window(results: Results, ratio: float) -> xr.Dataset:
 
 
 def _ratio(centre: Quantity, end: Quantity, least: float) -> Quantity:
-    """Of two numbers of which neither is told from one smaller than *least*."""
+    """Ratio of two numbers that are both significantly above *least*."""
     above_it, below_it = max(centre.value, least), max(end.value, least)
     value = above_it / below_it
     return Quantity(value, value * combined(centre.uncertainty / above_it, end.uncertainty / below_it))
 
 
 def _means(x: _Array, values: _Array, error: float) -> tuple[Quantity, Quantity]:
-    """Of the locations near a clamp and near the centre."""
+    """Means over the locations near a clamp and near mid-span."""
     return mean_of(values[x <= END], error), mean_of(values[x >= CENTRE], error)
 
 

@@ -60,7 +60,7 @@ def along(results: Results, ratio: float, which: int) -> tuple[_Array, _Array, f
 
 
 def _follows(results: Results, ratio: float, which: int, printed: float, narrow: float) -> ClaimResult:
-    """Whether a threshold is a printed multiple of V_QS1 at nearly all locations."""
+    """Check that a threshold is a printed multiple of V_QS1 at nearly all locations."""
     ds = _map(results, ratio, which)
     x, curve = relative_threshold(ds)
     step = grid_step(ds, float(np.nanmedian(curve)))
@@ -95,7 +95,7 @@ def many_modes_slow(results: Results) -> ClaimResult:
 
 
 def _peak(results: Results, ratio: float, place: float) -> ClaimResult:
-    """Where the threshold of many modes is highest, and how far that goes."""
+    """Location and width of the maximum of the threshold with many modes."""
     x, curve, step = along(results, ratio, 1)
     top = int(np.argmax(curve))
     same = x[curve >= curve[top] - step]

@@ -1,4 +1,4 @@
-"""What the paper leaves open, and how much it matters beside what chaos alone does to the same model's map."""
+"""Properties that the paper does not specify, and their influence compared with that of chaos alone."""
 
 from __future__ import annotations
 

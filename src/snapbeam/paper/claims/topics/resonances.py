@@ -137,7 +137,7 @@ def softening(results: Results) -> ClaimResult:
 
 
 def _linked(results: Results, which: int) -> ClaimResult:
-    """Where the maximum stands just below the threshold, against the notch of Fig. 6."""
+    """Frequency of the maximum just below the threshold, compared with the notch of Fig. 6."""
     study = list(results["resonance"].values())[which]
     drives, ratios = ridge(study)
     grid = float(np.diff(study.frequency_ratio.values).max())

@@ -130,7 +130,7 @@ def first_mode_away(results: Results) -> ClaimResult:
 
 
 def _repeats(record: _Array) -> bool:
-    """Whether cycles some number p apart, up to 40, are alike, or grow alike, over both halves of a record."""
+    """Return whether a signal is periodic, or becomes so, with a period of at most 40 cycles."""
     size = float(record.std())
 
     def apart(half: _Array) -> float:

@@ -493,7 +493,7 @@ def _count_zero_crossings(
 def _accumulate_zero_crossings(
     m, n, lane_settings, kernel_input, accumulators_of_runs, kinematics1, length, after, which, inner_samples
 ):
-    """Where the centre may have crossed, have it counted."""
+    """Count zero crossings of mid-span in the lanes in which one is possible."""
     touching = which & n[at.TOUCHING]
     near = bits(less(load(m, at.SAFE_CENTER), after)) & which & ~touching
     if touching:

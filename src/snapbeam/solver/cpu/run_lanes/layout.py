@@ -53,7 +53,7 @@ FLOW = SAMPLING_FLOW + 4 * WIDTH
 """a11 - 1, a12, a21, a22 - 1 of each distinct flow of the step at hand."""
 MODE_ROWS = FLOW + FLOWS * 4 * WIDTH
 TABLES = MODE + MOST * MODE_ROWS
-"""Of each run the prepared steps: one a level, and one of any length."""
+"""Offset of the prepared steps of each run: one for each level, and one of variable length."""
 
 
 def groups(modes: int, distinct: int) -> int:
@@ -67,7 +67,7 @@ def slot_size(modes: int, distinct: int) -> int:
 
 
 def sizes(modes: int, distinct: int, subintervals: int) -> tuple[int, int]:
-    """Where the rows of the samples begin, and the length of the memory, for so many *subintervals* of a step."""
+    """Offset of the sample rows, and memory length, for a number of *subintervals* of a step."""
     sampling = TABLES + WIDTH * (LEVELS + 1) * slot_size(modes, distinct)
     return sampling, sampling + 4 * WIDTH * (subintervals + 1)
 

@@ -1,4 +1,4 @@
-"""What the layout for few modes serves, and the memory of a thread that integrates them."""
+"""Restrictions of the run-lane layout, and the memory of a thread that integrates it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class FewMemory(NamedTuple):
 
 
 def suits(ensemble: Ensemble, packed: Packed, most: int = at.MOST) -> bool:
-    """Whether the layout for few modes serves an ensemble, of *most* modes at most.
+    """Return whether the run-lane layout supports an ensemble with at most *most* modes.
 
     It knows a structure without terms and circuit, sinusoidal drives, laws that store energy and are plain arithmetic, modes whose flows
     polynomials serve, and the package's own statistics.
@@ -104,7 +104,7 @@ def lay_out_few(ensemble: Ensemble, packed: Packed, subintervals: int) -> FewMem
 
 
 def _enter_pairs(m: _Array, of_modes: list[_Array], flow: int, distinct: int) -> None:
-    """What the flows follow from, for each pair of a mode and a distinct flow; those that fill a group do not move."""
+    """Write the coefficients of the flows for each pair of a mode and a distinct flow; padding pairs do not move."""
     modes = of_modes[0].size
     pairs = np.zeros((at.groups(modes, distinct) * WIDTH, 4))
     pairs[:, 0] = 1.0

@@ -51,7 +51,7 @@ _OK, _RUNNING = int(RunStatus.OK), int(RunStatus.INTERRUPTED)
 
 
 class LaneSettings(NamedTuple):
-    """What all runs share beside the modes."""
+    """Settings common to all runs, apart from the modes."""
 
     stages: Stages
     gamma: float
@@ -60,7 +60,7 @@ class LaneSettings(NamedTuple):
     slot: int
     """Plain numbers of a prepared step."""
     sampling: int
-    """Where in memory the samples inside a step begin."""
+    """Memory offset of the samples inside a step."""
 
 
 @inlined
@@ -85,7 +85,7 @@ def flows_over(m, shape, length, place, which):
 
 @called
 def prepare(m, shape, lane_settings, place, length, omega):
-    """What a step of *length* needs, from *place* on: all modes' flows, and the turns of a drive of rate *omega*."""
+    """Prepare a step of *length* at *place*: flows of all modes, and rotations of a drive of frequency *omega*."""
     for group in range(groups_of(shape)):
         pairs = at.PAIRS + 4 * WIDTH * group
         omega_damped, sigma, squared = (
@@ -111,7 +111,7 @@ def prepare(m, shape, lane_settings, place, length, omega):
 
 @inlined
 def slot_of(lane_settings, lane, level):
-    """Where the prepared step of a level stands."""
+    """Memory offset of the prepared step of a level."""
     return at.TABLES + (lane * (at.LEVELS + 1) + level) * lane_settings.slot
 
 
@@ -165,7 +165,7 @@ def _energies_at(m, shape, law, q, p, k, d, pressed):
 
 @inlined
 def _keep_energies(m, whole, high, power, high_power, mask):
-    """What was found last."""
+    """Store the latest energies and powers of the masked lanes."""
     for row, value in (
         (at.ENERGY, whole),
         (at.HIGH_ENERGY, high),
@@ -218,7 +218,7 @@ def change_energy_origin(m, shape, kernel_input, span, touching, which):
 
 @compiled
 def _constants(m, shape, kernel_input, lane, i):
-    """What stays the same in run *i*."""
+    """Write the constants of run *i* to its lane."""
     record = kernel_input.runs[i]
     drive = numbers_of(kernel_input.drive, kernel_input.drive_numbers, i)
     m[at.OMEGA + lane], m[at.AMPLITUDE + lane] = drive.omega, drive.amplitude

@@ -191,12 +191,12 @@ class StepData(NamedTuple):
     gamma: float
     tip: Any
     in_contact: bool
-    """Whether any of the runs is."""
+    """True if any of the runs is in contact."""
     closed: Any
     """Mask of those that are."""
     length: Any
     sine: Any
-    """Of the phase of the drive at the beginning."""
+    """Sine of the phase of the drive at the beginning."""
     cosine: Any
 
 
@@ -596,7 +596,7 @@ def _tension_of(m, shape, gamma, which, q):
 
 
 def bounds(m: Any, shape: Any) -> Any:
-    """Of contact point and centre: a speed that the linear flow cannot exceed, and what the tension accelerates by."""
+    """Bounds of the speed of contact point and mid-span, and of the acceleration by the tension."""
     raise TypeError("bounds runs in compiled code only")
 
 
@@ -653,7 +653,7 @@ def _propagate_free_of(m, shape, sampling, which, with_center, most):
 
 
 def modes_of(shape: Any) -> int:
-    """How many modes there are."""
+    """Number of modes."""
     return sum(type(shape).blocks)
 
 

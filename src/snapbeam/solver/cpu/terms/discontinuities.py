@@ -1,4 +1,4 @@
-"""Where the velocity of a drive jumps, as at the end of a shock: no step may go across, or it loses its order.
+"""Velocity jumps of a drive, such as the end of a shock: steps must not cross them, or they lose their order.
 
 A drive names the times of its jumps (:attr:`~snapbeam.model.drive.base.Drive.discontinuities`).  Of one that does not, as the
 paper's, nothing of this is compiled.  Steps end a few ticks before a jump and after it.  The step between is taken in
@@ -21,7 +21,7 @@ _TWO_PI = 2.0 * math.pi
 _MARGIN = 2
 """Ticks on either side of a jump, between which one step goes across it."""
 APART = 8e-15
-"""Of the argument of a drive, rad: so far from the jump both parts of that step read the motion, beyond rounding."""
+"""Distance from a jump, rad, at which both parts of a step evaluate the motion, beyond rounding."""
 
 
 class Jump(NamedTuple):
@@ -30,7 +30,7 @@ class Jump(NamedTuple):
     time: str
     """The number that holds it, s since what jumps began."""
     begun: tuple[tuple[str, str], ...]
-    """Of each motion that it is part of, its argument's phase and rate: what jumps may have begun before the whole."""
+    """Names of phase and rate of the argument of each motion in a combination, for the order of the jumps."""
 
 
 def jumps_of(kind: Any, prefix: str = "") -> list[Jump]:
@@ -142,7 +142,7 @@ def _up_to_discontinuity(drive, phase, period, t, limit):
 
 
 def discontinuity_within(drive: Any, phase: float, period: int, t: int, ticks: float) -> float:
-    """How many ticks after tick *t* the drive jumps first, within less than *ticks*; -1 if it does not.
+    """Number of ticks after tick *t* to the first jump of the drive within *ticks*; -1 if there is none.
 
     Other parameters are those of :func:`up_to_discontinuity`.
     """

@@ -1,4 +1,4 @@
-"""When the strikers beside the first one meet the beam and leave it, and what is kept of their contacts.
+"""Contact onset and release of the further strikers, and the statistics of their contacts.
 
 Each is watched as the first one is: near the beam a free step is sampled inside, a step that would pass an onset or release of
 a contact ends there, and steps in contact are graded.  A step ends at the first onset or release of all.
@@ -100,7 +100,7 @@ def _observe(memory, size, others, drive, argument, t, q):
 
 @inlined
 def restart_further_contacts(memory, size, others, drive, argument, t, q):
-    """Where they are at tick *t*, from the state alone; p follows *q*."""
+    """Set the further strikers at tick *t* from the state alone; p follows *q*."""
     if others is None:
         return
     _observe(memory, size, others, drive, argument, t, q)
@@ -144,7 +144,7 @@ def begin_further_contacts(memory, size, others, drive, kernel_input, i, tick, a
 
 @inlined
 def any_touches(memory, others, touching):
-    """Whether the first striker touches, or another one."""
+    """Return whether the first striker or a further one is in contact."""
     if others is None:
         return touching
     for j in range(count_of(others.kinds)):
@@ -196,7 +196,7 @@ def observe_further_contacts(memory, size, others, drive, argument, q, p):
 
 @called
 def _onset_time(memory, layout, others, drive, flow, subintervals, subinterval, step, j, scratch):
-    """When within a free step the gap of striker j closes, s; -1 if it does not."""
+    """Time within a free step at which the gap of striker j closes, s; -1 if it does not."""
     size, row, parts = layout.size, others.rows + j * layout.size, scratch.parts
     sign, here = memory[block(others, j) + SIGN], memory[block(others, j) + HERE]
     propagate_free(
@@ -310,7 +310,7 @@ def corrections_of_onset(others, most):
 
 @inlined
 def refine_further_onsets(memory, others, clock, edge, event_ticks, whole, smallest_correction, corrections):
-    """Where a step that was shortened to *event_ticks* should end, from the gap of the contact that begins there.
+    """End of a step that was shortened to *event_ticks*, refined by the gap of the contact that begins there.
 
     Nothing new without *corrections* left: the *edge* to which the step was shortened first is one of theirs.
     """
@@ -448,7 +448,7 @@ def _turn(memory, size, others, q, p, edge, t, length, tick, accumulators, outpu
 
 @inlined
 def update_further_contacts(memory, size, others, q, p, edge, t, length, tick, accumulators, outputs):
-    """Where they stand at tick *t*, after a step of *length* (s) whose first edge was at tick *edge* of it.
+    """Update the further strikers at tick *t*, after a step of *length* (s) with its first event at tick *edge*.
 
     The state stands in the rows *q* and *p*.  With a length of 0 nothing has moved: those turn whose gap closes as the step begins.
     """

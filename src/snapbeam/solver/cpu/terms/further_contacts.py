@@ -82,12 +82,12 @@ __all__ = [
 
 
 class FurtherContacts(NamedTuple):
-    """Where in memory the strikers beside the first one stand."""
+    """Memory offsets of the strikers after the first."""
 
     rows: int
-    """Their contact rows, one after the other."""
+    """Offset of the contact rows, one after the other."""
     numbers: int
-    """Their blocks of numbers."""
+    """Offset of the blocks of numbers."""
     kinds: Any
     """A value whose type says which laws they touch by."""
     indentations: Any
@@ -105,7 +105,7 @@ class FurtherContacts(NamedTuple):
 
 @inlined
 def block(others, j):
-    """Where the numbers of striker j stand."""
+    """Memory offset of the numbers of striker j."""
     return others.numbers + j * NUMBERS
 
 
@@ -196,7 +196,7 @@ def add_damped_contacts(memory, size, others, k, k1):
 
 @inlined
 def mirror_further_contacts(memory, others, well_sign):
-    """Where they are, in coordinates about the well *well_sign*."""
+    """Transform the positions of the further strikers to coordinates about the well *well_sign*."""
     if others is None:
         return
     for j in range(count_of(others.kinds)):

@@ -82,7 +82,7 @@ def taken_across(
     done: Any,
     with_energy: Any,
 ) -> Any:
-    """What a step that was taken from tick *t* on gave; taken again in two parts if the drive jumps within it."""
+    """Result of a step from tick *t*; if the drive jumps within the step, the step is repeated in two parts."""
     raise TypeError("taken_across runs in compiled code only")
 
 

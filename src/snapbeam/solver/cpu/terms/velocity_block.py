@@ -198,7 +198,7 @@ def enter_contact(memory, at, elastic, damping, velocity):
 
 @inlined
 def open_first_contact(memory, block):
-    """No force of the first contact at a kick, unless it is entered."""
+    """Set the force of the first contact in a kick to zero."""
     if block is None:
         return
     _open(memory, block.first)
