@@ -234,3 +234,24 @@ def test_two_wells_against_fokker_planck() -> None:
     assert chisquare(placed).pvalue > 1e-3
     speeds = np.histogram(norm.cdf(v / math.sqrt(wanted)), bins, (0.0, 1.0))[0]
     assert chisquare(speeds).pvalue > 1e-3
+
+
+def test_interval_of_an_estimate_contains_the_density() -> None:
+    """At 95 % of the frequencies of 20 motions; a record without a density has none in its estimate."""
+    shares = []
+    for seed in range(20):
+        found = sb.RecordedAcceleration.from_psd(
+            SHAPE, duration_s=8.0, seed=seed, ramp_up_s=0.5, rms_g=2.0
+        ).estimated_psd()
+        data = found.sel(frequency=slice(25.0, 190.0))
+        shares.append(np.mean((data.psd_low < data.psd_target) & (data.psd_target < data.psd_high)))
+        assert found.attrs["rms_g"] == pytest.approx(2.0, rel=0.1)
+    # 20 times some 40 lines, neighbours correlated
+    assert np.mean(shares) == pytest.approx(0.95, abs=4.0 * math.sqrt(0.95 * 0.05 / 800 * 2.0))
+    record = sb.RecordedAcceleration.from_g(np.random.default_rng(1).standard_normal(4000), 1000.0)
+    ax = sb.plot.plot_psd(record.estimated_psd())
+    assert ax.get_xlabel() == "Frequency (Hz)" and "psd_target" not in record.estimated_psd()
+    with pytest.raises(InputError, match="segments = 1: must be"):
+        record.estimated_psd(1)
+    with pytest.raises(InputError, match="dataset without psd, psd_low, psd_high"):
+        sb.plot.plot_psd(record.estimated_psd()[[]])

@@ -283,7 +283,7 @@ def read_file(
     kinds = kinds_of(numbered(section)[0])
     kind = kinds.get(str(values.get("type")))
     if kind is None or not hasattr(kind, "from_file"):
-        known = ", ".join(repr(name) for name, each in kinds.items() if hasattr(each, "from_file"))
+        known = " or ".join(repr(name) for name, each in kinds.items() if hasattr(each, "from_file"))
         must = f"a key of type = {known}" if known else "left out"
         raise InputError(f"[{section}] file = {shown(values['file'])}: must be {must}")
     rest = dict(values)

@@ -912,8 +912,15 @@ def _is_saved_system(sections: Mapping[str, Any]) -> bool:
     contacts = [name for name in sections if numbered(name)[0] == "contact"]
     return all(
         numbered(section)[0] in SYSTEM_SECTIONS and isinstance(values, Mapping) and not values.keys() & _CONVERTED
+        and not any(_has_unit(section, *item) for item in values.items())
         for section, values in sections.items()
     ) and all("type" in sections[name] for name in contacts)  # fmt: skip
+
+
+def _has_unit(section: str, name: str, value: Any) -> bool:
+    """Whether a number is given as text."""
+    row = row_of(f"{section}.{name}") if isinstance(value, str) else None
+    return row is not None and row.quantity.kind is float
 
 
 def dump_config(config: Config, path: str | os.PathLike[str], comment: str = "") -> None:

@@ -284,6 +284,18 @@ class RandomVibration(SampledAcceleration):
         """Samples of the acceleration before :attr:`rms_g` scales them, m/s^2."""
         return self._drawn[0]
 
+    @property
+    def _stationary(self) -> slice:
+        """Samples after the rise."""
+        return slice(math.ceil(self.ramp_up_s * self.sampling_frequency), None)
+
+    def _density(self, frequency: _Array) -> _Array:
+        """Straight lines between the break points on logarithmic axes, scaled to the root mean square."""
+        f, g = np.log(np.array(self.psd)).T
+        with np.errstate(divide="ignore"):
+            found = np.exp(np.interp(np.log(frequency), f, g, -np.inf, -np.inf))
+        return np.asarray(found * (self.rms_g / self._rms_of_psd) ** 2)
+
     def _initial_velocity(self, gained: _Array, mean: float) -> float:
         """That of the velocity of the sum, so that the displacement does not drift, by least squares."""
         return float(np.mean(self._drawn[1] - gained))

@@ -15,9 +15,11 @@ from snapbeam.model.drive.sampled import FileKeys, Sampled, refuse_drift, requir
 from snapbeam.model.drive.shock import GRAVITY
 from snapbeam.model.quantity import quantity
 from snapbeam.util.diagnostics import Diagnostic
-from snapbeam.util.validation import finite_array
+from snapbeam.util.validation import finite_array, integer, within
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from snapbeam.model.drive.random_vibration import RandomVibration
     from snapbeam.model.reduced_model import ReducedModel
 
@@ -97,6 +99,74 @@ class SampledAcceleration(Sampled):
         gain = self.gain(columns)
         speed = gain * np.abs(self._rows[:, 2]).max() + half * self.peak_acceleration(columns, scale)
         return gain * float((sign * self._rows[:, 3]).max()) + half * speed, speed
+
+    @property
+    def _stationary(self) -> slice:
+        """Samples of which a spectrum is estimated."""
+        return slice(None)
+
+    def estimated_psd(self, segments: int = 32, confidence: float = 0.95) -> xr.Dataset:
+        """Estimate the power spectral density of the acceleration by Welch's method, with an interval at each frequency.
+
+        The segments overlap by half, under a Hann window.  The estimate over the true density is chi square over its
+        degrees of freedom, 2 K/(1 + 2 c (K - 1)/K) of K overlapped segments, where c is the square of the correlation of
+        the window with itself half a segment later (P. D. Welch, 1967).
+
+        Parameters
+        ----------
+        segments : int
+            Number of segments without overlap, from 2; more of them narrow the interval and widen the lines.
+        confidence : float
+            Probability with which an interval contains the true density, in (0, 1).
+
+        Returns
+        -------
+        xarray.Dataset
+            ``psd``, ``psd_low`` and ``psd_high`` (g^2/Hz) over ``frequency`` (Hz), of a random vibration with the density
+            ``psd_target`` that it was drawn from; attribute ``rms_g``.
+
+        Examples
+        --------
+        >>> import snapbeam as sb
+        >>> motion = sb.RecordedAcceleration.from_psd([(20, 0.04), (200, 0.04)], duration_s=5.0)
+        >>> list(motion.estimated_psd().data_vars)
+        ['psd', 'psd_low', 'psd_high', 'psd_target']
+        """
+        from scipy.signal import get_window, welch
+        from scipy.stats import chi2
+
+        from snapbeam.util.datasets import xr
+
+        gain = self.gain({name: np.array([value]) for name, value in self.values().items()})[0]
+        values = gain * self.record[self._stationary] / GRAVITY
+        count = values.size // integer("segments", segments, 2, values.size // 16) // 2 * 2
+        within("confidence", confidence, 0.0, 1.0)
+        window = get_window("hann", count)
+        frequency, psd = welch(values, self.sampling_frequency, window, detrend=False)
+        k = 2 * (values.size // count) - 1
+        c = float(np.sum(window[: count // 2] * window[count // 2 :]) / np.sum(window**2)) ** 2
+        freedom = 2.0 * k / (1.0 + 2.0 * c * (k - 1) / k)
+        tails = chi2.ppf([0.5 + 0.5 * confidence, 0.5 - 0.5 * confidence], freedom) / freedom
+        words = {
+            "psd": "acceleration power spectral density, estimate",
+            "psd_low": f"lower end of the {100 * confidence:g} % interval",
+            "psd_high": f"upper end of the {100 * confidence:g} % interval",
+            "psd_target": "density drawn from",
+        }
+        found = dict(zip(words, (psd, psd / tails[0], psd / tails[1], self._density(frequency)), strict=True))
+        return xr.Dataset(
+            {
+                name: ("frequency", each, {"units": "g^2/Hz", "long_name": words[name]})
+                for name, each in found.items()
+                if each is not None
+            },
+            {"frequency": ("frequency", frequency, {"units": "Hz", "long_name": "frequency"})},
+            {"rms_g": float(np.sqrt(np.mean(values**2))), "degrees_of_freedom": freedom},
+        )
+
+    def _density(self, frequency: _Array) -> _Array | None:
+        """The density that the samples were drawn from, g^2/Hz; None of a record."""
+        return None
 
     @staticmethod
     def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
