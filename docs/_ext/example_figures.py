@@ -29,7 +29,7 @@ def main() -> None:
     page = (DOCS / "base_and_load.md").read_text(encoding="utf-8")
     os.chdir(DOCS / "images")
     exec(
-        next(each for each in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "plot_psd" in each),
+        next(each for each in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "estimated_psd" in each),
         {"sb": snapbeam},
     )
 

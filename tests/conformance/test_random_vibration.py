@@ -249,9 +249,7 @@ def test_interval_of_an_estimate_contains_the_density() -> None:
     # 20 times some 40 lines, neighbours correlated
     assert np.mean(shares) == pytest.approx(0.95, abs=4.0 * math.sqrt(0.95 * 0.05 / 800 * 2.0))
     record = sb.RecordedAcceleration.from_g(np.random.default_rng(1).standard_normal(4000), 1000.0)
-    ax = sb.plot.plot_psd(record.estimated_psd())
+    ax = sb.plot.plot_spectrum(record.estimated_psd())
     assert ax.get_xlabel() == "Frequency (Hz)" and "psd_target" not in record.estimated_psd()
     with pytest.raises(InputError, match="segments = 1: must be"):
         record.estimated_psd(1)
-    with pytest.raises(InputError, match="dataset without psd, psd_low, psd_high"):
-        sb.plot.plot_psd(record.estimated_psd()[[]])

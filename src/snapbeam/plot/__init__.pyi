@@ -17,7 +17,6 @@ from .map import class_handles as class_handles
 from .map import plot_points as plot_points
 from .map import plot_response_map as plot_response_map
 from .map import plot_statistic as plot_statistic
-from .psd import plot_psd as plot_psd
 from .run import plot_energies as plot_energies
 from .run import plot_modal_amplitudes as plot_modal_amplitudes
 from .run import plot_phase_portrait as plot_phase_portrait
