@@ -214,7 +214,7 @@ def plot_spectrum(
     >>> motion = sb.RecordedAcceleration.from_psd("NAVMAT P-9492", duration_s=2.0)
     >>> ax = sb.plot.plot_spectrum(motion.estimated_psd())
     """
-    if "psd_low" in getattr(run, "data_vars", ()):
+    if not isinstance(run, Run) and "psd_low" in getattr(run, "data_vars", ()):
         return _plot_density(run, ax)
     dataset = dataset_of(run, variable)
     choice(

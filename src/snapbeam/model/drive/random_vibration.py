@@ -243,7 +243,7 @@ class RandomVibration(SampledAcceleration):
         return math.sqrt(float(mean_square(self.psd, 0.0, math.inf)))
 
     @property
-    def sampling_frequency(self) -> float:  # type: ignore[override]
+    def sampling_frequency(self) -> float:
         """Samples per second, Hz."""
         return float(_SAMPLES_PER_PERIOD * self.psd[-1][0])
 
@@ -273,14 +273,14 @@ class RandomVibration(SampledAcceleration):
         acceleration, velocity, moved = (irfft(each, whole)[:count] for each in (a, v, x))
         if self.ramp_up_s > 0.0:
             t = np.minimum(np.arange(count) / rate / self.ramp_up_s, 1.0)
-            e, slope, bend = smooth_rise(t)
+            e, slope, bend = smooth_rise(t)  # type: ignore[arg-type]  # a polynomial
             slope, bend = slope / self.ramp_up_s, bend / self.ramp_up_s**2
             acceleration = e * acceleration + 2.0 * slope * velocity + bend * moved
             velocity = e * velocity + slope * moved
         return acceleration, velocity
 
     @property
-    def record(self) -> _Array:  # type: ignore[override]
+    def record(self) -> _Array:
         """Samples of the acceleration before :attr:`rms_g` scales them, m/s^2."""
         return self._drawn[0]
 

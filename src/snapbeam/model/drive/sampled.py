@@ -28,7 +28,7 @@ class Sampled(Timed):
     """A history by its ``record`` at ``sampling_frequency``, which ends with the record.  A cycle is a period of the first mode."""
 
     recorded = True
-    number_names = ("omega", "fastest", "table", "samples", "interval")
+    number_names: ClassVar[tuple[str, ...]] = ("omega", "fastest", "table", "samples", "interval")
     amplitudes = ()
     record: Any
     sampling_frequency: Any
