@@ -253,3 +253,28 @@ def test_interval_of_an_estimate_contains_the_density() -> None:
     assert ax.get_xlabel() == "Frequency (Hz)" and "psd_target" not in record.estimated_psd()
     with pytest.raises(InputError, match="segments = 1: must be"):
         record.estimated_psd(1)
+
+
+@pytest.mark.slow
+def test_motion_of_a_striker_is_that_of_its_samples() -> None:
+    """A tip that moves by a random vibration against the same samples as a record: impacts and displacements agree."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
+    motion = sb.RecordedAcceleration.from_psd(
+        [(40.0, 1e-3), (300.0, 1e-3)], duration_s=0.5, rms_g=3.0, ramp_up_s=0.1
+    )
+    rows = motion.samples().reshape(-1, 4) * motion.gain({"rms_g": np.array([3.0])})[0]
+    record = sb.RecordedMotion(
+        displacement=rows[:, 3],
+        velocity=rows[:, 2],
+        sampling_frequency=motion.sampling_frequency,
+        frequency=80.0,
+    )
+    found = []
+    for drive in (motion, record):
+        system = sb.System(
+            model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, gap=2e-5))]
+        )
+        run = sb.simulate(system, sb.Integration(cycles=20), sample_times=np.linspace(0.0, 0.15, 100))
+        assert run.summary.impacts > 0
+        found.append(run.dataset["striker_displacement"].values)
+    np.testing.assert_allclose(found[0], found[1], rtol=0.0, atol=1e-3 * np.abs(found[1]).max())

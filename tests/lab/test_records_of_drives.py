@@ -99,7 +99,7 @@ def test_units_columns_and_quantities(folder) -> None:
         sb.RecordedForce.from_file("tip.csv")
 
 
-def test_drift_is_decided() -> None:
+def test_drift_is_decided(folder) -> None:
     """An offset of a sensor: refused, removed by a straight line, or kept."""
     for of, unit, values, words in (
         (sb.RecordedAcceleration, "g", G + 0.15, "an offset of 1.47 m/s"),
