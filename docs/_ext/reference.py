@@ -36,14 +36,16 @@ _SECTIONS = {
     "`[[contact]]`, the drive of each below it as `[contact.drive]`. A `label` replaces the number in the names of their "
     "parameters; see [systems](systems.md#names-of-parameters).",
     "drive": "The motion of the striker, selected by `type`: {drives}. `frequency_hz` (Hz), `velocity_m_s` (m/s) and "
-    "`displacement_um` (µm) can replace the ratios. A recorded motion is available from Python and with `--recorded-drive` only.",
+    "`displacement_um` (µm) can replace the ratios. A type with samples can have `file` and its [keys](base_and_load.md#records-from-files) instead of them.",
     "base_excitation": "The motion of the base, selected by `type` as in `[drive]`; without this section the base is at rest. "
-    "`frequency_hz` (Hz), `velocity_m_s` (m/s) and `amplitude_g` (g) can replace the ratios.",
+    "`frequency_hz` (Hz), `velocity_m_s` (m/s) and `amplitude_g` (g) can replace the ratios. A type with samples or a spectrum can have "
+    "`file` and its [keys](base_and_load.md#records-from-files) instead of them.",
     "axial_load": "The change of the axial load in time, selected by `type`: {loads}; without this section the load is "
     "constant.",
     "force": "A force on the structure, selected by `type`: as a function of time {forces}; of the displacement or velocity of "
     "one point {local_forces}. A law of your own has its own type; see [Your own parts](extending.md#local-force). Several "
-    "forces are an array `[[force]]`, each with a `label` if you like.",
+    "forces are an array `[[force]]`, each with a `label` if you like. `recorded_force` can have `file` and its "
+    "[keys](base_and_load.md#records-from-files) instead of samples.",
     "harvester": "The circuit of an energy harvester, selected by `type`: {harvesters}.",
     "integration": "Solver settings.",
 }

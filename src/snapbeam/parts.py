@@ -10,7 +10,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
 
-__all__ = ["PARTS", "installed_parts", "load_part"]
+__all__ = ["PARTS", "installed_parts", "load_part", "signal_files"]
 
 PARTS = {
     "lab": "lab",  # camera recordings, vibrometer signals, free decays, calibration, comparison with simulations
@@ -18,6 +18,10 @@ PARTS = {
     "paper": "",  # figures and claims of the source paper
 }
 """Name of the package of each part, and the extra of the distribution that installs what it needs."""
+
+
+_SIGNALS = "lab"
+"""The part that reads files of measured signals."""
 
 
 def installed_parts() -> list[str]:
@@ -36,3 +40,18 @@ def load_part(name: str) -> ModuleType:
     if name not in PARTS or find_spec(f"snapbeam.{name}") is None:
         raise AttributeError(f"module 'snapbeam' has no attribute {name!r}")
     return import_module(f"snapbeam.{name}")
+
+
+def signal_files() -> ModuleType:
+    """Readers of files of measured signals, by which the core reads records of drives.
+
+    Raises
+    ------
+    InputError
+        If the part that has them is not installed.
+    """
+    from snapbeam.util.validation import InputError
+
+    if _SIGNALS not in installed_parts():
+        raise InputError(f"file: reading records needs the part snapbeam.{_SIGNALS}, which is not installed")
+    return import_module(f"snapbeam.{_SIGNALS}.signal_files")

@@ -47,8 +47,8 @@ def refused(*arguments):
 @pytest.mark.parametrize(
     ("parts", "way"),
     [
-        (SHAKEN, "[base_excitation] with type = recorded_acceleration, record (m/s^2)"),
-        (FORCE, "[force] with type = recorded_force, record (N)"),
+        (SHAKEN, "[base_excitation] with type = 'recorded_acceleration' and its file"),
+        (FORCE, "[force] with type = 'recorded_force' and its file"),
         (SPRING, "use a system with a [contact] and without a moving base, load or external force"),
     ],
 )

@@ -137,6 +137,9 @@ def test_every_page_with_code_runs():
 def test_parameter_files_of_pages_are_valid(tmp_path):
     """Blocks of TOML with the sections of a parameter file are read without an error."""
     read = 0
+    (tmp_path / "shaker.csv").write_text(
+        "# sampling_frequency: 1000 Hz\nbase (g)\n" + "0.1\n-0.1\n" * 20, encoding="utf-8"
+    )
     for page in PAGES:
         for block in blocks(page, "toml"):
             sections = set(re.findall(r"^\[+(\w+)", block, re.MULTILINE))

@@ -238,6 +238,10 @@ OF_OTHERS = {
         sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
         {"low_ratio": 0.6, "high_ratio": 3.0, "velocity_rms": 0.2, "seed": 5, "ramp_up_cycles": 2.0},
     ),
+    "random_vibration": (
+        sb.RecordedAcceleration.from_psd([(20.0, 0.04), (200.0, 0.04)], duration_s=0.5),
+        {"psd": ((20.0, 0.04), (200.0, 0.02)), "duration_s": 0.4, "rms_g": 1.0, "seed": 2, "ramp_up_s": 0.1},
+    ),
     "two_tone": (
         sb.TwoTone(frequency_ratio=1.0, velocity_amplitude=0.1, second_ratio=2.0, second_amplitude=0.1),
         {

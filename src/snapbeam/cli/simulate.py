@@ -203,10 +203,10 @@ class _share_done:
 
 
 _OWN_RECORD = {
-    "base_excitation": "recorded_acceleration, record (m/s^2)",
-    "force": "recorded_force, record (N)",
+    "base_excitation": "recorded_acceleration",
+    "force": "recorded_force",
 }
-"""Type and sampled quantity of a record that a section takes from a parameter file."""
+"""Type of a record that a section takes from a parameter file."""
 
 
 def _require_striker(system: Any) -> None:
@@ -220,7 +220,7 @@ def _require_striker(system: Any) -> None:
     way = (
         "use a system with a [contact] and without a moving base, load or external force"
         if instead is None
-        else f"give the record in the file: [{instead}] with type = {_OWN_RECORD[instead]} and sampling_frequency (Hz)"
+        else f"give the record in the parameter file: [{instead}] with type = {_OWN_RECORD[instead]!r} and its file"
     )
     raise InputError(
         f"recorded_drive (--recorded-drive): moves a striker, but the system does not have one; {way}"

@@ -87,7 +87,7 @@ def read(file: Path, section: str) -> tuple[Config, ParameterUncertainty, dict[s
     question = sections.get(section, {})
     if not isinstance(question, dict):
         raise InputError(f"{file.name}: [{section}] must be a section")
-    return config_from_mapping(sections, file.name), uncertainty, question
+    return config_from_mapping(sections, file.name, folder=file.parent), uncertainty, question
 
 
 def taken(kind: Any, table: dict[str, Any], where: str) -> Any:

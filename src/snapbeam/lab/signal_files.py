@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snapbeam.lab.signal_formats import READERS, WRITERS, Channel, Told, agree
+from snapbeam.lab.signal_formats import READERS, WRITERS, Channel, Told, agree, read_table, split_unit
 from snapbeam.lab.signals import check_signal, make_signal, parse_sensitivity, si_unit
 from snapbeam.util.diagnostics import DiagnosticWarning, to_json
 from snapbeam.util.files import atomic_path, check_writable
@@ -24,7 +25,7 @@ from snapbeam.util.validation import InputError, InputTypeError, positive, shown
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["read_channels", "read_signal", "write_signal"]
+__all__ = ["read_channels", "read_columns", "read_signal", "write_signal"]
 
 
 def read_channels(
@@ -173,6 +174,51 @@ def read_signal(
         return _to_signal(entry, units, sensitivity, Path(path).name)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
+
+
+def read_columns(
+    path: str | os.PathLike[str],
+    names: Sequence[str] | None,
+    units: Sequence[str],
+    *,
+    are_stated: bool = False,
+) -> list[tuple[list[float], str]]:
+    """Return columns of a text table whose header names them, each with its unit.
+
+    Parameters
+    ----------
+    path : path
+        A table as :func:`read_channels` reads it, without the need of a time.
+    names : sequence of str or None
+        Names of the columns, with or without their units; the first ones if left out.
+    units : sequence of str
+        Unit of each column where the header does not state it.
+    are_stated : bool
+        Whether a header that states another unit of the last column is refused.
+
+    Raises
+    ------
+    InputError
+    """
+    source = Path(path)
+    if not source.is_file():
+        raise InputError(f"{source}: no such file")
+    table = read_table(source)
+    known = {split_unit(full)[0]: full for full in table.columns} | {full: full for full in table.columns}
+    if names is not None and (isinstance(names, str) or len(names) != len(units)):
+        raise InputError(f"columns = {shown(names)}: must be {len(units)} names")
+    wanted = list(table.columns)[: len(units)] if names is None else list(names)
+    missing = [name for name in wanted if name not in known]
+    if missing or len(wanted) < len(units):
+        listing = ", ".join(map(repr, table.columns))
+        raise InputError(f"{source}: columns = {shown(missing or wanted)}: must be {len(units)} of {listing}")
+    found = []
+    for name, unit in zip(wanted, units, strict=True):
+        own = split_unit(known[name])[1] or unit
+        if are_stated and name == wanted[-1] and own != unit:
+            raise InputError(f"{source}: {name} is in {own!r} but unit = {unit!r} was given")
+        found.append((table.numbers(known[name]).tolist(), own))
+    return found
 
 
 def _to_signal(entry: Channel, units: str | None, sensitivity: str | None, source: str) -> xr.DataArray:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Drive, Scale, Timed, sincos
+from snapbeam.model.drive.sampled import FileKeys, Sampled, require_unit
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, check_label, quantity
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.validation import InputError, InputTypeError, finite_array, shown
@@ -22,8 +23,6 @@ _Array = NDArray[np.float64]
 
 FORCES: dict[str, type[Drive]] = {}
 """Every history of a force, by the name it has in parameter files."""
-_KNOTS = 8.0
-"""Samples in the shortest period that the steps of a recorded force resolve."""
 
 
 class ForceHistory(Drive):
@@ -172,7 +171,7 @@ class ConstantForce(ForceHistory, Timed):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RecordedForce(ForceHistory, Timed):
+class RecordedForce(FileKeys, ForceHistory, Sampled):
     """A sampled force: any history.  Between samples it is the cubic spline through all of them.
 
     A cycle is a period of the first mode.  A run must end before the record does.
@@ -180,7 +179,7 @@ class RecordedForce(ForceHistory, Timed):
     Parameters
     ----------
     record : array_like of shape (samples,)
-        N, the first sample at the start of the run.
+        N, the first sample at the start of the run; :meth:`from_file` reads a file.
     sampling_frequency : float
         Samples per second, Hz.
 
@@ -195,47 +194,13 @@ class RecordedForce(ForceHistory, Timed):
     record: NDArray[np.float64] = quantity("N", "force, sampled", kind=object)
     sampling_frequency: float = quantity("Hz", "samples per second of the force", low=0.0)
     name = "recorded_force"
-    recorded = True
-    number_names = ("omega", "fastest", "table", "samples", "interval")
-    amplitudes = ()
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-        record = finite_array("record", self.record, 1).copy()
-        if record.size < 4:
-            raise InputError(f"record of {record.size} samples: must hold at least 4; give a longer one")
-        record.setflags(write=False)
-        object.__setattr__(self, "record", record)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, RecordedForce):
-            return NotImplemented
-        return self.sampling_frequency == other.sampling_frequency and np.array_equal(
-            self.record, other.record
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.sampling_frequency, self.record.tobytes()))
-
-    @property
-    def duration(self) -> float:
-        """Length of the record, s."""
-        return (self.record.size - 1) / self.sampling_frequency
-
-    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """A period of the first mode."""
-        return np.full(next(iter(columns.values())).size, 2.0 * math.pi / scale.omega)
-
-    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
-        """Location and number of the samples, and their interval, s."""
-        runs = next(iter(columns.values())).size
-        fixed = {
-            "fastest": 2.0 * math.pi * self.sampling_frequency / _KNOTS,
-            "table": 0.0,
-            "samples": float(self.record.size),
-            "interval": 1.0 / self.sampling_frequency,
-        }
-        return {name: np.full(runs, value) for name, value in fixed.items()}
+    @classmethod
+    def _of_signal(
+        cls, values: _Array, unit: str, rate: float, decided: bool, **fields: Any
+    ) -> RecordedForce:
+        require_unit(unit, {"N": "a force"})
+        return cls(record=values, sampling_frequency=rate, **fields)
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A bound on the spline: between two samples it is at most both, and 4/27 of an interval times each slope."""

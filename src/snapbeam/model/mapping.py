@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +29,7 @@ __all__ = [
     "nested",
     "parts_from_mapping",
     "parts_to_mapping",
+    "read_file",
     "replaced",
     "resolved",
     "sequence_of",
@@ -255,6 +258,8 @@ def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
 
 def _chosen(values: Mapping[str, Any], section: str) -> Any:
     """The part whose kind the key ``type`` of its section names."""
+    if "file" in values:
+        values = read_file(section, values)
     own, known = dict(values), kinds_of(numbered(section)[0])
     name = own.pop("type", None)
     if not isinstance(name, str) or name not in known:
@@ -263,6 +268,38 @@ def _chosen(values: Mapping[str, Any], section: str) -> Any:
     _only(own, section, [item.name for item in dataclasses.fields(kind)])
     _needed(own, section, kind, f" for type = {shown(name)}")
     return kind(**own)
+
+
+def read_file(
+    section: str, values: Mapping[str, Any], folder: str | os.PathLike[str] = "."
+) -> dict[str, Any]:
+    """The values of a section with the record that its ``file``, relative to *folder*, contains in place of the keys of files.
+
+    Raises
+    ------
+    InputError
+        For a type without a record, a file that cannot be read, and values that are missing or given twice.
+    """
+    kinds = kinds_of(numbered(section)[0])
+    kind = kinds.get(str(values.get("type")))
+    if kind is None or not hasattr(kind, "from_file"):
+        known = " or ".join(repr(name) for name, each in kinds.items() if hasattr(each, "from_file"))
+        must = f"a key of type = {known}" if known else "left out"
+        raise InputError(f"[{section}] file = {shown(values['file'])}: must be {must}")
+    rest = dict(values)
+    file = rest.pop("file")
+    if not isinstance(file, (str, os.PathLike)):
+        raise InputError(f"[{section}] file = {shown(file)}: must be a path")
+    fields = [item.name for item in dataclasses.fields(kind) if item.name not in kind.file_gives]
+    twice = [name for name in kind.file_gives if name in rest and name not in kind.file_keys]
+    if twice:
+        raise InputError(f"[{section}] {twice[0]}: is in the file {shown(file)}; leave one out")
+    own = _taken(rest, [*fields, *kind.file_keys])
+    _needed(own | dict.fromkeys(kind.file_gives), section, kind, f" for type = {shown(rest['type'])}")
+    try:
+        return rest | _fields(kind.from_file(Path(folder) / file, **own))
+    except InputError as error:
+        raise InputError(f"[{section}] {error}") from error
 
 
 def _needed(values: Mapping[str, Any], section: str, kind: Any, why: str = "") -> None:

@@ -20,7 +20,7 @@ from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION
 from snapbeam.model.drive.base import DRIVES
 from snapbeam.model.external_force import FORCES
 from snapbeam.model.integration import CYCLES, Integration
-from snapbeam.model.mapping import flattened, labels_of, parts_from_mapping, resolved
+from snapbeam.model.mapping import flattened, labels_of, parts_from_mapping, read_file, resolved
 from snapbeam.model.parameter_axes import (
     PHYSICAL,
     axis_that_changes_unit,
@@ -154,8 +154,10 @@ _SYMBOLS = {
 }  # fmt: skip
 
 
-def checked_sections(sections: Mapping[str, Any]) -> tuple[dict[str, dict[str, Any]], list[str]]:
-    """Return the checked values by section and name, and one message for each fault."""
+def checked_sections(
+    sections: Mapping[str, Any], folder: str | os.PathLike[str] = "."
+) -> tuple[dict[str, dict[str, Any]], list[str]]:
+    """Return the checked values by section and name, and one message for each fault; files of records are in *folder*."""
     lines: list[str] = []
     found: dict[str, dict[str, Any]] = {}
     flat = flattened(mapping("sections", sections))
@@ -174,6 +176,12 @@ def checked_sections(sections: Mapping[str, Any]) -> tuple[dict[str, dict[str, A
         elif not isinstance(values, Mapping):
             lines.append(f"{section} = {shown(values)}: must be a section [{section}]")
         else:
+            if "file" in values and section not in _OF_RUNS:
+                try:
+                    values = read_file(str(section), values, folder)
+                except InputError as error:
+                    lines.append(str(error))
+                    continue
             faults = [_checked(section, str(name), value, found, labels) for name, value in values.items()]
             lines += [f"[{section}] {message}" for message in faults if message]
     return found, lines
@@ -239,7 +247,7 @@ def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
         return f"{name} = {shown(value)}: must be a whole number{unit}", None
     elif item.kind is str and not isinstance(value, str):
         return f"{name} = {shown(value)}: must be text", None
-    elif item.kind is object or isinstance(value, (list, np.ndarray)):
+    elif item.parse is None and (item.kind is object or isinstance(value, (list, np.ndarray))):
         return _array(name, value)
     try:
         return "", item.check(name, value)
@@ -413,7 +421,7 @@ _AROUND, _STRIKING = (
     ("base_excitation", "axial_load", "force", "harvester"),
     ("contact", "drive"),
 )
-_CONVERTED = {"radius", *WANTED, *(field for _, field in map(split_name, PHYSICAL))}
+_CONVERTED = {"radius", "file", *WANTED, *(field for _, field in map(split_name, PHYSICAL))}
 """Names of a parameter file that a system does not have."""
 # What stands for the same thing in a section: giving one set takes the other away.
 _RIVALS: dict[str, list[tuple[set[str], set[str]]]] = {
@@ -783,7 +791,13 @@ def _stand_in(name: str, value: Any) -> float:
     return 1.0 if name == "frequency_ratio" else 0.5 if name == "location" else 0.0
 
 
-def config_from_mapping(sections: Mapping[str, Any], source: str = "", *, complete: bool = True) -> Config:
+def config_from_mapping(
+    sections: Mapping[str, Any],
+    source: str = "",
+    *,
+    complete: bool = True,
+    folder: str | os.PathLike[str] = ".",
+) -> Config:
     """Check nested parameters, as a TOML file holds them.
 
     Parameters
@@ -795,6 +809,8 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "", *, comple
         Source of the values, the prefix of each error message.
     complete : bool
         Whether they must describe a system.  If not, each value is checked, but others may complete them.
+    folder : path
+        Folder of the files of records that are named.
 
     Raises
     ------
@@ -802,7 +818,7 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "", *, comple
         One line for each thing that is wrong: unknown names, wrong kinds, wrong units.
     """
     instance("source", source, str, "text")
-    found, lines = checked_sections(sections)
+    found, lines = checked_sections(sections, folder)
     config = Config(found, "extends" in sections or not set(found) - set(_OF_RUNS))
     lines = lines or contradictions(found)
     if not lines and complete:
@@ -872,7 +888,7 @@ def load_config(path: str | os.PathLike[str], *, complete: bool = True) -> Confi
         If it cannot be read or is no TOML, and for anything :func:`config_from_mapping` refuses.
     """
     file = file_path("config", path)
-    return config_from_mapping(read_toml("config", file), file.name, complete=complete)
+    return config_from_mapping(read_toml("config", file), file.name, complete=complete, folder=file.parent)
 
 
 def system_of_file(path: str | os.PathLike[str]) -> System:
@@ -886,7 +902,8 @@ def system_of_file(path: str | os.PathLike[str]) -> System:
     sections = read_toml("path", path)
     if _is_saved_system(sections):
         return System.from_mapping(sections)
-    return config_from_mapping(sections, file_path("path", path).name).system
+    file = file_path("path", path)
+    return config_from_mapping(sections, file.name, folder=file.parent).system
 
 
 def _is_saved_system(sections: Mapping[str, Any]) -> bool:
@@ -895,8 +912,15 @@ def _is_saved_system(sections: Mapping[str, Any]) -> bool:
     contacts = [name for name in sections if numbered(name)[0] == "contact"]
     return all(
         numbered(section)[0] in SYSTEM_SECTIONS and isinstance(values, Mapping) and not values.keys() & _CONVERTED
+        and not any(_has_unit(section, *item) for item in values.items())
         for section, values in sections.items()
     ) and all("type" in sections[name] for name in contacts)  # fmt: skip
+
+
+def _has_unit(section: str, name: str, value: Any) -> bool:
+    """Whether a number is given as text."""
+    row = row_of(f"{section}.{name}") if isinstance(value, str) else None
+    return row is not None and row.quantity.kind is float
 
 
 def dump_config(config: Config, path: str | os.PathLike[str], comment: str = "") -> None:

@@ -10,7 +10,7 @@ import dataclasses
 import math
 import secrets
 from collections import namedtuple
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -74,6 +74,8 @@ class ParameterField:
         The sizes that numbers of real structures have, and the unit that is probably meant outside.
     optional : bool
         Whether it may be None.
+    parse : callable, optional
+        Of kind object: takes name and value, returns what the field holds, or refuses.
     """
 
     unit: str
@@ -88,6 +90,7 @@ class ParameterField:
     short: str = ""
     plausible: tuple[float, float, str] | None = None
     optional: bool = False
+    parse: Callable[[str, Any], Any] | None = None
 
     def check(self, name: str, value: Any) -> Any:
         """*value* as what this quantity holds; refused, with *name*, if it cannot be."""
@@ -106,7 +109,7 @@ class ParameterField:
             return flag(name, value)
         if self.kind is str:
             return choice(name, value, self.choices)
-        return value
+        return value if self.parse is None else self.parse(name, value)
 
 
 def quantity(unit: str, words: str, *, default: Any = dataclasses.MISSING, **more: Any) -> Any:

@@ -15,6 +15,7 @@ from snapbeam.plot.style import (
     BEAM_COLOR,
     CENTER_COLOR,
     SHAKER_COLOR,
+    axes_or_new,
     caption,
     figure_style,
     fix_ticks,
@@ -183,11 +184,13 @@ def plot_spectrum(
     variable: str = "midspan_displacement",
     window: Any = None,
 ) -> Axes:
-    """Draw the amplitude spectrum of a run, from evenly spaced samples under a Hann window.
+    """Draw the amplitude spectrum of a run, from evenly spaced samples under a Hann window, or an estimated density.
 
     Parameters
     ----------
     run : Run or xarray.Dataset
+        Of a run; or the power spectral density that ``estimated_psd`` of a recorded acceleration or a random vibration
+        returns: it is drawn with its interval, over the density that it was drawn from.
     ax : matplotlib.axes.Axes, optional
     variable : str
         A variable over time, by name.
@@ -208,7 +211,11 @@ def plot_spectrum(
     >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_spectrum(run)
+    >>> motion = sb.RecordedAcceleration.from_psd("NAVMAT P-9492", duration_s=2.0)
+    >>> ax = sb.plot.plot_spectrum(motion.estimated_psd())
     """
+    if not isinstance(run, Run) and "psd_low" in getattr(run, "data_vars", ()):
+        return _plot_density(run, ax)
     dataset = dataset_of(run, variable)
     choice(
         "variable", variable, tuple(str(key) for key in dataset.data_vars if dataset[key].dims == ("time",))
@@ -236,6 +243,29 @@ def plot_spectrum(
         ax.set_xlabel(r"Frequency $f\,/\,f_\mathrm{excitation}$" if name == "cycle" else "Frequency (Hz)")
         words = str(dataset[variable].attrs.get("long_name", variable)).replace(", over b", " over $b$")
         ax.set_ylabel(f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}")
+    return ax
+
+
+def _plot_density(dataset: xr.Dataset, ax: Axes | None) -> Axes:
+    """Draw an estimated power spectral density with its interval, on logarithmic axes."""
+    data = dataset.sel(frequency=dataset["frequency"] > 0.0)
+    with figure_style():
+        ax = axes_or_new(ax)
+        f = data["frequency"].values
+        inside = np.ones(f.size, dtype=bool)
+        if "psd_target" in data:
+            inside = data["psd_target"].values > 0.0
+        band = data["psd_low"].values[inside], data["psd_high"].values[inside]
+        words = str(data["psd_low"].attrs["long_name"]).removeprefix("lower end of the ")
+        ax.fill_between(f[inside], *band, color=BEAM_COLOR, alpha=0.25, linewidth=0.0, label=words)
+        ax.plot(f[inside], data["psd"].values[inside], color=BEAM_COLOR, linewidth=0.8, label="estimate")
+        if "psd_target" in data:
+            target = data["psd_target"].values[inside]
+            ax.plot(f[inside], target, "--", color=SHAKER_COLOR, linewidth=1.2, label="drawn from")
+        ax.set(xscale="log", yscale="log", xlabel="Frequency (Hz)", ylabel="Acceleration density (g$^2$/Hz)")
+        ax.set_title(f"{data.attrs['rms_g']:.3g} g root mean square")
+        ax.legend()
+        fix_ticks(ax)
     return ax
 
 

@@ -430,9 +430,9 @@ def _require_record(system: System, table: NDArray[Any], driven: Driven) -> None
     omega = driven.numbers[:, driven.kind.number_names.index("omega")]
     ends = float((table["end"] * table["tick"] + table["phase"] / omega).max())
     if ends > record.duration * (1.0 + 1e-9) + float(table["tick"].max()):
-        what = record.name.removeprefix("recorded_")
+        what = record.name.replace("_", " ")
         raise InputError(
-            f"cycles: the run ends after {ends:g} s, but the recorded {what} lasts {record.duration:g} s; ask for fewer "
+            f"cycles: the run ends after {ends:g} s, but the {what} lasts {record.duration:g} s; ask for fewer "
             "cycles, or give a longer record"
         )
 

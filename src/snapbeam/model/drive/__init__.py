@@ -8,6 +8,7 @@ from snapbeam.model.drive import (  # noqa: F401, I001  the order of DRIVES
     noise,
     recorded_acceleration,
     recorded_motion,
+    random_vibration,
     shock,
     sine,
     fixed_stop,

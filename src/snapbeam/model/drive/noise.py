@@ -14,7 +14,7 @@ from snapbeam.model.drive.base import Scale, Timed, smooth_rise
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
 from snapbeam.util.validation import InputError
 
-__all__ = ["LINES", "BandLimitedNoise", "sums_of_sines"]
+__all__ = ["LINES", "BandLimitedNoise", "seed_of_noise", "sums_of_sines"]
 
 
 _Array = NDArray[np.float64]
@@ -24,6 +24,20 @@ _LOW_BITS = np.uint64(0xFFFFFFFF)
 _STEEPEST = 1.875
 _SHARPEST = 5.7736
 """Maximum curvature of x^3 (10 - 15 x + 6 x^2) on [0, 1], 10/sqrt(3)."""
+
+
+def seed_of_noise() -> Any:
+    """The field ``seed`` of a random drive."""
+    return quantity(
+        "1",
+        "seed of the noise",
+        default=0,
+        kind=int,
+        low=0,
+        high=2**31 - 1,
+        scope=STRUCTURE,
+        short="noise_seed",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,16 +84,7 @@ class BandLimitedNoise(Timed):
         scope=RUN,
         symbol=r"V_\mathrm{rms}",
     )
-    seed: int = quantity(
-        "1",
-        "seed of the noise",
-        default=0,
-        kind=int,
-        low=0,
-        high=2**31 - 1,
-        scope=STRUCTURE,
-        short="noise_seed",
-    )
+    seed: int = seed_of_noise()
     ramp_up_cycles: float = quantity("1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN)
 
     name = "band_limited_noise"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,115 +10,40 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.drive.base import Scale
+from snapbeam.model.drive.sampled import FileKeys, Sampled, refuse_drift, require_unit
 from snapbeam.model.drive.shock import GRAVITY
-from snapbeam.model.quantity import check_fields, quantity
+from snapbeam.model.quantity import quantity
 from snapbeam.util.diagnostics import Diagnostic
-from snapbeam.util.validation import InputError, finite_array
+from snapbeam.util.validation import finite_array, integer, within
 
 if TYPE_CHECKING:
+    import xarray as xr
+
+    from snapbeam.model.drive.random_vibration import RandomVibration
     from snapbeam.model.reduced_model import ReducedModel
 
-__all__ = ["RecordedAcceleration"]
+__all__ = ["RecordedAcceleration", "SampledAcceleration"]
 
 
 _Array = NDArray[np.float64]
 
-_KNOTS = 8.0
-"""Samples in the shortest period that the steps resolve."""
 _LONGEST_DRIFT = 1.0
 """Displacement by an offset of the record, over the length scale, up to which it is plausible."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RecordedAcceleration(Timed):
-    """A motion by its measured acceleration, such as that of a shaken base.
+class SampledAcceleration(Sampled):
+    """A motion by samples of its acceleration, m/s^2: the cubic spline through all of them, times a gain, and its integrals."""
 
-    Between samples the acceleration is the cubic spline through all of them.  Velocity and displacement are its exact
-    integrals; the velocity has zero mean over the record, so that the motion ends where it began.  Low frequencies in a
-    record, such as an offset of the sensor, become large displacements: filter them out first if the displacement
-    matters, that is for a striker, or for a base under a striker in space.  A cycle is a period of the first mode.  A run
-    must end before the record does.
+    number_names = (*Sampled.number_names, "gain")
 
-    Parameters
-    ----------
-    record : array_like of shape (samples,)
-        Acceleration, m/s^2, the first sample at the start of the run; :meth:`from_g` takes g.
-    sampling_frequency : float
-        Samples per second, Hz.
-
-    Raises
-    ------
-    InputError
-        For fewer than four samples and for values that are not finite.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import snapbeam as sb
-    >>> time = np.arange(2000) / 1e4  # s
-    >>> record = 0.3 * np.sin(2.0 * np.pi * 80.0 * time)  # g
-    >>> motion = sb.RecordedAcceleration.from_g(record, sampling_frequency=1e4)
-    >>> base = sb.BaseExcitation(motion=motion)
-    """
-
-    record: _Array = quantity("m/s^2", "acceleration, sampled", kind=object)
-    sampling_frequency: float = quantity("Hz", "samples per second", low=0.0)
-
-    name = "recorded_acceleration"
-    recorded = True
-    number_names = ("omega", "fastest", "table", "samples", "interval")
-    amplitudes = ()
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        record = finite_array("record", self.record, 1).copy()
-        if record.size < 4:
-            raise InputError(f"record of {record.size} samples: must hold at least 4; give a longer one")
-        record.setflags(write=False)
-        object.__setattr__(self, "record", record)
-
-    @classmethod
-    def from_g(cls, record: ArrayLike, sampling_frequency: float) -> RecordedAcceleration:
-        """Return a motion whose acceleration is given in g = 9.80665 m/s^2.
-
-        Examples
-        --------
-        >>> import snapbeam as sb
-        >>> float(sb.RecordedAcceleration.from_g([0.0, 1.0, 0.0, -1.0], 1000.0).record[1])
-        9.80665
-        """
-        return cls(record=GRAVITY * finite_array("record", record, 1), sampling_frequency=sampling_frequency)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, RecordedAcceleration):
-            return NotImplemented
-        return self.sampling_frequency == other.sampling_frequency and np.array_equal(
-            self.record, other.record
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.sampling_frequency, self.record.tobytes()))
-
-    @property
-    def duration(self) -> float:
-        """Length of the record, s."""
-        return (self.record.size - 1) / self.sampling_frequency
-
-    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """A period of the first mode."""
-        return np.full(next(iter(columns.values())).size, 2.0 * math.pi / scale.omega)
+    def gain(self, columns: Mapping[str, _Array]) -> _Array:
+        """Factor on the samples, shape (runs,)."""
+        return np.ones(next(iter(columns.values())).size)
 
     def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
-        """Location and number of the samples, and their interval, s."""
-        runs = next(iter(columns.values())).size
-        fixed = {
-            "fastest": 2.0 * math.pi * self.sampling_frequency / _KNOTS,
-            "table": 0.0,
-            "samples": float(self.record.size),
-            "interval": 1.0 / self.sampling_frequency,
-        }
-        return {name: np.full(runs, value) for name, value in fixed.items()}
+        """Those of the samples, and the factor on them."""
+        return super().shape_numbers(columns, scale) | {"gain": self.gain(columns)}
 
     @cached_property
     def _rows(self) -> _Array:
@@ -130,10 +54,13 @@ class RecordedAcceleration(Timed):
         spline = CubicSpline(times, self.record)
         velocity = spline.antiderivative()
         moved = spline.antiderivative(2)
-        mean = float(moved(times[-1])) / times[-1]
-        return np.column_stack(
-            (self.record, spline(times, 1), velocity(times) - mean, moved(times) - mean * times)
-        )
+        gained = velocity(times)
+        start = self._initial_velocity(gained, float(moved(times[-1])) / times[-1])
+        return np.column_stack((self.record, spline(times, 1), gained + start, moved(times) + start * times))
+
+    def _initial_velocity(self, gained: _Array, mean: float) -> float:
+        """Velocity at the start, m/s, of a motion that gains these velocities, *mean* on average: their mean is zero."""
+        return -mean
 
     @property
     def drift(self) -> float:
@@ -157,7 +84,7 @@ class RecordedAcceleration(Timed):
         """A bound on the spline: between two samples it is at most both, and 4/27 of an interval times each slope."""
         most = np.abs(self._rows).max(axis=0)
         peak = float(most[0] + 8.0 / 27.0 * most[1] / self.sampling_frequency)
-        return np.full(next(iter(columns.values())).size, peak)
+        return self.gain(columns) * peak
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
         """Bounds of displacement and speed: the samples, plus the possible change within half an interval."""
@@ -169,8 +96,77 @@ class RecordedAcceleration(Timed):
 
     def _bound(self, columns: Mapping[str, _Array], scale: Scale, sign: float) -> tuple[_Array, _Array]:
         half = 0.5 / self.sampling_frequency
-        speed = np.abs(self._rows[:, 2]).max() + half * self.peak_acceleration(columns, scale)
-        return float((sign * self._rows[:, 3]).max()) + half * speed, speed
+        gain = self.gain(columns)
+        speed = gain * np.abs(self._rows[:, 2]).max() + half * self.peak_acceleration(columns, scale)
+        return gain * float((sign * self._rows[:, 3]).max()) + half * speed, speed
+
+    @property
+    def _stationary(self) -> slice:
+        """Samples of which a spectrum is estimated."""
+        return slice(None)
+
+    def estimated_psd(self, segments: int = 32, confidence: float = 0.95) -> xr.Dataset:
+        """Estimate the power spectral density of the acceleration by Welch's method, with an interval at each frequency.
+
+        The segments overlap by half, under a Hann window.  The estimate over the true density is chi square over its
+        degrees of freedom, 2 K/(1 + 2 c (K - 1)/K) of K overlapped segments, where c is the square of the correlation of
+        the window with itself half a segment later (P. D. Welch, 1967).
+
+        Parameters
+        ----------
+        segments : int
+            Number of segments without overlap, from 2; more of them narrow the interval and widen the lines.
+        confidence : float
+            Probability with which an interval contains the true density, in (0, 1).
+
+        Returns
+        -------
+        xarray.Dataset
+            ``psd``, ``psd_low`` and ``psd_high`` (g^2/Hz) over ``frequency`` (Hz), of a random vibration with the density
+            ``psd_target`` that it was drawn from; attribute ``rms_g``.
+
+        Examples
+        --------
+        >>> import snapbeam as sb
+        >>> motion = sb.RecordedAcceleration.from_psd([(20, 0.04), (200, 0.04)], duration_s=5.0)
+        >>> list(motion.estimated_psd().data_vars)
+        ['psd', 'psd_low', 'psd_high', 'psd_target']
+        """
+        from scipy.signal import get_window, welch
+        from scipy.stats import chi2
+
+        from snapbeam.util.datasets import xr
+
+        gain = self.gain({name: np.array([value]) for name, value in self.values().items()})[0]
+        values = gain * self.record[self._stationary] / GRAVITY
+        count = values.size // integer("segments", segments, 2, values.size // 16) // 2 * 2
+        within("confidence", confidence, 0.0, 1.0)
+        window = get_window("hann", count)
+        frequency, psd = welch(values, self.sampling_frequency, window, detrend=False)
+        k = 2 * (values.size // count) - 1
+        c = float(np.sum(window[: count // 2] * window[count // 2 :]) / np.sum(window**2)) ** 2
+        freedom = 2.0 * k / (1.0 + 2.0 * c * (k - 1) / k)
+        tails = chi2.ppf([0.5 + 0.5 * confidence, 0.5 - 0.5 * confidence], freedom) / freedom
+        words = {
+            "psd": "acceleration power spectral density, estimate",
+            "psd_low": f"lower end of the {100 * confidence:g} % interval",
+            "psd_high": f"upper end of the {100 * confidence:g} % interval",
+            "psd_target": "density drawn from",
+        }
+        found = dict(zip(words, (psd, psd / tails[0], psd / tails[1], self._density(frequency)), strict=True))
+        return xr.Dataset(
+            {
+                name: ("frequency", each, {"units": "g^2/Hz", "long_name": words[name]})
+                for name, each in found.items()
+                if each is not None
+            },
+            {"frequency": ("frequency", frequency, {"units": "Hz", "long_name": "frequency"})},
+            {"rms_g": float(np.sqrt(np.mean(values**2))), "degrees_of_freedom": freedom},
+        )
+
+    def _density(self, frequency: _Array) -> _Array | None:
+        """The density that the samples were drawn from, g^2/Hz; None of a record."""
+        return None
 
     @staticmethod
     def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
@@ -184,7 +180,8 @@ class RecordedAcceleration(Timed):
         c2, c3 = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
         gained = interval * s * (a0 + s * (a / 2.0 + s * (c2 / 3.0 + s * c3 / 4.0)))
         moved = interval * interval * s * s * (a0 / 2.0 + s * (a / 6.0 + s * (c2 / 12.0 + s * c3 / 20.0)))
-        return memory[row + 3] + memory[row + 2] * interval * s + moved, memory[row + 2] + gained
+        moved = memory[row + 3] + memory[row + 2] * interval * s + moved
+        return drive.gain * moved, drive.gain * (memory[row + 2] + gained)
 
     @staticmethod
     def acceleration(drive: Any, memory: Any, argument: float) -> float:
@@ -195,7 +192,7 @@ class RecordedAcceleration(Timed):
         s, interval = at - i, drive.interval
         a0, rise = memory[row], memory[row + 4] - memory[row]
         a, b = memory[row + 1] * interval, memory[row + 5] * interval
-        return a0 + s * (a + s * (3.0 * rise - 2.0 * a - b + s * (a + b - 2.0 * rise)))
+        return drive.gain * (a0 + s * (a + s * (3.0 * rise - 2.0 * a - b + s * (a + b - 2.0 * rise))))
 
     def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:
         """A drift of the displacement by an offset of the record."""
@@ -213,3 +210,79 @@ class RecordedAcceleration(Timed):
                 {"drift": drift, "drift_over_length_scale": drift / model.length_scale, "offset": offset},
             )
         ]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedAcceleration(FileKeys, SampledAcceleration):
+    """A motion by its measured acceleration, such as that of a shaken base.
+
+    Between samples the acceleration is the cubic spline through all of them.  Velocity and displacement are its exact
+    integrals; the velocity has zero mean over the record, so that the motion ends where it began.  Low frequencies in a
+    record, such as an offset of the sensor, become large displacements: filter them out first if the displacement
+    matters, that is for a striker, or for a base under a striker in space.  A cycle is a period of the first mode.  A run
+    must end before the record does.
+
+    Parameters
+    ----------
+    record : array_like of shape (samples,)
+        Acceleration, m/s^2, the first sample at the start of the run; :meth:`from_g` takes g, :meth:`from_file` reads a file,
+        :meth:`from_psd` draws the record of a random vibration.
+    sampling_frequency : float
+        Samples per second, Hz.
+
+    Raises
+    ------
+    InputError
+        For fewer than four samples and for values that are not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> time = np.arange(2000) / 1e4  # s
+    >>> record = 0.3 * np.sin(2.0 * np.pi * 80.0 * time)  # g
+    >>> motion = sb.RecordedAcceleration.from_g(record, sampling_frequency=1e4)
+    >>> base = sb.BaseExcitation(motion=motion)
+    """
+
+    record: _Array = quantity("m/s^2", "acceleration, sampled", kind=object)
+    sampling_frequency: float = quantity("Hz", "samples per second", low=0.0)
+
+    name = "recorded_acceleration"
+
+    @classmethod
+    def from_g(cls, record: ArrayLike, sampling_frequency: float) -> RecordedAcceleration:
+        """Return a motion whose acceleration is given in g = 9.80665 m/s^2.
+
+        Examples
+        --------
+        >>> import snapbeam as sb
+        >>> float(sb.RecordedAcceleration.from_g([0.0, 1.0, 0.0, -1.0], 1000.0).record[1])
+        9.80665
+        """
+        return cls(record=GRAVITY * finite_array("record", record, 1), sampling_frequency=sampling_frequency)
+
+    @classmethod
+    def _of_signal(
+        cls, values: _Array, unit: str, rate: float, decided: bool, **fields: Any
+    ) -> RecordedAcceleration:
+        require_unit(unit, {"m/s^2": "an acceleration"})
+        made = cls(record=values, sampling_frequency=rate, **fields)
+        if made.drift > 0.0 and not decided:
+            refuse_drift(made.drift, f"an offset of {float(np.median(values)):.3g} m/s^2")
+        return made
+
+    @staticmethod
+    def from_psd(psd: Any, duration_s: float, **options: Any) -> RandomVibration:
+        """Return a random vibration by its power spectral density, a :class:`RandomVibration` with its *options*.
+
+        Examples
+        --------
+        >>> import snapbeam as sb
+        >>> motion = sb.RecordedAcceleration.from_psd([(20, 0.04), (2000, 0.04)], duration_s=0.5, seed=1)
+        >>> round(motion.rms_g, 3)
+        8.899
+        """
+        from snapbeam.model.drive.random_vibration import RandomVibration
+
+        return RandomVibration(psd=psd, duration_s=duration_s, **options)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.drive.base import Drive, Scale
+from snapbeam.model.drive.sampled import FileKeys, refuse_drift, require_unit
 from snapbeam.model.quantity import check_fields, quantity
 from snapbeam.util.validation import InputError, finite_array, instance, shown
 
@@ -26,10 +27,10 @@ _SPEED_MARGIN = 1.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RecordedMotion(Drive):
+class RecordedMotion(FileKeys, Drive):
     """A measured motion of the tip, its start-up transient included.
 
-    The motion between samples is the cubic that matches displacement and velocity at both; the displacement of the
+    :meth:`from_file` takes displacement or velocity from a file.  The motion between samples is the cubic that matches displacement and velocity at both; the displacement of the
     first sample is taken as zero.
 
     Parameters
@@ -61,6 +62,7 @@ class RecordedMotion(Drive):
     frequency: float = quantity("Hz", "nominal frequency of the excitation", low=0.0, short="drive_frequency")
 
     name = "recorded_motion"
+    file_gives = ("displacement", "velocity", "sampling_frequency")
     recorded = True
     number_names = ("omega", "table", "samples", "interval")
     amplitudes = ()
@@ -103,6 +105,22 @@ class RecordedMotion(Drive):
             sampling_frequency=1.0 / interval,
             frequency=float(dataset.attrs["frequency"]),
         )
+
+    @classmethod
+    def _of_signal(
+        cls, values: _Array, unit: str, rate: float, decided: bool, **fields: Any
+    ) -> RecordedMotion:
+        """The cubic spline through displacements and its rate, or the integral of the one through velocities."""
+        from scipy.interpolate import CubicSpline
+
+        require_unit(unit, {"m": "a displacement", "m/s": "a velocity"})
+        times = np.arange(values.size) / rate
+        spline = CubicSpline(times, values)
+        moved, speed = (values, spline(times, 1)) if unit == "m" else (spline.antiderivative()(times), values)
+        change = abs(float(moved[-1] - moved[0]))
+        if unit == "m/s" and not decided and change > 0.5 * float(np.ptp(moved)):
+            refuse_drift(change, f"a mean velocity of {float(values.mean()):.3g} m/s")
+        return cls(displacement=moved, velocity=speed, sampling_frequency=rate, **fields)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RecordedMotion):
