@@ -48,12 +48,14 @@ class Motion:
         self.pulsing = case.pulse is not None
 
     def tip_motion(self, j: int, t: Any) -> tuple[Any, Any, Any]:
+        """Displacement, velocity and acceleration of tip j."""
         tip = self.case.tips[j]
         a, w = Real(tip.amplitude), Real(tip.frequency)
         s, c = np.sin(w * t + Real(tip.phase)), np.cos(w * t + Real(tip.phase))
         return a * s, a * w * c, -a * w * w * s
 
     def approach(self, j: int, t: Any, u: Any) -> tuple[Any, Any]:
+        """Penetration of contact j and its rate."""
         y, dy, _ = self.tip_motion(j, t)
         n = self.n
         return y - Real(self.case.tips[j].gap) - self.rows[j] @ u[:n], dy - self.rows[j] @ u[n : 2 * n]
@@ -63,14 +65,18 @@ class Motion:
         return self.tip_motion(j, t)[2] - self.rows[j] @ self.slope(t, u)[self.n : 2 * self.n]
 
     def law(self, j: int, d: Any, rate: Any) -> Any:
+        """Force of contact j."""
         tip = self.case.tips[j]
         if tip.law == "kelvin_voigt":
             return Real(tip.stiffness) * d + Real(tip.damping) * rate
         d = max(d, Real(0))
-        power = d if tip.exponent == 1.0 else d * np.sqrt(d) if tip.exponent == 1.5 else d ** Real(tip.exponent)
+        power = (
+            d if tip.exponent == 1.0 else d * np.sqrt(d) if tip.exponent == 1.5 else d ** Real(tip.exponent)
+        )
         return Real(tip.stiffness) * power * (1 + Real(tip.factor) * rate)
 
     def slope(self, t: Any, u: Any) -> Any:
+        """Derivative of the state."""
         self.evaluations += 1
         case, n = self.case, self.n
         x, v = u[:n], u[n : 2 * n]
@@ -141,7 +147,12 @@ def _first_end(motion: Motion, t: Any, u: Any, h: Any, end: Any, first: Any) -> 
             middle = end
         else:
             q = s - 1
-            middle = (1 + 2 * s) * q * q * u + s * q * q * h * first + s * s * (3 - 2 * s) * end + s * s * q * h * last
+            middle = (
+                (1 + 2 * s) * q * q * u
+                + s * q * q * h * first
+                + s * s * (3 - 2 * s) * end
+                + s * s * q * h * last
+            )
         for j in range(len(motion.closed)):
             if motion.indicator(j, t + s * h, middle) < 0:
                 before = motion.indicator(j, t, u)
@@ -217,7 +228,9 @@ def solve(case: Case) -> Outcome:
         found = _first_end(motion, t, u, h_now, end, first) if motion.closed else None
         if found is None:
             t, u = (stops[at] if short else t + h_now), end
-            motion.leaving = [left and motion.approach(j, t, u)[0] > 0 for j, left in enumerate(motion.leaving)]
+            motion.leaving = [
+                left and motion.approach(j, t, u)[0] > 0 for j, left in enumerate(motion.leaving)
+            ]
             if short:
                 if stops[at] in times:
                     values[stops[at]] = output @ u[:n]
@@ -261,7 +274,9 @@ def solve(case: Case) -> Outcome:
                 low, high = t, until
                 for _ in range(80):
                     middle = (low + high) / 2
-                    low, high = (middle, high) if motion.pressing(j, middle, held(middle)) >= 0 else (low, middle)
+                    low, high = (
+                        (middle, high) if motion.pressing(j, middle, held(middle)) >= 0 else (low, middle)
+                    )
                 t, u = high, held(high)
                 break
             t = until

@@ -36,7 +36,9 @@ def library() -> Any:
     include = ["-I", os.environ["BOOST_INCLUDE"]] if "BOOST_INCLUDE" in os.environ else []
     flags = ["-O3", "-march=native", "-ffast-math", "-std=c++17", "-shared", "-fPIC"]
     source = str(Path(__file__).with_name("boost.cpp"))
-    done = subprocess.run([compiler, *flags, *include, source, "-o", str(target)], capture_output=True, text=True)
+    done = subprocess.run(
+        [compiler, *flags, *include, source, "-o", str(target)], capture_output=True, text=True
+    )
     if done.returncode:
         raise ImportError(f"Boost.odeint does not compile: {done.stderr.strip().splitlines()[0]}")
     loaded = ctypes.CDLL(str(target))
@@ -97,6 +99,8 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
         )  # fmt: skip
         if hit == -2:
             raise CannotRun("the integration failed")
-        return Segment(at.value, state, out[: reached.value, :n] @ case.output, hit, loaded.counted() - before)
+        return Segment(
+            at.value, state, out[: reached.value, :n] @ case.output, hit, loaded.counted() - before
+        )
 
     return lambda: drive(case, segment)

@@ -25,7 +25,9 @@ def settings(case: Case) -> list[dict[str, Any]]:
 
 
 def _dot(weights: Array, terms: list[Any]) -> Any:
-    return hy.sum([float(w) * x for w, x in zip(weights, terms, strict=True) if w != 0.0] or [hy.expression(0.0)])
+    return hy.sum(
+        [float(w) * x for w, x in zip(weights, terms, strict=True) if w != 0.0] or [hy.expression(0.0)]
+    )
 
 
 def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
@@ -33,7 +35,9 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
     n, tolerance = len(case.stiffness), setting["tolerance"]
     singular = any(tip.law in ("power", "hunt_crossley") and tip.exponent % 1 for tip in case.tips)
     # Force left out at the edge: stiffness edge^1.5.
-    edge = 1e-2 * case.scale * (tolerance / max(tip.stiffness for tip in case.tips)) ** 0.5 if singular else 0.0
+    edge = (
+        1e-2 * case.scale * (tolerance / max(tip.stiffness for tip in case.tips)) ** 0.5 if singular else 0.0
+    )
     x, v = ([hy.make_vars(f"{name}{i}") for i in range(n)] for name in "xv")
     z = hy.make_vars("z")
     made: dict[tuple[tuple[int, ...], bool], Any] = {}
@@ -60,7 +64,9 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
         if pulse:
             add(case.pulse, hy.sin((np.pi / case.pulse_duration) * hy.time))
         if case.truss is not None:
-            accelerations[0] = accelerations[0] - case.truss[0] * x[0] * (1.0 - case.truss[1] * (1.0 + x[0] ** 2) ** -0.5)
+            accelerations[0] = accelerations[0] - case.truss[0] * x[0] * (
+                1.0 - case.truss[1] * (1.0 + x[0] ** 2) ** -0.5
+            )
         if case.circuit is not None:
             accelerations[0] = accelerations[0] - case.circuit[0] * z
         events = []
@@ -85,7 +91,9 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
                         f = f * (1.0 + tip.factor * rate)
                 add(tip.row, f)
             events.append(hy.t_event(ends, direction=hy.event_direction.negative))
-        equations = [(a, b + 0.0) for a, b in zip(x, v, strict=True)] + list(zip(v, accelerations, strict=True))
+        equations = [(a, b + 0.0) for a, b in zip(x, v, strict=True)] + list(
+            zip(v, accelerations, strict=True)
+        )
         if case.circuit is not None:
             equations.append((z, case.circuit[0] * v[0] - case.circuit[1] * z))
         return hy.taylor_adaptive(

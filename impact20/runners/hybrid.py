@@ -33,23 +33,30 @@ class Segment(NamedTuple):
     evaluations: int
 
 
-def approach(case: Case, j: int, t: float, u: Array) -> tuple[float, float, float]:
-    """Penetration, its rate, and the acceleration of the tip."""
+def approach(case: Case, j: int, t: float, u: Array) -> tuple[float, float]:
+    """Penetration and its rate."""
     tip, n = case.tips[j], len(case.stiffness)
     angle = tip.frequency * t + tip.phase
     d = tip.amplitude * sin(angle) - tip.gap - float(tip.row @ u[:n])
     rate = tip.amplitude * tip.frequency * cos(angle) - float(tip.row @ u[n : 2 * n])
-    return d, rate, -tip.amplitude * tip.frequency**2 * sin(angle)
+    return d, rate
 
 
 def _reaction(case: Case, t: float) -> tuple[float, Array]:
     """Acceleration that presses a single mass which stands on the tip of its only contact, and its state."""
-    if len(case.stiffness) != 1 or case.coupling is not None or case.circuit is not None or case.truss is not None:
+    if (
+        len(case.stiffness) != 1
+        or case.coupling is not None
+        or case.circuit is not None
+        or case.truss is not None
+    ):
         raise CannotRun("sustained contact of several or nonlinear coordinates is left out")
     tip = case.tips[0]
     row = tip.row[0]
     angle = tip.frequency * t + tip.phase
-    u = np.array([(tip.amplitude * sin(angle) - tip.gap) / row, tip.amplitude * tip.frequency * cos(angle) / row])
+    u = np.array(
+        [(tip.amplitude * sin(angle) - tip.gap) / row, tip.amplitude * tip.frequency * cos(angle) / row]
+    )
     force = -case.stiffness[0] * u[0] - case.damping[0] * u[1]
     if case.load is not None:
         force += case.load[0]
@@ -79,7 +86,7 @@ def drive(case: Case, segment: Callable[..., Segment], edge: float = 0.0) -> Res
     t, u = 0.0, initial_state(case)
     states = [0] * len(case.tips)
     for j, tip in enumerate(case.tips):
-        d, rate, _ = approach(case, j, t, u)
+        d, rate = approach(case, j, t, u)
         if tip.law != "restitution":
             states[j] = int(d > edge or (d == edge and rate > 0))
     impacts, evaluations, at = sum(states), 0, 0
@@ -106,7 +113,7 @@ def drive(case: Case, segment: Callable[..., Segment], edge: float = 0.0) -> Res
             impacts += states[j] == 1
             continue
         impacts += 1
-        _, speed, tip_acceleration = approach(case, j, t, u)
+        _, speed = approach(case, j, t, u)
         square = float(tip.row @ tip.row)
         if speed < CHATTER * case.scale and _reaction(case, t)[0] > 0:
             until = _stand(case, t, case.horizon)

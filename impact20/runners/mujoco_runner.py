@@ -38,7 +38,12 @@ def _damping(e: float) -> float:
 
 def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
     """A solve of the case."""
-    if len(case.stiffness) > 1 or case.coupling is not None or case.truss is not None or case.circuit is not None:
+    if (
+        len(case.stiffness) > 1
+        or case.coupling is not None
+        or case.truss is not None
+        or case.circuit is not None
+    ):
         raise CannotRun("modal, cubic and circuit terms are no rigid bodies")
     if case.stiffness[0] < 0 or case.pulse is not None:
         raise CannotRun("only passive springs and steady forces")
@@ -57,7 +62,7 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
     high = [each.gap for each in case.tips if each.row[0] < 0]
     limits = f"{-low[0] if low else -1e3!r} {high[0] if high else 1e3!r}"
     model = mujoco.MjModel.from_xml_string(f"""
-<mujoco><option timestep="{h!r}" integrator="{setting['method']}" gravity="0 0 0" tolerance="1e-15"/>
+<mujoco><option timestep="{h!r}" integrator="{setting["method"]}" gravity="0 0 0" tolerance="1e-15"/>
 <compiler autolimits="true"/>
 <worldbody><body><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
 <joint type="slide" axis="1 0 0" stiffness="{float(case.stiffness[0])!r}" damping="{float(case.damping[0])!r}" range="{limits}"
@@ -71,7 +76,9 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
         while at < case.samples:
             data.qfrc_applied[0] = steady
             if case.harmonic is not None:
-                data.qfrc_applied[0] += case.harmonic[0] * sin(case.frequency * (count + 0.5) * h + case.phase)
+                data.qfrc_applied[0] += case.harmonic[0] * sin(
+                    case.frequency * (count + 0.5) * h + case.phase
+                )
             before, speed = data.qpos[0], data.qvel[0]
             mujoco.mj_step(model, data)
             count += 1
@@ -81,9 +88,17 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
                 q = s - 1
                 x, v = data.qpos[0], data.qvel[0]
                 values[at] = case.output[0] * (
-                    (1 + 2 * s) * q * q * before + s * q * q * h * speed + s * s * (3 - 2 * s) * x + s * s * q * h * v
+                    (1 + 2 * s) * q * q * before
+                    + s * q * q * h * speed
+                    + s * s * (3 - 2 * s) * x
+                    + s * s * q * h * v
                 )
                 at += 1
-        return Result(values, None, count * (4 if setting["method"] == "RK4" else 1), np.concatenate((data.qpos, data.qvel)))
+        return Result(
+            values,
+            None,
+            count * (4 if setting["method"] == "RK4" else 1),
+            np.concatenate((data.qpos, data.qvel)),
+        )
 
     return solve
