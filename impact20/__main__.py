@@ -1,4 +1,4 @@
-"""Run the comparison: `python -m impact20 [--quick] [--only SOLVER ...] [--problems NAME ...] [--out FOLDER]`."""
+"""Run the comparison: `python -m impact20 [--quick] [--only SOLVER ...] [--problems NAME ...] [--out FOLDER] [--budget SECONDS]`."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def search(module: Any, problem: Problem, case: Case, budget: float) -> dict[str
         if time.perf_counter() - begin > budget:
             break
         signal.signal(signal.SIGALRM, _stop)
-        signal.alarm(int(4 * budget))
+        signal.alarm(int(4 * budget + 10))
         try:
             rows.append(measure(module, problem, case, setting))
             if not np.isfinite(rows[-1]["error"]):
@@ -120,7 +120,7 @@ def search(module: Any, problem: Problem, case: Case, budget: float) -> dict[str
             reason = str(refusal)
             skipped.add(method)
         except TooLong:
-            reason = reason or f"a run takes more than {int(4 * budget)} s"
+            reason = reason or f"a run takes more than {int(4 * budget + 10)} s"
             skipped.add(method)
         except Exception as failure:  # a solver that fails at one tolerance may succeed at another
             reason = (
@@ -161,9 +161,10 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=list(REGISTER), metavar="SOLVER", default=list(REGISTER))
     parser.add_argument("--problems", nargs="+", choices=names(), metavar="NAME")
     parser.add_argument("--out", type=Path, default=FOLDER / "results")
+    parser.add_argument("--budget", type=float, help="seconds for the search of one solver on one case")
     given = parser.parse_args()
     wanted = given.problems or (list(QUICK) if given.quick else names())
-    budget = 2.0 if given.quick else BUDGET
+    budget = given.budget or (2.0 if given.quick else BUDGET)
     given.out.mkdir(parents=True, exist_ok=True)
     target = given.out / "results.json"
     stored = json.loads(target.read_text(encoding="utf-8")) if target.exists() else {}

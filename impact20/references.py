@@ -75,7 +75,7 @@ def study(problem: Problem) -> dict[str, Any]:
         ]
         return {"threshold": found[0], "agreement": abs(found[0] / found[1] - 1)}
     cases = studies.replicas_of(case, problem.study)
-    second = studies.snapped([integrated.solve(each)[0] for each in cases])
+    second = studies.snapped([integrated.solve(each, 1e-9, 1e-11)[0] for each in cases])
     # The slower code takes every fortieth replica.
     first = studies.snapped([extrapolation.solve(each).values for each in cases[::40]])
     return {
