@@ -109,8 +109,8 @@ def search(module: Any, problem: Problem, case: Case, budget: float) -> dict[str
             continue
         if time.process_time() - begin > budget:
             break
-        signal.signal(signal.SIGPROF, _stop)
-        signal.setitimer(signal.ITIMER_PROF, 4 * budget + 20)
+        signal.signal(signal.SIGALRM, _stop)
+        signal.alarm(int(10 * budget + 60))  # a timer of processor time would make process_time coarse
         try:
             rows.append(measure(module, problem, case, setting))
             if not np.isfinite(rows[-1]["error"]):
@@ -120,7 +120,7 @@ def search(module: Any, problem: Problem, case: Case, budget: float) -> dict[str
             reason = str(refusal)
             skipped.add(method)
         except TooLong:
-            reason = reason or f"a run takes more than {4 * budget + 20:.0f} s of processor time"
+            reason = reason or f"a run takes more than {10 * budget + 60:.0f} s"
             skipped.add(method)
         except Exception as failure:  # a solver that fails at one tolerance may succeed at another
             reason = (
@@ -128,7 +128,7 @@ def search(module: Any, problem: Problem, case: Case, budget: float) -> dict[str
                 or f"{type(failure).__name__}: {str(failure).splitlines()[0][:100] if str(failure) else ''}"
             )
         finally:
-            signal.setitimer(signal.ITIMER_PROF, 0.0)
+            signal.alarm(0)
     return {"rows": rows} if rows else {"reason": reason or "no setting finished"}
 
 

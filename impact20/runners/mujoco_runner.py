@@ -66,7 +66,7 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
 <compiler autolimits="true"/>
 <worldbody><body><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
 <joint type="slide" axis="1 0 0" stiffness="{float(case.stiffness[0])!r}" damping="{float(case.damping[0])!r}" range="{limits}"
- solreflimit="{-k!r} {-b!r}" solimplimit="0.9999 0.9999 0.001"/></body></worldbody></mujoco>""")
+ solreflimit="{-float(k)!r} {-float(b)!r}" solimplimit="0.9999 0.9999 0.001"/></body></worldbody></mujoco>""")
     steady = float(case.load[0]) if case.load is not None else 0.0
 
     def solve() -> Result:
