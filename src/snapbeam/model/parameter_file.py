@@ -918,7 +918,7 @@ def _is_saved_system(sections: Mapping[str, Any]) -> bool:
 
 
 def _has_unit(section: str, name: str, value: Any) -> bool:
-    """Whether a number is given as text."""
+    """True for a number that is given as text."""
     row = row_of(f"{section}.{name}") if isinstance(value, str) else None
     return row is not None and row.quantity.kind is float
 

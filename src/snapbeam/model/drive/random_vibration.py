@@ -297,7 +297,7 @@ class RandomVibration(SampledAcceleration):
         return np.asarray(found * (self.rms_g / self._rms_of_psd) ** 2)
 
     def _initial_velocity(self, gained: _Array, mean: float) -> float:
-        """That of the velocity of the sum, so that the displacement does not drift, by least squares."""
+        """Initial velocity of the sum, for a displacement that does not drift, by least squares."""
         return float(np.mean(self._drawn[1] - gained))
 
     def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:

@@ -21,7 +21,7 @@ _Array = NDArray[np.float64]
 _KNOTS = 8.0
 """Samples in the shortest period that the steps resolve."""
 DRIFT = ("keep", "remove")
-"""What may be done with the drift of a record: nothing, or subtraction of the straight line fitted to its samples."""
+"""Treatments of the drift of a record: nothing, or subtraction of the straight line fitted to its samples."""
 
 
 class Sampled(Timed):
