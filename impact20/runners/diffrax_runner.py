@@ -118,16 +118,13 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
 
     longest = 1.0 / max([case.frequency, *[tip.frequency for tip in case.tips], 0.5])
     restart = diffrax.PIDController(rtol=tolerance, atol=tolerance * 1e-1, dtmax=longest)
-    finder = optimistix.Newton(1e-14, 1e-14)
+    finder = optimistix.Bisection(1e-12, 1e-12, flip="detect")
 
-    def outside(j: int) -> Any:
-        def condition(t: Any, y: Any, args: Any, **more: Any) -> Any:
-            del args, more
-            return -contact(j, t, y)[0]
+    def outside(t: Any, y: Any, args: Any, **more: Any) -> Any:
+        del args, more
+        return -jnp.max(jnp.stack([contact(j, t, y)[0] for j in range(len(case.tips))]))
 
-        return condition
-
-    event = diffrax.Event([outside(j) for j in range(len(case.tips))], finder, [False] * len(case.tips))
+    event = diffrax.Event(outside, finder, False)
 
     def both(times: Any) -> Any:
         return diffrax.SaveAt(subs=[diffrax.SubSaveAt(ts=times), diffrax.SubSaveAt(t1=True)])
@@ -142,7 +139,7 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
             found.ts[1][0],
             found.ys[0],
             found.ys[1][0],
-            jnp.stack([jnp.asarray(hit) for hit in found.event_mask]),
+            found.event_mask,
         )
 
     def segment(
@@ -152,10 +149,8 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
         wanted = np.clip(case.times, t, end)
         at, found, last, hits = flight(t, jnp.asarray(u), end, jnp.asarray(wanted))
         at, array = float(at), np.asarray(found)
-        if len(case.tips) and bool(np.any(np.asarray(hits))):
-            hit = int(np.flatnonzero(np.asarray(hits))[0])
-        else:
-            hit = -1
+        depths = [float(contact(j, at, last)[0]) for j in range(len(case.tips))]
+        hit = int(np.argmax(depths)) if bool(hits) else -1
         first = case.samples - np.count_nonzero(case.times >= (times[0] if times.size else np.inf))
         reached = int(np.count_nonzero(times <= at))
         return Segment(at, np.asarray(last), array[first : first + reached, :n] @ case.output, hit, 0)

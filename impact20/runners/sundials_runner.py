@@ -68,7 +68,8 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
         at_once = [case.output @ u[:n]] * (times.size - asked.size)
         stops = np.concatenate(([t], asked, [] if asked.size and asked[-1] == end else [end]))
         run = watching.solve(stops, u)
-        ended = run.t_events is not None and len(run.t_events) > 0
+        # the events of earlier solves are kept
+        ended = run.t_events is not None and len(run.t_events) > 0 and run.t_events[-1] > t
         at = float(run.t_events[-1] if ended else run.t[-1])
         state = np.array(run.y_events[-1] if ended else run.y[-1])
         kept = [case.output @ y[:n] for when, y in zip(run.t, run.y, strict=True) if when in set(asked)]
