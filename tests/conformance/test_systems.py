@@ -17,6 +17,7 @@ import snapbeam as sb
 from snapbeam.model.axial_load import LOADS
 from snapbeam.model.contact.base import LAWS
 from snapbeam.model.drive.base import DRIVES
+from snapbeam.model.drive.random_vibration import RandomVibration
 from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.parameters import parameters
 from snapbeam.model.quantity import quantities
@@ -46,10 +47,10 @@ def swept(name: str, count: int, seed: int, *, mirrored: bool = False, modes: in
 def test_none_is_missing() -> None:
     """Every kind of law, drive, motion of a base, load and harvester, and every parameter but those of runs.
 
-    Laws with a memory are in ``test_elastic_plastic.py``.  ``test_external_force.py``, ``test_local_force.py``, ``test_shock.py`` and ``test_recorded_acceleration.py`` compare
-    those with independent solutions.
+    Laws with a memory are in ``test_elastic_plastic.py``.  ``test_external_force.py``, ``test_local_force.py``, ``test_shock.py``,
+    ``test_random_vibration.py`` and ``test_recorded_acceleration.py`` compare those with independent solutions.
     """
-    others = sb.Shock, sb.RecordedAcceleration
+    others = sb.Shock, sb.RecordedAcceleration, RandomVibration
     elsewhere = {
         f"{section}.{name}"
         for section in ("drive", "base_excitation")

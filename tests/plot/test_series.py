@@ -96,6 +96,6 @@ def test_statistics_of_a_map(synthetic_map):
 
 def test_a_map_over_one_axis(synthetic_map):
     ax = plots.plot_response_map(synthetic_map.isel(frequency_ratio=3))
-    assert ax.get_xlabel() == "Velocity amplitude $V$" and "Centre displacement" in ax.get_ylabel()
+    assert ax.get_xlabel() == "Velocity amplitude $V$" and "Mid-span displacement" in ax.get_ylabel()
     with pytest.raises(InputError, match="are drawn over two axes"):
         plots.plot_response_map(synthetic_map.isel(frequency_ratio=3), quasi_static_line=True)

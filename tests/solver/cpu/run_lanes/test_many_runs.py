@@ -73,6 +73,7 @@ def test_memory_of_a_run_does_not_depend_on_their_number():
     assert more < MOST_BYTES
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_an_interrupt_ends_them_at_once():
     """One that comes in the midst of runs that would take half a minute at least, none of which ends before."""
     driver.run_ensemble(many(16, cycles=1), 2)
