@@ -15,6 +15,7 @@ import numpy as np
 import snapbeam as sb
 from impact20 import Array, Case, Tip
 from impact20.runners import CannotRun, Result
+from snapbeam.simulation.request import cycle_of
 
 PACKAGE = "snapbeam"
 
@@ -114,10 +115,8 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
         warnings.simplefilter("ignore")
         try:
             system, origin = _system(case)
-            period = 2 * math.pi
-            moving = [tip.frequency for tip in case.tips if tip.amplitude] or ([case.frequency] if case.harmonic is not None else [])  # fmt: skip
-            rate = moving[0] if moving else float(2 * math.pi * system.model.natural_frequencies[0])
-            cycles = max(1, math.ceil(case.horizon * (rate if rate > 0 else 1.0) / period + 1e-9))
+            cycle = cycle_of(system)
+            cycles = max(1, math.ceil(case.horizon / cycle + 1e-9))
             integration = sb.Integration(cycles=cycles, threads=1, accuracy="reference" if setting["method"] == "reference" else "standard")  # fmt: skip
             if setting["step"] != 1.0:
                 plain = sb.simulate(system, sb.Integration(cycles=1, threads=1), sample_times=[0.0])
@@ -125,7 +124,7 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
             sb.simulate(system, integration, sample_times=[0.0])
         except sb.InputError as refusal:
             raise CannotRun(str(refusal).splitlines()[0]) from None
-    times = np.minimum(case.times, cycles * period / (rate if rate > 0 else 1.0))
+    times = np.minimum(case.times, cycles * cycle)
 
     def solve() -> Result:
         with warnings.catch_warnings():
