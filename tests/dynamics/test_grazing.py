@@ -16,6 +16,8 @@ from scipy.optimize import brentq
 from scipy.special import beta
 
 import snapbeam as sb
+from snapbeam.dynamics.flow import Stroboscope
+from snapbeam.dynamics.periodic_orbits import passage_of
 
 SWING = 1.0
 STIFFNESS = 1e9
@@ -54,6 +56,31 @@ def exact(over: float) -> float:
 
     held = 2.0 * quad(pace, 0.0, 0.5 * math.pi, epsabs=0.0, epsrel=1e-11)[0]
     return 4.0 * math.asin(math.sqrt(0.5 * over / SWING)) - held
+
+
+@pytest.mark.parametrize("start", [(-0.95, 0.0), (-0.95, 0.3), (0.0, 0.2), (-0.8, -0.4)])
+def test_the_clearance_of_a_motion_that_does_not_repeat(start: tuple[float, float]) -> None:
+    """The first swing of a damped oscillator towards the stop, in closed form; the ends of the run are no turning points."""
+    zeta = 0.05
+    model = sb.ReducedModel.from_matrices(
+        [[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0, damping_ratio=zeta
+    )
+    stop = sb.Striker(drive=sb.FixedStop(), gap=1.0)
+    history = sb.HarmonicForce(amplitude=1e-9, frequency_ratio=0.25)
+    system = sb.System(
+        model, contacts=[sb.Contact(sb.HertzContact(STIFFNESS), stop)],
+        forces=[sb.ExternalForce(shape=[1.0], history=history)],
+    )  # fmt: skip
+    flow = Stroboscope(system, sb.Integration(accuracy="reference"))
+    found = passage_of(flow, np.array(start) / flow.scales, 1)
+    w = math.sqrt(1.0 - zeta**2)
+    time = np.linspace(0.0, flow.period, 400_001)
+    x = np.exp(-zeta * time) * (
+        start[0] * np.cos(w * time) + (start[1] + zeta * start[0]) / w * np.sin(w * time)
+    )
+    inner = x[1:-1]
+    least = inner[(inner <= x[:-2]) & (inner < x[2:])].min()
+    assert found.clearance == pytest.approx(1.0 + least, abs=1e-7)
 
 
 def test_the_shift_is_the_exact_one() -> None:

@@ -344,7 +344,10 @@ def passage_of(flow: Stroboscope, coordinates: _Array, periods: int) -> Passage:
     run, depths, impacts = _followed(flow, coordinates, periods)
     time = run.dataset["time"].values
     # a turning point within a contact, or as near to one as a sample, is part of it
-    turns, spacing = turning_points(flow, coordinates, periods), 1.000001 * (time[1] - time[0])
+    turns, spacing = (
+        turning_points(flow, coordinates, periods, periodic=False),
+        1.000001 * (time[1] - time[0]),
+    )
     free = np.isfinite(turns.depth)
     deepest = []
     for onset, duration, contact in impacts:
@@ -364,7 +367,7 @@ def passage_of(flow: Stroboscope, coordinates: _Array, periods: int) -> Passage:
 
 
 class TurningPoints(NamedTuple):
-    """Maxima of the penetrations of a periodic motion."""
+    """Maxima of the penetrations of a motion."""
 
     time: _Array
     """s."""
@@ -394,15 +397,21 @@ def penetrations(flow: Stroboscope, coordinates: _Array, periods: int, times: _A
     return _followed(flow, coordinates, periods, times)[1]
 
 
-def turning_points(flow: Stroboscope, coordinates: _Array, periods: int) -> TurningPoints:
-    """Turning points of the gaps of a periodic motion, by the quartic through the five nearest samples, sampled once more there.
+def turning_points(
+    flow: Stroboscope, coordinates: _Array, periods: int, *, periodic: bool = True
+) -> TurningPoints:
+    """Turning points of the gaps of a motion, by the quartic through the five nearest samples, sampled once more there.
 
-    An impact that lasts no time is none: the velocity jumps.
+    Of a *periodic* motion the samples go on from its end to its beginning.  An impact that lasts no time is no turning point: the
+    velocity jumps.
     """
     end, count = periods * flow.period, _SAMPLES * periods
     _, depth, impacts = _followed(flow, coordinates, periods)
-    depth, spacing = depth[:-1], end / count
-    at, contact = np.nonzero((depth >= np.roll(depth, 1, axis=0)) & (depth > np.roll(depth, -1, axis=0)))
+    depth, spacing = depth[:-1] if periodic else depth, end / count
+    turns = (depth >= np.roll(depth, 1, axis=0)) & (depth > np.roll(depth, -1, axis=0))
+    if not periodic:
+        turns[[0, -1]] = False
+    at, contact = np.nonzero(turns)
     for onset, duration, touched in impacts:
         if duration == 0.0:
             apart = np.abs((spacing * at - onset + 0.5 * end) % end - 0.5 * end)
@@ -410,9 +419,10 @@ def turning_points(flow: Stroboscope, coordinates: _Array, periods: int) -> Turn
     if not at.size:
         return TurningPoints(np.empty(0), np.empty(0), contact)
     nearest = np.arange(-2, 3)
-    place, _ = _maximum(depth[(at[:, None] + nearest) % count, contact[:, None]])
+    middle = at if periodic else np.clip(at, 2, len(depth) - 3)
+    place, _ = _maximum(depth[(middle[:, None] + nearest) % len(depth), contact[:, None]])
     finer = spacing / _SAMPLES
-    time = spacing * (at + place)
+    time = spacing * (middle + place)
     times, back = np.unique((time[:, None] + finer * nearest) % end, return_inverse=True)
     depth = penetrations(flow, coordinates, periods, times)
     place, top = _maximum(depth[back.reshape(at.size, 5), contact[:, None]])
