@@ -190,6 +190,7 @@ def test_the_grazing_curve_of_an_oscillator_before_a_stop(law: sb.ContactLaw, po
         grazing, names, bounds, step=0.1, max_step=0.2, tolerance=1e-12, max_points=points
     )
     ratio, found = (curve[name].values for name in curve.attrs["parameters"])
+    assert curve.attrs["contact_force"] == "left out" and curve.attrs["kept_gap"] == 0.0
     if points > 3:
         assert ratio.min() == pytest.approx(0.9) and ratio.max() == pytest.approx(1.3)
     np.testing.assert_allclose(found, grazing_amplitude(ratio), rtol=1e-9)
@@ -207,6 +208,7 @@ def test_the_grazing_curve_of_orbits_with_an_impact() -> None:
     names, bounds = ("frequency_ratio", "contact.coefficient"), ((2.001, 3.61), (0.75, 0.85))
     curve = sb.dynamics.bifurcation_curve(branch.special_points[-1], names, bounds, max_points=4, step=1e-3)
     assert curve.sizes["point"] > 4
+    assert curve.attrs["contact_force"] == "included" and curve.attrs["kept_gap"] == 1e-6
     for ratio, restitution in zip(
         curve["frequency_ratio"].values, curve["restitution_coefficient"].values, strict=True
     ):

@@ -84,6 +84,44 @@ def test_refusals() -> None:
         sb.dynamics.homoclinic_tangency(saddle, "a", (1.39, 1.41))
 
 
+def test_a_map_that_jumps_ends_the_branch() -> None:
+    """No gap wider than max_distance is left without a word."""
+    jumping = KnownMap(
+        lambda x, of: np.stack([2.0 * x[:, 0] + (x[:, 0] > 0.3), 0.25 * x[:, 1]], axis=1),
+        lambda x, of: table([2.0, 0.0], [0.0, 0.25]),
+        2, unused=0.0,
+    )  # fmt: skip
+    found = sb.dynamics.invariant_manifold(sb.dynamics.periodic_orbit(jumping, [0.1, 0.1]), max_arclength=5.0)
+    right, left = found.attrs["termination_reason"].split("; ")
+    if found["state"].values[found["side"].values == 1][:, 0].max() < 0.0:
+        right, left = left, right
+    assert right.startswith("the map jumps") and left == "max_arclength"
+    for side in (-1, 1):
+        states = found["state"].values[found["side"].values == side]
+        assert np.linalg.norm(np.diff(states, axis=0), axis=1).max() <= 0.05
+
+
+def test_a_manifold_that_ends_early_is_no_proof_that_none_cross(monkeypatch: pytest.MonkeyPatch) -> None:
+    from snapbeam.dynamics import manifolds
+
+    whole = manifolds.invariant_manifold
+    monkeypatch.setattr(
+        manifolds, "invariant_manifold", lambda *each, **limits: whole(*each, **limits, max_points=40)
+    )
+    saddle = sb.dynamics.periodic_orbit(henon(1.0, 0.3), [0.7, 0.2])
+    with pytest.raises(sb.dynamics.OrbitNotFoundError, match="ends before max_arclength"):
+        sb.dynamics.homoclinic_tangency(saddle, "a", (0.95, 1.05))
+
+
+def test_newtons_law_has_no_inverse() -> None:
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.05)
+    shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.005)
+    system = sb.System(model, contacts=[sb.Contact(sb.Restitution(0.8), shaker)])
+    saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
+    with pytest.raises(InputError, match="under Newton's law the map has no inverse"):
+        sb.dynamics.invariant_manifold(saddle, "stable")
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:accuracy = 'standard'")
 def test_melnikovs_threshold() -> None:

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.dynamics.branches import SpecialPoint
-from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, fixed_parameters
+from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, dimensionless, fixed_parameters
 from snapbeam.dynamics.periodic_orbits import (
     Family,
     OrbitNotFoundError,
@@ -40,7 +40,7 @@ from snapbeam.dynamics.periodic_orbits import (
 )
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.parameters import lookup
-from snapbeam.model.quantity import split_name
+from snapbeam.model.quantity import numbered, split_name
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.validation import InputError, checked, instance, integer, interval, shown, within
 
@@ -291,9 +291,8 @@ class _Curve:
         size = point.y.size - 2
         steep = float(np.abs(point.came.jacobian).sum())
         # a gap follows from the run itself, a multiplier from the derivative of the map
-        off = np.append(
-            np.full(size, point.residual), (self.kind != "grazing") * relative * steep + point.residual
-        )
+        uncertain = self.room if self.kind == "grazing" else relative * steep
+        off = np.append(np.full(size, point.residual), uncertain + point.residual)
         inverse = np.linalg.pinv(point.table)[size:]
         return np.asarray(np.abs(inverse) @ off * self.spans)
 
@@ -314,7 +313,8 @@ def _without_contact_force(grazing: SpecialPoint, names: tuple[str, str]) -> Flo
         return flow
     for name in names:
         section, field = split_name(lookup(name).name)
-        if section == "contact" and field in flow.system.contacts[0].law.numbers_type()._fields:
+        kind, number = numbered(section)
+        if kind == "contact" and field in flow.system.contacts[number - 1].law.numbers_type()._fields:
             raise InputError(
                 f"names = {shown(names)}: {name} does not change where an orbit without other impacts grazes; choose another parameter"
             )
@@ -474,7 +474,9 @@ def bifurcation_curve(
     -------
     xarray.Dataset
         Over ``point``: both parameters, their errors at these steps, the state, the multipliers, impacts, residual.  Over
-        ``special_point``: kind and parameters of points of codimension two.
+        ``special_point``: kind and parameters of points of codimension two.  On a grazing curve the attribute ``kept_gap`` is the gap
+        of its orbits over b, and ``contact_force`` tells whether they have one; without it the multipliers are those of the
+        motion without contact.
 
     Raises
     ------
@@ -632,19 +634,19 @@ def _dataset(
         "state": (
             ("point", "coordinate"),
             np.array([by.state(point, flow) for by, point in seen]),
-            _labels("state of the orbit at the phase of observation of the special point"),
+            dimensionless("state of the orbit at the phase of observation of the special point"),
         ),
-        "multiplier_real": (("point", "multiplier"), multipliers.real, _labels("Floquet multiplier")),
-        "multiplier_imag": (("point", "multiplier"), multipliers.imag, _labels("its imaginary part")),
+        "multiplier_real": (("point", "multiplier"), multipliers.real, dimensionless("Floquet multiplier")),
+        "multiplier_imag": (("point", "multiplier"), multipliers.imag, dimensionless("its imaginary part")),
         "impacts": (
             "point",
             np.array([p.came.impacts for p in points], np.int32),
-            _labels("impacts within the period"),
+            dimensionless("impacts within the period"),
         ),
         "residual": (
             "point",
             np.array([point.residual for point in points]),
-            _labels("of the return and of the condition"),
+            dimensionless("of the return and of the condition"),
         ),
         "special_point_kind": (
             "special_point",
@@ -672,8 +674,8 @@ def _dataset(
         "period": curve.period,
         "termination_reason": "; ".join(ends),
     }
+    if curve.kind == "grazing":
+        assert isinstance(flow, Stroboscope)
+        left_out = flow.system.contacts[0].law == HertzContact(_WITHOUT_FORCE)
+        attrs |= {"kept_gap": curve.room, "contact_force": "left out" if left_out else "included"}
     return xr.Dataset(variables, coords, attrs)
-
-
-def _labels(words: str) -> dict[str, str]:
-    return {"units": "1", "long_name": words}

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.dynamics.flow import Flow, Stroboscope, fixed_parameters
+from snapbeam.dynamics.flow import Flow, Stroboscope, dimensionless, fixed_parameters
 from snapbeam.dynamics.periodic_orbits import (
     Corrector,
     Family,
@@ -153,26 +153,38 @@ class Branch:
                 "state": (
                     ("orbit", "coordinate"),
                     states,
-                    _labels("state of the orbit at the phase of observation of the first orbit"),
+                    dimensionless("state of the orbit at the phase of observation of the first orbit"),
                 ),
-                "multiplier_real": (("orbit", "multiplier"), values.real, _labels("Floquet multiplier")),
-                "multiplier_imag": (("orbit", "multiplier"), values.imag, _labels("its imaginary part")),
+                "multiplier_real": (
+                    ("orbit", "multiplier"),
+                    values.real,
+                    dimensionless("Floquet multiplier"),
+                ),
+                "multiplier_imag": (
+                    ("orbit", "multiplier"),
+                    values.imag,
+                    dimensionless("its imaginary part"),
+                ),
                 "stable": (
                     "orbit",
                     self.is_stable,
-                    _labels("whether every multiplier is inside the unit circle"),
+                    dimensionless("whether every multiplier is inside the unit circle"),
                 ),
                 "impacts": (
                     "orbit",
                     np.array(self.impacts, dtype=np.int32),
-                    _labels("impacts within the period"),
+                    dimensionless("impacts within the period"),
                 ),
                 "arclength": (
                     "orbit",
                     np.append(0.0, np.cumsum(steps)),
-                    _labels("length of the branch in states"),
+                    dimensionless("length of the branch in states"),
                 ),
-                "residual": ("orbit", [orbit.residual for orbit in self.orbits], _labels("of the return")),
+                "residual": (
+                    "orbit",
+                    [orbit.residual for orbit in self.orbits],
+                    dimensionless("of the return"),
+                ),
                 "special_point_kind": (
                     "special_point",
                     [point.kind for point in self.special_points],
@@ -181,7 +193,7 @@ class Branch:
                 "special_point_index": (
                     "special_point",
                     [point.index for point in self.special_points],
-                    _labels("orbit before it"),
+                    dimensionless("orbit before it"),
                 ),
                 "special_point_value": (
                     "special_point",
@@ -198,7 +210,7 @@ class Branch:
                     np.array(
                         [orbit_at(point.orbit, first.flow).coordinates for point in self.special_points]
                     ).reshape(-1, states.shape[1]),
-                    _labels("state of the orbit there"),
+                    dimensionless("state of the orbit there"),
                 ),
             },
             {
@@ -219,12 +231,12 @@ class Branch:
             dataset["midspan_displacement"] = (
                 "orbit",
                 centers[:, 0],
-                _labels("centre displacement there, over b"),
+                dimensionless("centre displacement there, over b"),
             )
             dataset["midspan_returns"] = (
                 ("orbit", "return"),
                 centers,
-                _labels("centre displacement once a period of the drive, over b"),
+                dimensionless("centre displacement once a period of the drive, over b"),
             )
         return dataset
 
@@ -240,10 +252,6 @@ def _centers(orbit: PeriodicOrbit) -> NDArray[np.float64]:
         states = np.concatenate([states, later[0]])
     amplitudes = states[:, : flow.modes] * flow.scales[: flow.modes]
     return np.asarray(amplitudes @ flow.system.model.midspan_shape / flow.system.scale.length)
-
-
-def _labels(words: str) -> dict[str, str]:
-    return {"units": "1", "long_name": words}
 
 
 # ----------------------------------------------------------------------------------------------------

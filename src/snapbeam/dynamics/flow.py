@@ -40,6 +40,7 @@ __all__ = [
     "InitialConditions",
     "Stroboscope",
     "common_cycles",
+    "dimensionless",
     "fixed_parameters",
     "flow_of",
     "frequencies_of",
@@ -895,6 +896,11 @@ def fixed_parameters(flow: Flow, *varied: str) -> dict[str, Any]:
     if system.striker is not None:
         attrs["location"] = float(system.striker.location)
     return {name: value for name, value in attrs.items() if name not in varied}
+
+
+def dimensionless(words: str) -> dict[str, str]:
+    """Attributes of a variable without a unit."""
+    return {"units": "1", "long_name": words}
 
 
 def settling_periods(flow: Flow, rates: ArrayLike = (), least: int = 200) -> tuple[int, str]:

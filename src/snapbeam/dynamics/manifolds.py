@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.dynamics.flow import Flow, fixed_parameters
-from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, periodic_orbit
+from snapbeam.dynamics.flow import Flow, Stroboscope, dimensionless, fixed_parameters
+from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, periodic_orbit
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.validation import InputError, checked, choice, instance, integer, interval, shown, within
 
@@ -62,7 +62,7 @@ class _Segment(NamedTuple):
     def image(self, states: _Array, near: _Array) -> _Array:
         """Images of states; under the inverse map they are sought from *near*, and NaN where Newton's method fails.
 
-        The map of a flow is one to one, so that whatever is found is the inverse image.
+        The map of a flow is one to one, so that a state that is found is the inverse image.
         """
         if not self.inverse:
             return self.flow.advance(states, self.periods).states
@@ -137,6 +137,8 @@ def _next_level(
                 return "the inverse map does not converge"
         else:
             places = _gaps(ages, states, max_distance, max_turn)
+            if (np.diff(ages)[places] < _FINEST).any():
+                return "the map jumps, or the curve bends too sharply for max_distance and max_turn"
             if not places.size:
                 return ages, states
         between = 0.5 * (ages[places] + ages[places + 1])
@@ -151,7 +153,7 @@ def _next_level(
 
 
 def _gaps(ages: _Array, states: _Array, max_distance: float, max_turn: float) -> NDArray[np.intp]:
-    """Places behind which a point is missing."""
+    """Places after which a point must be inserted."""
     chords = np.diff(states, axis=0)
     size = np.linalg.norm(chords, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -161,7 +163,7 @@ def _gaps(ages: _Array, states: _Array, max_distance: float, max_turn: float) ->
     longer = size[1:] > size[:-1]
     missing[1:] |= sharp & longer
     missing[:-1] |= sharp & ~longer
-    return np.flatnonzero(missing & (np.diff(ages) > _FINEST) & np.isfinite(size))
+    return np.flatnonzero(missing)
 
 
 @checked
@@ -197,13 +199,15 @@ def invariant_manifold(
     -------
     xarray.Dataset
         Over ``point``: ``state`` over ``coordinate``, ``side`` (-1 or 1: the branch), ``arclength`` along the branch and ``age``
-        (applications of the map, or its inverse, since the fundamental segment).  The attributes have the multiplier, the bound of the
-        distance from the chord, ``chord_error``, and for each branch the reason for its end.
+        (applications of the return map of the orbit, or its inverse, since the fundamental segment; of the map of twice its period for
+        a negative multiplier).  The attributes have the multiplier, the estimated distance from the chord, ``chord_error``, and for each
+        branch the reason for its end: ``max_arclength`` if it is complete.
 
     Raises
     ------
     InputError
-        If the manifold does not have one dimension.
+        If the manifold does not have one dimension, and for a stable one under Newton's law, whose map has no inverse where the beam
+        sticks to the tip.
 
     Examples
     --------
@@ -223,6 +227,12 @@ def invariant_manifold(
     distance = within("max_distance", max_distance, 1e-6, 1.0, closed="both")
     turn = within("max_turn", max_turn, 1e-3, 1.0, closed="both")
     most = integer("max_points", max_points, 10, 10**6)
+    flow = orbit.flow
+    if inverse and isinstance(flow, Stroboscope) and any(each.law.impulsive for each in flow.system.contacts):
+        raise InputError(
+            "stability = 'stable': under Newton's law the map has no inverse where the beam sticks to the tip; use a HertzContact, or a "
+            "HuntCrossley with the same restitution"
+        )
     values, vectors = np.linalg.eig(orbit.jacobian)
     size = np.abs(values)
     which = np.flatnonzero(size < 1.0 if inverse else size > 1.0)
@@ -238,7 +248,7 @@ def invariant_manifold(
     branches = []
     for side in (1, -1):
         begun = side * _NEAR_SADDLE * vector / np.linalg.norm(vector)
-        segment = _Segment(orbit.flow, twice * orbit.period, orbit.coordinates, begun, factor, inverse)
+        segment = _Segment(flow, twice * orbit.period, orbit.coordinates, begun, factor, inverse)
         branches.append((side, *_grow(segment, length, distance, turn, most)))
     return _dataset(orbit, stability, value, branches, distance * turn / 8.0)
 
@@ -260,13 +270,13 @@ def _dataset(
 
     names = getattr(orbit.flow, "names", tuple(f"x[{i + 1}]" for i in range(orbit.coordinates.size)))
     variables: dict[str, Any] = {
-        "state": (("point", "coordinate"), joined(lambda side, age, states: states), _labels("state")),
-        "side": ("point", joined(lambda side, age, states: np.full(age.size, side, np.int8)), _labels("branch")),
-        "arclength": ("point", joined(length), _labels("length of the branch")),
+        "state": (("point", "coordinate"), joined(lambda side, age, states: states), dimensionless("state")),
+        "side": ("point", joined(lambda side, age, states: np.full(age.size, side, np.int8)), dimensionless("branch")),
+        "arclength": ("point", joined(length), dimensionless("length of the branch")),
         "age": (
-            "point", joined(lambda side, age, states: age), _labels("applications of the map since the fundamental segment")
+            "point", joined(lambda side, age, states: age), dimensionless("applications of the map since the fundamental segment")
         ),
-        "saddle": ("coordinate", orbit.coordinates, _labels("state of the orbit")),
+        "saddle": ("coordinate", orbit.coordinates, dimensionless("state of the orbit")),
     }  # fmt: skip
     attrs = {
         **fixed_parameters(orbit.flow), "title": f"{stability} manifold of a periodic orbit", "stability": stability,
@@ -274,10 +284,6 @@ def _dataset(
         "termination_reason": "; ".join(reason for *_, reason in branches),
     }  # fmt: skip
     return xr.Dataset(variables, {"coordinate": list(names)}, attrs)
-
-
-def _labels(words: str) -> dict[str, str]:
-    return {"units": "1", "long_name": words}
 
 
 @checked
@@ -339,9 +345,9 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
     table = np.array(sorted(found)).reshape(-1, 4)
     return xr.Dataset(
         {
-            "state": (("point", "coordinate"), table[:, 2:], _labels("state")),
-            "arclength": ("point", table[:, 0], _labels("length of the unstable manifold")),
-            "stable_arclength": ("point", table[:, 1], _labels("length of the stable manifold")),
+            "state": (("point", "coordinate"), table[:, 2:], dimensionless("state")),
+            "arclength": ("point", table[:, 0], dimensionless("length of the unstable manifold")),
+            "stable_arclength": ("point", table[:, 1], dimensionless("length of the stable manifold")),
         },
         {"coordinate": unstable["coordinate"].values},
         {
@@ -401,7 +407,7 @@ def homoclinic_tangency(
     InputError
         If the manifolds cross at both ends of *bounds*, or at none.
     OrbitNotFoundError
-        If the saddle is not found at a value.
+        If the saddle is not found at a value, or a manifold ends before *max_arclength* without a crossing.
 
     Examples
     --------
@@ -425,8 +431,17 @@ def homoclinic_tangency(
         flow = orbit.flow.neighbour(name, value)
         saddle = periodic_orbit(flow, orbit.coordinates, orbit.period)
         limits = {"max_arclength": max_arclength, "max_distance": max_distance, "max_turn": max_turn}
-        both = (invariant_manifold(saddle, kind, **limits) for kind in ("unstable", "stable"))  # type: ignore[arg-type]
-        return homoclinic_points(*both).sizes["point"] > 0
+        both = [invariant_manifold(saddle, kind, **limits) for kind in ("unstable", "stable")]  # type: ignore[arg-type]
+        if homoclinic_points(*both).sizes["point"]:
+            return True
+        for found in both:
+            reason = str(found.attrs["termination_reason"])
+            if reason != "max_arclength; max_arclength":
+                raise OrbitNotFoundError(
+                    f"{name} = {value:g}: the {found.attrs['stability']} manifold ends before max_arclength = {max_arclength:g} ({reason}), so "
+                    "that crossings may be missed; choose a smaller max_arclength"
+                )
+        return False
 
     report = counting(progress, "homoclinic tangency", "values")
     total, done = 2 + int(np.ceil(np.log2((high - low) / width))), 2
