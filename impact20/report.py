@@ -121,7 +121,7 @@ def write_report(folder: Path) -> None:
     text = [
         f"Processor {content['processor']}, one core; Python {content['python']}, NumPy {content['numpy']}; {versions}.\n",
         "Processor time in milliseconds of the cheapest setting whose error is at most the target and that misses no impact; in",
-        "brackets the least error that was reached otherwise; -: cannot run, the reasons are below the tables.",
+        "brackets the minimum error if the target was missed; -: not run, for the reasons below the tables.",
     ]
     for target in TARGETS:
         text += [f"\nError at most {target:g} of the scale:\n", table(content, target)]

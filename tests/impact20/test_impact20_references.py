@@ -12,6 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from impact20 import FOLDER, closed_form, extrapolation, integrated, load, matrices, names, studies
+from impact20.report import ratios
 from impact20.runners import CannotRun, runner
 
 ROOT = Path(__file__).parents[2]
@@ -165,3 +166,19 @@ def test_runner_of_the_readme_runs():
     assert errors[1] < errors[0] / 5
     with pytest.raises(CannotRun):
         own["prepare"](load("two_stops").cases[0], own["settings"](case)[0])
+
+
+def test_the_readmes_state_the_stored_results():
+    """Number of cases, range of the ratios and the fastest solvers."""
+    content = json.loads((FOLDER / "results" / "results.json").read_text(encoding="utf-8"))
+    found = [*ratios(content, 1e-3), *ratios(content, 1e-6)]
+    least, most = min(found, key=lambda row: row[1]), max(found, key=lambda row: row[1])
+    words = f"{least[1]:.1f} to {float(f'{most[1]:.2g}'):g} times"
+    assert least[0].startswith("beam_8")
+    assert {row[2] for row in found} == {"Boost.odeint", "numbalsoda", "heyoka"}
+    own = (FOLDER / "README.md").read_text(encoding="utf-8")
+    assert words in own and words in (FOLDER.parent / "README.md").read_text(encoding="utf-8")
+    assert f"1e-6 in all {len(ratios(content, 1e-6))} cases" in own
+    assert len(ratios(content, 1e-6)) == sum(
+        "rows" in case for problem in content["results"]["snapbeam"].values() for case in problem.values()
+    )

@@ -261,8 +261,8 @@ def _plot_density(dataset: xr.Dataset, ax: Axes | None) -> Axes:
         ax.plot(f[inside], data["psd"].values[inside], color=BEAM_COLOR, linewidth=0.8, label="estimate")
         if "psd_target" in data:
             target = data["psd_target"].values[inside]
-            ax.plot(f[inside], target, "--", color=SHAKER_COLOR, linewidth=1.2, label="drawn from")
-        ax.set(xscale="log", yscale="log", xlabel="Frequency (Hz)", ylabel="Acceleration density (g$^2$/Hz)")
+            ax.plot(f[inside], target, "--", color=SHAKER_COLOR, linewidth=1.2, label="given density")
+        ax.set(xscale="log", yscale="log", xlabel="Frequency (Hz)", ylabel="Acceleration PSD (g$^2$/Hz)")
         ax.set_title(f"{data.attrs['rms_g']:.3g} g root mean square")
         ax.legend()
         fix_ticks(ax)

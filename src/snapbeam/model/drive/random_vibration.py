@@ -48,6 +48,8 @@ SPECTRA: dict[str, _Points] = {
 _SAMPLES_PER_PERIOD = 8
 """Samples in the shortest period: the cubic spline through them keeps 99.9 % of the amplitude there."""
 _MOST_SAMPLES = 1 << 22
+_UNITS = (("Hz", 1.0), ("m^2/s^3", GRAVITY**-2))
+"""Units of a frequency and of a density, by pint, and their sizes."""
 
 
 def break_points(name: str, value: Any) -> _Points:
@@ -84,10 +86,6 @@ def break_points(name: str, value: Any) -> _Points:
             f"{name}: {found[at + 1][0]:g} Hz after {found[at][0]:g} Hz: frequencies must increase"
         )
     return tuple((float(f), float(g)) for f, g in found)
-
-
-_UNITS = (("Hz", 1.0), ("m^2/s^3", GRAVITY**-2))
-"""Units of a frequency and of a density, by pint, and their sizes."""
 
 
 def _number(name: str, value: Any, unit: tuple[str, float]) -> float:
@@ -301,5 +299,5 @@ class RandomVibration(SampledAcceleration):
         return float(np.mean(self._drawn[1] - gained))
 
     def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:
-        """None: there is no offset."""
+        """No diagnostics, since the motion has no offset."""
         return []

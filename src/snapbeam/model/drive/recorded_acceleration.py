@@ -151,7 +151,7 @@ class SampledAcceleration(Sampled):
             "psd": "acceleration power spectral density, estimate",
             "psd_low": f"lower end of the {100 * confidence:g} % interval",
             "psd_high": f"upper end of the {100 * confidence:g} % interval",
-            "psd_target": "density drawn from",
+            "psd_target": "given power spectral density",
         }
         found = dict(zip(words, (psd, psd / tails[0], psd / tails[1], self._density(frequency)), strict=True))
         return xr.Dataset(
