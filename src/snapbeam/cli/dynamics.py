@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from snapbeam.dynamics.basins import BasinEntropy
+    from snapbeam.model.parameter_file import Config
 
 __all__ = ["dynamics"]
 
@@ -66,7 +67,6 @@ _AXES = ("drive.frequency_ratio", "drive.velocity_amplitude", "contact.location"
 _OWN = "Analysis"
 _FEW = 4000
 """Maximum size of a variable in the JSON output."""
-_BOUNDS = "the unit of the parameter, such as 0.1:0.3"
 _SETTLING = "16 time constants of the slowest mode, at least 200 and at most 20,000"
 Output = Annotated[
     Path,
@@ -85,6 +85,13 @@ def _checked(output: Path, plot: Path | None) -> None:
 
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
+
+
+def _interval(name: str, text: str, settings: Config, parameter: str) -> tuple[float, float]:
+    """Minimum and maximum of a parameter, in its unit."""
+    from snapbeam.model.parameters import lookup
+
+    return opt.parse_range(name, text, lookup(settings.full_name(parameter)).quantity.unit)
 
 
 def _plain(found: object) -> str:
@@ -202,11 +209,11 @@ def bifurcation_diagram(
     Example: snapbeam dynamics bifurcation-diagram --modes 8 --frequency-ratio 1.4 --values 0.01:0.3:400 --plot diagram.png
     """
     from snapbeam.dynamics.bifurcation import bifurcation_diagram as diagram_of
-    from snapbeam.model.parameter_axes import parse_axis
+    from snapbeam.model.parameter_file import parsed_axis
 
     settings = configured(given)
     _checked(output, plot)
-    points = np.atleast_1d(parse_axis(parameter, values))
+    points = parsed_axis(settings.full_name(parameter), values)
     begun = time.monotonic()
     with progress(None, "bifurcation diagram", "values") as report:
         dataset = diagram_of(
@@ -242,7 +249,7 @@ def hysteresis(
     """
     from snapbeam.cli.console import check_pictures, draw, write_map
     from snapbeam.dynamics.swept_statistics import hysteresis as swept
-    from snapbeam.model.parameter_axes import parse_axis
+    from snapbeam.model.parameter_file import parsed_axis
     from snapbeam.solver.statistics import STATISTICS
     from snapbeam.util.files import check_writable
     from snapbeam.util.status_codes import RunStatus
@@ -252,7 +259,7 @@ def hysteresis(
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
     choice("statistic", statistic, tuple(STATISTICS))
-    points = np.atleast_1d(parse_axis(parameter, values))
+    points = parsed_axis(settings.full_name(parameter), values)
     begun = time.monotonic()
     with progress(None, "hysteresis", "values") as report:
         dataset = swept(settings.system, parameter, points, settings.integration, progress=report)
@@ -428,7 +435,7 @@ def branch(
 
     settings = configured(given)
     _checked(output, plot)
-    limits = opt.parse_range("bounds (--bounds)", bounds, _BOUNDS)
+    limits = _interval("bounds (--bounds)", bounds, settings, parameter)
     begun = time.monotonic()
     options = None if given.get("integration.accuracy") is None else settings.integration
     try:
@@ -540,8 +547,8 @@ def bifurcation_curve(
 
     settings = configured(given)
     _checked(output, plot)
-    limits = opt.parse_range("bounds (--bounds)", bounds, _BOUNDS)
-    others = opt.parse_range("second_bounds (--second-bounds)", second_bounds, _BOUNDS)
+    limits = _interval("bounds (--bounds)", bounds, settings, parameter)
+    others = _interval("second_bounds (--second-bounds)", second_bounds, settings, second)
     wanted = 1 if number is None else number
     begun = time.monotonic()
     options = None if given.get("integration.accuracy") is None else settings.integration

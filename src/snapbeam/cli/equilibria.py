@@ -190,18 +190,16 @@ def equilibria(
 def _branches(settings: Any, over: str, output: Path | None, plot: Path | None) -> None:
     """Print the critical points over a parameter, and write the branches and their figure."""
     from snapbeam.model.equilibrium_branches import equilibrium_branches
-    from snapbeam.model.parameter_axes import parse_axis
     from snapbeam.model.parameters import lookup
     from snapbeam.util.si_prefixes import prefixed
     from snapbeam.util.validation import InputError
 
     name, equals, text = over.partition("=")
-    name = settings.resolved(name.strip())
+    name = settings.full_name(name.strip())
     unit = lookup(name).quantity.unit
-    if not equals or text.count(":") != 1:
+    if not equals:
         raise InputError(f"over = {over!r}: must be name=start:stop, such as force.voltage=0:40")
-    ends = [float(parse_axis(name, each, unit=unit)) for each in text.split(":")]
-    found = equilibrium_branches(settings.static_system, name, (ends[0], ends[1]))
+    found = equilibrium_branches(settings.static_system, name, opt.parse_range(name, text, unit))
     console = out()
     for kind, value, place in zip(
         *(found[f"critical_{each}"].values for each in ("kind", "value", "displacement")), strict=True

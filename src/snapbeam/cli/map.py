@@ -141,8 +141,7 @@ def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
     Where nothing but the paper's own axes and the number of modes is named, the frequency ratio and the velocity
     amplitude have their default axes unless they have a value.
     """
-    from snapbeam.model.parameter_axes import PHYSICAL
-    from snapbeam.model.parameter_file import DEFAULT_AXES
+    from snapbeam.model.parameter_file import DEFAULT_AXES, same_axis
     from snapbeam.model.quantity import split_name
 
     named: dict[str, Any] = settings.axes(keep_units=True)
@@ -152,9 +151,8 @@ def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
     drive = settings.section("drive")
     axes = dict(named)
     for name, text in DEFAULT_AXES.items():
-        field = split_name(name)[1]
-        physical = {row.parameter: split_name(full)[1] for full, row in PHYSICAL.items()}[name]
-        if name not in named and field not in drive and physical not in drive:
+        own = {split_name(each)[1] for each in same_axis(name)}
+        if name not in named and not own & drive.keys():
             axes |= settings.axes({name: text}) if not named else _default(name, text)
     axes = {name: axes[name] for name in sorted(axes, key=lambda each: order.index(each))}
     if not axes:
@@ -189,10 +187,10 @@ def _check_variable(variable: str | None, plot: Path | None, *, overlaid: bool) 
 
 
 def _check_two_axes(path: Path, axes: dict[str, Any]) -> None:
-    from snapbeam.model.parameter_axes import parameter_of_axis
+    from snapbeam.model.parameters import lookup
     from snapbeam.util.validation import InputError
 
-    many = [parameter_of_axis(name).short for name, values in axes.items() if len(values) > 1]
+    many = [lookup(name).short for name, values in axes.items() if len(values) > 1]
     if len(many) != 2:
         raise InputError(
             f"plot = {str(path)!r}: a map is drawn over two axes, not {len(many)} ({', '.join(many)}); "

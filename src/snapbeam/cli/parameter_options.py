@@ -225,8 +225,7 @@ def _general(with_axes: bool) -> dict[str, tuple[Any, Any]]:
 
 def _option(name: str, is_axis: bool) -> Any:
     """The type of an option, with its words."""
-    from snapbeam.model.parameter_axes import PHYSICAL
-    from snapbeam.model.parameters import parameters
+    from snapbeam.model.parameters import PHYSICAL, parameters
     from snapbeam.model.quantity import split_name
 
     section, field = split_name(name)
@@ -307,7 +306,6 @@ def configured(
     *axes_of* returns the axes of a command, its own ones included, for ``--print-config``.
     """
     from snapbeam.model.parameter_file import Config, load_config, override, same_axis
-    from snapbeam.model.parameters import lookup
     from snapbeam.model.quantity import split_name
     from snapbeam.util.validation import InputError
 
@@ -320,22 +318,22 @@ def configured(
     sections: dict[str, dict[str, Any]] = {}
     axes: dict[str, Any] = {}
     for name, value in given.items():
-        section, field = split_name(name)
-        if not field or value is None:
+        if not split_name(name)[1] or value is None:
             continue
+        name = config.of_option(name)
+        section, field = split_name(name)
         if isinstance(value, str) and _is_axis(name, value):
             axes[name] = value
         else:
             sections.setdefault(section, {})[field] = _value(name, value)
     for text in given.get("set_") or ():
         name, value = _assignment(text, "set")
-        name = config.resolved(name)
-        full = name if split_name(name)[1] in ("type", "label") else lookup(name).name
+        full = config.full_name(name)
         section, field = split_name(full)
         sections.setdefault(section, {})[field] = _value(full, value)
     for text in given.get("sweep") or ():
         name, value = _assignment(text, "sweep")
-        name = config.resolved(name)
+        name = config.full_name(name)
         if name in axes:
             raise InputError(f"sweep = {text!r}: {name} is given twice; give each axis once")
         axes[name] = value
@@ -371,16 +369,13 @@ def _needs_drive(given: Mapping[str, Any]) -> bool:
 
 def _require_striker(config: Config, sections: Mapping[str, Any], axes: Mapping[str, Any]) -> None:
     """Raise an error for a striker without a drive next to another excitation of the file."""
-    from snapbeam.model.parameter_axes import physical_name
-    from snapbeam.model.parameters import lookup
     from snapbeam.model.quantity import split_name
     from snapbeam.util.validation import InputError
 
     moved = [name for name in ("base_excitation", "axial_load") if config.section(name) or sections.get(name)]
     given = [f"drive.{field}" for field in sections.get("drive", {})]
-    swept = [physical_name(name) or lookup(name).name for name in axes]
-    given += [name for name in swept if name.startswith("drive.")]
-    others = {*sections, *(split_name(name)[0] for name in swept), *config.given}
+    given += [name for name in axes if name.startswith("drive.")]
+    others = {*sections, *(split_name(name)[0] for name in axes), *config.given}
     if moved and given and "contact" not in others and not config.section("drive"):
         raise InputError(
             f"{', '.join(given)}: there is no striker to drive, {moved[0]} moves the beam; use --set or --sweep "
@@ -400,8 +395,7 @@ def _shown(sections: Mapping[str, Mapping[str, Any]], name: str) -> str:
 
 def _is_axis(name: str, value: str) -> bool:
     """Return whether the text of an option is an axis, not a number."""
-    from snapbeam.model.parameter_axes import PHYSICAL
-    from snapbeam.model.parameters import parameters
+    from snapbeam.model.parameters import PHYSICAL, parameters
 
     row = parameters().get(name)
     numeric = name in PHYSICAL or (row is not None and row.quantity.kind in (float, int))
@@ -419,8 +413,8 @@ def _assignment(text: str, option: str) -> tuple[str, str]:
 
 def _value(name: str, value: Any) -> Any:
     """The text of an option as what its parameter holds."""
-    from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, parse_axis
-    from snapbeam.model.parameters import row_of
+    from snapbeam.model.parameter_axes import parse_axis
+    from snapbeam.model.parameters import PHYSICAL, lookup, row_of
     from snapbeam.util.validation import InputError
 
     if not isinstance(value, str):
@@ -435,7 +429,7 @@ def _value(name: str, value: Any) -> Any:
         if kind is int:
             return int(value)
         if kind is float and (row is not None or name in PHYSICAL or name.startswith("initial_state.")):
-            numbers = np.ravel(parse_axis(name, value, unit=parameter_of_axis(name).quantity.unit))
+            numbers = np.ravel(parse_axis(name, value, unit=lookup(name).quantity.unit))
             if numbers.size != 1:
                 raise InputError(f"{name} = {value!r}: must be one number, not {numbers.size}")
             return float(numbers[0])
@@ -494,17 +488,17 @@ Window = Annotated[
 
 def parse_window(text: str | None) -> tuple[float, float] | None:
     """Return the cycles ``first:last`` as two numbers."""
-    return None if text is None else parse_range("window", text, "cycles, such as 0:10")
+    return None if text is None else parse_range("window", text)
 
 
-def parse_range(name: str, text: str, what: str) -> tuple[float, float]:
-    """Return ``first:last`` as two numbers, the first less than the last."""
-    from snapbeam.util.validation import InputError, finite
+def parse_range(name: str, text: str, unit: str = "1") -> tuple[float, float]:
+    """Return ``first:last`` as two numbers in *unit*, the first less than the last."""
+    from snapbeam.model.parameter_axes import parse_axis
+    from snapbeam.util.validation import InputError
 
-    try:
-        first, last = (finite(name, float(part)) for part in text.split(":"))
-    except ValueError:
-        raise InputError(f"{name} = {text!r}: must be first:last, in {what}") from None
+    if text.count(":") != 1 or "," in text:
+        raise InputError(f"{name} = {text!r}: must be first:last, such as 0:10")
+    first, last = (float(parse_axis(name, part, unit=unit)) for part in text.split(":"))
     if not first < last:
         raise InputError(f"{name} = {text!r}: first must be less than last")
     return first, last
@@ -772,8 +766,8 @@ def config_of_file(path: Path, point: str | None) -> Config:
         ``name=value,name=value``: the point nearest to these coordinates, its values exact.
     """
     from snapbeam.cli.console import open_result
-    from snapbeam.model.parameter_axes import PHYSICAL
     from snapbeam.model.parameter_file import config_from_mapping
+    from snapbeam.model.parameters import PHYSICAL
     from snapbeam.model.quantity import split_name
     from snapbeam.util.validation import InputError, parsed_json
 
@@ -809,11 +803,10 @@ def config_of_file(path: Path, point: str | None) -> Config:
 
 def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, Any]:
     """Values of the parameters at the nearest point, by dotted name."""
-    from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, physical_name
+    from snapbeam.model.parameters import lookup
     from snapbeam.util.validation import InputError
 
     axes = {name: dataset[name] for name in map(str, dataset.dims) if "parameter" in dataset[name].attrs}
-    physical = {parameter_of_axis(name).short: name for name in PHYSICAL}
     if point is None:
         return {}
     if "point" in dataset.dims:
@@ -821,8 +814,7 @@ def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, A
     found: dict[str, Any] = {}
     for part in point.split(","):
         name, equals, value = part.partition("=")
-        name = physical_name(name.strip()) or physical.get(name.strip(), name.strip())
-        short = parameter_of_axis(name).short
+        short = lookup(name.strip()).short
         if not equals or short not in axes:
             raise InputError(f"point = {point!r}: must name axes of {path.name}: {', '.join(axes)}")
         values = axes[short].values

@@ -15,8 +15,7 @@ from rich.table import Table
 
 from snapbeam.cli.console import duration, file_line
 from snapbeam.cli.parameter_options import point_text
-from snapbeam.model.parameter_axes import PHYSICAL
-from snapbeam.model.parameters import lookup, parameters
+from snapbeam.model.parameters import PHYSICAL, lookup, parameters
 from snapbeam.model.quantity import numbered, split_name
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import ResponseClass, RunStatus

@@ -45,6 +45,14 @@ def threshold(
     parameter: Annotated[
         str, typer.Option(help="Parameter to raise (velocity_amplitude).", rich_help_panel="Threshold")
     ] = "velocity_amplitude",
+    values: Annotated[
+        str | None,
+        typer.Option(
+            help="Values of the parameter to choose from, start:stop:count.",
+            rich_help_panel="Threshold",
+            metavar="VALUES",
+        ),
+    ] = None,
     output: Annotated[
         Path,
         typer.Option(
@@ -65,11 +73,11 @@ def threshold(
     from snapbeam.cli.console import check_pictures, draw, write_map
     from snapbeam.util.files import check_writable
 
-    settings = configured(given, lambda config, _: _axes_of(config, parameter))
+    settings = configured(given, lambda config, _: _axes_of(config, parameter, values))
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
-    axes = _axes_of(settings, parameter)
-    name, values = axes.popitem()
+    axes = _axes_of(settings, parameter, values)
+    name, chosen = axes.popitem()
 
     from snapbeam.sweeps.threshold import threshold as find
 
@@ -78,7 +86,7 @@ def threshold(
     start = time.monotonic()
     with progress(None, "threshold", "runs") as report:
         dataset = find(
-            system, name, values, axes, settings.integration.replace(threads=threads), progress=report
+            system, name, chosen, axes, settings.integration.replace(threads=threads), progress=report
         )
     elapsed = time.monotonic() - start
     files = [write_map(dataset, output)]
@@ -97,25 +105,29 @@ def threshold(
     out().print(*_summary(dataset, elapsed), *(f"Written: {file_line(path)}" for path in files), sep="\n")
 
 
-def _axes_of(settings: Config, parameter: str) -> dict[str, Any]:
+def _axes_of(settings: Config, parameter: str, text: str | None) -> dict[str, Any]:
     """The axes of a search, those of the structure first, and the values to choose from."""
-    from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, parse_axis
-    from snapbeam.model.parameters import lookup
+    from snapbeam.model.parameter_file import parsed_axis, same_axis
+    from snapbeam.model.parameters import lookup, ratio_of
     from snapbeam.util.validation import InputError
 
     axes: dict[str, Any] = settings.axes(keep_units=True)
-    name = lookup(parameter).name
-    name = next((each for each, row in PHYSICAL.items() if row.parameter == name and each in axes), name)
-    values = axes.pop(name, None)
+    name = settings.full_name(parameter)
+    given = [each for each in axes if each in same_axis(name)]
+    values = axes.pop(given[0]) if given else None
+    if text is not None:
+        if given:
+            raise InputError(f"values, {parameter}: its values are given twice; give them once")
+        values = parsed_axis(name, text)
     if values is None:
         if name != "drive.velocity_amplitude":
-            raise InputError(
-                f"{parameter}: give the values to choose from, as --sweep {parameter}=start:stop:count"
-            )
-        values = np.atleast_1d(parse_axis("velocity_amplitude", _VALUES))
-    if not [each for each in axes if each != "model.modes"]:
-        axes["drive.frequency_ratio"] = np.atleast_1d(parse_axis("frequency_ratio", "0.1:4:64"))
-    return dict(sorted(axes.items(), key=lambda item: parameter_of_axis(item[0]).is_run)) | {name: values}
+            raise InputError(f"{parameter}: give the values to choose from, as --values start:stop:count")
+        values = parsed_axis(name, _VALUES)
+    over_frequency = ratio_of(name) == "drive.velocity_amplitude" and not axes.keys() - {"model.modes"}
+    if over_frequency and not settings.section("drive").keys() & {"frequency_ratio", "frequency_hz"}:
+        axes["drive.frequency_ratio"] = parsed_axis("drive.frequency_ratio", "0.1:4:64")
+    name = given[0] if given else name
+    return dict(sorted(axes.items(), key=lambda item: lookup(item[0]).is_run)) | {name: values}
 
 
 def _summary(dataset: xr.Dataset, elapsed: float) -> list[str]:

@@ -98,7 +98,7 @@ def bifurcation_diagram(
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
-    row = lookup(name)
+    row = system.parameter(name)
     if row.quantity.kind is not float:
         raise InputError(f"name = {shown(name)}: must be a parameter that is a number")
     points = axis(row.short, values, row.quantity.low, row.quantity.high, closed=row.quantity.closed)

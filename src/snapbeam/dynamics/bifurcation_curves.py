@@ -39,7 +39,7 @@ from snapbeam.dynamics.periodic_orbits import (
     turning_points,
 )
 from snapbeam.model.contact.hertz import HertzContact
-from snapbeam.model.parameters import lookup
+from snapbeam.model.parameters import ratio_of
 from snapbeam.model.quantity import numbered, split_name
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.validation import InputError, checked, instance, integer, interval, shown, within
@@ -270,7 +270,7 @@ class _Curve:
         if (
             not isinstance(flow, Stroboscope)
             or flow.smooth
-            or any(lookup(name).name.endswith(".phase") for name in names)
+            or any(flow.system.parameter(name).name.endswith(".phase") for name in names)
         ):
             return self, point
         here = self.at(point.y)
@@ -312,7 +312,7 @@ def _without_contact_force(grazing: SpecialPoint, names: tuple[str, str]) -> Flo
     if not depth.size or orbit.contact_summary.impacts > int(depth[np.argmin(np.abs(depth))] > 0.0):
         return flow
     for name in names:
-        section, field = split_name(lookup(name).name)
+        section, field = split_name(flow.system.parameter(name).name)
         kind, number = numbered(section)
         if kind == "contact" and field in flow.system.contacts[number - 1].law.numbers_type()._fields:
             raise InputError(
@@ -508,10 +508,14 @@ def bifurcation_curve(
     flow = special_point.orbit.flow
     if special_point.kind == "grazing":
         flow = _without_contact_force(special_point, names)
-    for name in names:
-        if isinstance(flow, Stroboscope) and not lookup(name).is_run:
-            raise InputError(f"names = {shown(names)}: {name} cannot differ between runs")
-    if len(names) != 2 or len({lookup(n).name if isinstance(flow, Stroboscope) else n for n in names}) < 2:
+    own = list(names)
+    if isinstance(flow, Stroboscope):
+        rows = [flow.system.parameter(name) for name in names]
+        own = [ratio_of(row.name) for row in rows]
+        for row in rows:
+            if not row.is_run:
+                raise InputError(f"names = {shown(names)}: {row.name} cannot differ between runs")
+    if len(names) != 2 or len(set(own)) < 2:
         raise InputError(f"names = {shown(names)}: must be two different parameters")
     if len(bounds) != 2:
         raise InputError(f"bounds = {shown(bounds)}: must be a minimum and a maximum of each parameter")
@@ -659,7 +663,7 @@ def _dataset(
     for k, name in enumerate(names):
         short, labels = name, {"units": "1", "long_name": name}
         if isinstance(flow, Stroboscope):
-            row = lookup(name)
+            row = flow.system.parameter(name)
             short, labels = row.short, {"units": row.quantity.unit, "long_name": row.quantity.long_name}
         shorts.append(short)
         coords[short] = ("point", values[:, k], labels | {"parameter": name})

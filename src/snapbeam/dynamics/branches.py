@@ -135,7 +135,6 @@ class Branch:
         Over ``orbit``: the parameter, the state, the multipliers, stability, impacts and the mid-span displacement,
         once and at every ``return``.  Over ``special_point``: kind, value, error, state and the orbit before it.
         """
-        from snapbeam.model.parameters import lookup
         from snapbeam.util.datasets import xr
 
         first = self.orbits[0]
@@ -144,7 +143,7 @@ class Branch:
         values = np.array([orbit.multipliers for orbit in self.orbits])
         short, unit, words = self.name, "1", self.name
         if isinstance(first.flow, Stroboscope):
-            row = lookup(self.name)
+            row = first.flow.system.parameter(self.name)
             short, unit, words = row.short, row.quantity.unit, row.quantity.long_name
         states = np.array([orbit.coordinates for orbit in seen])
         steps = np.linalg.norm(np.diff(states, axis=0), axis=1)

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.drive.base import HORIZON, Drive
 from snapbeam.model.integration import Integration
+from snapbeam.model.parameter_axes import ratios_of
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import split_name
 from snapbeam.model.state import FIELDS, OWN_FIELDS, State, amplitude_scale
@@ -513,12 +514,12 @@ class Stroboscope:
         """The flow of the system with parameters changed, by dotted names or the names in datasets."""
         for name in values:
             self._require_free(name)
-        changes: dict[str, Any] = {lookup(name).name: value for name, value in values.items()}
+        changes = {self.system.parameter(name).name: value for name, value in values.items()}
         return Stroboscope(self.system.replace(**changes), self.integration, self.phase)
 
     def _require_free(self, name: str) -> None:
         """Refuse to change a phase that another value would override."""
-        section, field = split_name(lookup(name).name)
+        section, field = split_name(self.system.parameter(name).name)
         leads = self.system.moving[:1]
         if field != "phase" or not leads or section != leads[0][0]:
             return
@@ -530,7 +531,7 @@ class Stroboscope:
 
     def value(self, name: str) -> float:
         """A parameter of the system."""
-        return float(self.system.get(lookup(name).name))
+        return float(self.system.get(self.system.parameter(name).name))
 
     def coordinates(self, state: State | None = None) -> _Array:
         """A state, or a batch of them, in the coordinates of the flow, shape (runs, d); the start by default."""
@@ -712,9 +713,10 @@ class Stroboscope:
         points: Mapping[str, _Array] | None,
     ) -> AdvancedStates:
         lost = None if begun.statistics is None else ~np.isin(begun.statistics["status"], _REACHED)
-        own = {lookup(name).name: np.asarray(values) for name, values in (points or {}).items()}
-        for name in own:
+        for name in points or ():
             self._require_free(name)
+        named = {self.system.parameter(name).name: np.asarray(each) for name, each in (points or {}).items()}
+        own = ratios_of(self.system, named)
         if own:
             self._require_period(own)
         ensemble = make_ensemble(

@@ -183,7 +183,7 @@ def _runs(
         begun = np.atleast_2d(finite_array("states", states))
     if axes is None:
         return begun, None, None
-    points = points_of(axes)
+    points = points_of(axes, getattr(flow, "system", None))
     for name in points.names:
         if not lookup(name).is_run:
             raise InputError(f"axes {name}: needs another structure at each value; ask for each by itself")

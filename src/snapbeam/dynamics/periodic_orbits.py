@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, fixed_parameters, flow_of
 from snapbeam.model.integration import Integration
-from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.simulation.advance import differences
@@ -119,7 +118,9 @@ class Family:
     def __init__(self, flow: Flow, name: str | None = None) -> None:
         self.flow = flow
         self.name = name
-        self._beside = name is not None and (not isinstance(flow, Stroboscope) or lookup(name).is_run)
+        self._beside = name is not None and (
+            not isinstance(flow, Stroboscope) or flow.system.parameter(name).is_run
+        )
 
     def advance(
         self, x: _Array, periods: int, value: float | None = None, tangents: _Array | None = None
@@ -866,7 +867,7 @@ class Corrector:
             not isinstance(flow, Stroboscope)
             or flow.smooth
             or name is None
-            or lookup(name).name.endswith(".phase")
+            or flow.system.parameter(name).name.endswith(".phase")
         ):
             return self, spot
         here = self.family.at(float(spot.y[-1]) * self.span)

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from snapbeam.dynamics.flow import frequencies_of
 from snapbeam.model.integration import Integration
-from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import numbered
 from snapbeam.model.system import System
 from snapbeam.simulation.simulate import simulate
@@ -90,7 +89,7 @@ def hysteresis(
 
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
-    row = lookup(name)
+    row = system.parameter(name)
     if row.quantity.kind is not float:
         raise InputError(f"name = {shown(name)}: must be a parameter that is a number")
     points = axis(row.short, values, row.quantity.low, row.quantity.high, closed=row.quantity.closed)

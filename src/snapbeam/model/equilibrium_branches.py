@@ -13,8 +13,7 @@ from snapbeam.model.equilibrium_paths import (
     critical_points,
     paths_over_parameter,
 )
-from snapbeam.model.mapping import resolved
-from snapbeam.model.parameters import lookup
+from snapbeam.model.parameters import ratio_of
 from snapbeam.model.potential import Potential
 from snapbeam.model.system import System
 from snapbeam.util.validation import InputError, checked, instance, interval, shown
@@ -69,9 +68,9 @@ def equilibrium_branches(system: System, parameter: str, values: tuple[float, fl
     from snapbeam.util.datasets import xr
 
     instance("system", system, System, "a System")
-    name = lookup(resolved(instance("parameter", parameter, str, "text"), system.labels)).name
-    row = lookup(name)
-    if row.quantity.kind is not float or not isinstance(system.parameters.get(name), float):
+    row = system.parameter(parameter)
+    name = row.name
+    if row.quantity.kind is not float or not isinstance(system.parameters.get(ratio_of(name)), float):
         raise InputError(
             f"parameter = {shown(parameter)}: must be a number that the system has; it has "
             f"{', '.join(key for key, value in system.parameters.items() if isinstance(value, float))}"

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.model.drive.shock import GRAVITY
-from snapbeam.model.parameters import Parameter, lookup
+from snapbeam.model.parameters import PHYSICAL, lookup
 from snapbeam.model.quantity import split_name
 from snapbeam.model.system import System
 from snapbeam.util.units import number_in_unit
@@ -32,13 +29,12 @@ __all__ = [
     "CHANGES_UNITS",
     "PHYSICAL",
     "Axis",
-    "Physical",
     "axis_that_changes_unit",
     "checked_physical",
     "from_physical",
     "parameter_of_axis",
     "parse_axis",
-    "physical_name",
+    "ratios_of",
     "to_physical",
     "unit_of",
 ]
@@ -46,7 +42,9 @@ __all__ = [
 
 Axis = float | NDArray[np.float64]
 
-_FORMS = "a number, numbers separated by commas, or start:stop:count, such as 0.1:4:64"
+_FORMS = (
+    "a number, numbers separated by commas, or start:stop:count, such as 0.1:4:64, with :log if geometric"
+)
 
 
 _WHOLE = "a whole number, whole numbers separated by commas, such as 1,32, or start:stop:count"
@@ -63,7 +61,7 @@ def parse_axis(
         The parameter to name in a refusal.
     value : float, str or sequence of float
         ``0.18``, ``"0.18"``, ``"1/2.1"``, ``"0.1,0.2,0.5"``, or ``"0.1:4:64"`` for 64 points from 0.1 to 4,
-        both included.  Numbers of text may have a unit that pint knows: ``"1.9um:2.1um:5"``, ``"1kohm,1Mohm"``.
+        both included, ``"1e3:1e6:7:log"`` for a geometric sequence.  Numbers of text may have a unit that pint knows: ``"1.9um:2.1um:5"``, ``"1kohm,1Mohm"``.
     whole : bool
         True if the numbers must be integers, for the error message.
     unit : str
@@ -94,7 +92,8 @@ _MOST_POINTS = 10_000_000
 
 def _parse_text(name: str, text: str, forms: str, unit: str) -> Axis:
     parts = text.split(":")
-    if len(parts) == 3:
+    geometric = len(parts) == 4 and parts[3].strip() == "log"
+    if geometric or len(parts) == 3:
         start, stop = (_number(name, text, part, forms, unit) for part in parts[:2])
         try:
             count = int(parts[2])
@@ -104,7 +103,9 @@ def _parse_text(name: str, text: str, forms: str, unit: str) -> Axis:
             raise InputError(f"{name} = {text!r}: start must be less than stop and count at least 2")
         if count > _MOST_POINTS:
             raise InputError(f"{name} = {text!r}: the count must be at most {_MOST_POINTS}")
-        return np.linspace(start, stop, count)
+        if geometric and start <= 0.0:
+            raise InputError(f"{name} = {text!r}: start must be greater than 0 for a geometric sequence")
+        return np.geomspace(start, stop, count) if geometric else np.linspace(start, stop, count)
     if len(parts) != 1:
         raise InputError(f"{name} = {shown(text)}: must be {forms}")
     numbers = [_number(name, text, part, forms, unit) for part in text.split(",")]
@@ -127,86 +128,20 @@ def _finite(name: str, text: str, value: float) -> float:
     return value
 
 
-# ----------------------------------------------------------------------------------------------------
-# Values in physical units: frequencies in Hz, velocities in m/s and locations in m are converted to ratios on input.
-
-
-@dataclass(frozen=True)
-class Physical:
-    """A parameter in its physical unit."""
-
-    parameter: str
-    """Dotted name of the ratio."""
-    unit: str
-    words: str
-
-    def unit_of(self, length: float, omega: float) -> float:
-        """Value of a normalised parameter of 1, from the length scale (m) and omega_1 (rad/s); not for a location."""
-        return {
-            "frequency_ratio": omega / (2.0 * math.pi),
-            "velocity_amplitude": length * omega,
-            "displacement_amplitude": 1e6 * length,
-            "acceleration_amplitude": length * omega**2 / GRAVITY,
-        }[split_name(self.parameter)[1]]
-
-
-PHYSICAL: dict[str, Physical] = {
-    "drive.frequency_hz": Physical("drive.frequency_ratio", "Hz", "excitation frequency"),
-    "drive.velocity_m_s": Physical("drive.velocity_amplitude", "m/s", "velocity amplitude of the striker"),
-    "drive.displacement_um": Physical(
-        "drive.displacement_amplitude", "um", "displacement amplitude of the striker"
-    ),
-    "contact.location_m": Physical("contact.location", "m", "distance of the striker from the left clamp"),
-    "base_excitation.frequency_hz": Physical(
-        "base_excitation.frequency_ratio", "Hz", "frequency of the base"
-    ),
-    "base_excitation.velocity_m_s": Physical(
-        "base_excitation.velocity_amplitude", "m/s", "velocity amplitude of the base"
-    ),
-    "base_excitation.amplitude_g": Physical(
-        "base_excitation.acceleration_amplitude", "g", "acceleration amplitude of the base"
-    ),
-}
-"""Physical quantities that can replace a normalised parameter, by dotted name; one unit for each."""
-
-
-def physical_name(name: str) -> str | None:
-    """The dotted name of a parameter in its physical unit, by itself or by its last part; None if it is none."""
-    instance("name", name, str, "text")
-    found = [full for full in PHYSICAL if name in (full, split_name(full)[1])]
-    return found[0] if found else None
-
-
 CHANGES_UNITS = ("beam.", "boundary.", "imperfection.", "model.")
 """Sections of parameters that may change the first natural frequency and the length scale."""
 
 
-def parameter_of_axis(name: str) -> Parameter:
-    """The row of an axis: a parameter, or one in its physical unit by its dotted name, such as ``drive.frequency_hz``.
-
-    Raises
-    ------
-    InputError
-        If there is none: the message names the nearest.
-    """
-    if name not in PHYSICAL:
-        return lookup(name)
-    row = PHYSICAL[name]
-    ratio = lookup(row.parameter)
-    own = dataclasses.replace(
-        ratio.quantity, unit=row.unit, long_name=row.words, symbol="", high=math.inf, plausible=None
-    )
-    short = name.removeprefix("drive.").removeprefix("contact.").replace(".", "_")
-    return dataclasses.replace(ratio, name=name, short=short, quantity=own)
+parameter_of_axis = lookup
 
 
 def unit_of(system: System, name: str) -> float:
     """Value of a normalised parameter of 1 in the physical unit of *name*."""
     scale, row = system.scale, PHYSICAL[name]
-    if row.parameter != "contact.location":
+    if row.unit != "m":
         return row.unit_of(scale.length, scale.omega)
     if system.model.beam is None:
-        raise InputError("contact.location_m: a structure given by matrices has no length; give location")
+        raise InputError(f"{name}: a structure given by matrices has no length; give location")
     return system.model.beam.length
 
 
@@ -260,3 +195,14 @@ def to_physical(system: System, name: str, value: ArrayLike) -> Any:
     """Values in the physical unit of *name* from ratios."""
     unit = _unit(system, name)
     return finite_array(name, value) * unit
+
+
+def ratios_of(system: System, columns: Mapping[str, Any]) -> dict[str, Any]:
+    """Return columns with those in physical units as ratios of one structure."""
+    found = dict(columns)
+    for name in columns.keys() & PHYSICAL.keys():
+        values = found.pop(name)
+        for value in np.unique(values).tolist():
+            checked_physical(system, name, value, name)
+        found[PHYSICAL[name].parameter] = values / unit_of(system, name)
+    return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -21,16 +21,19 @@ from snapbeam.model.drive.base import DRIVES
 from snapbeam.model.external_force import FORCES
 from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import flattened, labels_of, parts_from_mapping, read_file, resolved
-from snapbeam.model.parameter_axes import (
+from snapbeam.model.parameter_axes import axis_that_changes_unit, checked_physical, parse_axis
+from snapbeam.model.parameters import (
     PHYSICAL,
-    axis_that_changes_unit,
-    checked_physical,
-    parameter_of_axis,
-    parse_axis,
-    physical_name,
+    Parameter,
+    kinds_of,
+    lookup,
+    named_in,
+    parameters,
+    physical_names,
+    ratio_of,
+    row_of,
 )
 from snapbeam.model.parameters import SECTIONS as SYSTEM_SECTIONS
-from snapbeam.model.parameters import Parameter, kinds_of, lookup, parameters, row_of
 from snapbeam.model.potential import Potential
 from snapbeam.model.quantity import check_label, numbered, quantities, split_name
 from snapbeam.model.reduced_model import ReducedModel
@@ -161,7 +164,6 @@ def checked_sections(
     lines: list[str] = []
     found: dict[str, dict[str, Any]] = {}
     flat = flattened(mapping("sections", sections))
-    labels = labels_of(flat)
     for section, values in flat.items():
         if section == "extends":
             if values != "paper":
@@ -182,7 +184,7 @@ def checked_sections(
                 except InputError as error:
                     lines.append(str(error))
                     continue
-            faults = [_checked(section, str(name), value, found, labels) for name, value in values.items()]
+            faults = [_checked(section, str(name), value, found, flat) for name, value in values.items()]
             lines += [f"[{section}] {message}" for message in faults if message]
     return found, lines
 
@@ -202,12 +204,12 @@ def _checked(
     name: str,
     value: Any,
     found: dict[str, dict[str, Any]],
-    labels: Mapping[str, Sequence[str]],
+    flat: Mapping[str, Any],
 ) -> str:
     """Enter a value in *found*, or return what is wrong with it."""
     own = found.setdefault(section, {})
     if section == "sweep":
-        return _checked_axis(name, value, own, labels)
+        return _checked_axis(name, value, own, flat)
     if section == "initial_state":
         try:
             row: Parameter | None = lookup(f"initial_state.{name}")
@@ -329,13 +331,15 @@ def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
     return "", [float(each) for each in pair]
 
 
-def _checked_axis(name: str, value: Any, own: dict[str, Any], labels: Mapping[str, Sequence[str]]) -> str:
+def _full_name(name: str, sections: Mapping[str, Any]) -> str:
+    """The dotted name of a parameter that is given by its last part, by number 1 or by a label, among sections."""
+    return lookup(named_in(resolved(name, labels_of(sections)), sections)).name
+
+
+def _checked_axis(name: str, value: Any, own: dict[str, Any], flat: Mapping[str, Any]) -> str:
     try:
-        name = resolved(name, labels)
-        full = physical_name(name) or lookup(name).name
-        rivals = {full, *(key for key, row in PHYSICAL.items() if row.parameter == full)}
-        rivals |= {PHYSICAL[full].parameter} if full in PHYSICAL else set()
-        twice = sorted(rivals & own.keys())
+        full = _full_name(name, flat)
+        twice = sorted(same_axis(full) & own.keys())
         if twice:
             return f"{name}: the same axis is given as {twice[0]}"
         parsed = parsed_axis(full, value)
@@ -355,13 +359,11 @@ def _checked_axis(name: str, value: Any, own: dict[str, Any], labels: Mapping[st
 
 def parsed_axis(name: str, value: Any) -> Any:
     """The values of an axis: numbers, or words."""
-    row = None if name in PHYSICAL else lookup(name)
-    short = split_name(name)[1] or name
-    if row is not None and row.quantity.kind in (str, bool):
+    row, short = lookup(name), split_name(name)[1] or name
+    if row.quantity.kind in (str, bool):
         words = value.split(",") if isinstance(value, str) else value
         return np.array([row.quantity.check(short, word) for word in words])
-    whole = row is not None and row.quantity.kind is int
-    return np.atleast_1d(parse_axis(short, value, whole=whole, unit=parameter_of_axis(name).quantity.unit))
+    return np.atleast_1d(parse_axis(short, value, whole=row.quantity.kind is int, unit=row.quantity.unit))
 
 
 def contradictions(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -375,7 +377,7 @@ def contradictions(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
     if "coefficient" in contact and "type" not in contact and (given or "stiffness" in contact):
         return ["[contact] give stiffness, of Hertz's law, or coefficient, of Newton's, not both"]
     for full, row in PHYSICAL.items():
-        section, name, ratio = *full.split("."), row.parameter.partition(".")[2]
+        (section, name), ratio = split_name(full), split_name(row.parameter)[1]
         if {name, ratio} <= found.get(section, {}).keys():
             return [f"[{section}] give {ratio} or {name}, not both"]
     beam = found.get("beam", {})
@@ -429,8 +431,8 @@ _RIVALS: dict[str, list[tuple[set[str], set[str]]]] = {
     "contact": contact_rivals(),
 }
 for _name, _row in PHYSICAL.items():
-    _section, _, _own = _name.partition(".")
-    _RIVALS.setdefault(_section, []).append(({_row.parameter.partition(".")[2]}, {_own}))
+    _section, _own = split_name(_name)
+    _RIVALS.setdefault(numbered(_section)[0], []).append(({split_name(_row.parameter)[1]}, {_own}))
 
 
 @dataclass(frozen=True)
@@ -457,17 +459,35 @@ class Config:
         """Values given in a section."""
         return dict(self.given.get(name, {}))
 
-    def resolved(self, name: str) -> str:
-        """The dotted name by number of a parameter that is given by the label of a contact or force."""
-        return resolved(name, labels_of(self.given))
+    def full_name(self, name: str) -> str:
+        """The dotted name of a parameter that is given by its last part or by the label of a contact or force.
+
+        Raises
+        ------
+        InputError
+            If there is none: the message names the nearest.
+        """
+        found = resolved(name, labels_of(self.given))
+        section, field = split_name(found)
+        of_file = ("type", "label", *((*MATERIALS, *WANTED) if numbered(section)[0] == "contact" else ()))
+        return found if field in of_file else _full_name(name, self.given)
+
+    def of_option(self, name: str) -> str:
+        """The dotted name that an option of the striker or its drive has, in a system without a striker.
+
+        ``--frequency-hz`` is then the frequency of the one excitation that has one, such as that of the base.
+        """
+        if split_name(name)[0] not in _STRIKING or any(self.section(part) for part in _STRIKING):
+            return name
+        found = named_in(split_name(name)[1], self.given)
+        return found if split_name(found)[1] else name
 
     def _with_axes(self, name: str) -> dict[str, Any]:
         """Values given in a section; a key that has only an axis takes the first value of the axis."""
         found, known = self.section(name), parameters()
         kind = law_of(found) if numbered(name)[0] == "contact" else found.get("type", "sine")
         for axis, values in self.section("sweep").items():
-            ratio = PHYSICAL[axis].parameter if axis in PHYSICAL else lookup(axis).name
-            section, key = split_name(ratio)
+            section, key = split_name(ratio_of(lookup(axis).name))
             if section != name or key in found:
                 continue
             if axis in PHYSICAL:
@@ -503,7 +523,7 @@ class Config:
             The axes by dotted name, in place of those that were given.
         """
         axes = self.axes(keep_units=True) if axes is None and self.section("sweep") else dict(axes or {})
-        swept = {PHYSICAL[name].parameter if name in PHYSICAL else name for name in axes}
+        swept = {*map(ratio_of, axes)}
         if self.model.length_scale is None:  # a beam that does not buckle makes no system
             sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
             sections |= {
@@ -526,7 +546,7 @@ class Config:
             if value is not None and f"integration.{name}" not in axes
         }
         if axes:
-            whole_number = {name: parameter_of_axis(name).quantity.kind is int for name in axes}
+            whole_number = {name: lookup(name).quantity.kind is int for name in axes}
             sections["sweep"] = {
                 name: np.asarray(values, dtype=int if whole_number[name] else None).tolist()
                 for name, values in axes.items()
@@ -613,8 +633,8 @@ class Config:
             sections["drive"].setdefault("type", "sine")
         later = {
             f"{section}.{name}": sections[section].pop(name)
-            for section in ("drive", "contact", "base_excitation")
-            for name in [key for key in sections.get(section, {}) if f"{section}.{key}" in PHYSICAL]
+            for section in [*sections]
+            for name in [key for key in sections[section] if f"{section}.{key}" in PHYSICAL]
         }
         for physical, value in later.items():
             section, own = split_name(PHYSICAL[physical].parameter)
@@ -868,11 +888,10 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]], source: 
 def same_axis(name: str) -> set[str]:
     """Dotted names of *name*, those in physical units included; empty if it is unknown."""
     try:
-        physical = physical_name(name)
-        full = lookup(name).name if physical is None else PHYSICAL[physical].parameter
+        full = ratio_of(lookup(name).name)
     except InputError:
         return set()
-    return {full, *(key for key, row in PHYSICAL.items() if row.parameter == full)}
+    return {full, *physical_names([full])}
 
 
 # ----------------------------------------------------------------------------------------------------

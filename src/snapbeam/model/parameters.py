@@ -21,18 +21,40 @@ from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import BoundaryConditions
 from snapbeam.model.contact.base import LAWS
 from snapbeam.model.drive.base import DRIVES
+from snapbeam.model.drive.shock import GRAVITY
 from snapbeam.model.external_force import FORCES, ExternalForce
 from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.integration import Integration
 from snapbeam.model.local_force import LOCAL_FORCES
-from snapbeam.model.quantity import RUN, ParameterField, numbered, quantities, section_of, split_name
+from snapbeam.model.quantity import (
+    NUMBERED,
+    RUN,
+    ParameterField,
+    numbered,
+    quantities,
+    section_of,
+    split_name,
+)
 from snapbeam.model.reduced_model import MODEL_QUANTITIES
 from snapbeam.model.state import START_NAME
 from snapbeam.model.striker import Striker
 from snapbeam.util.validation import InputError, shown
 
-__all__ = ["SECTIONS", "Parameter", "kinds_of", "lookup", "parameters", "row_of", "short_names"]
+__all__ = [
+    "PHYSICAL",
+    "SECTIONS",
+    "Parameter",
+    "Physical",
+    "kinds_of",
+    "lookup",
+    "named_in",
+    "parameters",
+    "physical_names",
+    "ratio_of",
+    "row_of",
+    "short_names",
+]
 
 
 SECTIONS = (
@@ -239,8 +261,9 @@ def short_names() -> dict[str, str]:
 
 
 def lookup(name: str) -> Parameter:
-    """The row of a parameter, by its dotted name or by the name that datasets use.
+    """The row of a parameter, by its dotted name or by the name that datasets use, in its physical unit too.
 
+    ``drive.frequency_hz`` and ``frequency_hz`` are rows of their own, whose values are made into ratios.
     ``initial_state.amplitude[i]`` and ``initial_state.velocity[i]`` apply to every mode i.
 
     Raises
@@ -251,7 +274,7 @@ def lookup(name: str) -> Parameter:
     if not isinstance(name, str):
         raise InputError(f"parameter {shown(name)}: must be a name, such as 'drive.frequency_ratio'")
     table = parameters()
-    row = row_of(name)
+    row = _row_in_unit(name) if name in PHYSICAL else row_of(name)
     if row is not None:
         return row
     found = START_NAME.fullmatch(name.removeprefix("initial_state."))
@@ -275,15 +298,129 @@ def lookup(name: str) -> Parameter:
     row = _by_short(name, shorts)
     if row is not None:
         return row
+    named = [full for full in PHYSICAL if name in (split_name(full)[1], _row_in_unit(full).short)]
+    if named:
+        return _row_in_unit(named[0])
     tails: dict[str, list[str]] = {}
     for full in (each for each in table if split_name(each)[0] not in _AROUND):
         tails.setdefault(split_name(full)[1], []).append(full)
     if len(tails.get(name, [])) == 1:
         return table[tails[name][0]]
-    close = difflib.get_close_matches(name, [*table, *shorts], 3)
+    close = difflib.get_close_matches(name, [*table, *shorts, *PHYSICAL], 3)
     hint = (
         f"; did you mean {' or '.join(map(repr, close))}?"
         if close
         else f"; see {', '.join(list(table)[:6])}, ..."
     )
     raise InputError(f"{name}: is not a parameter{hint}")
+
+
+# ----------------------------------------------------------------------------------------------------
+# Parameters in physical units: frequencies in Hz, velocities in m/s, locations in m, which are made into ratios.
+
+
+@dataclass(frozen=True)
+class Physical:
+    """A parameter in its physical unit."""
+
+    parameter: str
+    """Dotted name of the ratio."""
+    unit: str
+    words: str
+
+    def unit_of(self, length: float, omega: float) -> float:
+        """Value of a normalised parameter of 1, from the length scale (m) and omega_1 (rad/s); not for a location."""
+        return {
+            "Hz": omega / (2.0 * math.pi),
+            "m/s": length * omega,
+            "um": 1e6 * length,
+            "g": length * omega**2 / GRAVITY,
+        }[self.unit]
+
+
+_IN_UNITS = {
+    "frequency_ratio": ("frequency_hz", "Hz", "frequency"),
+    "start_ratio": ("start_hz", "Hz", "frequency at the start of the sweep"),
+    "stop_ratio": ("stop_hz", "Hz", "frequency at the end of the sweep"),
+    "low_ratio": ("low_hz", "Hz", "lower limit of the band"),
+    "high_ratio": ("high_hz", "Hz", "upper limit of the band"),
+    "second_ratio": ("second_hz", "Hz", "second frequency"),
+    "velocity_amplitude": ("velocity_m_s", "m/s", "velocity amplitude"),
+    "second_amplitude": ("second_m_s", "m/s", "velocity amplitude of the second sine"),
+    "velocity_rms": ("velocity_rms_m_s", "m/s", "root-mean-square velocity"),
+    "speed": ("speed_m_s", "m/s", "speed"),
+    "displacement_amplitude": ("displacement_um", "um", "displacement amplitude"),
+    "acceleration_amplitude": ("amplitude_g", "g", "acceleration amplitude"),
+    "location": ("location_m", "m", "distance from the left end"),
+}
+"""Name in the physical unit, unit and words of each ratio, by its field."""
+_OWNERS = {
+    "drive": "the striker",
+    "contact": "the striker",
+    "base_excitation": "the base",
+    "axial_load": "the axial load",
+    "force": "the force",
+    "harvester": "the coil",
+}
+_MAX_NUMBER = 9
+"""Number of the last contact or force that has parameters in physical units."""
+
+
+def _in_units() -> Iterable[tuple[str, Physical]]:
+    for row in parameters().values():
+        section, field = split_name(row.name)
+        if field not in _IN_UNITS or section not in _OWNERS or row.quantity.unit != "1":
+            continue
+        own, unit, words = _IN_UNITS[field]
+        of = (
+            f"excitation {words}" if row.name == "drive.frequency_ratio" else f"{words} of {_OWNERS[section]}"
+        )
+        for number in range(1, 1 + (_MAX_NUMBER if section in NUMBERED else 1)):
+            name = section_of(section, number)
+            text = of if number == 1 else f"{of} {number}"
+            yield f"{name}.{own}", Physical(f"{name}.{field}", unit, text)
+
+
+PHYSICAL: dict[str, Physical] = dict(_in_units())
+"""Physical quantities that can replace a normalised parameter, by dotted name; one unit for each."""
+
+
+def ratio_of(name: str) -> str:
+    """The dotted name of the ratio that a parameter in its physical unit is made into; of another the name itself."""
+    return PHYSICAL[name].parameter if name in PHYSICAL else name
+
+
+def _row_in_unit(name: str) -> Parameter:
+    """The row of a parameter in its physical unit."""
+    physical, field = PHYSICAL[name], split_name(name)[1]
+    ratio = row_of(physical.parameter)
+    assert ratio is not None
+    item = ratio.quantity
+    own = dataclasses.replace(
+        item, unit=physical.unit, long_name=physical.words, symbol="", high=math.inf, plausible=None
+    )
+    short = ratio.short.replace(split_name(physical.parameter)[1], field)
+    return dataclasses.replace(ratio, name=name, short=short, quantity=own)
+
+
+def physical_names(names: Iterable[str]) -> list[str]:
+    """The names of :data:`PHYSICAL` whose ratio is among *names*."""
+    chosen = set(names)
+    return [name for name, row in PHYSICAL.items() if row.parameter in chosen]
+
+
+def named_in(name: str, sections: Mapping[str, Any]) -> str:
+    """The dotted name of a parameter that is given by its last part, among the sections of one system.
+
+    A name that several of its sections have, or none, is returned as it is: :func:`lookup` decides.
+    """
+    if "." in name:
+        return name
+    full = []
+    for section, values in sections.items():
+        kind = numbered(section)[0]
+        row = row_of(ratio_of(f"{section}.{name}")) if kind in (*SECTIONS, "integration") else None
+        typed = values.get("type") if isinstance(values, Mapping) else None
+        if row is not None and (not row.kinds or typed is None or typed in row.kinds):
+            full.append(f"{section}.{name}")
+    return full[0] if len(full) == 1 else name

@@ -32,6 +32,7 @@ from snapbeam.model.mapping import (
     resolved,
     sequence_of,
 )
+from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, named_in, ratio_of
 from snapbeam.model.potential import Potential
 from snapbeam.model.quantity import section_of
 from snapbeam.model.reduced_model import ReducedModel
@@ -180,9 +181,15 @@ class System:
         InputError
             For a name that the system does not have, and for values as the parts refuse them.
         """
+        from snapbeam.model.parameter_axes import ratios_of
+
         prefix = "initial_state."
         parts = {item.name: getattr(self, item.name) for item in fields(self)}
         changes = {resolved(name, self.labels): value for name, value in changes.items()}
+        in_units = {name: changes.pop(name) for name in [*changes] if name in PHYSICAL}
+        if in_units:  # of the structure as changed
+            found = self.replace(**changes)
+            return found.replace(**{name: float(value) for name, value in ratios_of(found, in_units).items()})
         other = {name: value for name, value in changes.items() if not name.startswith(prefix)}
         found = System(**replaced(parts, other))
         start = {name.removeprefix(prefix): changes[name] for name in changes if name not in other}
@@ -198,10 +205,27 @@ class System:
         InputError
             For a name that the system does not have.
         """
+        from snapbeam.model.parameter_axes import to_physical
+
         found, name = self.parameters, resolved(instance("name", name, str, "text"), self.labels)
-        if name not in found:
+        if ratio_of(name) not in found:
             raise InputError(f"{name}: is not a parameter of this system; it has {', '.join(found)}")
-        return found[name]
+        value = found[ratio_of(name)]
+        return float(to_physical(self, name, value)) if name in PHYSICAL else value
+
+    def parameter(self, name: str) -> Parameter:
+        """The row of the table of parameters of a name: dotted, by label, as in datasets, or its last part alone.
+
+        A last part that one part of the system alone has is that part's: ``frequency_hz`` is that of the base if nothing
+        else has a frequency.
+
+        Raises
+        ------
+        InputError
+            If there is none: the message names the nearest.
+        """
+        instance("name", name, str, "text")
+        return lookup(named_in(resolved(name, self.labels), self.to_mapping() if "." not in name else {}))
 
     @cached_property
     def parameters(self) -> dict[str, Any]:

@@ -10,8 +10,7 @@ from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
-from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis
-from snapbeam.model.parameters import Parameter
+from snapbeam.model.parameters import PHYSICAL, Parameter, lookup
 from snapbeam.plot.style import cell_edges
 from snapbeam.util.validation import InputError
 
@@ -127,7 +126,7 @@ def _parameter(dataset: xr.Dataset, name: str) -> Parameter | None:
     """The row of the table for an axis, by its attribute, or for a fixed parameter, by the name in the dataset."""
     full = dataset[name].attrs.get("parameter", name) if name in dataset.coords else name
     try:
-        return parameter_of_axis(str(full))
+        return lookup(str(full))
     except InputError:
         return None
 

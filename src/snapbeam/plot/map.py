@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis
+from snapbeam.model.parameters import PHYSICAL, lookup
 from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
 from snapbeam.plot.agreement import draw_agreement
 from snapbeam.plot.axes import axis_label, dress, edges_of, in_units, positions, symbol_of
@@ -243,7 +243,7 @@ def subtitle(dataset: xr.Dataset, axes: tuple[str, ...]) -> str:
         value = _scalar(dataset, name)
         if name not in axes and value is not None:
             parts.append(f"{symbol_of(dataset, name)} = {value:.4g}")
-    for row in map(parameter_of_axis, PHYSICAL):
+    for row in map(lookup, PHYSICAL):
         value = _scalar(dataset, row.short)
         if row.short not in axes and value is not None:
             unit = row.quantity.unit

@@ -12,17 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.mapping import resolved
 from snapbeam.model.parameter_axes import (
-    PHYSICAL,
     axis_that_changes_unit,
-    checked_physical,
-    parameter_of_axis,
     parse_axis,
-    physical_name,
+    ratios_of,
     unit_of,
 )
-from snapbeam.model.parameters import Parameter, lookup, parameters, short_names
+from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, parameters, ratio_of, short_names
 from snapbeam.model.quantity import split_name
 from snapbeam.util.provenance import array_hash
 from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, shown
@@ -38,10 +34,7 @@ __all__ = [
     "PointList",
     "Points",
     "labels_of",
-    "list_in_ratios",
-    "physical_points",
     "points_of",
-    "ratios_of",
     "require_memory",
 ]
 
@@ -73,7 +66,7 @@ class Grid:
     @cached_property
     def order(self) -> tuple[str, ...]:
         """Axes in the order in which points are counted."""
-        structural = [name for name in self.axes if not parameter_of_axis(name).is_run]
+        structural = [name for name in self.axes if not lookup(name).is_run]
         return (*structural, *(name for name in self.axes if name not in structural))
 
     @property
@@ -84,7 +77,7 @@ class Grid:
     @property
     def dims(self) -> tuple[str, ...]:
         """Dimensions of the dataset."""
-        return tuple(parameter_of_axis(name).short for name in self.axes)
+        return tuple(lookup(name).short for name in self.axes)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -109,7 +102,7 @@ class Grid:
 
     def coordinates(self) -> dict[str, Any]:
         """Return dimensions, values and attributes of the axes, by name."""
-        return {row.short: _coordinate(row, self.axes[row.name]) for row in map(parameter_of_axis, self.axes)}
+        return {row.short: _coordinate(row, self.axes[row.name]) for row in map(lookup, self.axes)}
 
     def describe(self) -> dict[str, Any]:
         """Return plain values that identify the grid."""
@@ -160,8 +153,7 @@ class PointList:
     def coordinates(self) -> dict[str, Any]:
         """Return dimension, values and attributes of each parameter and label, by name."""
         found: dict[str, Any] = {
-            row.short: ((POINT,), self.columns[row.name], labels_of(row))
-            for row in map(parameter_of_axis, self.columns)
+            row.short: ((POINT,), self.columns[row.name], labels_of(row)) for row in map(lookup, self.columns)
         }
         return found | {name: ((POINT,), values, {}) for name, values in self.labels.items()}
 
@@ -189,7 +181,7 @@ def require_memory(points: int, remedy: str, bytes_each: int = _POINT_BYTES) -> 
         )
 
 
-def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:
+def points_of(given: Mapping[str, Any] | xr.Dataset | Any, system: System | None = None) -> Points:
     """Return the points of a request.
 
     Parameters
@@ -198,6 +190,10 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:
         A mapping defines a grid: names of parameters, dotted or short, with strictly increasing numbers or different
         words.  A dataset with one-dimensional variables along one dimension, or a data frame, defines a list.  Its
         columns that are not parameters become labels; a name that is almost a parameter's is refused.
+    system : System, optional
+        The system that the names belong to.  Values in Hz, m/s, g, um or m become ratios of it.  Where another axis
+        changes the structure, and with it the unit of a ratio, they stay as they are given;
+        :meth:`~snapbeam.sweeps.setup.SweepSetup.groups` makes the ratios of each structure.
 
     Raises
     ------
@@ -206,78 +202,49 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:
     """
     from snapbeam.util.datasets import xr
 
+    if isinstance(given, (Grid, PointList)):
+        return given if isinstance(given, Grid) else _list_in_ratios(given, system)
     if isinstance(given, xr.Dataset):
-        return _list_of({str(name): np.asarray(given[name].values) for name in given.variables})
+        columns = {str(name): np.asarray(given[name].values) for name in given.variables}
+        return _list_in_ratios(_list_of(columns), system)
     if hasattr(given, "columns") and hasattr(given, "to_dict"):
-        return _list_of({str(name): np.asarray(given[name]) for name in given.columns})
+        return _list_in_ratios(
+            _list_of({str(name): np.asarray(given[name]) for name in given.columns}), system
+        )
     if not isinstance(given, Mapping):
         raise InputTypeError(
             f"axes = {shown(given)}: must be a mapping of parameters to values, an xarray.Dataset or a table of points"
         )
     if not given:
         raise InputError("axes: must name at least one parameter to sweep")
-    axes: dict[str, NDArray[Any]] = {}
-    for name, values in given.items():
-        row = _swept(str(name))
-        if row.name in axes:
-            raise InputError(f"{name}: is given twice among the axes; give it once")
-        axes[row.name] = _axis(row, str(name), values)
+    rows: dict[str, Parameter] = {}
+    found: dict[str, NDArray[Any]] = {}
+    for each, values in given.items():
+        row = _swept(str(each), system)
+        ratio = ratio_of(row.name)
+        if ratio in rows:
+            raise InputError(f"{each}: is given twice among the axes; give it once")
+        rows[ratio], found[ratio] = row, _axis(row, str(each), values)
+    axes = {}
+    for ratio, values in found.items():
+        name = rows[ratio].name
+        if name == ratio or system is None or axis_that_changes_unit(system, name, found) is not None:
+            axes[name] = values
+        else:
+            axes[ratio] = _axis(lookup(ratio), name, values / unit_of(system, name))
     return Grid(axes)
 
 
-def physical_points(system: System, axes: Mapping[str, Any]) -> Points:
-    """Return the grid of axes of which some may be in Hz, m/s, g, um or m.
-
-    These become ratios.  Where another axis changes the structure, and with it the unit of a ratio, they stay as they are
-    given; :meth:`~snapbeam.sweeps.setup.SweepSetup.groups` makes the ratios of each structure.
-    """
-    axes = {resolved(str(name), system.labels): values for name, values in axes.items()}
-    given = {PHYSICAL[own].parameter: own for name in axes if (own := physical_name(str(name))) is not None}
-    if not given:
-        return points_of(axes)
-    found: dict[str, NDArray[Any]] = {}
-    for name, values in axes.items():
-        own = physical_name(str(name))
-        row = _swept(str(name)) if own is None else parameter_of_axis(own)
-        ratio = row.name if own is None else PHYSICAL[own].parameter
-        if ratio in found:
-            raise InputError(f"{name}: is given twice among the axes; give it once")
-        found[ratio] = _axis(row, str(name), values)
-    axes = {}
-    for name, values in found.items():
-        if name not in given:
-            axes[name] = values
-        elif axis_that_changes_unit(system, given[name], found) is not None:
-            axes[given[name]] = values
-        else:
-            axes[name] = values / unit_of(system, given[name])
-    plain = points_of({name: values for name, values in axes.items() if name not in PHYSICAL})
-    return Grid({name: plain.axes.get(name, values) for name, values in axes.items()})
-
-
-def list_in_ratios(system: System, points: PointList) -> PointList:
+def _list_in_ratios(points: PointList, system: System | None) -> PointList:
     """Return a list of points without columns in physical units, which become labels, unless the structure changes."""
-    if any(not parameter_of_axis(name).is_run for name in points.columns):
+    if system is None or any(not lookup(name).is_run for name in points.columns):
         return points
-    given = {
-        parameter_of_axis(name).short: values for name, values in points.columns.items() if name in PHYSICAL
-    }
+    given = {lookup(name).short: values for name, values in points.columns.items() if name in PHYSICAL}
     return PointList(ratios_of(system, points.columns), points.labels | given) if given else points
 
 
-def ratios_of(system: System, columns: Mapping[str, Any]) -> dict[str, Any]:
-    """Return columns with those in physical units as ratios of one structure."""
-    found = dict(columns)
-    for name in columns.keys() & PHYSICAL.keys():
-        values = found.pop(name)
-        for value in np.unique(values).tolist():
-            checked_physical(system, name, value, name)
-        found[PHYSICAL[name].parameter] = values / unit_of(system, name)
-    return found
-
-
-def _swept(name: str) -> Parameter:
-    row = lookup(name)
+def _swept(name: str, system: System | None = None) -> Parameter:
+    row = lookup(name) if system is None else system.parameter(name)
     if row.name in _NOT_SWEPT:
         raise InputError(f"{name}: cannot be swept; set it in the system or the integration")
     return row
@@ -321,11 +288,10 @@ def _list_of(columns: dict[str, NDArray[Any]]) -> PointList:
                 values = np.full(_length(columns), values)
             else:
                 raise InputError(f"{name} of shape {values.shape}: a list of points must have one dimension")
-        physical = physical_name(name)
-        if physical is None and _is_label(name):
+        if _is_label(name):
             labels[name] = values
             continue
-        row = _swept(name) if physical is None else parameter_of_axis(physical)
+        row = _swept(name)
         if row.name in known:
             raise InputError(f"{name}: is given twice among the points, also as {row.name}; give it once")
         item = row.quantity
@@ -353,7 +319,7 @@ def _is_label(name: str) -> bool:
         For a name that is almost the name of a parameter.
     """
     table = parameters()
-    known = [*table, *short_names(), *(split_name(full)[1] for full in table)]
+    known = [*table, *short_names(), *(split_name(full)[1] for full in (*table, *PHYSICAL))]
     if name in known:
         return False
     try:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.integration import Integration
-from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, unit_of
-from snapbeam.model.parameters import lookup
+from snapbeam.model.parameter_axes import ratios_of, unit_of
+from snapbeam.model.parameters import PHYSICAL, lookup, ratio_of
 from snapbeam.model.quantity import quantities, split_name
 from snapbeam.model.state import State, started
 from snapbeam.model.system import System
@@ -30,10 +30,7 @@ from snapbeam.sweeps.points import (
     PointList,
     Points,
     labels_of,
-    list_in_ratios,
-    physical_points,
     points_of,
-    ratios_of,
     require_memory,
 )
 from snapbeam.util.diagnostics import Diagnostic, tell
@@ -61,8 +58,8 @@ def require_parameters(system: System, points: Points) -> None:
     for name in first:
         if (
             name.startswith(("integration.", "initial_state."))
-            or not parameter_of_axis(name).is_run
-            or _ratio(name) in system.parameters
+            or not lookup(name).is_run
+            or ratio_of(name) in system.parameters
         ):
             continue
         section, field = split_name(name)
@@ -86,14 +83,7 @@ def _at(system: System, point: dict[str, Any]) -> System:
     """Return the system at a point."""
     plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in point.items()}
     plain = {name: value for name, value in plain.items() if not name.startswith("integration.")}
-    physical = {name: plain.pop(name) for name in list(plain) if name in PHYSICAL}
-    system = system.replace(**plain)
-    return system.replace(**ratios_of(system, physical)) if physical else system
-
-
-def _ratio(name: str) -> str:
-    """The dotted name of a parameter, of that in physical units too."""
-    return PHYSICAL[name].parameter if name in PHYSICAL else name
+    return system.replace(**plain)
 
 
 def diagnostics_of(system: System, points: Points) -> Iterator[Diagnostic]:
@@ -124,9 +114,7 @@ def require_every_structure(setup: SweepSetup) -> None:
     """
     names = setup.points.names
     stepped = setup.integration.step is not None or "integration.step" in names
-    if not stepped and all(
-        parameter_of_axis(name).is_run and not name.startswith("initial_state.") for name in names
-    ):
+    if not stepped and all(lookup(name).is_run and not name.startswith("initial_state.") for name in names):
         return
     require_memory(setup.points.size, "give fewer points", 16 * (len(names) + 1))
     columns = setup.points.take(np.arange(setup.points.size))
@@ -224,7 +212,7 @@ class SweepSetup:
         self, columns: Columns
     ) -> Iterator[tuple[System, Integration, NDArray[np.int64], dict[str, NDArray[np.float64]]]]:
         """Yield the points by model: a system, an integration, the numbers of its points, and their parameters."""
-        structural = [name for name in columns if not parameter_of_axis(name).is_run]
+        structural = [name for name in columns if not lookup(name).is_run]
         own = [name for name in columns if name not in structural]
         total = next(iter(columns.values())).size
         if not structural:
@@ -280,7 +268,7 @@ class SweepSetup:
         return {
             name: parameters[name]
             for name in _ALWAYS
-            if name in parameters and name not in map(_ratio, self.points.names)
+            if name in parameters and name not in map(ratio_of, self.points.names)
         }
 
     @property
@@ -318,7 +306,7 @@ class SweepSetup:
         own |= {lookup(name).short: value for name, value in self.fixed.items()}
         more = own | (more or {})
         attrs = attributes_of(title, self.system, self.integration, self.plan, more, self.points.describe())
-        varied = {lookup(_ratio(name)).short for name in self.points.names}
+        varied = {lookup(ratio_of(name)).short for name in self.points.names}
         if self.structural:
             varied |= {
                 "reference_frequency",
@@ -406,7 +394,7 @@ class SweepSetup:
                 found[row.short] = (dims, self.points.columns[name] / units, labels_of(row))
                 continue
             values = self.points.axes[name] / units[..., None]
-            found[row.short] = ((*dims, parameter_of_axis(name).short), values, labels_of(row))
+            found[row.short] = ((*dims, lookup(name).short), values, labels_of(row))
         return found
 
 
@@ -421,12 +409,7 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         raise InputError(
             f"tolerance = {integration.tolerance:g}: applies to single runs; for a sweep give step, or accuracy = 'reference'"
         )
-    if isinstance(axes, Mapping) and not hasattr(axes, "dims"):
-        points: Points = physical_points(system, axes)
-    else:
-        points = axes if isinstance(axes, Points) else points_of(axes)
-    if isinstance(points, PointList):
-        points = list_in_ratios(system, points)
+    points = points_of(axes, system)
     require_parameters(system, points)
     check_integrable(system)
     law = type(system.contact_law) if system.contact_law is not None else None

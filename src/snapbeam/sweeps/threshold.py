@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.integration import Integration
-from snapbeam.model.mapping import resolved
-from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, physical_name
-from snapbeam.model.parameters import lookup
+from snapbeam.model.parameters import lookup, ratio_of
 from snapbeam.model.system import System
 from snapbeam.sweeps.compute import CheckpointOptions, compute_sweep
 from snapbeam.sweeps.points import Grid
@@ -51,7 +49,7 @@ def threshold(
     system: System,
     parameter: str,
     values: ArrayLike,
-    axes: Mapping[str, ArrayLike],
+    axes: Mapping[str, ArrayLike] | None = None,
     integration: Integration | None = None,
     *,
     progress: Progress | bool | None = None,
@@ -70,8 +68,8 @@ def threshold(
         Parameter to raise, such as ``"velocity_amplitude"``: one that may differ between the runs of an ensemble.
     values : array_like
         Values of that parameter, strictly increasing, in its unit: the range and the resolution of the threshold.
-    axes : mapping of str to array_like
-        Axes of the threshold, as in :func:`snapbeam.sweep`.
+    axes : mapping of str to array_like, optional
+        Axes of the threshold, as in :func:`snapbeam.sweep`; without one the result is one threshold.
     integration : Integration, optional
         Solver settings.  Early termination is always used, also if ``integration.early_termination`` is False.
     progress : callable, optional
@@ -118,15 +116,14 @@ def threshold(
     >>> found["lower_threshold"].dims
     ('frequency_ratio',)
     """
-    if isinstance(system, System) and isinstance(parameter, str):
-        parameter = resolved(parameter, system.labels)
-    row = parameter_of_axis(physical_name(str(parameter)) or lookup(parameter).name)
+    row = system.parameter(parameter) if isinstance(system, System) else lookup(parameter)
     if not row.is_run or row.quantity.kind is not float:
         raise InputError(
             f"parameter = {shown(parameter)}: must be a number that may differ between runs, such as velocity_amplitude"
         )
-    if not isinstance(axes, Mapping) or not axes:
-        raise InputError(f"axes = {shown(axes)}: must map at least one parameter to an array of values")
+    axes = {} if axes is None else axes
+    if not isinstance(axes, Mapping):
+        raise InputError(f"axes = {shown(axes)}: must map parameters to arrays of values")
     if (len(values) if isinstance(values, range) else np.size(values)) < 2:
         raise InputError(f"{parameter}: must be an array of at least two values to choose from")
     asked = Integration() if integration is None else integration
@@ -134,7 +131,7 @@ def threshold(
         raise InputError(f"integration = {shown(integration)}: must be an Integration")
     setup = sweep_setup(system, {**axes, row.name: values}, asked.replace(early_termination=True))
     computed = compute_sweep(setup, CheckpointOptions(), progress=counting(progress, "threshold", "runs"))
-    along = row.name if row.name in setup.points.axes else PHYSICAL[row.name].parameter
+    along = row.name if row.name in setup.points.axes else ratio_of(row.name)
     return _dataset(setup, along, computed)
 
 
@@ -143,9 +140,9 @@ def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
     from snapbeam.util.datasets import xr
 
     assert isinstance(setup.points, Grid)
-    row = parameter_of_axis(along)
+    row = lookup(along)
     values = setup.points.axes[along]
-    dims = tuple(parameter_of_axis(name).short for name in setup.points.axes if name != along)
+    dims = tuple(lookup(name).short for name in setup.points.axes if name != along)
     whole = (*dims, row.short)
     response = computed["response_class"].transpose(*whole).values
     rows = _thresholds(response)

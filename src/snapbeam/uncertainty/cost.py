@@ -143,7 +143,7 @@ def estimate_cost(
 def _of_sweep(
     trial: float, system: Any, axes: Any, integration: Integration | None = None, **options: Any
 ) -> CostEstimate:
-    points = points_of(axes)
+    points = points_of(axes, system)
     repeats = options.get("replicates") or 0
     each = 1 + int(getattr(repeats, "count", repeats))
     early = bool(integration is not None and integration.early_termination)
@@ -157,7 +157,7 @@ def _of_probability(
 ) -> CostEstimate:
     allocation = allocation_of(runs)
     trials = trials_of(system, uncertainty, options.get("integration"))
-    points = points_of(axes)
+    points = points_of(axes, system)
     where: list[NDArray[np.int64]] = []
 
     def point(ranks: NDArray[np.float64]) -> Columns:
@@ -209,7 +209,7 @@ def _of_threshold(
 ) -> CostEstimate:  # fmt: skip
     options = QuantileSearchSettings() if options is None else options
     trials = trials_of(system, uncertainty, more.get("integration"))
-    points = points_of(axes) if axes else None
+    points = points_of(axes, system) if axes else None
     low, high = bounds
 
     def point(ranks: NDArray[np.float64]) -> Columns:

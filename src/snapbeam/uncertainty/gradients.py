@@ -85,7 +85,9 @@ def gradient(
     how = instance(
         "integration", Integration() if integration is None else integration, Integration, "an Integration"
     ).replace(early_termination=False)
-    names = [lookup(name).name for name in ([parameters] if isinstance(parameters, str) else parameters)]
+    names = [
+        system.parameter(name).name for name in ([parameters] if isinstance(parameters, str) else parameters)
+    ]
     if not names or len(set(names)) < len(names):
         raise InputError(f"parameters = {shown(parameters)}: must be different names, at least one")
     here = np.array([_value(system, name) for name in names])

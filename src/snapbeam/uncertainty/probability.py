@@ -273,7 +273,7 @@ def probability_map(
     trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint, cluster=cluster)
     if trials.uncertainty.is_empty:
         raise InputError("uncertainty: nothing is uncertain, so every probability is 0 or 1; use sb.sweep")
-    points = axes if isinstance(axes, Points) else points_of(axes)
+    points = points_of(axes, trials.system)
     setup = sweep_setup(trials.system, points, trials.integration)
     counts = _counted(trials, points, allocation, counting(progress, "probability map", "runs"))
     return _dataset(setup, trials, counts, allocation)

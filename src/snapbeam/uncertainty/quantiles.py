@@ -479,7 +479,7 @@ def quantile_threshold(
     trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint)
     if axes is not None and not isinstance(axes, Mapping):
         raise InputTypeError(f"axes = {shown(axes)}: must map parameters to arrays of values")
-    points = points_of(axes) if axes else PointList({row.name: np.array([low])})
+    points = points_of(axes, trials.system) if axes else PointList({row.name: np.array([low])})
     assert isinstance(points, (Grid, PointList))
     if axes and row.name in points.names:
         raise InputError(f"axes: contains {row.name}, the parameter itself; leave it out")
