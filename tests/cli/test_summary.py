@@ -194,11 +194,12 @@ def test_a_named_statistic_is_in_the_summary(synthetic_map):
 
 
 def test_the_power_of_a_harvester_with_one_well():
-    dataset = harvester_map([[0, 0]] * 3)
+    dataset = harvester_map([[0, 1]] * 3).assign_attrs(wells=1)
     for name in ("min_midspan_displacement", "max_midspan_displacement"):
         dataset[name] = dataset["harvested_power_last_quarter"].fillna(0.0).assign_attrs(units="1")
-    said = text(map_summary(dataset, [], bistable=False))
+    said = text(map_summary(dataset, []))
     assert "1.42 mW at load resistance = 10 kohm" in said
+    assert "snapped and returned" in said and "interwell" not in said
 
 
 def test_a_threshold_over_the_acceleration_of_a_base_has_units():

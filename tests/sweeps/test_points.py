@@ -11,7 +11,7 @@ import xarray as xr
 
 import snapbeam as sb
 from snapbeam.model.parameter_file import Config
-from snapbeam.sweeps.points import Grid, PointList, physical_points, points_of
+from snapbeam.sweeps.points import Grid, PointList, points_of
 from snapbeam.util.validation import InputError
 
 MIXED = {
@@ -196,16 +196,16 @@ def test_axes_in_hz_keep_their_hz() -> None:
     """Axes in Hz and m are a grid of ratios; beside an axis that changes the frequency they stay in Hz."""
     system = Config().system.replace(**{"model.modes": 1})
     freq = system.model.reference_frequency
-    grid = physical_points(system, {"frequency_hz": [50.0, 100.0], "contact.location_m": [0.04, 0.06]})
+    grid = points_of({"frequency_hz": [50.0, 100.0], "contact.location_m": [0.04, 0.06]}, system)
     assert isinstance(grid, Grid)
     np.testing.assert_allclose(grid.axes["drive.frequency_ratio"] * freq, [50.0, 100.0], rtol=1e-14)
     np.testing.assert_allclose(grid.axes["contact.location"] * 0.161, [0.04, 0.06], rtol=1e-14)
-    made = physical_points(system, {"beam.length": [0.1, 0.161], "drive.frequency_hz": [50.0, 100.0]})
+    made = points_of({"beam.length": [0.1, 0.161], "drive.frequency_hz": [50.0, 100.0]}, system)
     assert isinstance(made, Grid)
     assert made.axes["drive.frequency_hz"].tolist() == [50.0, 100.0]
     assert made.dims == ("beam_length", "frequency_hz")
     with pytest.raises(InputError, match="given twice"):
-        physical_points(system, {"frequency_hz": [50.0], "frequency_ratio": [1.0]})
+        points_of({"frequency_hz": [50.0], "frequency_ratio": [1.0]}, system)
 
 
 def test_a_sweep_over_the_length_at_fixed_hz() -> None:

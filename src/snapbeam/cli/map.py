@@ -77,8 +77,6 @@ def compute_map(
         _check_two_axes(plot, axes)
     _check_variable(variable, plot, overlaid=measurements is not None or quasi_static_line)
     system = settings.system
-    if plot is not None and variable in (None, "response_class"):
-        system.model.require_bistable("a map of response classes")
     beam = system.model.beam
     overlay = read_overlay(
         measurements, system.model.reference_frequency, None if beam is None else beam.buckling_level
@@ -127,7 +125,6 @@ def compute_map(
             files,
             None if opt.is_long(keeping) else elapsed,
             variable,
-            bistable=system.model.is_bistable,
         )
     )
     out().print(*lines, sep="\n", markup=False, end="\n" if lines else "")

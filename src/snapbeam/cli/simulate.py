@@ -278,12 +278,11 @@ def _summary_text(summary: Any, elapsed: float, system: Any) -> str:
         f"{summary.min_midspan_displacement:.4g} to {summary.max_midspan_displacement:.4g} b (b = {scale})"
     )
     end = f"in the {well} well{final}"
-    other = f"the other well was {'' if summary.other_well_reached else 'not '}reached"
+    reached = "" if summary.other_well_reached else "not "
+    other, wells = f"the other well was {reached}reached", 2
     if not system.model.is_bistable:
-        end, other = (
-            f"the centre is {'above' if summary.final_well > 0 else 'below'} 0",
-            "the beam has one well",
-        )
+        wells, end = 1, f"the centre is {'above' if summary.final_well > 0 else 'below'} 0"
+        other = f"the beam has one well; its shape was {reached}inverted"
     force = (
         "no finite force"
         if summary.peak_force != summary.peak_force
@@ -291,7 +290,7 @@ def _summary_text(summary: Any, elapsed: float, system: Any) -> str:
     )
     work, lost = (prefixed(each, "J", 4) for each in (summary.striker_work, summary.energy_dissipated))
     lines = [
-        f"[bold]{kind.label}[/] (in {duration(elapsed)}; {status.advice})",
+        f"[bold]{kind.label_of(wells)}[/] (in {duration(elapsed)}; {status.advice})",
         f"  zero crossings        {crossings}",
         f"  at the end            {end}",
         f"  centre displacement   {center}; {other}",

@@ -18,7 +18,7 @@ from snapbeam.cli.parameter_options import point_text
 from snapbeam.model.parameters import PHYSICAL, lookup, parameters
 from snapbeam.model.quantity import numbered, split_name
 from snapbeam.util.si_prefixes import prefixed
-from snapbeam.util.status_codes import ResponseClass, RunStatus
+from snapbeam.util.status_codes import ResponseClass, RunStatus, wells_of
 from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
@@ -46,13 +46,11 @@ def map_summary(
     files: Sequence[Path],
     elapsed: float | None = None,
     variable: str | None = None,
-    *,
-    bistable: bool = True,
 ) -> RenderableType:
     """Return the classes, the lowest interwell amplitude, the highest statistic, failures, files and next commands.
 
     The amplitude is that of an axis of the map that drives the system.  The statistic is *variable*, or the power of a
-    harvester.  For a beam with one well the range of *variable*, or of the centre's displacement, replaces the classes.
+    harvester.  For a beam with one well the range of the centre's displacement is added.
     """
     attrs = dataset.attrs
     runs = dataset["response_class"].size
@@ -61,24 +59,24 @@ def map_summary(
     if elapsed is not None:
         head += f" in {duration(elapsed)} ({runs / max(elapsed, 1e-9):.3g} runs/s)"
     lines = [head]
-    if not bistable:
-        lines.append("The beam has one well: response classes are not shown.")
-        lines += _ranges(
-            dataset, (variable,) if variable else ("min_midspan_displacement", "max_midspan_displacement")
-        )
-        best = None if variable else _highest(dataset, None)
-        lines += [] if best is None else [best[1]]
-        lines += [*status_lines(dataset), *(f"Written: {file_line(path)}" for path in files)]
-        return Group(*lines)
     low, response = lowest_interwell(dataset), dataset["response_class"]
     interwell = response.values >= _SNAPPED
     failed = _failed_below(dataset, low)
-    point, lines_after = low, []
+    one = wells_of(dataset.attrs) == 1
+    point, lines_after = (
+        low,
+        _ranges(dataset, ("min_midspan_displacement", "max_midspan_displacement")) if one else [],
+    )
     if not interwell.any():
         advice = f": raise the {raised}" if (raised := _strength_words(dataset)) else ""
         lines_after.append(f"No run snapped through{advice}.")
     elif low is not None and (name := _strength_axis(dataset)) is not None:
-        lines_after.append(f"Lowest interwell {_words(dataset, name)}: {_where(dataset, low, name)}")
+        lowest = (
+            f"Lowest {_words(dataset, name)} with snap-through"
+            if one
+            else f"Lowest interwell {_words(dataset, name)}"
+        )
+        lines_after.append(f"{lowest}: {_where(dataset, low, name)}")
         notch = deepest_notch(dataset)
         if notch is not None:
             lines_after.append(f"Deepest notch of the threshold: {_where(dataset, notch, name)}")
@@ -136,7 +134,9 @@ def map_facts(dataset: xr.Dataset) -> dict[str, Any]:
     low = lowest_interwell(dataset)
     return {
         "sizes": {str(name): int(size) for name, size in dataset["response_class"].sizes.items()},
-        "classes": {kind.label: int((kinds == kind).sum()) for kind in ResponseClass},
+        "classes": {
+            kind.label_of(wells_of(dataset.attrs)): int((kinds == kind).sum()) for kind in ResponseClass
+        },
         "statuses": {
             kind.name.lower(): int((codes == kind).sum()) for kind in RunStatus if (codes == kind).any()
         },
@@ -251,7 +251,9 @@ def class_table(dataset: xr.Dataset) -> Table:
     for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
         count = int((kinds == kind).sum())
         if count or kind is not ResponseClass.UNKNOWN:
-            table.add_row(kind.label, str(count), f"{100.0 * count / kinds.size:.1f} %")
+            table.add_row(
+                kind.label_of(wells_of(dataset.attrs)), str(count), f"{100.0 * count / kinds.size:.1f} %"
+            )
     return table
 
 

@@ -22,6 +22,7 @@ from snapbeam.cli.parameter_options import (
     with_parameters,
 )
 from snapbeam.cli.summary import coordinate_text, status_lines, value_text
+from snapbeam.util.status_codes import wells_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -82,7 +83,6 @@ def threshold(
     from snapbeam.sweeps.threshold import threshold as find
 
     system = settings.system
-    system.model.require_bistable("a threshold")
     start = time.monotonic()
     with progress(None, "threshold", "runs") as report:
         dataset = find(
@@ -134,6 +134,8 @@ def _summary(dataset: xr.Dataset, elapsed: float) -> list[str]:
     lines = [f"{dataset.attrs['runs']} runs in {duration(elapsed)}"]
     parameter = dataset.attrs["parameter"]
     first = dataset["lower_threshold"]
+    if not first.ndim:  # one threshold
+        return lines + _curve(dataset, parameter, None, {}) + status_lines(dataset)
     across = str(first.dims[-1])
     for at in np.ndindex(first.shape[:-1]):
         chosen = dict(zip(map(str, first.dims[:-1]), at, strict=True))
@@ -146,31 +148,31 @@ def _kinds(dataset: xr.Dataset) -> list[str]:
     return str(dataset["outcome"].attrs["flag_meanings"]).split()
 
 
-def _curve(curve: xr.Dataset, parameter: str, across: str, chosen: dict[str, int]) -> list[str]:
+def _curve(curve: xr.Dataset, parameter: str, across: str | None, chosen: dict[str, int]) -> list[str]:
     """Return the lines that describe one curve."""
     first, always = curve["lower_threshold"], curve["upper_threshold"]
+    word = "snap-through" if wells_of(curve.attrs) == 1 else "interwell response"
     named = [coordinate_text(curve, name, curve[name].item()) for name in chosen]
     if "modes" in curve.attrs and "modes" not in chosen:
         named.append(coordinate_text(curve, "modes", int(curve.attrs["modes"])))
     head = f"{', '.join(named)}: " if named else ""
     if bool(first.isnull().all()):
-        line = f"{head}no interwell response found"
+        line = f"{head}no {word} found"
     else:
-        at = first.isel({across: int(np.nanargmin(first.values))})
-        line = (
-            f"{head}lowest threshold {coordinate_text(curve, parameter, float(at))} "
-            f"at {coordinate_text(curve, across, at[across].item())}"
-        )
+        line = f"{head}lowest threshold {coordinate_text(curve, parameter, float(first.min()))}"
+        if across is not None:
+            at = first.isel({across: int(np.nanargmin(first.values))})
+            line += f" at {coordinate_text(curve, across, at[across].item())}"
         width = always - first
         if bool(width.notnull().any()):
             of = f" over {int(width.notnull().sum())} points" if bool(width.isnull().any()) else ""
             step = float(np.max(np.diff(curve[parameter].values)))
             wide, steps = (value_text(curve, parameter, each, 2) for each in (float(width.mean()), step))
-            line += f"; band {wide} wide on average{of}, in steps of {steps}"
+            line += f"; band {wide} wide{'' if across is None else ' on average'}{of}, in steps of {steps}"
     lines = [line]
     for kind, text in (
-        ("no_interwell_in_range", f"no interwell response in range: extend the values of {parameter}"),
-        ("undecided", "undecided: no run is interwell, but runs failed"),
+        ("no_interwell_in_range", f"no {word} in range: extend the values of {parameter}"),
+        ("undecided", f"undecided: no {word}, but runs failed"),
         ("not_searched", "not searched: no run has a response class"),
     ):
         count = int((curve["outcome"] == _kinds(curve).index(kind)).sum())
@@ -178,7 +180,7 @@ def _curve(curve: xr.Dataset, parameter: str, across: str, chosen: dict[str, int
             lines.append(f"  {text}, at {count} of {first.size} points")
     open_above = int((first.notnull() & always.isnull()).sum())
     if open_above:
-        lines.append(f"  highest run is intrawell, at {open_above} of {first.size} points")
+        lines.append(f"  highest run has no {word}, at {open_above} of {first.size} points")
     lower = first.notnull() & (curve["lower_threshold_min"] < first)
     if bool(lower.any()):
         lowest = float(curve["lower_threshold_min"].where(lower).min())

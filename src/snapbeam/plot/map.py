@@ -34,7 +34,7 @@ from snapbeam.plot.style import (
 from snapbeam.solver.statistics import STATISTICS
 from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.util.si_prefixes import prefixed, scale_of
-from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.status_codes import ResponseClass, wells_of
 from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, instance, shown
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def plot_response_map(
         dress(ax.xaxis, dataset, across)
         dress(ax.yaxis, dataset, upward)
         set_title(ax, subtitle(dataset, (across, upward)))
-        handles = class_handles(kinds)
+        handles = class_handles(kinds, wells_of(dataset.attrs))
         if "class_fraction" in dataset:
             handles.append(draw_agreement(ax, dataset, (across, upward), edges))
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
@@ -180,7 +180,7 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
         fix_ticks(ax)
         _draw_line(ax, dataset, name)
         set_title(ax, subtitle(dataset, (name,)))
-        handles = class_handles(dataset["response_class"].values)
+        handles = class_handles(dataset["response_class"].values, wells_of(dataset.attrs))
         if legend and own is not None:
             own.legend(handles=handles, loc="outside lower center", ncols=2)
         elif legend:
@@ -253,13 +253,15 @@ def subtitle(dataset: xr.Dataset, axes: tuple[str, ...]) -> str:
     return "\n".join(line for line in (beam, ", ".join(parts)) if line)
 
 
-def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]:
+def class_handles(kinds: NDArray[np.int8] | None = None, wells: int = 2) -> list[Patch | Line2D]:
     """Return legend handles of the response classes.
 
     Parameters
     ----------
     kinds : int8 array, optional
         Classes of runs, whose fractions are then shown with the names; classes without runs are omitted.
+    wells : int
+        Number of wells of the beam, which the names of the classes follow from.
 
     Examples
     --------
@@ -278,7 +280,8 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
         count = 0 if kinds is None else int((kinds == kind).sum())
         if count or (kinds is None and kind is not ResponseClass.UNKNOWN):
-            label = kind.label if kinds is None else f"{kind.label}, {_percent(count, kinds.size)}"
+            name = kind.label_of(wells)
+            label = name if kinds is None else f"{name}, {_percent(count, kinds.size)}"
             handles.append(Patch(facecolor=CLASS_COLORS[kind], edgecolor="black", linewidth=0.4, label=label))
     return handles
 
@@ -589,7 +592,7 @@ def plot_points(
         if of_class:
             kinds = dataset[name].values.astype(int)
             ax.scatter(at[0], at[1], c=[CLASS_COLORS[ResponseClass(int(kind))] for kind in kinds], **look)
-            handles += class_handles(kinds)
+            handles += class_handles(kinds, wells_of(dataset.attrs))
         else:
             _statistic(ax, dataset, name, at, look)
         handles += _over(ax, dataset, along, measurements, quasi_static_line)

@@ -88,6 +88,8 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
             "reference_well": model.reference_well,
             "initial_well": model.side_of(system.start_state.amplitude),
         }
+    if not model.is_bistable:
+        attrs["wells"] = 1
     if system.contacts[1:]:
         attrs["strikers"] = len(system.contacts)
     around = ("base_excitation", "axial_load", "force", "harvester")

@@ -24,8 +24,8 @@ class RunSummary(Mapping[str, Any]):
     gives the reason.  If a run ends early (``early_stop_time`` in seconds, NaN otherwise), its class is certain, but
     its extremes and counts stop at that time.  ``final_well`` is the sign of w(1/2) at the end; ``final_well_proven``
     is True if the run provably stays in that well.  ``other_well_reached`` is True if the centre came more than half of
-    the way from the border of the wells to the other well; with unequal wells or without a striker, only such a run is
-    interwell.
+    the way from the border of the wells to the other well (with one well, to the mirror image of its rest); with unequal wells, one
+    well or without a striker, only such a run is interwell.
 
     Examples
     --------

@@ -199,7 +199,8 @@ def _response(reading: Reading) -> Values:
         -reading.first_side * accumulators["side"],
     )
     ensemble = reading.ensemble
-    if not (ensemble.structure.wells_are_mirror_images and ensemble.has_striker):
+    structure = ensemble.structure
+    if not (structure.model.is_bistable and structure.wells_are_mirror_images and ensemble.has_striker):
         # the paper's rule is for equal wells and a striker; here the centre may cross far from the other well
         kinds = np.where(reading.other_well_reached, kinds, ResponseClass.INTRAWELL)
     return np.where(reading.good, kinds, ResponseClass.UNKNOWN)
@@ -301,7 +302,7 @@ _ROWS = (
     Statistic(
         "other_well_reached", "bool", "1",
         "whether the centre came more than half of the way from the border of the wells to the well it did not begin in, "
-        "or provably stays in that well",
+        "or provably stays in that well; with one well, to the mirror image of its rest",
         lambda reading: reading.other_well_reached,
     ),
     Statistic("final_well_proven", "bool", "1", "whether the run provably ends in its last well", lambda r: r.final),
@@ -632,14 +633,18 @@ class Reading:
     def other_well_reached(self) -> NDArray[np.bool_]:
         """Runs whose centre came more than half of the way from the border of the wells to the other well.
 
+        Of a beam with one well, which snaps through and returns, the mirror image of its rest takes the place of the
+        other well, and the flat shape that of the border.
         Runs that provably stay in that well count too: an early end may come before the first half of the way.
         """
         structure, kept = self.ensemble.structure, self.accumulators
-        if not structure.model.is_bistable:
-            return np.zeros(kept.size, dtype=bool)
         level, first = structure.dividing_height, structure.center_rest
-        _, from_mirror_image, _ = structure.about_second_well()
-        second = float(structure.center @ from_mirror_image) - first
+        second = -first  # of one well, the mirror image of its rest position
+        if structure.model.is_bistable:
+            _, from_mirror_image, _ = structure.about_second_well()
+            second = float(structure.center @ from_mirror_image) - first
+        elif first == 0.0:
+            return np.zeros(kept.size, dtype=bool)
         upper, lower = 0.5 * (max(first, second) - level), 0.5 * (min(first, second) - level)
         over, under = kept["max_center"] - level > upper, kept["min_center"] - level < lower
         stays = self.final & (kept["side"] == -self.first_side)

@@ -316,6 +316,7 @@ class SweepSetup:
                 "length_scale",
                 "reference_well",
                 "initial_well",
+                "wells",
             }
         if any(name == "contact.side" or name.startswith("initial_state.") for name in self.points.names):
             varied.add("initial_well")

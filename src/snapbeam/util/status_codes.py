@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import IntEnum
 from typing import Any
 
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.util.validation import InputError, finite_array
 
-__all__ = ["ResponseClass", "RunStatus", "class_of", "classify"]
+__all__ = ["ResponseClass", "RunStatus", "class_of", "classify", "wells_of"]
 
 
 class ResponseClass(IntEnum):
@@ -18,7 +19,9 @@ class ResponseClass(IntEnum):
 
     Decided from the zero crossings of the displacement at the centre of the beam: none is intrawell;
     more than n/5 in the last quarter (n cycles) is continuous interwell; anything else is transient,
-    1 if it ends about the well it started in and 2 if about the other.
+    1 if it ends about the well it started in and 2 if about the other.  A beam with one well, such as a shallow arch, has
+    the same codes with the names of :meth:`label_of`: it snapped if its centre came more than half of the way from the
+    flat shape to the mirror image of its rest.
 
     Examples
     --------
@@ -38,6 +41,10 @@ class ResponseClass(IntEnum):
         """The name used in tables and legends."""
         return _LABELS[self]
 
+    def label_of(self, wells: int) -> str:
+        """The name used in tables and legends of a beam with one well or two."""
+        return _ONE_WELL_LABELS.get(self, self.label) if wells == 1 else self.label
+
     @property
     def is_interwell(self) -> bool:
         """True if the beam snapped through at least once."""
@@ -51,6 +58,19 @@ _LABELS = {
     ResponseClass.TRANSIENT_2: "transient interwell 2",
     ResponseClass.CONTINUOUS: "continuous interwell",
 }
+
+
+_ONE_WELL_LABELS = {
+    ResponseClass.INTRAWELL: "no snap-through",
+    ResponseClass.TRANSIENT_1: "snapped and returned",
+    ResponseClass.TRANSIENT_2: "snapped, inverted at the end",
+    ResponseClass.CONTINUOUS: "continuous snap-through",
+}
+
+
+def wells_of(attrs: Mapping[str, Any]) -> int:
+    """Number of wells of the beam of a dataset, from its attributes."""
+    return int(attrs.get("wells", 2))
 
 
 class RunStatus(IntEnum):
