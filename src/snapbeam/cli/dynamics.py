@@ -65,6 +65,8 @@ dynamics = typer.Typer(
 _ALL = (*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN)
 _AXES = ("drive.frequency_ratio", "drive.velocity_amplitude", "contact.location", "model.modes")
 _OWN = "Analysis"
+_BRANCHES = 0.1
+"""Difference of two sweeps, over the maximum, from which they are reported as two branches."""
 _FEW = 4000
 """Maximum size of a variable in the JSON output."""
 _SETTLING = "16 time constants of the slowest mode, at least 200 and at most 20,000"
@@ -85,6 +87,37 @@ def _checked(output: Path, plot: Path | None) -> None:
 
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
+
+
+def _extremes(dataset: xr.Dataset, statistic: str) -> list[str]:
+    """Return the maximum of a statistic in each direction of a sweep, and where both directions differ."""
+    from snapbeam.cli.summary import coordinate_text, value_text
+
+    values, name = dataset[statistic], str(dataset.attrs["parameter"])
+    lines = []
+    for direction in values["sweep"].values:
+        part = (
+            values.sel(sweep=direction).dropna(name)
+            if values.dtype.kind == "f"
+            else values.sel(sweep=direction)
+        )
+        if part.size:
+            at = part.isel({name: int(part.values.argmax())})
+            where = coordinate_text(dataset, name, at[name].item())
+            lines.append(
+                f"{direction}: maximum {part.attrs['long_name']} {value_text(dataset, statistic, at.item())} at {where}"
+            )
+    if values.sizes["sweep"] == 2 and values.dtype.kind == "f":
+        one, other = (values.isel(sweep=i).values for i in (0, 1))
+        apart = np.abs(one - other) > _BRANCHES * np.nanmax(np.abs(values.values), initial=0.0)
+        if apart.any():
+            ends = (
+                coordinate_text(dataset, name, each) for each in values[name].values[apart][[0, -1]].tolist()
+            )
+            lines.append(
+                f"both directions differ by more than 10 % of the maximum between {' and '.join(ends)}"
+            )
+    return lines
 
 
 def _interval(name: str, text: str, settings: Config, parameter: str) -> tuple[float, float]:
@@ -265,7 +298,8 @@ def hysteresis(
         dataset = swept(settings.system, parameter, points, settings.integration, progress=report)
     failed = int((dataset["status"] != RunStatus.OK).sum())
     lines = [
-        f"{points.size} values up and down in {duration(time.monotonic() - begun)}, {failed} runs failed or not run"
+        f"{points.size} values up and down in {duration(time.monotonic() - begun)}, {failed} runs failed or not run",
+        *_extremes(dataset, statistic),
     ]
     files = [write_map(dataset, output)]
     if plot is not None:

@@ -138,32 +138,27 @@ def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
     Where nothing but the paper's own axes and the number of modes is named, the frequency ratio and the velocity
     amplitude have their default axes unless they have a value.
     """
-    from snapbeam.model.parameter_file import DEFAULT_AXES, same_axis
+    from snapbeam.model.parameter_file import DEFAULT_AXES, parsed_axis, same_axis
+    from snapbeam.model.parameters import ratio_of
     from snapbeam.model.quantity import split_name
 
-    named: dict[str, Any] = settings.axes(keep_units=True)
+    named: dict[str, Any] = settings.axes()
     order = ("model.modes", "drive.frequency_ratio", "drive.velocity_amplitude", "contact.location")
-    if any(text for text in given.get("sweep") or ()) or any(name not in order for name in named):
+    if any(text for text in given.get("sweep") or ()) or any(ratio_of(name) not in order for name in named):
         return named
     drive = settings.section("drive")
     axes = dict(named)
     for name, text in DEFAULT_AXES.items():
         own = {split_name(each)[1] for each in same_axis(name)}
-        if name not in named and not own & drive.keys():
-            axes |= settings.axes({name: text}) if not named else _default(name, text)
-    axes = {name: axes[name] for name in sorted(axes, key=lambda each: order.index(each))}
+        if not same_axis(name) & named.keys() and not own & drive.keys():
+            axes |= {name: parsed_axis(name, text)}
+    axes = {name: axes[name] for name in sorted(axes, key=lambda each: order.index(ratio_of(each)))}
     if not axes:
         import numpy as np
 
         striker = settings.system.striker
         return {"contact.location": np.array([striker.location])}
     return axes
-
-
-def _default(name: str, text: str) -> dict[str, Any]:
-    from snapbeam.model.parameter_axes import parse_axis
-
-    return {name: parse_axis(name, text)}
 
 
 def _check_variable(variable: str | None, plot: Path | None, *, overlaid: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import re
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -803,7 +804,6 @@ def config_of_file(path: Path, point: str | None) -> Config:
 
 def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, Any]:
     """Values of the parameters at the nearest point, by dotted name."""
-    from snapbeam.model.parameters import lookup
     from snapbeam.util.validation import InputError
 
     axes = {name: dataset[name] for name in map(str, dataset.dims) if "parameter" in dataset[name].attrs}
@@ -813,19 +813,12 @@ def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, A
         return _of_list(dataset, point, path)
     found: dict[str, Any] = {}
     for part in point.split(","):
-        name, equals, value = part.partition("=")
-        short = lookup(name.strip()).short
-        if not equals or short not in axes:
-            raise InputError(f"point = {point!r}: must name axes of {path.name}: {', '.join(axes)}")
-        values = axes[short].values
-        if values.dtype.kind in "OU":
-            chosen: Any = value.strip()
-        else:
-            try:
-                chosen = values[int(np.argmin(np.abs(values - float(value))))].item()
-            except ValueError:
-                raise InputError(f"point = {point!r}: {value!r} is not a number") from None
-        found[str(axes[short].attrs["parameter"])] = chosen
+        dim, number = coordinate_on_axis(dataset, "point", part)
+        values = axes[dim].values
+        chosen = (
+            number if values.dtype.kind in "OU" else values[int(np.argmin(np.abs(values - number)))].item()
+        )
+        found[str(axes[dim].attrs["parameter"])] = chosen
     missing = [name for name in axes if axes[name].attrs["parameter"] not in found and axes[name].size > 1]
     if missing:
         raise InputError(f"point = {point!r}: must also give {', '.join(missing)}")
@@ -833,6 +826,51 @@ def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, A
         if axes[name].size == 1:
             found.setdefault(str(axes[name].attrs["parameter"]), axes[name].values[0].item())
     return found
+
+
+def coordinate_on_axis(dataset: xr.Dataset, option: str, text: str) -> tuple[str, Any]:
+    """The axis of a map and the value on it that ``name=value`` names, in the axis' own unit or as a physical value.
+
+    Raises
+    ------
+    InputError
+        If the map has no such axis, or the value is no number in its unit.
+    """
+    from snapbeam.model.parameter_axes import parse_axis
+    from snapbeam.model.parameters import PHYSICAL, lookup, named_in, ratio_of
+    from snapbeam.model.quantity import split_name
+    from snapbeam.util.validation import InputError
+
+    name, value = _assignment(text, option)
+    axes = {
+        str(dim): dataset[dim].attrs["parameter"] for dim in dataset.dims if "parameter" in dataset[dim].attrs
+    }
+    row = lookup(named_in(name, {split_name(full)[0]: {} for full in axes.values()}))
+    dim = next((each for each, full in axes.items() if full in (row.name, ratio_of(row.name))), None)
+    if dim is None:
+        raise InputError(
+            f"{option} = {text!r}: {name} is not an axis of the file; its axes are {', '.join(axes)}"
+        )
+    if dataset[dim].dtype.kind in "OU":
+        return dim, value
+    numbers = np.ravel(parse_axis(name, value, unit=row.quantity.unit))
+    if numbers.size != 1:
+        raise InputError(f"{option} = {text!r}: must be one number")
+    if row.name == axes[dim]:
+        return dim, float(numbers[0])
+    attrs = dataset.attrs
+    if row.short in dataset.coords:
+        unit = float(dataset[row.short][-1] / dataset[dim][-1])
+    elif PHYSICAL[row.name].unit == "m":
+        unit = attrs.get("beam_length", math.nan)
+    else:
+        length, frequency = (attrs.get(each, math.nan) for each in ("length_scale", "reference_frequency"))
+        unit = PHYSICAL[row.name].unit_of(length, 2.0 * math.pi * frequency)
+    if not math.isfinite(unit):
+        raise InputError(
+            f"{option} = {text!r}: the unit of the axis differs between the points of this file; give {dim}"
+        )
+    return dim, float(numbers[0]) / unit
 
 
 def _of_list(dataset: xr.Dataset, point: str, path: Path) -> dict[str, Any]:

@@ -89,16 +89,10 @@ def plot(
 
 def _sliced(dataset: xr.Dataset, wanted: dict[str, float | None], at: list[str]) -> xr.Dataset:
     """The map at the points that were named, the nearest there are."""
-    from snapbeam.cli.parameter_options import parse_number
-    from snapbeam.model.parameters import lookup
     from snapbeam.util.validation import InputError
 
     chosen = {name: value for name, value in wanted.items() if value is not None}
-    for text in at:
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise InputError(f"at = {text!r}: must be name=value")
-        chosen[lookup(name).short] = parse_number(value)
+    chosen |= dict(opt.coordinate_on_axis(dataset, "at", text) for text in at)
     for name in chosen:
         if name not in dataset.dims:
             raise InputError(

@@ -15,7 +15,7 @@ from rich.table import Table
 
 from snapbeam.cli.console import duration, file_line
 from snapbeam.cli.parameter_options import point_text
-from snapbeam.model.parameters import PHYSICAL, lookup, parameters
+from snapbeam.model.parameters import PHYSICAL, Physical, lookup, parameters
 from snapbeam.model.quantity import numbered, split_name
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import ResponseClass, RunStatus, wells_of
@@ -206,19 +206,22 @@ def _long_name(dataset: xr.Dataset, name: str) -> str:
     return str(dataset[name].attrs.get("long_name", name.replace("_", " ")))
 
 
-def _physical(dataset: xr.Dataset, name: str) -> tuple[float, str] | None:
-    """Return factor and unit of a ratio of a base's motion, where one reference frequency holds for all points."""
+def _physical(dataset: xr.Dataset, name: str) -> tuple[float, Physical] | None:
+    """Return factor and row of a ratio of a base's motion, where one reference frequency holds for all points."""
     frequency, length = (dataset.attrs.get(each) for each in ("reference_frequency", "length_scale"))
     parameter = _parameter(dataset, name)
     for row in PHYSICAL.values():
         if row.parameter == parameter and parameter.startswith("base_excitation.") and frequency and length:
-            return row.unit_of(float(length), 2.0 * np.pi * float(frequency)), row.unit
+            return row.unit_of(float(length), 2.0 * np.pi * float(frequency)), row
     return None
 
 
 def _words(dataset: xr.Dataset, name: str) -> str:
     """Return the words for an axis, without what normalises it."""
-    return name.replace("_", " ") if name in _SYMBOLS else _without_scale(_long_name(dataset, name))
+    if name in _SYMBOLS:
+        return name.replace("_", " ")
+    physical = _physical(dataset, name)
+    return _without_scale(_long_name(dataset, name)) if physical is None else physical[1].words
 
 
 def value_text(dataset: xr.Dataset, name: str, value: Any, digits: int = 4) -> str:
@@ -228,13 +231,17 @@ def value_text(dataset: xr.Dataset, name: str, value: Any, digits: int = 4) -> s
     if name in _SYMBOLS:
         return f"{value:.{digits}g}"
     physical = _physical(dataset, name)
-    factor, unit = (1.0, dataset[name].attrs.get("units", "1")) if physical is None else physical
+    unit = dataset[name].attrs.get("units", "1") if physical is None else physical[1].unit
+    factor = 1.0 if physical is None else physical[0]
     if unit in _WITH_PREFIX:
         return prefixed(factor * value, unit, digits)
     scale = _NORMALISED.search(_long_name(dataset, name))
     if unit == "1":
         unit = scale[1] if scale else ""
-    return f"{factor * value:.{digits}g} {unit}".rstrip()
+    text = f"{factor * value:.{digits}g}"
+    if "e+0" in text and abs(factor * value) < 1e6:
+        text = f"{float(text):.0f}"
+    return f"{text} {unit}".rstrip()
 
 
 def _count(number: int, noun: str) -> str:

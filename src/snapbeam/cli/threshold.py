@@ -111,7 +111,7 @@ def _axes_of(settings: Config, parameter: str, text: str | None) -> dict[str, An
     from snapbeam.model.parameters import lookup, ratio_of
     from snapbeam.util.validation import InputError
 
-    axes: dict[str, Any] = settings.axes(keep_units=True)
+    axes: dict[str, Any] = settings.axes()
     name = settings.full_name(parameter)
     given = [each for each in axes if each in same_axis(name)]
     values = axes.pop(given[0]) if given else None

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from snapbeam.model.parameter_file import Config
+    from snapbeam.model.system import System
     from snapbeam.uncertainty.cost import CostEstimate
     from snapbeam.uncertainty.distributions import ParameterUncertainty
 
@@ -83,11 +84,12 @@ def read(file: Path, section: str) -> tuple[Config, ParameterUncertainty, dict[s
         raise InputError(
             f"{file.name}: has no section [uncertainty]; add one, or use snapbeam map for a system without uncertainty"
         )
-    uncertainty = uncertainty_from_mapping(sections["uncertainty"], "uncertainty")
+    config = config_from_mapping(sections, file.name, folder=file.parent)
+    uncertainty = uncertainty_from_mapping(sections["uncertainty"], "uncertainty", config.full_name)
     question = sections.get(section, {})
     if not isinstance(question, dict):
         raise InputError(f"{file.name}: [{section}] must be a section")
-    return config_from_mapping(sections, file.name, folder=file.parent), uncertainty, question
+    return config, uncertainty, question
 
 
 def taken(kind: Any, table: dict[str, Any], where: str) -> Any:
@@ -275,7 +277,6 @@ def probability(
     Example: snapbeam probability switch.toml -o probability.nc --plot probability.png
     """
     from snapbeam.cli.console import check_pictures
-    from snapbeam.model.parameter_file import DEFAULT_AXES
     from snapbeam.plot.uncertainty import plot_probability
     from snapbeam.uncertainty.cost import estimate_cost as cost_of
     from snapbeam.uncertainty.probability import SamplingPlan, probability_map
@@ -285,7 +286,7 @@ def probability(
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
     runs: Any = asked["runs"] if set(asked) == {"runs"} else taken(SamplingPlan, asked, "probability")
-    axes = settings.axes(DEFAULT_AXES)
+    axes = settings.axes() or _default_axes(settings.system)
     how = settings.integration.replace(threads=threads)
     cost = cost_of(
         probability_map,
@@ -316,12 +317,27 @@ def probability(
     )
 
 
+def _default_axes(system: System) -> dict[str, Any]:
+    """Axes of a map if none is named: the paper's plane of a struck beam; the one point of another system."""
+    from snapbeam.model.parameter_file import DEFAULT_AXES, parsed_axis
+    from snapbeam.model.parameters import lookup
+
+    if DEFAULT_AXES.keys() <= system.parameters.keys():
+        return {name: parsed_axis(name, text) for name, text in DEFAULT_AXES.items()}
+    numbers = [
+        name for name, each in system.parameters.items() if isinstance(each, float) and lookup(name).is_run
+    ]
+    return {numbers[0]: np.array([system.get(numbers[0])])}
+
+
 _MOST_PRINTED = 24
 """Points up to which the command prints the probability of each."""
 
 
 def _probabilities(one: xr.Dataset) -> list[str]:
     """Probability and interval of each point of one outcome; the range of all, where there are many points."""
+    from snapbeam.cli.summary import coordinate_text
+
     found = one["probability"]
     if found.size > _MOST_PRINTED:
         low, high = float(found.min()), float(found.max())
@@ -330,10 +346,7 @@ def _probabilities(one: xr.Dataset) -> list[str]:
     for at in np.ndindex(found.shape):
         point = one.isel(dict(zip(found.dims, at, strict=True)))
         values = {dim: point[dim].values.item() for dim in found.dims if dim in point.coords}
-        where = ", ".join(
-            f"{dim} = {value:.6g}" if isinstance(value, float) else f"{dim} = {value}"
-            for dim, value in values.items()
-        )
+        where = ", ".join(coordinate_text(one, str(dim), value) for dim, value in values.items())
         low, high = float(point["probability_low"]), float(point["probability_high"])
         lines.append(
             f"  {where or 'probability'}: {float(point['probability']):.4g} ({low:.4g} to {high:.4g})"

@@ -505,7 +505,7 @@ class Config:
         """Names of values that were not given: those of the paper's beam for another beam, else the default drive."""
         if not self.section("beam"):
             return ()
-        found, swept = self._defaults(), self.axes(keep_units=True) if self.section("sweep") else {}
+        found, swept = self._defaults(), self.axes() if self.section("sweep") else {}
         sections = ("beam", "model", "contact") if self.extends_paper else ("drive",)
         return tuple(
             f"{section}.{name}"
@@ -522,7 +522,7 @@ class Config:
         axes : mapping of str to array_like, optional
             The axes by dotted name, in place of those that were given.
         """
-        axes = self.axes(keep_units=True) if axes is None and self.section("sweep") else dict(axes or {})
+        axes = self.axes() if axes is None and self.section("sweep") else dict(axes or {})
         swept = {*map(ratio_of, axes)}
         if self.model.length_scale is None:  # a beam that does not buckle makes no system
             sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
@@ -761,44 +761,29 @@ class Config:
         """Solver settings."""
         return Integration(**self.section("integration"))
 
-    def axes(
-        self, default: Mapping[str, str] | None = None, *, keep_units: bool = False
-    ) -> dict[str, _Array]:
-        """The axes, by dotted name, those in physical units made into ratios; *default* if none is named.
+    def axes(self, default: Mapping[str, str] | None = None) -> dict[str, _Array]:
+        """The axes, by dotted name, in the units in which they were given; *default* if none is named.
 
-        A single value makes an axis of one point.  If an axis changes the structure, and with it what a ratio of 1 is, values
-        in physical units stay as they are with *keep_units*, and those that are no axes become axes of one point.
+        If an axis changes the structure, and with it what a ratio of 1 is, single values in physical units become axes of
+        one point.
 
         Raises
         ------
         InputError
-            For values in physical units that are out of range, or that change along an axis without *keep_units*.
+            For values in physical units that are out of range.
         """
         given = self.section("sweep") or dict(default or {})
-        found: dict[str, Any] = {}
-        for name, value in given.items():
-            parsed = parsed_axis(name, value)
-            if name in PHYSICAL:
-                ratios = [checked_physical(self.system, name, each, name) for each in parsed.tolist()]
-                found[PHYSICAL[name].parameter] = np.array(ratios)
-            else:
-                found[lookup(name).name] = parsed
-        own = [name for name in PHYSICAL for of, field in [split_name(name)] if field in self.section(of)]
-        for name in [*own, *(name for name in given if name in PHYSICAL)]:
-            axis = axis_that_changes_unit(self.system, name, found)
-            if axis is None:
-                continue
-            ratio = PHYSICAL[name].parameter
-            if not keep_units:
-                raise InputError(
-                    f"{name}: is made into {ratio}, whose unit changes along {axis}; give {ratio}, or use sb.sweep "
-                    f"with an axis {name}"
-                )
-            found.pop(ratio, None)
-            section, key = split_name(name)
-            found[name] = (
-                parsed_axis(name, given[name]) if name in given else np.array([self.section(section)[key]])
-            )
+        found = {lookup(name).name: parsed_axis(name, value) for name, value in given.items()}
+        for name in [each for each in found if each in PHYSICAL]:
+            for value in found[name].tolist():
+                checked_physical(self.system, name, value, name)
+        for name in PHYSICAL:
+            section, field = split_name(name)
+            if (
+                field in self.section(section)
+                and axis_that_changes_unit(self.system, name, found) is not None
+            ):
+                found[name] = np.array([self.section(section)[field]])
         return found
 
     def to_mapping(self) -> dict[str, dict[str, Any]]:
@@ -846,7 +831,7 @@ def config_from_mapping(
             config.potential  # noqa: B018
             if config.model.length_scale is not None and not config.is_static:
                 config.system  # noqa: B018
-                config.axes(keep_units=True)
+                config.axes()
             config.integration  # noqa: B018
         except InputError as error:
             lines = [with_section(str(error), found)]

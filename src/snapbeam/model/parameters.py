@@ -351,6 +351,7 @@ _IN_UNITS = {
     "speed": ("speed_m_s", "m/s", "speed"),
     "displacement_amplitude": ("displacement_um", "um", "displacement amplitude"),
     "acceleration_amplitude": ("amplitude_g", "g", "acceleration amplitude"),
+    "retraction": ("retraction_um", "um", "withdrawal after the burst"),
     "location": ("location_m", "m", "distance from the left end"),
 }
 """Name in the physical unit, unit and words of each ratio, by its field."""

@@ -73,7 +73,18 @@ def axis_label(dataset: xr.Dataset, name: str) -> str:
 
 
 def in_units(dataset: xr.Dataset) -> xr.Dataset:
-    """The dataset with axes of a base's motion in Hz, m/s and g, where one reference frequency holds for all points."""
+    """The dataset with its axes in the physical units in which they were given, and those of a base's motion always.
+
+    The paper's own plane keeps its ratios unless it was given in physical units.
+    """
+    for dim in map(str, dataset.dims):
+        given = [
+            str(name)
+            for name, each in dataset.coords.items()
+            if each.dims == (dim,) and name != dim and each.attrs.get("parameter") in PHYSICAL
+        ]
+        if given and dataset.sizes[dim] > 1:
+            dataset = dataset.swap_dims({dim: given[0]})
     frequency, length = (dataset.attrs.get(each) for each in ("reference_frequency", "length_scale"))
     if frequency is None or length is None:
         return dataset

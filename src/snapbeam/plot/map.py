@@ -128,7 +128,8 @@ def plot_response_map(
             quasi_static_line=quasi_static_line,
             legend=legend,
         )
-    dataset = in_units(dataset)
+    if measurements is None and not quasi_static_line:  # which are drawn over ratios
+        dataset = in_units(dataset)
     if "response_class" in dataset and _is_line(dataset):
         return _line(dataset, ax, measurements is not None or quasi_static_line, legend)
     across, upward, kinds = _two_axes(dataset)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.parameter_axes import (
     axis_that_changes_unit,
+    checked_physical,
     parse_axis,
     ratios_of,
     unit_of,
@@ -62,6 +63,8 @@ class Grid:
 
     axes: dict[str, NDArray[Any]]
     """Values by dotted name, in the order of the dimensions."""
+    units: dict[str, tuple[str, float]] = field(default_factory=dict)
+    """Name in the physical unit in which an axis of ratios was given, and the value of a ratio of 1 in this unit."""
 
     @cached_property
     def order(self) -> tuple[str, ...]:
@@ -102,7 +105,12 @@ class Grid:
 
     def coordinates(self) -> dict[str, Any]:
         """Return dimensions, values and attributes of the axes, by name."""
-        return {row.short: _coordinate(row, self.axes[row.name]) for row in map(lookup, self.axes)}
+        found = {row.short: _coordinate(row, self.axes[row.name]) for row in map(lookup, self.axes)}
+        for ratio, (name, unit) in self.units.items():
+            row, dim = lookup(name), lookup(ratio).short
+            values = [float(f"{value:.14g}") for value in self.axes[ratio] * unit]  # as they were given
+            found[row.short] = (dim,), np.array(values), labels_of(row)
+        return found
 
     def describe(self) -> dict[str, Any]:
         """Return plain values that identify the grid."""
@@ -225,14 +233,17 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any, system: System | None
         if ratio in rows:
             raise InputError(f"{each}: is given twice among the axes; give it once")
         rows[ratio], found[ratio] = row, _axis(row, str(each), values)
-    axes = {}
+    axes, units = {}, {}
     for ratio, values in found.items():
         name = rows[ratio].name
         if name == ratio or system is None or axis_that_changes_unit(system, name, found) is not None:
             axes[name] = values
-        else:
-            axes[ratio] = _axis(lookup(ratio), name, values / unit_of(system, name))
-    return Grid(axes)
+            continue
+        for end in (values[0], values[-1]):
+            checked_physical(system, name, end, name)
+        units[ratio] = name, unit_of(system, name)
+        axes[ratio] = values / units[ratio][1]
+    return Grid(axes, units)
 
 
 def _list_in_ratios(points: PointList, system: System | None) -> PointList:

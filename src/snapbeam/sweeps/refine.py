@@ -56,7 +56,7 @@ def refined_grid(grid: Grid) -> Grid:
         axes[name] = np.empty(2 * values.size - 1)
         axes[name][::2] = values
         axes[name][1::2] = 0.5 * (values[1:] + values[:-1])
-    return Grid(axes)
+    return Grid(axes, grid.units)
 
 
 def refine(runner: StageRunner, levels: int, progress: Progress | None = None) -> tuple[Grid, RefinedRows]:

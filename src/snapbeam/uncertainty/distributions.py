@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr
 
 from snapbeam.model.parameters import lookup
+from snapbeam.model.quantity import split_name
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -285,8 +286,15 @@ class ParameterUncertainty:
                 raise InputTypeError(
                     f"{name} = {shown(each)}: must be a distribution, such as sb.uncertainty.Normal(0.01, relative=True)"
                 )
-            if row.quantity.kind is not float or row.section == "integration":
-                raise InputError(f"{name}: cannot be uncertain; must be a real number of the system")
+            seed = split_name(row.name)[1] == "seed" and row.section != "integration"
+            if seed and not isinstance(each, UniformRange):
+                raise InputError(
+                    f"{name} = {each!r}: must be a UniformRange, such as UniformRange(0, 1000000)"
+                )
+            if not seed and (row.quantity.kind is not float or row.section == "integration"):
+                raise InputError(
+                    f"{name}: cannot be uncertain; must be a real number of the system, or a seed"
+                )
             if row.name in of:
                 raise InputError(f"{name}: is given twice")
             of[row.name] = each
@@ -387,12 +395,16 @@ class ParameterUncertainty:
         return found | own
 
 
-def uncertainty_from_mapping(given: Mapping[str, Any], name: str = "uncertainty") -> ParameterUncertainty:
+def uncertainty_from_mapping(
+    given: Mapping[str, Any],
+    name: str = "uncertainty",
+    full_name: Callable[[str], str] = str,
+) -> ParameterUncertainty:
     """Read the uncertainty from a section of a parameter file.
 
     Each parameter has a table that names one distribution: ``{normal = 0.02, relative = true}``, ``{uniform =
     1e-5}``, ``{lognormal = 0.3}`` or ``{range = [3.14, 6.28]}``; further keys are ``displacement``, ``phase``,
-    ``hold_fixed`` and ``seed``.
+    ``hold_fixed`` and ``seed``.  *full_name* returns the dotted name of a parameter of the system of the file.
 
     Raises
     ------
@@ -404,7 +416,7 @@ def uncertainty_from_mapping(given: Mapping[str, Any], name: str = "uncertainty"
     for key, table in _flat(given).items():
         if not isinstance(table, Mapping):
             raise InputError(f"{name}.{key} = {shown(table)}: must be a table, such as {{normal = 0.01}}")
-        of[key] = _distribution(f"{name}.{key}", table)
+        of[full_name(key)] = _distribution(f"{name}.{key}", table)
     return ParameterUncertainty(of=of, **{key: given[key] for key in _OWN if key in given})
 
 

@@ -16,8 +16,9 @@ from scipy import special
 from snapbeam.dynamics.flow import InitialConditions, held_in_space
 from snapbeam.dynamics.lifetimes import proportion as jeffreys
 from snapbeam.model.integration import Integration
-from snapbeam.model.parameter_axes import PHYSICAL, unit_of
-from snapbeam.model.parameters import lookup
+from snapbeam.model.parameter_axes import unit_of
+from snapbeam.model.parameters import PHYSICAL, lookup, physical_names, ratio_of, row_of
+from snapbeam.model.quantity import numbered, split_name
 from snapbeam.model.state import amplitude_scale
 from snapbeam.model.system import System
 from snapbeam.solver.statistics import STATISTICS, rows_for
@@ -117,9 +118,16 @@ class Trials:
         for j, (name, each) in enumerate(uncertainty.of.items()):
             nominal = points[name] if name in points else np.full(numbers.size, self._nominal(name))
             found[name] = each.at(nominal, scores[:, j])
+            if lookup(name).quantity.kind is int:  # a seed
+                found[name] = np.floor(found[name]).astype(np.int64)
             _require_allowed(name, found[name], each)
+        in_units = [name for name in found if name in PHYSICAL]
+        units = self._units(found, in_units, numbers.size)
+        for j, name in enumerate(in_units):  # of the structure of each sample
+            found[ratio_of(name)] = found.pop(name) / units[:, j]
+            _require_allowed(ratio_of(name), found[ratio_of(name)])
         if uncertainty.hold_fixed == "physical" and uncertainty.structural:
-            self._hold(points, found, numbers.size)
+            self._hold(points, found, numbers.size, {ratio_of(name) for name in in_units})
         if uncertainty.displacement > 0.0:
             found |= self._ringing(found, numbers)
         return found
@@ -138,7 +146,8 @@ class Trials:
         return self.of_columns(columns, progress)
 
     def _any_parameter(self) -> tuple[str, ...]:
-        return ("contact.location",)
+        own = self.system.parameters
+        return tuple(name for name in own if isinstance(own[name], float) and lookup(name).is_run)[:1]
 
     def of_columns(self, columns: Columns, progress: Progress | None = None) -> dict[str, NDArray[Any]]:
         """Run points as they are, without sampling."""
@@ -167,14 +176,15 @@ class Trials:
         return _DrawnSetup(setup.system, setup.integration, PointList(columns), self.made)
 
     def _nominal(self, name: str) -> float:
-        value = self.system.parameters.get(name)
+        value = self.system.get(name) if ratio_of(name) in self.system.parameters else None
         if value is None or np.ndim(value) != 0:
             raise InputError(f"{name}: has no single value in this system to be drawn about")
         return float(value)
 
-    def _hold(self, points: Columns, found: Columns, size: int) -> None:
-        """Keep Hz, m/s and m where the beam differs from the one that the ratios were given for."""
-        names = [physical for physical in PHYSICAL if self._is_held(PHYSICAL[physical].parameter)]
+    def _hold(self, points: Columns, found: Columns, size: int, known: set[str]) -> None:
+        """Keep Hz, m/s and m where the beam differs from the one that the ratios were given for, but for those *known*."""
+        ratios = [ratio for ratio in self.system.parameters if self._is_held(ratio) and ratio not in known]
+        names = physical_names(ratios)
         nominal, drawn = self._units(points, names, size), self._units(found, names, size)
         for j, physical in enumerate(names):
             ratio = PHYSICAL[physical].parameter
@@ -183,9 +193,7 @@ class Trials:
             _require_allowed(ratio, found[ratio])
 
     def _is_held(self, ratio: str) -> bool:
-        if ratio == "contact.location":
-            return "beam.length" in self.uncertainty.of and self.system.striker is not None
-        return ratio in self.system.parameters
+        return not ratio.endswith(".location") or "beam.length" in self.uncertainty.of
 
     def in_hz(self, points: Columns) -> Columns:
         """Points whose Omega and V are those of the nominal system, in the ratios of their own structure."""
@@ -232,9 +240,9 @@ class Trials:
                 f"{given[0]}: is sampled by the displacement of the uncertainty; leave one of the two out"
             )
         striker, size = self.system.striker, numbers.size
-        assert striker is not None
         modes = self.system.model.modes
-        location = columns.get("contact.location", np.full(size, striker.location))
+        given_place = 0.5 if striker is None else striker.location
+        location = columns.get("contact.location", np.full(size, given_place))
         table = np.empty((size, 2, modes))
         starts = InitialConditions(
             count=1, displacement=self.uncertainty.displacement, seed=self.uncertainty.seed
@@ -296,7 +304,7 @@ def _require_allowed(
     """Refuse samples that no system can have, with the advice to sample from something else."""
     for value in (values.min(), values.max()):
         try:
-            lookup(name).quantity.check(name, float(value))
+            lookup(name).quantity.check(name, value.item())
         except InputError as error:
             raise InputError(f"{error}; a sample is out of range; {_remedy(name, distribution)}") from None
 
@@ -318,28 +326,35 @@ def trials_of(
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
-    if system.striker is None:
-        raise InputError("contacts = []: must hold a Contact; the outcomes are those of a struck beam")
     uncertainty = ParameterUncertainty() if uncertainty is None else uncertainty
     if not isinstance(uncertainty, ParameterUncertainty):
         raise InputTypeError(f"uncertainty = {shown(uncertainty)}: must be a ParameterUncertainty")
     integration = Integration() if integration is None else integration
     if not isinstance(integration, Integration):
         raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
-    if (
-        uncertainty.hold_fixed == "physical"
-        and uncertainty.structural
-        and system.striker.drive.name not in ("sine", "fixed")
-    ):
-        raise InputError(
-            f"hold_fixed = 'physical' with a drive of type {system.striker.drive.name!r}: must be a sine to stay fixed in Hz "
-            "and m/s; give hold_fixed = 'normalised'"
-        )
+    if uncertainty.hold_fixed == "physical" and uncertainty.structural:
+        loose = [name for name in system.parameters if _has_no_unit(name)]
+        if loose:
+            raise InputError(
+                f"hold_fixed = 'physical' with {loose[0]}: is a ratio without a physical unit, which would change with the "
+                "structure; give hold_fixed = 'normalised'"
+            )
     keeping = checkpoint if isinstance(checkpoint, CheckpointOptions) else CheckpointOptions(checkpoint)
-    if uncertainty.moves_start and "contact.gap" not in uncertainty.of:
+    if uncertainty.moves_start and system.striker is not None and "contact.gap" not in uncertainty.of:
         if system.parameters.get("contact.gap") is None:
             system = held_in_space(system)
     return Trials(system, integration.replace(early_termination=early), uncertainty, keeping, cluster)
+
+
+def _has_no_unit(name: str) -> bool:
+    """Return whether a parameter of an excitation is a ratio to a time or length of the structure, without a unit of its own."""
+    section, field = split_name(name)
+    row = row_of(name)
+    if row is None or numbered(section)[0] not in ("drive", "base_excitation", "axial_load", "force"):
+        return False
+    counts = field.endswith(("_cycles", "_fraction"))
+    number = row.quantity.kind is float and row.is_run and row.quantity.unit == "1"
+    return number and not counts and not physical_names([name])
 
 
 Ask = Callable[[_Numbers, _Numbers], dict[str, NDArray[Any]]]

@@ -587,7 +587,7 @@ def problem_of(
         )
     bounds: dict[str, tuple[float, float]] = {}
     for name, pair in variables.items():
-        row = lookup(str(name))
+        row = trials.system.parameter(str(name))
         if row.quantity.kind is not float or row.section == "integration":
             raise InputError(f"{name}: cannot be chosen; must be a real number of the system")
         try:

@@ -392,7 +392,7 @@ def snapped(setup: SweepSetup, path: str | os.PathLike[str] | None) -> tuple[Swe
         f"{moved} values of the axes differ from those of the checkpoint only by rounding, by at most {most:.1g}; the "
         "values of the checkpoint are used"
     )
-    return setup.with_points(Grid(axes)), words
+    return setup.with_points(Grid(axes, points.units)), words
 
 
 # ----------------------------------------------------------------------------------------------------
