@@ -162,9 +162,9 @@ def test_an_option_of_the_striker_is_that_of_the_base_without_one(harvester) -> 
     assert result.exit_code == 0, result.output
     wanted = config_of("base and circuit").system.replace(**{"base_excitation.frequency_hz": 40.0})
     (harvester.parent / "printed.toml").write_text(result.output, encoding="utf-8")
-    assert sb.System.load(harvester.parent / "printed.toml").get(
-        "base_excitation.frequency_hz"
-    ) == (pytest.approx(wanted.get("base_excitation.frequency_hz"), rel=1e-12))
+    assert sb.System.load(harvester.parent / "printed.toml").get("base_excitation.frequency_hz") == (
+        pytest.approx(wanted.get("base_excitation.frequency_hz"), rel=1e-12)
+    )
     refused = CliRunner().invoke(app, ["simulate", "--config", str(harvester), "--velocity-amplitude", "0.1"])
     assert refused.exit_code == 2 and "there is no striker to drive" in refused.output
 

@@ -22,6 +22,7 @@ from snapbeam.cli.parameter_options import BEAM, BOUNDARY, IMPERFECTION, MODEL, 
 
 if TYPE_CHECKING:
     from snapbeam.model.potential import Potential
+    from snapbeam.model.system import System
 
 __all__ = ["equilibria"]
 
@@ -95,8 +96,11 @@ def equilibria(
     """
     from rich.table import Table
 
+    from snapbeam.cli.frequencies import modal_error_text
     from snapbeam.model.imperfection_identification import identify_imperfection
+    from snapbeam.model.modal_convergence import modal_error
     from snapbeam.model.potential import Potential
+    from snapbeam.model.system import System
     from snapbeam.util.si_prefixes import prefixed, scale_of
     from snapbeam.util.validation import InputError
 
@@ -117,7 +121,7 @@ def equilibria(
         raise InputError("--over, --force-displacement: give one of the two")
     check_pictures(("plot", plot))
     settings = configured(given)
-    potential = settings.potential
+    settings_potential = potential = settings.potential
     model = potential.model
     assert model.beam is not None
     if (lower_frequency is None) != (upper_frequency is None):
@@ -169,7 +173,12 @@ def equilibria(
     for line in potential.force_texts:
         console.print(line)
     console.print(model.reference_text)
+    same = settings.static_system if potential is settings_potential else System(model=model)
+    error = modal_error(same)
+    if error == error:
+        console.print(modal_error_text("frequencies", error, model.modes))
     add_json(
+        modal_error=error,
         bistable=len(freq) > 1,
         buckling_level=beam.buckling_level,
         imperfection={} if model.imperfection is None else {
@@ -182,7 +191,7 @@ def equilibria(
         barriers=barriers, reference_well=model.reference_well, reference_frequency=model.reference_frequency,
     )  # fmt: skip
     if with_force:
-        _force_displacement(potential, 0.5 if location is None else location, well, output, plot)
+        _force_displacement(same, potential, 0.5 if location is None else location, well, output, plot)
     if over is not None:
         _branches(settings, over, output, plot)
 
@@ -218,10 +227,17 @@ def _branches(settings: Any, over: str, output: Path | None, plot: Path | None) 
 
 
 def _force_displacement(
-    potential: Potential, location: float, well: str | None, output: Path | None, plot: Path | None
+    system: System,
+    potential: Potential,
+    location: float,
+    well: str | None,
+    output: Path | None,
+    plot: Path | None,
 ) -> None:
     """Print snap-through and snap-back, and write the curve and its figure."""
+    from snapbeam.cli.frequencies import modal_error_text
     from snapbeam.model.force_displacement import force_displacement
+    from snapbeam.model.modal_convergence import modal_error
     from snapbeam.util.si_prefixes import prefixed
 
     curve = force_displacement(potential, location, well=well)
@@ -239,7 +255,13 @@ def _force_displacement(
             )
         else:
             console.print(f"{words}: none; the stable path does not end")
+    error = modal_error(
+        system, lambda each: force_displacement(each, location, well=well)["snap_through_force"]
+    )
+    if error == error:
+        console.print(modal_error_text("snap-through force", error, system.model.modes))
     add_json(
+        snap_through_modal_error=error,
         location=location,
         well=curve.attrs["well"],
         snap_through_force=float(curve["snap_through_force"]),

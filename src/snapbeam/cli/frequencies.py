@@ -30,17 +30,19 @@ def frequencies(
     """
     from rich.table import Table
 
+    from snapbeam.model.modal_convergence import modal_error
     from snapbeam.model.natural_frequencies import exact_natural_frequencies
     from snapbeam.util.si_prefixes import prefixed
     from snapbeam.util.validation import integer
 
     count = integer("count", count, 1, 200)
-    potential = configured(given).potential
+    settings = configured(given)
+    potential = settings.potential
     model = potential.model
     beam = model.beam
     assert beam is not None
     if model.imperfection is not None or not potential.is_of_the_structure_alone:
-        _print_wells(potential, count)
+        _print_wells(potential, count, modal_error(settings.static_system))
         return
     reduced = model.natural_frequencies
     exact = exact_natural_frequencies(beam, count=count)
@@ -68,7 +70,15 @@ def frequencies(
     console.print(table)
 
 
-def _print_wells(potential: Potential, count: int) -> None:
+def modal_error_text(quantity: str, error: float, modes: int) -> str:
+    """Sentence with the estimated error of a quantity by the number of modes."""
+    from snapbeam.model.modal_convergence import AUTO_ERROR
+
+    advice = "; use more modes, or --modes auto" if error > AUTO_ERROR else ""
+    return f"{quantity}: estimated error of {modes} modes {100.0 * error:.2g} %{advice}"
+
+
+def _print_wells(potential: Potential, count: int, error: float) -> None:
     """Print the frequencies about each well of a beam with an imperfection or a force, for which no exact ones are known."""
     from rich.table import Table
 
@@ -76,7 +86,7 @@ def _print_wells(potential: Potential, count: int) -> None:
     freq = np.array([potential.natural_frequencies(well)[:count] for well in potential.wells])
     heights = [potential.center(well) for well in potential.wells]
     add_json(
-        modes=model.modes, bistable=len(names) > 1, wells=names, centers=heights, reduced=freq,
+        modes=model.modes, modal_error=error, bistable=len(names) > 1, wells=names, centers=heights, reduced=freq,
         reference_well=model.reference_well, reference_frequency=model.reference_frequency,
     )  # fmt: skip
     console = out()
@@ -95,3 +105,5 @@ def _print_wells(potential: Potential, count: int) -> None:
         table.add_row(str(at + 1), *(f"{row[at]:.3f}" for row in freq))
     console.print(table)
     console.print(model.reference_text)
+    if error == error:
+        console.print(modal_error_text("frequencies", error, model.modes))

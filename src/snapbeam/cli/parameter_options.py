@@ -252,6 +252,8 @@ def _option(name: str, is_axis: bool) -> Any:
         return Annotated[str | None, typer.Option(flag, metavar="NUMBER|A,B,...", **options)]
     if row is not None and row.quantity.kind is str:
         return Annotated[str | None, typer.Option(flag, metavar="|".join(row.quantity.choices), **options)]
+    if name == "model.modes":
+        return Annotated[str | None, typer.Option(flag, metavar="COUNT|auto", **options)]
     if row is not None and row.quantity.kind is int:
         return Annotated[int | None, typer.Option(flag, parser=parse_count, metavar="COUNT", **options)]
     unit = physical.unit if physical is not None else unit
@@ -428,7 +430,7 @@ def _value(name: str, value: Any) -> Any:
         if kind is bool:
             return {"true": True, "false": False}[value.lower()]
         if kind is int:
-            return int(value)
+            return value if name == "model.modes" and value.strip().startswith("auto") else int(value)
         if kind is float and (row is not None or name in PHYSICAL or name.startswith("initial_state.")):
             numbers = np.ravel(parse_axis(name, value, unit=lookup(name).quantity.unit))
             if numbers.size != 1:

@@ -21,6 +21,7 @@ from snapbeam.model.drive.base import DRIVES
 from snapbeam.model.external_force import FORCES
 from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import flattened, labels_of, parts_from_mapping, read_file, resolved
+from snapbeam.model.modal_convergence import converged_modes, error_of_auto
 from snapbeam.model.parameter_axes import axis_that_changes_unit, checked_physical, parse_axis
 from snapbeam.model.parameters import (
     PHYSICAL,
@@ -245,6 +246,8 @@ def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
         message = _implausible(row, name, value)
         if message:
             return message, None
+    elif row.name == "model.modes" and error_of_auto(value) is not None:
+        return "", value.strip()
     elif item.kind is int and (isinstance(value, bool) or not isinstance(value, int)):
         return f"{name} = {shown(value)}: must be a whole number{unit}", None
     elif item.kind is str and not isinstance(value, str):
@@ -423,6 +426,8 @@ _AROUND, _STRIKING = (
     ("base_excitation", "axial_load", "force", "harvester"),
     ("contact", "drive"),
 )
+_FIRST_MODES = 2
+"""Number of modes of the first model from which that of ``modes = "auto"`` follows."""
 _CONVERTED = {"radius", "file", *WANTED, *(field for _, field in map(split_name, PHYSICAL))}
 """Names of a parameter file that a system does not have."""
 # What stands for the same thing in a section: giving one set takes the other away.
@@ -707,6 +712,19 @@ class Config:
             and not kinds - {"beam", "model", "boundary", "imperfection", "force"}
         )
 
+    def _with_number_of_modes(self) -> Config:
+        """The parameters with the number of modes that ``modes = "auto"`` asks for."""
+        error = error_of_auto(self.section("model").get("modes"))
+        if error is None:
+            return self
+
+        def given(modes: int) -> Config:
+            return Config(
+                {**self.given, "model": self.section("model") | {"modes": modes}}, self.extends_paper
+            )
+
+        return given(converged_modes(given(_FIRST_MODES).static_system, error))
+
     def _started(self, system: System) -> System:
         """The system with the start that was given."""
         start = self.section("initial_state")
@@ -828,6 +846,7 @@ def config_from_mapping(
     lines = lines or contradictions(found)
     if not lines and complete:
         try:
+            config = config._with_number_of_modes()
             config.potential  # noqa: B018
             if config.model.length_scale is not None and not config.is_static:
                 config.system  # noqa: B018
