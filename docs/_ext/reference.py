@@ -181,15 +181,21 @@ def command_line() -> str:
     from snapbeam.cli.app import app
 
     group: Any = typer.main.get_command(app)
-    commands = [each for name, command in group.commands.items() for each in _commands(f"snapbeam {name}", command, 2)]
+    commands = [
+        each for name, command in group.commands.items() for each in _commands(f"snapbeam {name}", command, 2)
+    ]
     counts = Counter(row for _, command, _ in commands for row in _options(command))
     common: dict[str, list[tuple[str, str, str]]] = {}
     for row, count in counts.items():
         if count >= _COMMON:
             common.setdefault(row[0], []).append(row)
-    parts = ["## Common options\n\nBelow each command, a line names the groups of these options that it has.\n"]
+    parts = [
+        "## Common options\n\nBelow each command, a line names the groups of these options that it has.\n"
+    ]
     for panel, rows in common.items():
-        parts.append(f"### {panel.partition(' (')[0]}\n\n" + _table(("option", "meaning"), [row[1:] for row in rows]))
+        parts.append(
+            f"### {panel.partition(' (')[0]}\n\n" + _table(("option", "meaning"), [row[1:] for row in rows])
+        )
     return "\n".join([*parts, *(part for each in commands for part in _command(*each, common))])
 
 
@@ -222,7 +228,9 @@ def _options(command: Any) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _command(title: str, command: Any, level: int, common: Mapping[str, list[tuple[str, str, str]]]) -> list[str]:
+def _command(
+    title: str, command: Any, level: int, common: Mapping[str, list[tuple[str, str, str]]]
+) -> list[str]:
     """Return the help of a command, a table of its own options, and the groups of its common options."""
     words = "\n\n".join(_paragraphs(command.help or ""))
     parts = [f"{'#' * level} {title}\n\n{words}\n"]
@@ -237,7 +245,13 @@ def _command(title: str, command: Any, level: int, common: Mapping[str, list[tup
         has = [flags[row] for row in rows if row in options]
         lacks = [flags[row] for row in rows if row not in options]
         if has:
-            some = "" if not lacks else f" ({', '.join(has)})" if len(has) <= len(lacks) else f" without {', '.join(lacks)}"
+            some = (
+                ""
+                if not lacks
+                else f" ({', '.join(has)})"
+                if len(has) <= len(lacks)
+                else f" without {', '.join(lacks)}"
+            )
             groups.append(f"[{name}](#{name.lower().replace(' ', '-')}){some}")
     if groups:
         parts.append(f"Common options: {'; '.join(groups)}.\n")
