@@ -258,6 +258,39 @@ def _command(
     return parts
 
 
+_INTERFACE = {
+    "Basic": ("system", "contact", "excitation", "forces", "runs", "sweeps", "figures", "errors"),
+    "Advanced": (
+        "orbits", "basins", "probability", "design", "figure_style", "lab_recordings", "lab_signals", "lab_comparison",
+        "lab_figures", "parameters", "paper", "provenance",
+    ),
+}  # fmt: skip
+"""Pages of the interface: those that most scripts need, and the others."""
+
+
+def interface_tables() -> str:
+    """Return tables of the pages of the interface, with the names on each."""
+    from importlib import import_module
+
+    docs = Path(__file__).parents[1]
+    parts = []
+    for caption, pages in _INTERFACE.items():
+        rows = []
+        for page in pages:
+            text = (docs / f"api_{page}.md").read_text(encoding="utf-8")
+            found: list[str] = []
+            for kind, name, members in re.findall(
+                r"^\.\. (auto\w+|py:data):: (\S+)$(?:\n   :members:(.*)$)?", text, re.MULTILINE
+            ):
+                module = kind == "automodule"
+                listed = [each.strip() for each in members.split(",") if each.strip()] if module else []
+                found += listed or (import_module(name).__all__ if module else [name.rpartition(".")[2]])
+            rows.append((f"[{text.partition(chr(10))[0].removeprefix('# ')}](api_{page}.md)", _listed(found)))
+        parts.append(f"## {caption}\n\n" + _table(("page", "names"), rows))
+    tree = "\n".join(f"api_{page}" for pages in _INTERFACE.values() for page in pages)
+    return "\n".join([*parts, f"```{{toctree}}\n:hidden:\n:maxdepth: 1\n\n{tree}\n```"])
+
+
 def _paragraphs(text: str) -> list[str]:
     """Return the paragraphs of a help text; an example becomes a code block."""
     found = []
@@ -532,7 +565,7 @@ def pages() -> dict[str, Any]:
     """Functions that write the second part of a page, by the name of the page."""
     return {
         "parameters": parameter_tables, "variables": lambda: variable_tables() + "\n" + status_tables(),
-        "command_line": command_line, "support": support_tables,
+        "command_line": command_line, "support": support_tables, "api": interface_tables,
     }  # fmt: skip
 
 
