@@ -52,6 +52,7 @@ myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
+autodoc_mock_imports = ["bokeh", "panel", "param", "tornado"]  # of the explorer, which a build does not need
 napoleon_google_docstring = False
 napoleon_use_param = False  # types are words: "array of shape (N,)" names no class
 napoleon_use_rtype = False
