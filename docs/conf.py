@@ -52,6 +52,7 @@ myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
+autodoc_mock_imports = ["bokeh", "panel", "param", "tornado"]  # of the explorer, which a build does not need
 napoleon_google_docstring = False
 napoleon_use_param = False  # types are words: "array of shape (N,)" names no class
 napoleon_use_rtype = False
@@ -148,6 +149,11 @@ def draw_paper(app: Any) -> None:
             plt.close(figure)
 
 
+def link_gallery(app: Any, name: str, source: list[str]) -> None:
+    """Lead links of a page to scripts of the gallery to the pages that show them."""
+    source[0] = re.sub(r"\]\(\.\./examples/(ex\d\d_\w+)\.py\)", r"](gallery/\1.rst)", source[0])
+
+
 _HERE = Path(__file__).parent
 (_HERE / "_generated" / "static").mkdir(parents=True, exist_ok=True)
 shutil.copyfile(
@@ -159,4 +165,5 @@ shutil.copyfile(
 def setup(app: Any) -> None:
     """Connect to Sphinx."""
     app.connect("builder-inited", draw_paper)
+    app.connect("source-read", link_gallery)
     app.connect("doctree-read", with_dashes)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -174,39 +175,120 @@ def status_tables() -> str:
 
 
 def command_line() -> str:
-    """Return the help of each command and of each of its subcommands."""
+    """Return the options that commands share, then the help of each command with its own options."""
     import typer.main
 
     from snapbeam.cli.app import app
 
     group: Any = typer.main.get_command(app)
-    return "\n".join(
-        part for name, command in group.commands.items() for part in _command(f"snapbeam {name}", command, 2)
-    )
+    commands = [
+        each for name, command in group.commands.items() for each in _commands(f"snapbeam {name}", command, 2)
+    ]
+    counts = Counter(row for _, command, _ in commands for row in _options(command))
+    common: dict[str, list[tuple[str, str, str]]] = {}
+    for row, count in counts.items():
+        if count >= _COMMON:
+            common.setdefault(row[0], []).append(row)
+    parts = [
+        "## Common options\n\nBelow each command, a line names the groups of these options that it has.\n"
+    ]
+    for panel, rows in common.items():
+        parts.append(
+            f"### {panel.partition(' (')[0]}\n\n" + _table(("option", "meaning"), [row[1:] for row in rows])
+        )
+    return "\n".join([*parts, *(part for each in commands for part in _command(*each, common))])
 
 
-def _command(title: str, command: Any, level: int) -> list[str]:
-    """Return the help of a command, its options by panel, and its subcommands."""
-    words = "\n\n".join(_paragraphs(command.help or ""))
-    parts = [f"{'#' * level} {title}\n\n{words}\n"]
-    panels: dict[str, list[tuple[str, str]]] = {}
+_COMMON = 4
+"""Number of commands that share a common option, at least."""
+
+
+def _commands(title: str, command: Any, level: int) -> list[tuple[str, Any, int]]:
+    """Return a command and its subcommands, each with its title and the level of its heading."""
+    found = [(title, command, level)]
+    for name, each in getattr(command, "commands", {}).items():
+        found += _commands(f"{title} {name}", each, level + 1)
+    return found
+
+
+def _options(command: Any) -> list[tuple[str, str, str]]:
+    """Return panel, flags and meaning of every option of a command."""
+    rows = []
     for parameter in command.params:
         if parameter.name in ("help", "help_all"):
             continue
-        panel = getattr(parameter, "rich_help_panel", None) or (
-            "Arguments" if parameter.param_type_name == "argument" else "Options"
-        )
+        argument = parameter.param_type_name == "argument"
+        panel = getattr(parameter, "rich_help_panel", None) or ("Arguments" if argument else "Options")
         flags = ", ".join(f"`{flag}`" for flag in [*parameter.opts, *parameter.secondary_opts])
-        if parameter.param_type_name == "argument":
+        if argument:
             flags = f"`{parameter.metavar or parameter.human_readable_name}`"
         elif parameter.metavar:
             flags += f" *{parameter.metavar}*"
-        panels.setdefault(panel, []).append((flags, _options_as_code(parameter.help or "")))
-    for panel, rows in panels.items():
-        parts.append(f"**{panel}**\n\n" + _table(("option", "meaning"), rows))
-    for name, each in getattr(command, "commands", {}).items():
-        parts += _command(f"{title} {name}", each, level + 1)
+        rows.append((panel, flags, _options_as_code(parameter.help or "")))
+    return rows
+
+
+def _command(
+    title: str, command: Any, level: int, common: Mapping[str, list[tuple[str, str, str]]]
+) -> list[str]:
+    """Return the help of a command, a table of its own options, and the groups of its common options."""
+    words = "\n\n".join(_paragraphs(command.help or ""))
+    parts = [f"{'#' * level} {title}\n\n{words}\n"]
+    options = _options(command)
+    own = [row[1:] for row in options if row not in common.get(row[0], ())]
+    if own:
+        parts.append(_table(("option", "meaning"), own))
+    groups = []
+    for panel, rows in common.items():
+        name = panel.partition(" (")[0]
+        flags = {row: row[1].split(" *")[0].split(", ")[0] for row in rows}
+        has = [flags[row] for row in rows if row in options]
+        lacks = [flags[row] for row in rows if row not in options]
+        if has:
+            some = (
+                ""
+                if not lacks
+                else f" ({', '.join(has)})"
+                if len(has) <= len(lacks)
+                else f" without {', '.join(lacks)}"
+            )
+            groups.append(f"[{name}](#{name.lower().replace(' ', '-')}){some}")
+    if groups:
+        parts.append(f"Common options: {'; '.join(groups)}.\n")
     return parts
+
+
+_INTERFACE = {
+    "Basic": ("system", "contact", "excitation", "forces", "runs", "sweeps", "figures", "errors"),
+    "Advanced": (
+        "orbits", "basins", "probability", "design", "figure_style", "lab_recordings", "lab_signals", "lab_comparison",
+        "lab_figures", "parameters", "paper", "provenance",
+    ),
+}  # fmt: skip
+"""Pages of the interface: those that most scripts need, and the others."""
+
+
+def interface_tables() -> str:
+    """Return tables of the pages of the interface, with the names on each."""
+    from importlib import import_module
+
+    docs = Path(__file__).parents[1]
+    parts = []
+    for caption, pages in _INTERFACE.items():
+        rows = []
+        for page in pages:
+            text = (docs / f"api_{page}.md").read_text(encoding="utf-8")
+            found: list[str] = []
+            for kind, name, members in re.findall(
+                r"^\.\. (auto\w+|py:data):: (\S+)$(?:\n   :members:(.*)$)?", text, re.MULTILINE
+            ):
+                module = kind == "automodule"
+                listed = [each.strip() for each in members.split(",") if each.strip()] if module else []
+                found += listed or (import_module(name).__all__ if module else [name.rpartition(".")[2]])
+            rows.append((f"[{text.partition(chr(10))[0].removeprefix('# ')}](api_{page}.md)", _listed(found)))
+        parts.append(f"## {caption}\n\n" + _table(("page", "names"), rows))
+    tree = "\n".join(f"api_{page}" for pages in _INTERFACE.values() for page in pages)
+    return "\n".join([*parts, f"```{{toctree}}\n:hidden:\n:maxdepth: 1\n\n{tree}\n```"])
 
 
 def _paragraphs(text: str) -> list[str]:
@@ -482,8 +564,8 @@ MARK = "<!-- From here on the text is written by `python docs/_ext/reference.py`
 def pages() -> dict[str, Any]:
     """Functions that write the second part of a page, by the name of the page."""
     return {
-        "parameters": parameter_tables, "variables": variable_tables, "status_codes": status_tables,
-        "command_line": command_line, "support": support_tables,
+        "parameters": parameter_tables, "variables": lambda: variable_tables() + "\n" + status_tables(),
+        "command_line": command_line, "support": support_tables, "api": interface_tables,
     }  # fmt: skip
 
 

@@ -23,18 +23,16 @@ ROOT = Path(__file__).parents[2]
 PAGES = sorted([*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md")])
 CODE = [
     "README.md",
-    "accuracy.md",
     "contacts.md",
-    "export.md",
     "finite_elements.md",
     "getting-started.md",
     "long_maps.md",
     "states.md",
-    "status_codes.md",
     "strikers.md",
     "sweeps.md",
+    "index.md",
     "systems.md",
-    "thresholds.md",
+    "variables.md",
     pytest.param("base_and_load.md", marks=pytest.mark.slow),
     pytest.param("basins.md", marks=pytest.mark.slow),
     pytest.param("beams.md", marks=pytest.mark.slow),
@@ -42,7 +40,6 @@ CODE = [
     pytest.param("exponents.md", marks=pytest.mark.slow),
     pytest.param("harvesters.md", marks=pytest.mark.slow),
     pytest.param("lifetimes.md", marks=pytest.mark.slow),
-    pytest.param("optimisation.md", marks=pytest.mark.slow),
     pytest.param("orbits.md", marks=pytest.mark.slow),
     pytest.param("questions.md", marks=pytest.mark.slow),
 ]
@@ -244,18 +241,14 @@ def test_interface_pages_are_short(path):
 
 
 def test_every_page_is_in_the_tree():
-    index = "\n".join((ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("index.md", "api.md"))
-    listed = {
-        line.strip()
-        for tree in re.findall(r"```\{toctree\}(.*?)```", index, re.DOTALL)
-        for line in tree.splitlines()
-    }
-    pages = {path.stem for path in (ROOT / "docs").glob("*.md")} - {"index"}
-    assert pages <= listed, pages - listed
+    text = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md")}
+    trees = "".join(re.findall(r"```\{toctree\}(.*?)```", "".join(text.values()), re.DOTALL))
+    listed = re.findall(r"^(?:.* <)?([\w-]+)>?$", trees, re.MULTILINE)
+    assert sorted(listed) == sorted(text.keys() - {"index"})
 
 
 @pytest.mark.parametrize("name", [
-    "parameters", "variables", "status_codes", "command_line", pytest.param("support", marks=pytest.mark.slow),
+    "api", "parameters", "variables", "command_line", pytest.param("support", marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_tables_of_pages_are_those_of_the_program(name):
     """``python docs/_ext/reference.py`` writes them again."""
@@ -395,3 +388,40 @@ def test_links_lead_to_files_of_the_repository(path) -> None:
     }
     missing = [target for target in targets if target and not (path.parent / target).exists()]
     assert not missing
+
+
+def table(name: str) -> list[list[str]]:
+    """Rows of all tables of a stored text, without their headings."""
+    text = (ROOT / "docs" / "data" / name).read_text(encoding="utf-8")
+    lines = [
+        line for line in text.splitlines() if line.startswith("|") and not re.match(r"\|[-:| ]+\|$", line)
+    ]
+    return [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
+
+
+def test_numbers_of_the_diagnostics():
+    """The page states the counts of the stored tables."""
+    page = " ".join((ROOT / "docs" / "verification_methods.md").read_text(encoding="utf-8").split())
+    ends = [row[1] for row in table("mistakes.md") if row[1] != "Result"]
+    counts = [ends.count(end) for end in ("right", "flagged", "refused")]
+    assert sum(counts) == len(ends)
+    assert "Of {} errors, {} are right, {} are flagged and {} are refused".format(len(ends), *counts) in page
+    samples = [row for row in table("random_defects.md") if row[0] and "from its beginning" not in row[0]]
+    good, flagged, defective, undetected = (
+        sum(int(row[i].split(",")[0]) for row in samples) for i in (1, 2, 4, 6)
+    )
+    assert (
+        f"has {good + defective:,} random recordings" in page
+        and f"{defective:,} of them with a defect" in page
+    )
+    assert flagged == 1 and f"the {good:,} good ones, one was flagged by mistake" in page
+    assert undetected == 6 and "Six did" in page
+
+
+def test_lifetimes_of_the_pages():
+    """Three pages round the lifetimes of the four points with 32 modes."""
+    values = [float(row[1]) for row in table("lifetimes.md") if re.match(r"\(\d", row[0])]
+    first, last = (round(value, -1) for value in (min(values), max(values)))
+    for name in ("chaos", "exponents", "studies"):
+        page = " ".join((ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8").split())
+        assert f"about {first:.0f} to {last:.0f} cycles" in page, name

@@ -101,7 +101,7 @@ def _markdown(claims: Sequence[Claim]) -> str:
     for topic, group in groupby(ordered, key=lambda claim: claim.topic):
         rows = list(group)
         is_open = rows[0].verdict == "open"
-        lines += [f"### {topic}", "", *_table(rows, is_open), "", *_details(rows), ""]
+        lines += [f"### {topic}", "", *_table(rows, is_open), ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -126,15 +126,6 @@ def _link(figures: str) -> str:
     """Links to headings, given one after another with commas, of the page that holds the table."""
     names = [name.strip() for name in figures.split(",") if name.strip()]
     return ", ".join(f"[{name}](#{name.lower().replace(' ', '-').replace('.', '')})" for name in names)
-
-
-def _details(rows: Iterable[Claim]) -> list[str]:
-    lines = []
-    for row in rows:
-        verb = "Matters with" if row.verdict == "open" else "Fails with"
-        parts = [f"*{row.source}.*", f"Rule: {row.rule}", f"{verb}: {row.fails}", row.note]
-        lines += [row.number, ": " + " ".join(part for part in parts if part), ""]
-    return lines
 
 
 def _csv(claims: Sequence[Claim]) -> str:
