@@ -14,7 +14,7 @@ import panel as pn
 from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
-from snapbeam import InputError, Integration, ResponseClass, System, write_netcdf
+from snapbeam import InputError, Integration, ResponseClass, RunStatus, System, write_netcdf
 from snapbeam.explorer.address import Address, number
 from snapbeam.explorer.jobs import (
     UPLOAD,
@@ -27,6 +27,7 @@ from snapbeam.explorer.jobs import (
 )
 from snapbeam.explorer.map_view import MapView
 from snapbeam.explorer.maps import (
+    NOT_COMPUTED,
     Plane,
     Point,
     Scatter,
@@ -690,8 +691,8 @@ class MapCard:
         place, found = self.plane.index(x, y), {}
         if not self.plane.at(*place).values == point.values:
             return {}
-        for each in {"response_class", "zero_crossings", "peak_force", self.show.value} & set(
-            self.source.variables()
+        for each in {"response_class", "status", "zero_crossings", "peak_force", self.show.value} & set(
+            self.source.numbers()
         ):
             try:
                 values = self.plane.values(each)
@@ -703,6 +704,9 @@ class MapCard:
 
     def _readout(self, point: Point, held: dict[str, Any]) -> Markup:
         parts = [point.words()]
+        if held.get("status") == RunStatus.NOT_RUN:
+            parts.append(NOT_COMPUTED)
+            held = {}
         if "response_class" in held:
             parts.append(Markup("<b>{}</b>").format(ResponseClass(int(held["response_class"])).label))
         for each in dict.fromkeys((self.show.value, "zero_crossings", "peak_force")):
@@ -729,8 +733,12 @@ def _span(values: NDArray[Any]) -> tuple[float, float]:
 
 _SECTIONS = {
     "beam": "Beam", "model": "Reduced model", "contact": "Contact", "striker": "Striker", "drive": "Drive",
+    "base_excitation": "Base excitation", "axial_load": "Axial load", "force": "External force",
+    "local_force": "Local force", "harvester": "Harvester", "boundary": "Supports", "imperfection": "Imperfection",
     "integration": "Integration",
 }  # fmt: skip
+_ALWAYS = ("beam", "model", "integration")
+"""Sections of which all parameters have a field; of contact and drive if there is a striker, else those that are set."""
 _INTEGRATION = (
     "integration.cycles",
     "integration.accuracy",
@@ -797,15 +805,20 @@ class SystemCard:
     # ------------------------------------------------------------------ fields
 
     def _rows(self) -> list[Parameter]:
-        drive = str(self.system.parameters.get("drive.type", "sine"))
-        kinds = {"contact": self.law.value, "drive": drive}
+        held = self.system.parameters
+        kinds = {"contact": self.law.value, "drive": str(held.get("drive.type", "sine"))}
+        whole = (*_ALWAYS, *(kinds if self.system.contacts else ()))
         return [
             row
             for row in parameters().values()
-            if (not row.kinds or kinds.get(row.section) in row.kinds)
-            and row.quantity.kind in (float, int, str, bool)
+            if row.quantity.kind in (float, int, str, bool)
             and (row.section != "integration" or row.name in _INTEGRATION)
             and _group(row) in _SECTIONS
+            and (
+                not row.kinds or kinds.get(row.section) in row.kinds
+                if row.section in whole
+                else row.name in held
+            )
         ]
 
     def fill(self, keep: bool = False) -> None:
@@ -835,7 +848,7 @@ class SystemCard:
             parts: list[Any] = []
             for section, title in _SECTIONS.items():
                 fields = [self.fields[row.name] for row in rows if _group(row) == section]
-                if section == "contact":
+                if section == "contact" and self.system.contacts:
                     fields = [self.law, *fields]
                 if fields:
                     parts += [Html(_HEADING.format(title), margin=0), pn.FlexBox(*fields, margin=0)]

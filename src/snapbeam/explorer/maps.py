@@ -24,6 +24,7 @@ from snapbeam import (
     InputTypeError,
     Integration,
     ResponseClass,
+    RunStatus,
     RunSummary,
     System,
     sweep,
@@ -31,6 +32,7 @@ from snapbeam import (
 from snapbeam.explorer.jobs import WINDOW_POINTS, Jobs, Token, check_run
 from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, to_physical
 from snapbeam.model.parameter_file import config_from_mapping, config_text
+from snapbeam.model.parameters import parameters
 from snapbeam.model.quantity import split_name
 from snapbeam.plot.axes import edges_of, is_geometric, positions
 from snapbeam.sweeps.points import ratios_of
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
+    "NOT_COMPUTED",
     "POINT",
     "Axis",
     "CheckpointSource",
@@ -469,6 +472,40 @@ def _unread(item: xr.DataArray) -> NDArray[Any]:
     return np.broadcast_to(np.zeros((), item.dtype), item.shape)
 
 
+def default_axes(system: System) -> dict[str, Any]:
+    """Two axes over a system: frequency and amplitude of its excitation, else the first parameters that it has.
+
+    Raises
+    ------
+    InputError
+        If a run of the system has fewer than two parameters.
+    """
+    from snapbeam.model.parameter_axes import parse_axis
+    from snapbeam.model.parameter_file import DEFAULT_AXES
+
+    if DEFAULT_AXES.keys() <= system.parameters.keys():
+        return {name: parse_axis(name, text) for name, text in DEFAULT_AXES.items()}
+    rows = [
+        row
+        for row in parameters().values()
+        if row.name in system.parameters
+        and row.is_run
+        and row.quantity.kind is float
+        and not row.short.endswith("phase")
+    ]
+    rows.sort(key=lambda row: (not row.name.endswith("frequency_ratio"), "amplitude" not in row.name))
+    if len(rows) < 2:
+        raise InputError(
+            "system: has no two parameters of a run, such as an excitation, for the axes of a map"
+        )
+    axes = {}
+    for row in rows[:2]:
+        value = float(system.parameters[row.name]) or 1.0
+        low, high = sorted((0.1 * value, min(3.0 * value, row.quantity.high)))
+        axes[row.name] = np.linspace(low, high, 40)
+    return axes
+
+
 def axes_dataset(system: System, axes: Mapping[str, Any], integration: Integration) -> xr.Dataset:
     """Coordinates and attributes of a sweep that is not computed."""
     import json
@@ -531,11 +568,10 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
     from snapbeam.util.datasets import xr
 
     if what is None or isinstance(what, System):
-        from snapbeam.model.parameter_axes import parse_axis
-        from snapbeam.model.parameter_file import DEFAULT_AXES, Config
+        from snapbeam.model.parameter_file import Config
 
         chosen = what or system or Config().system
-        axes = {name: parse_axis(name, text) for name, text in DEFAULT_AXES.items()}
+        axes = default_axes(chosen)
         name = "the paper's beam" if what is None and system is None else "a system"
         return SystemSource(chosen, axes, integration or Integration(), name)
     if isinstance(what, xr.Dataset):
@@ -647,11 +683,17 @@ def parameter_of(skeleton: xr.Dataset, name: str) -> str:
     return parameter_of_axis(str(attrs.get("parameter", name))).name
 
 
+NOT_COMPUTED = "the map has no result here yet"
+"""Text of a cell that is not computed, as in an unfinished checkpoint."""
+
+
 def compared(expected: Mapping[str, Any], outcome: RunSummary, engine: str) -> tuple[bool, str]:
     """Return whether a run is bitwise equal to the values of a map, and a message."""
     expected = {name: value for name, value in expected.items() if name in outcome}
     if not expected:
         return True, ""
+    if expected.get("status") == RunStatus.NOT_RUN:
+        return True, NOT_COMPUTED
     differing = []
     for name, value in expected.items():
         found = outcome[name]
@@ -667,7 +709,7 @@ def compared(expected: Mapping[str, Any], outcome: RunSummary, engine: str) -> t
 
 
 def _why(expected: Mapping[str, Any], engine: str) -> str:
-    if int(expected.get("status", 0)) == 6:
+    if expected.get("status") == RunStatus.FILLED:
         return ": the map inferred it from its neighbours"
     if engine == "cuda":
         return ": the map was computed by another engine"
