@@ -35,6 +35,7 @@ from snapbeam.model.parameter_file import config_from_mapping, config_text
 from snapbeam.model.parameters import parameters
 from snapbeam.model.quantity import split_name
 from snapbeam.plot.axes import edges_of, is_geometric, positions
+from snapbeam.plot.dataset import figures_of
 from snapbeam.sweeps.points import ratios_of
 from snapbeam.util.netcdf import read_result, split_group
 
@@ -52,6 +53,7 @@ __all__ = [
     "Picture",
     "Plane",
     "Point",
+    "ResultSource",
     "Scatter",
     "Source",
     "SystemSource",
@@ -77,6 +79,7 @@ __all__ = [
     "python_lines",
     "run_command",
     "sections_of",
+    "started",
     "system_from",
     "system_of",
     "system_toml",
@@ -337,24 +340,41 @@ class DatasetSource(Source):
     """A map in memory."""
 
     def __init__(self, dataset: xr.Dataset, name: str = "map") -> None:
-        if not layers_of(dataset) or len(_axes_of(dataset)) < 2:
-            raise InputError(f"{name}: {_other_kind(dataset)}")
+        if not is_map(dataset):
+            raise InputError(f"{name}: must be a map over two parameters")
         self.skeleton = dataset
         self.name = name
 
 
-def _other_kind(dataset: xr.Dataset) -> str:
-    """Say of a dataset that is not a map which kind of result it is."""
-    from snapbeam.plot.dataset import figures_of
-
+def is_map(dataset: xr.Dataset) -> bool:
+    """Return whether a dataset has numbers over two parameters, and no figure of its own that shows more."""
     try:
-        kind, _ = figures_of(dataset)
-    except (InputError, ValueError, KeyError, IndexError, TypeError):
-        known = ", ".join(map(str, dataset.data_vars)) or "none"
-        return f"must be a map; it has no variable over swept parameters among {known}"
-    if kind == "map":
-        return "must be a map over parameters; neither its axes nor its coordinates name two of them"
-    return f"must be a map, and is a {kind}; draw it with snapbeam plot, or ds.snapbeam.plot()"
+        kind = figures_of(dataset)[0]
+    except InputError:
+        kind = "map"
+    return kind in _MAPS and bool(layers_of(dataset)) and len(_axes_of(dataset)) > 1
+
+
+_MAPS = ("map", "probability map", "lifetimes")
+
+
+class ResultSource(Source):
+    """A result that is no map: what ``snapbeam plot`` draws of it, and its run if it is one.
+
+    Raises
+    ------
+    InputError
+        If it is no result that has a figure.
+    """
+
+    def __init__(self, dataset: xr.Dataset, name: str = "result", run: sb.Run | None = None) -> None:
+        try:
+            self.kind, self.figures = figures_of(dataset)
+        except InputError as error:
+            raise InputError(f"{name}: {str(error).partition(': ')[2]}") from None
+        if not self.figures or self.kind in _MAPS[:1]:
+            raise InputError(f"{name}: a {self.kind} needs two parameters in its axes or coordinates")
+        self.skeleton, self.name, self.run = dataset, name, run
 
 
 class SystemSource(Source):
@@ -555,15 +575,15 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
 
     Parameters
     ----------
-    what : path, xarray.Dataset, System or None
-        A NetCDF file or a checkpoint; a map; a system; nothing, for the paper's beam or *system*.
+    what : path, xarray.Dataset, Run, System or None
+        A NetCDF file or a checkpoint; a result; a system; nothing, for the paper's beam or *system*.
     system, integration : optional
         What a map is computed of, where there is none.
 
     Raises
     ------
     InputError
-        If it cannot be read, or is no map.
+        If it cannot be read, or is no result that has a view.
     """
     from snapbeam.util.datasets import xr
 
@@ -574,8 +594,10 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
         axes = default_axes(chosen)
         name = "the paper's beam" if what is None and system is None else "a system"
         return SystemSource(chosen, axes, integration or Integration(), name)
+    if isinstance(what, sb.Run):
+        return ResultSource(what.dataset, "run", what)
     if isinstance(what, xr.Dataset):
-        return DatasetSource(what)
+        return DatasetSource(what) if is_map(what) else ResultSource(what)
     if isinstance(what, (str, Path)):
         path = Path(what)
         try:
@@ -586,9 +608,13 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
             return CheckpointSource(path)
         if not split_group(path)[0].exists():
             raise InputError(f"map = {str(path)!r}: there is no such file or checkpoint")
-        return FileSource(path)
+        with read_result(path, "map", lazily=True) as dataset:
+            if is_map(dataset):
+                return FileSource(path)
+        run = sb.load(path) if "snapbeam_system" in dataset.attrs else None
+        return ResultSource(read_result(path, "map") if run is None else run.dataset, path.name, run)
     raise InputTypeError(
-        f"map is a {type(what).__name__}: must be a map, a file, a checkpoint, a System, or None"
+        f"map is a {type(what).__name__}: must be a result, a file, a checkpoint, a System, or None"
     )
 
 
@@ -1616,6 +1642,12 @@ def system_from(sections: Mapping[str, Any], name: str = "sections") -> tuple[Sy
         system = System.from_mapping(system.to_mapping() | {"initial_state": start})
     check_run(system, integration)
     return system, integration
+
+
+def started(sections: Mapping[str, Any], state: Mapping[str, float]) -> System:
+    """The system of some sections, started from a *state* of amplitudes and velocities by name."""
+    own = {section: values for section, values in sections.items() if section != "initial_state"}
+    return config_from_mapping(own | {"initial_state": dict(state)}).system
 
 
 def difference(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
