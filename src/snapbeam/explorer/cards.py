@@ -1153,12 +1153,15 @@ class TakeCard:
         return run
 
     def _picture(self, of: str) -> None:
+        from snapbeam.plot.map import plot_points, plot_response_map, plot_statistic
+        from snapbeam.plot.run import plot_run
+
         suffix = f".{self.kind.value}"
         if of == "run":
             run = self._run()
             if run is not None:
                 window = self.page.runs[self.page.which].window
-                self._make("run", suffix, lambda path, _: _draw_run(run, window, path))
+                self._make("run", suffix, lambda path, _: _draw(plot_run, run.dataset, window, path=path))
             return
         try:
             cut = self._cut()
@@ -1169,12 +1172,16 @@ class TakeCard:
         dots = self.page.card.dots if "dots" in self.page.card.layers.value else None
         name = self.page.card.show.value
         label = name if name != "response_class" else "map"
+        painter: Callable[..., Any] = plot_statistic
+        options: dict[str, Any] = {"name": name}
+        overlay = {"quasi_static_line": quasi, "measurements": dots}
+        plane = self.page.card.plane
         if self.page.card.source.is_list:
-            plane = self.page.card.plane
-            along = str(plane.x.name), str(plane.y.name)
-            self._make(label, suffix, lambda path, _: _draw_points(cut, name, along, quasi, dots, path))
-            return
-        self._make(label, suffix, lambda path, _: _draw_map(cut, name, quasi, dots, path))
+            painter = plot_points
+            options |= {"across": str(plane.x.name), "upward": str(plane.y.name)} | overlay
+        elif name == "response_class":
+            painter, options = plot_response_map, overlay
+        self._make(label, suffix, lambda path, _: _draw(painter, cut, path=path, **options))
 
     def _cut(self) -> xr.Dataset:
         """The map over the two axes that are shown; of a system without a map, its finest window."""
@@ -1302,47 +1309,18 @@ def _posted(page: Page, work: Callable[[], None]) -> Callable[[Any], None]:
     return lambda _: page.post(work)
 
 
-def _draw_run(run: Run, window: tuple[float, float], path: Any) -> None:
-    from snapbeam.plot.run import plot_run
-    from snapbeam.plot.style import save_figure
-
-    with drawing:
-        _save(save_figure, plot_run(run.dataset, window), path)
-
-
-def _draw_map(cut: xr.Dataset, name: str, quasi: bool, dots: Any, path: Any) -> None:
-    from snapbeam.plot.map import plot_response_map, plot_statistic
-    from snapbeam.plot.style import save_figure
-
-    with drawing:
-        if name == "response_class":
-            ax = plot_response_map(cut, quasi_static_line=quasi, measurements=dots)
-        else:
-            ax = plot_statistic(cut, name)
-        _save(save_figure, ax, path)
-
-
-def _draw_points(
-    cut: xr.Dataset, name: str, along: tuple[str, str], quasi: bool, dots: Any, path: Any
-) -> None:
-    from snapbeam.plot.map import plot_points
-    from snapbeam.plot.style import save_figure
-
-    with drawing:
-        ax = plot_points(
-            cut, name, across=along[0], upward=along[1], measurements=dots, quasi_static_line=quasi
-        )
-        _save(save_figure, ax, path)
-
-
-def _save(save_figure: Any, drawn: Any, path: Any) -> None:
+def _draw(painter: Callable[..., Any], *given: Any, path: Any, **options: Any) -> None:
+    """Write the figure that a function draws; one thread at a time may draw."""
     import matplotlib.pyplot as plt
 
-    figure = drawn.get_figure(root=True) if hasattr(drawn, "get_figure") else drawn
-    try:
-        save_figure(figure, path)
-    finally:
-        plt.close(figure)
+    from snapbeam.plot.style import save_figure
+
+    with drawing:
+        figure = painter(*given, **options).get_figure(root=True)
+        try:
+            save_figure(figure, path)
+        finally:
+            plt.close(figure)
 
 
 def window_dataset(window: Any) -> xr.Dataset:

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,49 +43,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "NOT_COMPUTED",
-    "POINT",
-    "Axis",
-    "CheckpointSource",
-    "DatasetSource",
-    "FileSource",
-    "MapLayer",
-    "Picture",
-    "Plane",
-    "Point",
-    "ResultSource",
-    "Scatter",
-    "Source",
-    "SystemSource",
-    "Window",
-    "chances",
-    "compared",
-    "compute",
-    "difference",
-    "drawn_shares",
-    "integration_of",
-    "known_cells",
-    "layers_of",
-    "map_command",
-    "opened",
-    "parameter_dims",
-    "parameter_name",
-    "parameter_of",
-    "patched",
-    "picture",
-    "plain",
-    "plain_symbol",
-    "planned",
-    "python_lines",
-    "run_command",
-    "sections_of",
-    "started",
-    "system_from",
-    "system_of",
-    "system_toml",
-    "values_of",
-    "visible_strides",
-]
+    "NOT_COMPUTED", "POINT", "Axis", "CheckpointSource", "DatasetSource", "MapLayer", "Picture", "Plane",
+    "Point", "ResultSource", "Scatter", "Source", "SystemSource", "Window", "chances", "compared",
+    "compute", "difference", "drawn_shares", "integration_of", "known_cells", "layers_of", "map_command",
+    "opened", "parameter_dims", "parameter_name", "parameter_of", "patched", "picture", "plain",
+    "plain_symbol", "planned", "python_lines", "run_command", "sections_of", "started", "system_from",
+    "system_of", "system_toml", "values_of", "visible_strides",
+]  # fmt: skip
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -218,6 +182,11 @@ def _number(value: Any) -> str:
 # ----------------------------------------------------------------------------------------------------
 
 
+_SMALL = 2**25
+"""Size of a map up to which it is read completely with its first point, bytes."""
+_Data = TypeVar("_Data", "xr.Dataset", "xr.DataArray")
+
+
 class Source:
     """A map: its coordinates and attributes, and its variables when they are asked for.
 
@@ -235,6 +204,8 @@ class Source:
     skeleton: xr.Dataset
     version = 0
     growing = False
+    _reading = threading.RLock()
+    """Held while a file is read."""
 
     @property
     def attrs(self) -> dict[str, Any]:
@@ -309,17 +280,23 @@ class Source:
         return None if layer is None else self.variable(layer.variable).isel(layer.where)
 
     def variable(self, name: str) -> xr.DataArray:
-        """A variable as the dataset has it, in memory."""
-        return self.skeleton[name]
+        """A variable as the dataset has it, read from its file the first time."""
+        return self._read(self.skeleton[name])
+
+    def _read(self, part: _Data) -> _Data:
+        try:
+            with self._reading:
+                return part.load()
+        except (OSError, ValueError, RuntimeError) as error:
+            raise InputError(f"{self.name}: cannot be read ({error})") from error
 
     def point(self, where: Mapping[str, int]) -> dict[str, Any]:
-        """All that the map holds of one point, by name."""
-        return self._numbers_of(self.skeleton, where)
-
-    def _numbers_of(self, dataset: xr.Dataset, where: Mapping[str, int]) -> dict[str, Any]:
-        inside = {name: at for name, at in where.items() if name in dataset.dims}
+        """All that the map holds of one point, by name; of a large file only that is read."""
+        if self.skeleton.nbytes <= _SMALL:
+            self._read(self.skeleton)
+        inside = {name: at for name, at in where.items() if name in self.skeleton.dims}
         names = dict.fromkeys(layer.variable for layer in self.layers.values())
-        part = dataset[list(names)].isel(inside).load()
+        part = self._read(self.skeleton[list(names)].isel(inside))
         return {
             name: (
                 part[layer.variable].isel(layer.where) if layer.where else part[layer.variable]
@@ -329,7 +306,7 @@ class Source:
 
     def whole(self) -> xr.Dataset:
         """All of the map, in memory."""
-        return self.skeleton
+        return self._read(self.skeleton)
 
     def refresh(self) -> bool:
         """Look whether there is more; True if there is."""
@@ -394,77 +371,6 @@ class SystemSource(Source):
         return names + [name for name in each if name in STATISTICS]
 
 
-_SMALL = 2**25
-"""Size of a map up to which it is loaded completely on the first access, bytes."""
-
-
-class FileSource(DatasetSource):
-    """A map in a NetCDF file, of which a variable is read when it is first shown."""
-
-    def __init__(self, path: Path) -> None:
-        self._given, self._path = path, split_group(path)[0]
-        self._lock = threading.Lock()
-        self._all: xr.Dataset | None = None
-        self._held: dict[str, xr.DataArray] = {}
-        with self._open() as dataset:
-            self._stamp = self._stamped()
-            super().__init__(dataset.drop_vars([]), path.name)
-            coords = dataset.coords.to_dataset().load()
-            self.skeleton = coords.assign({
-                name: (item.dims, _unread(item), item.attrs) for name, item in dataset.data_vars.items()
-            }).assign_attrs(dataset.attrs)  # fmt: skip
-
-    def _stamped(self) -> tuple[int, int]:
-        found = self._path.stat()
-        return found.st_mtime_ns, found.st_size
-
-    def _open(self) -> xr.Dataset:
-        if not self._path.is_file():
-            raise InputError(f"{self._path.name}: there is no such file any more")
-        return read_result(self._given, "map", lazily=True)
-
-    def variable(self, name: str) -> xr.DataArray:
-        """A variable, read from the file the first time."""
-        with self._lock:
-            if name not in self._held:
-                with self._open() as dataset:
-                    if self._stamped() != self._stamp:
-                        raise InputError(f"{self.name}: the file was changed; load the page again")
-                    try:
-                        self._held[name] = dataset[name].load()
-                    except (OSError, ValueError, RuntimeError) as error:
-                        raise InputError(f"{self.name}: {name} cannot be read ({error})") from error
-            return self._held[name]
-
-    def point(self, where: Mapping[str, int]) -> dict[str, Any]:
-        """All that the file holds of one point; of a large file only that is read, each time."""
-        if self.skeleton.nbytes <= _SMALL:
-            if self._all is None:
-                self._all = self.whole()
-            elif not self._path.is_file():
-                raise InputError(f"{self._path.name}: there is no such file any more")
-            elif self._stamped() != self._stamp:
-                raise InputError(f"{self.name}: the file was changed; load the page again")
-            return self._numbers_of(self._all, where)
-        with self._lock, self._open() as dataset:
-            if self._stamped() != self._stamp:
-                raise InputError(f"{self.name}: the file was changed; load the page again")
-            try:
-                return self._numbers_of(dataset, where)
-            except (OSError, ValueError, RuntimeError) as error:
-                raise InputError(f"{self.name}: cannot be read ({error})") from error
-
-    def whole(self) -> xr.Dataset:
-        """All of the map, read now."""
-        with self._lock, self._open() as dataset:
-            if self._stamped() != self._stamp:
-                raise InputError(f"{self.name}: the file was changed; load the page again")
-            try:
-                return dataset.load()
-            except (OSError, ValueError, RuntimeError) as error:
-                raise InputError(f"{self.name}: cannot be read ({error})") from error
-
-
 def _axes_of(skeleton: xr.Dataset) -> list[str]:
     dims = parameter_dims(skeleton)
     if POINT in dims:
@@ -485,11 +391,6 @@ def _axes_of(skeleton: xr.Dataset) -> list[str]:
         if item.ndim == 0 and parameter_name(skeleton, str(name)) is not None and item.dtype.kind in "iuf"
     ]
     return [*found, *spare[: max(2 - len(found), 0)]]
-
-
-def _unread(item: xr.DataArray) -> NDArray[Any]:
-    """Stands for numbers that are not read: of the right shape and kind, and of no size in memory."""
-    return np.broadcast_to(np.zeros((), item.dtype), item.shape)
 
 
 def default_axes(system: System) -> dict[str, Any]:
@@ -547,7 +448,7 @@ def axes_dataset(system: System, axes: Mapping[str, Any], integration: Integrati
         "modes": system.model.modes,
         "cycles": integration.cycles_or_default,
         "reference_frequency": system.model.reference_frequency,
-        "system": json.dumps(_plain(system.to_mapping())),
+        "system": json.dumps(plain(system.to_mapping())),
         "integration": json.dumps(integration_mapping(integration)),
         "snapbeam_version": "",
     }
@@ -562,9 +463,10 @@ def integration_mapping(integration: Integration) -> dict[str, Any]:
     return {name: value for name, value in found.items() if name != "threads"}
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Plain values of sections, without what follows from others."""
     if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items() if item is not None}
+        return {key: plain(item) for key, item in value.items() if item is not None}
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     return value
@@ -608,11 +510,11 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
             return CheckpointSource(path)
         if not split_group(path)[0].exists():
             raise InputError(f"map = {str(path)!r}: there is no such file or checkpoint")
-        with read_result(path, "map", lazily=True) as dataset:
-            if is_map(dataset):
-                return FileSource(path)
+        dataset = read_result(path, "map", lazily=True)
+        if is_map(dataset):
+            return DatasetSource(dataset, path.name)
         run = sb.load(path) if "snapbeam_system" in dataset.attrs else None
-        return ResultSource(read_result(path, "map") if run is None else run.dataset, path.name, run)
+        return ResultSource(dataset.load() if run is None else run.dataset, path.name, run)
     raise InputTypeError(
         f"map is a {type(what).__name__}: must be a result, a file, a checkpoint, a System, or None"
     )
@@ -899,13 +801,13 @@ def picture(
 
 
 @dataclass(frozen=True, eq=False)
-class Plane:
-    """A cut through a map.
+class _Cut:
+    """A source along two axes.
 
     Attributes
     ----------
     x, y : Axis
-        Across and upward.
+        Across and upward; of a list, ``at`` are the places of the points, in the order of the list.
     fixed : dict of str to int
         Which point of each other axis.
     """
@@ -914,6 +816,27 @@ class Plane:
     x: Axis
     y: Axis
     fixed: dict[str, int]
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Dotted names of the two axes."""
+        return parameter_of(self.source.skeleton, self.x.name), parameter_of(
+            self.source.skeleton, self.y.name
+        )
+
+    @staticmethod
+    def check(source: Source, x: str, y: str) -> None:
+        """Refuse (InputError) names that are no two axes of a source."""
+        for name in (x, y):
+            if name not in source.dims:
+                raise InputError(f"{name}: is no axis of this map, whose axes are {', '.join(source.dims)}")
+        if x == y:
+            raise InputError(f"{x}: stands along both axes")
+
+
+@dataclass(frozen=True, eq=False)
+class Plane(_Cut):
+    """A cut through a map."""
 
     @classmethod
     def of(cls, source: Source, x: str, y: str, fixed: dict[str, int]) -> Plane:
@@ -924,20 +847,9 @@ class Plane:
         InputError
             If it has no such axes.
         """
-        for name in (x, y):
-            if name not in source.dims:
-                raise InputError(f"{name}: is no axis of this map, whose axes are {', '.join(source.dims)}")
-        if x == y:
-            raise InputError(f"{x}: stands along both axes")
+        cls.check(source, x, y)
         others = {name: fixed.get(name, 0) for name in source.dims if name not in (x, y)}
         return cls(source, Axis.of(source, x), Axis.of(source, y), others)
-
-    @property
-    def names(self) -> tuple[str, str]:
-        """Dotted names of the two axes."""
-        return parameter_of(self.source.skeleton, self.x.name), parameter_of(
-            self.source.skeleton, self.y.name
-        )
 
     def values(self, name: str) -> NDArray[Any] | None:
         """A variable on the cut, of shape (y, x)."""
@@ -958,7 +870,7 @@ class Plane:
     def fixed_values(self) -> dict[str, Any]:
         """The values of the other axes, by dotted name, and of axes of one point."""
         found = {
-            parameter_of(self.source.skeleton, name): _plain_plane(self.source.coordinate(name)[at])
+            parameter_of(self.source.skeleton, name): plain(self.source.coordinate(name)[at])
             for name, at in self.fixed.items()
         }
         for name in map(str, self.source.skeleton.dims):
@@ -967,15 +879,13 @@ class Plane:
                 and name not in (self.x.name, self.y.name)
                 and parameter_name(self.source.skeleton, name) is not None
             ):
-                found[parameter_of(self.source.skeleton, name)] = _plain_plane(
-                    self.source.coordinate(name)[0]
-                )
+                found[parameter_of(self.source.skeleton, name)] = plain(self.source.coordinate(name)[0])
         return found
 
     def at(self, row: int, column: int) -> Point:
         """The point of the map in a cell, without what the map holds of it."""
         across, upward = self.names
-        values = {across: _plain_plane(self.x.points[column]), upward: _plain_plane(self.y.points[row])}
+        values = {across: plain(self.x.points[column]), upward: plain(self.y.points[row])}
         return Point(values | self.fixed_values())
 
     def indexers(self, row: int, column: int) -> dict[str, int]:
@@ -1028,28 +938,13 @@ class Plane:
         return all(parameter_of_axis(name).quantity.kind is float for name in self.names)
 
 
-def _plain_plane(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
-
-
 # ----------------------------------------------------------------------------------------------------
 # A list of points over two of its parameters: each point stands where its own values are.
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter:
-    """A list of points seen along two of its parameters; it has the interface of a cut through a grid.
-
-    Attributes
-    ----------
-    x, y : Axis
-        Across and upward; their ``at`` are the places of the points, in the order of the list.
-    """
-
-    source: Source
-    x: Axis
-    y: Axis
-    fixed: dict[str, int]
+class Scatter(_Cut):
+    """A list of points seen along two of its parameters; it has the interface of a cut through a grid."""
 
     @classmethod
     def of(cls, source: Source, x: str, y: str) -> Scatter:
@@ -1060,21 +955,9 @@ class Scatter:
         InputError
             If its points have no such parameters.
         """
-        for name in (x, y):
-            if name not in source.dims:
-                raise InputError(
-                    f"{name}: is no parameter of these points, which are {', '.join(source.dims)}"
-                )
-        if x == y:
-            raise InputError(f"{x}: stands along both axes")
+        cls.check(source, x, y)
         size = source.skeleton.sizes[POINT]
         return cls(source, Axis.scattered(source, x, size), Axis.scattered(source, y, size), {})
-
-    @property
-    def names(self) -> tuple[str, str]:
-        """Dotted names of the two axes."""
-        skeleton = self.source.skeleton
-        return parameter_of(skeleton, self.x.name), parameter_of(skeleton, self.y.name)
 
     @property
     def parameters(self) -> list[str]:
@@ -1598,18 +1481,6 @@ def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) 
 
 
 _CONFIG = "system.toml"
-
-
-def plain(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """A system's sections as plain values, without what follows from others."""
-    return {
-        section: {
-            name: value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
-            for name, value in values.items()
-            if value is not None
-        }
-        for section, values in sections.items()
-    }
 
 
 def _integration_section(integration: Integration) -> dict[str, Any]:

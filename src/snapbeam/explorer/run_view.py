@@ -50,22 +50,9 @@ if TYPE_CHECKING:
     from snapbeam import ReducedModel, Run
 
 __all__ = [
-    "BeamPanel",
-    "Energy",
-    "Impacts",
-    "Modal",
-    "Numbers",
-    "Phase",
-    "RunPanel",
-    "RunView",
-    "Spectrum",
-    "WaveformPanel",
-    "across",
-    "amplitude_spectrum",
-    "envelope",
-    "round_trip",
-    "within",
-]
+    "BeamPanel", "Energy", "Impacts", "Modal", "Numbers", "Phase", "RunPanel", "RunView", "Spectrum",
+    "WaveformPanel", "across", "amplitude_spectrum", "envelope", "round_trip", "within",
+]  # fmt: skip
 
 
 # ----------------------------------------------------------------------------------------------------
