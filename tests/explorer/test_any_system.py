@@ -111,3 +111,26 @@ def test_a_system_without_two_parameters_is_refused():
     still = config_from_mapping({"beam": BEAM} | ONE_MODE).system
     with pytest.raises(sb.InputError, match="no two parameters"):
         opened(still)
+
+
+def test_cells_of_an_unfinished_checkpoint_say_that_they_are_not_computed(tmp_path):
+    pytest.importorskip("zarr")
+    system, done = system_of("two strikers"), []
+    axes = {
+        "drive.frequency_ratio": np.linspace(0.8, 1.6, 12),
+        "drive.velocity_amplitude": np.linspace(0.1, 0.3, 12),
+    }
+
+    def stop_early(*report):
+        done.append(report)
+        if len(done) > 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        sb.sweep(system, axes, HOW, checkpoint=tmp_path / "half.map", progress=stop_early)
+    source = opened(tmp_path / "half.map")
+    status = source.variable("status").values
+    summary = sb.simulate(system, HOW).summary
+    for at in np.argwhere(status == RunStatus.NOT_RUN)[:3]:
+        held = source.point(dict(zip(source.dims, at.tolist(), strict=True)))
+        assert compared(held, summary, "cpu") == (True, NOT_COMPUTED)

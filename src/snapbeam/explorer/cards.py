@@ -301,13 +301,13 @@ class MapCard:
     def _make_controls(self, address: Address) -> None:
         source = self.source
         dims, names = source.dims, source.variables()
-        x = address.x if address.x in dims else dims[0]
-        upward = [name for name in ("velocity_amplitude", "location") if name in dims and name != x]
-        y = (
-            address.y
-            if address.y in dims and address.y != x
-            else next(iter([*upward, *(n for n in dims if n != x)]))
-        )
+        sizes = {name: source.coordinate(name) for name in dims}
+        longest = sorted(dims, key=lambda name: (sizes[name].dtype.kind != "f", -sizes[name].size))
+        best = (
+            sorted(longest[:2], key=dims.index) + longest[2:]
+        )  # the longest continuous axes, in the map's order
+        x = address.x if address.x in dims else next(name for name in best if name != address.y)
+        y = address.y if address.y in dims and address.y != x else next(name for name in best if name != x)
         if (address.x and address.x not in dims) or (address.y and address.y not in dims):
             self._words.append(f"address: this map's axes are {', '.join(dims)}")
         show = address.show if address.show in names else names[0]

@@ -1049,7 +1049,6 @@ class CheckpointSource(DatasetSource):
         self._path = path
         self._stamp = self._stamped()
         super().__init__(sb.read_checkpoint(path), path.name)
-        self._read = time.monotonic()
 
     def _stamped(self) -> tuple[int, int]:
         try:

@@ -151,8 +151,13 @@ def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
     ):
         at = int(after)
         near = returns[:, at : at + 2].mean(axis=1)
-        look = {"marker": _SPECIAL_POINTS[str(kind)], "linestyle": "", "color": _LINE, "markersize": 3.5}
-        handles += ax.plot(np.full(near.size, value), near, markerfacecolor="white", label=str(kind), **look)
+        mark: dict[str, Any] = {
+            "marker": _SPECIAL_POINTS[str(kind)],
+            "linestyle": "",
+            "color": _LINE,
+            "markersize": 3.5,
+        }
+        handles += ax.plot(np.full(near.size, value), near, markerfacecolor="white", label=str(kind), **mark)
     return handles
 
 
