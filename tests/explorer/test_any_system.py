@@ -130,6 +130,7 @@ def test_cells_of_an_unfinished_checkpoint_say_that_they_are_not_computed(tmp_pa
         sb.sweep(system, axes, HOW, checkpoint=tmp_path / "half.map", progress=stop_early)
     source = opened(tmp_path / "half.map")
     status = source.variable("status").values
+    assert (status == RunStatus.NOT_RUN).any()
     summary = sb.simulate(system, HOW).summary
     for at in np.argwhere(status == RunStatus.NOT_RUN)[:3]:
         held = source.point(dict(zip(source.dims, at.tolist(), strict=True)))
