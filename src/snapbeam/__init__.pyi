@@ -56,7 +56,6 @@ from .model.striker import Contact as Contact
 from .model.striker import Shaker as Shaker
 from .model.striker import Striker as Striker
 from .model.system import System as System
-from .plot.style import plot_style as plot_style
 from .simulation.advance import advance as advance
 from .simulation.run import Run as Run
 from .simulation.save import load as load

@@ -123,15 +123,15 @@ def test_a_style_sets_widths_and_text_and_can_be_taken_back(name, width):
     from snapbeam.plot.style import figure_style, new_figure
 
     try:
-        sb.plot_style(name)
+        sb.plot.plot_style(name)
         with figure_style():
             figure = new_figure("single", 60.0)
             text = figure.text(0.5, 0.5, "text")
             assert 25.4 * figure.get_figwidth() == pytest.approx(width)
             assert text.get_fontsize() == (12.0 if name == "talk" else 8.0)
     finally:
-        sb.plot_style("elsevier")
+        sb.plot.plot_style("elsevier")
     with figure_style():
         assert 25.4 * new_figure("double").get_figwidth() == pytest.approx(190.0)
     with pytest.raises(sb.InputError, match="name"):
-        sb.plot_style("nature")
+        sb.plot.plot_style("nature")

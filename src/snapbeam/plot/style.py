@@ -133,10 +133,10 @@ def plot_style(name: str) -> None:
     Examples
     --------
     >>> import snapbeam as sb
-    >>> sb.plot_style("ieee")
+    >>> sb.plot.plot_style("ieee")
     >>> f"{25.4 * sb.plot.new_figure('single').get_figwidth():.1f} mm"
     '88.9 mm'
-    >>> sb.plot_style("elsevier")
+    >>> sb.plot.plot_style("elsevier")
     """
     widths, size, font = _STYLES[choice("name", name, tuple(_STYLES))]
     COLUMN_WIDTHS.update(zip(COLUMN_WIDTHS, widths, strict=True))
@@ -183,7 +183,7 @@ def new_figure(width: str = "single", height: float = 75.0) -> Figure:
     Parameters
     ----------
     width : {"single", "double"}
-        One column (90 mm) or two (190 mm), unless :func:`snapbeam.plot_style` chose others.
+        One column (90 mm) or two (190 mm), unless :func:`snapbeam.plot.plot_style` chose others.
     height : float
         Height, mm, for columns of 90 mm; in proportion for others.
 
