@@ -134,9 +134,3 @@ def test_shares_of_replicas_are_told(one_mode):
     first = int(shares.values.argmax())
     kind = sb.ResponseClass(int(found["class_code"][first]))
     assert f"{kind.label} {100 * float(shares[first]):.0f} %" in words
-
-
-def test_what_is_no_map_is_refused(one_mode):
-    run = sb.simulate(one_mode, SHORT)
-    with pytest.raises(sb.InputError, match="must be a map, and is a run"):
-        opened(run.dataset)

@@ -107,7 +107,7 @@ def test_the_force_of_a_link_has_all_samples(tab, served, small_map, system):
 def test_no_curve_of_the_waveform_hides_another_and_impacts_are_curves(system):
     panel = WaveformPanel(LIGHT, Cursor(LIGHT, "", lambda work, milliseconds: None))
     panel.activate()
-    _, center, striker = (each.glyph for each in panel.top.renderers)
+    _, center, striker, _ = (each.glyph for each in panel.top.renderers)
     assert striker.line_dash and not center.line_dash, "the dashed thin line lies on the wide one"
     assert striker.line_width < center.line_width
     point = {"drive.frequency_ratio": 1.14, "drive.velocity_amplitude": 0.4}

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
+import snapbeam as sb
 from snapbeam.plot.style import CLASS_COLORS, new_figure, save_figure
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError
@@ -115,3 +116,22 @@ def test_every_figure_of_a_notebook_is_shown(tmp_path):
         [sys.executable, "-c", _PLOTS], env=environment, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(("name", "width"), [("elsevier", 90.0), ("ieee", 88.9), ("talk", 130.0)])
+def test_a_style_sets_widths_and_text_and_can_be_taken_back(name, width):
+    from snapbeam.plot.style import figure_style, new_figure
+
+    try:
+        sb.plot.plot_style(name)
+        with figure_style():
+            figure = new_figure("single", 60.0)
+            text = figure.text(0.5, 0.5, "text")
+            assert 25.4 * figure.get_figwidth() == pytest.approx(width)
+            assert text.get_fontsize() == (12.0 if name == "talk" else 8.0)
+    finally:
+        sb.plot.plot_style("elsevier")
+    with figure_style():
+        assert 25.4 * new_figure("double").get_figwidth() == pytest.approx(190.0)
+    with pytest.raises(sb.InputError, match="name"):
+        sb.plot.plot_style("nature")

@@ -32,6 +32,7 @@ from snapbeam.solver.registry import resolve
 from snapbeam.solver.statistics import statistics_of
 from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates, perturbed_start
 from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.provenance import canonical_json
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, flag, integer, nonnegative, shown
 
@@ -886,6 +887,7 @@ def fixed_parameters(flow: Flow, *varied: str) -> dict[str, Any]:
         "modes": model.modes,
         "length_scale": model.length_scale,
         "reference_frequency": model.reference_frequency,
+        "system": canonical_json(system.to_mapping()),
     }
     if model.beam is not None:
         attrs |= {

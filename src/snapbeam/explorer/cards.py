@@ -14,7 +14,7 @@ import panel as pn
 from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
-from snapbeam import InputError, Integration, ResponseClass, System, write_netcdf
+from snapbeam import InputError, Integration, ResponseClass, RunStatus, System, write_netcdf
 from snapbeam.explorer.address import Address, number
 from snapbeam.explorer.jobs import (
     UPLOAD,
@@ -27,6 +27,7 @@ from snapbeam.explorer.jobs import (
 )
 from snapbeam.explorer.map_view import MapView
 from snapbeam.explorer.maps import (
+    NOT_COMPUTED,
     Plane,
     Point,
     Scatter,
@@ -300,13 +301,13 @@ class MapCard:
     def _make_controls(self, address: Address) -> None:
         source = self.source
         dims, names = source.dims, source.variables()
-        x = address.x if address.x in dims else dims[0]
-        upward = [name for name in ("velocity_amplitude", "location") if name in dims and name != x]
-        y = (
-            address.y
-            if address.y in dims and address.y != x
-            else next(iter([*upward, *(n for n in dims if n != x)]))
-        )
+        sizes = {name: source.coordinate(name) for name in dims}
+        longest = sorted(dims, key=lambda name: (sizes[name].dtype.kind != "f", -sizes[name].size))
+        best = (
+            sorted(longest[:2], key=dims.index) + longest[2:]
+        )  # the longest continuous axes, in the map's order
+        x = address.x if address.x in dims else next(name for name in best if name != address.y)
+        y = address.y if address.y in dims and address.y != x else next(name for name in best if name != x)
         if (address.x and address.x not in dims) or (address.y and address.y not in dims):
             self._words.append(f"address: this map's axes are {', '.join(dims)}")
         show = address.show if address.show in names else names[0]
@@ -690,8 +691,8 @@ class MapCard:
         place, found = self.plane.index(x, y), {}
         if not self.plane.at(*place).values == point.values:
             return {}
-        for each in {"response_class", "zero_crossings", "peak_force", self.show.value} & set(
-            self.source.variables()
+        for each in {"response_class", "status", "zero_crossings", "peak_force", self.show.value} & set(
+            self.source.numbers()
         ):
             try:
                 values = self.plane.values(each)
@@ -703,6 +704,9 @@ class MapCard:
 
     def _readout(self, point: Point, held: dict[str, Any]) -> Markup:
         parts = [point.words()]
+        if held.get("status") == RunStatus.NOT_RUN:
+            parts.append(NOT_COMPUTED)
+            held = {}
         if "response_class" in held:
             parts.append(Markup("<b>{}</b>").format(ResponseClass(int(held["response_class"])).label))
         for each in dict.fromkeys((self.show.value, "zero_crossings", "peak_force")):
@@ -729,8 +733,12 @@ def _span(values: NDArray[Any]) -> tuple[float, float]:
 
 _SECTIONS = {
     "beam": "Beam", "model": "Reduced model", "contact": "Contact", "striker": "Striker", "drive": "Drive",
+    "base_excitation": "Base excitation", "axial_load": "Axial load", "force": "External force",
+    "local_force": "Local force", "harvester": "Harvester", "boundary": "Supports", "imperfection": "Imperfection",
     "integration": "Integration",
 }  # fmt: skip
+_ALWAYS = ("beam", "model", "integration")
+"""Sections of which all parameters have a field; of contact and drive if there is a striker, else those that are set."""
 _INTEGRATION = (
     "integration.cycles",
     "integration.accuracy",
@@ -797,15 +805,20 @@ class SystemCard:
     # ------------------------------------------------------------------ fields
 
     def _rows(self) -> list[Parameter]:
-        drive = str(self.system.parameters.get("drive.type", "sine"))
-        kinds = {"contact": self.law.value, "drive": drive}
+        held = self.system.parameters
+        kinds = {"contact": self.law.value, "drive": str(held.get("drive.type", "sine"))}
+        whole = (*_ALWAYS, *(kinds if self.system.contacts else ()))
         return [
             row
             for row in parameters().values()
-            if (not row.kinds or kinds.get(row.section) in row.kinds)
-            and row.quantity.kind in (float, int, str, bool)
+            if row.quantity.kind in (float, int, str, bool)
             and (row.section != "integration" or row.name in _INTEGRATION)
             and _group(row) in _SECTIONS
+            and (
+                not row.kinds or kinds.get(row.section) in row.kinds
+                if row.section in whole
+                else row.name in held
+            )
         ]
 
     def fill(self, keep: bool = False) -> None:
@@ -835,7 +848,7 @@ class SystemCard:
             parts: list[Any] = []
             for section, title in _SECTIONS.items():
                 fields = [self.fields[row.name] for row in rows if _group(row) == section]
-                if section == "contact":
+                if section == "contact" and self.system.contacts:
                     fields = [self.law, *fields]
                 if fields:
                     parts += [Html(_HEADING.format(title), margin=0), pn.FlexBox(*fields, margin=0)]
@@ -1140,12 +1153,15 @@ class TakeCard:
         return run
 
     def _picture(self, of: str) -> None:
+        from snapbeam.plot.map import plot_points, plot_response_map, plot_statistic
+        from snapbeam.plot.run import plot_run
+
         suffix = f".{self.kind.value}"
         if of == "run":
             run = self._run()
             if run is not None:
                 window = self.page.runs[self.page.which].window
-                self._make("run", suffix, lambda path, _: _draw_run(run, window, path))
+                self._make("run", suffix, lambda path, _: _draw(plot_run, run.dataset, window, path=path))
             return
         try:
             cut = self._cut()
@@ -1156,12 +1172,16 @@ class TakeCard:
         dots = self.page.card.dots if "dots" in self.page.card.layers.value else None
         name = self.page.card.show.value
         label = name if name != "response_class" else "map"
+        painter: Callable[..., Any] = plot_statistic
+        options: dict[str, Any] = {"name": name}
+        overlay = {"quasi_static_line": quasi, "measurements": dots}
+        plane = self.page.card.plane
         if self.page.card.source.is_list:
-            plane = self.page.card.plane
-            along = str(plane.x.name), str(plane.y.name)
-            self._make(label, suffix, lambda path, _: _draw_points(cut, name, along, quasi, dots, path))
-            return
-        self._make(label, suffix, lambda path, _: _draw_map(cut, name, quasi, dots, path))
+            painter = plot_points
+            options |= {"across": str(plane.x.name), "upward": str(plane.y.name)} | overlay
+        elif name == "response_class":
+            painter, options = plot_response_map, overlay
+        self._make(label, suffix, lambda path, _: _draw(painter, cut, path=path, **options))
 
     def _cut(self) -> xr.Dataset:
         """The map over the two axes that are shown; of a system without a map, its finest window."""
@@ -1289,47 +1309,18 @@ def _posted(page: Page, work: Callable[[], None]) -> Callable[[Any], None]:
     return lambda _: page.post(work)
 
 
-def _draw_run(run: Run, window: tuple[float, float], path: Any) -> None:
-    from snapbeam.plot.run import plot_run
-    from snapbeam.plot.style import save_figure
-
-    with drawing:
-        _save(save_figure, plot_run(run.dataset, window), path)
-
-
-def _draw_map(cut: xr.Dataset, name: str, quasi: bool, dots: Any, path: Any) -> None:
-    from snapbeam.plot.map import plot_response_map, plot_statistic
-    from snapbeam.plot.style import save_figure
-
-    with drawing:
-        if name == "response_class":
-            ax = plot_response_map(cut, quasi_static_line=quasi, measurements=dots)
-        else:
-            ax = plot_statistic(cut, name)
-        _save(save_figure, ax, path)
-
-
-def _draw_points(
-    cut: xr.Dataset, name: str, along: tuple[str, str], quasi: bool, dots: Any, path: Any
-) -> None:
-    from snapbeam.plot.map import plot_points
-    from snapbeam.plot.style import save_figure
-
-    with drawing:
-        ax = plot_points(
-            cut, name, across=along[0], upward=along[1], measurements=dots, quasi_static_line=quasi
-        )
-        _save(save_figure, ax, path)
-
-
-def _save(save_figure: Any, drawn: Any, path: Any) -> None:
+def _draw(painter: Callable[..., Any], *given: Any, path: Any, **options: Any) -> None:
+    """Write the figure that a function draws; one thread at a time may draw."""
     import matplotlib.pyplot as plt
 
-    figure = drawn.get_figure(root=True) if hasattr(drawn, "get_figure") else drawn
-    try:
-        save_figure(figure, path)
-    finally:
-        plt.close(figure)
+    from snapbeam.plot.style import save_figure
+
+    with drawing:
+        figure = painter(*given, **options).get_figure(root=True)
+        try:
+            save_figure(figure, path)
+        finally:
+            plt.close(figure)
 
 
 def window_dataset(window: Any) -> xr.Dataset:

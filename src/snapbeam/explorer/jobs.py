@@ -13,41 +13,23 @@ import time
 import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import panel as pn
 from bokeh.models import ColumnDataSource, CustomJS
 
 import snapbeam as sb
 from snapbeam import CheckpointError, InputError, Integration, Run, RunStatus, System
 
 __all__ = [
-    "ADDRESS",
-    "BODY",
-    "CYCLES",
-    "MODES",
-    "NEIGHBOUR",
-    "RUN_SECONDS",
-    "SAMPLES",
-    "SESSIONS",
-    "UPLOAD",
-    "WINDOW_POINTS",
-    "Cancelled",
-    "Compiling",
-    "Downloads",
-    "Jobs",
-    "Token",
-    "Waiting",
-    "check_run",
-    "conditioned",
-    "drawing",
-    "file_bytes",
-    "samples_of",
-    "too_large",
-]
+    "ADDRESS", "BODY", "CYCLES", "MODES", "NEIGHBOUR", "RUN_SECONDS", "SAMPLES", "SESSIONS", "UPLOAD",
+    "WINDOW_POINTS", "Cancelled", "Compiling", "Downloads", "Jobs", "Tab", "Token", "Waiting", "check_run",
+    "conditioned", "drawing", "file_bytes", "samples_of", "too_large",
+]  # fmt: skip
 
 
 _LOG = logging.getLogger("snapbeam.explorer")
@@ -377,6 +359,50 @@ def samples_of(system: System, integration: Integration) -> int | None:
     row = 8 * (4 * system.model.modes + 20)
     most = min(SAMPLES, SAMPLE_BYTES // row)
     return None if wanted <= most else most
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+class Tab:
+    """One tab of a browser, with a thread of its own on which its page is changed."""
+
+    def __init__(self) -> None:
+        self.doc = pn.state.curdoc
+        self.closed = False
+
+    def close(self) -> None:
+        """The tab is closed: compute nothing for it any more."""
+        self.closed = True
+
+    def post(self, work: Callable[[], None]) -> None:
+        """Do something on the page's own thread, unless the page is closed."""
+        if self.closed or self.doc is None:
+            return
+
+        def guarded() -> None:
+            if not self.closed:
+                with self._together():
+                    work()
+
+        with suppress(Exception):  # the page was closed between the two lines
+            self.doc.add_next_tick_callback(guarded)
+
+    def later(self, work: Callable[[], None], milliseconds: int) -> None:
+        """Do something a little later."""
+
+        def guarded() -> None:
+            if not self.closed:
+                with self._together():
+                    work()
+
+        if not self.closed and self.doc is not None:
+            self.doc.add_timeout_callback(guarded, milliseconds)
+
+    def _together(self) -> AbstractContextManager[None]:
+        """Context that sends all changes to the browser at once."""
+        held: AbstractContextManager[None] = pn.io.hold(self.doc)
+        return held
 
 
 # ----------------------------------------------------------------------------------------------------

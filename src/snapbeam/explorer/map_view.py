@@ -158,7 +158,7 @@ class MapView:
                 if axis.log:
                     getattr(self.plot, f"extra_{name}_scales")["unit"] = LogScale()
                 style_axis(made, self.look)
-                self.plot.add_layout(made, place)
+                getattr(self.plot, place).insert(0, made)  # nearer than a colour bar
                 self.physical[name] = made
                 scaled = ColumnDataSource({"factor": [factor]}, name=f"map-unit-{name}")
                 made.tags = [scaled]

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from snapbeam import (
     InputTypeError,
     Integration,
     ResponseClass,
+    RunStatus,
     RunSummary,
     System,
     sweep,
@@ -31,8 +32,10 @@ from snapbeam import (
 from snapbeam.explorer.jobs import WINDOW_POINTS, Jobs, Token, check_run
 from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, to_physical
 from snapbeam.model.parameter_file import config_from_mapping, config_text
+from snapbeam.model.parameters import parameters
 from snapbeam.model.quantity import split_name
 from snapbeam.plot.axes import edges_of, is_geometric, positions
+from snapbeam.plot.dataset import figures_of
 from snapbeam.sweeps.points import ratios_of
 from snapbeam.util.netcdf import read_result, split_group
 
@@ -40,46 +43,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "POINT",
-    "Axis",
-    "CheckpointSource",
-    "DatasetSource",
-    "FileSource",
-    "MapLayer",
-    "Picture",
-    "Plane",
-    "Point",
-    "Scatter",
-    "Source",
-    "SystemSource",
-    "Window",
-    "chances",
-    "compared",
-    "compute",
-    "difference",
-    "drawn_shares",
-    "integration_of",
-    "known_cells",
-    "layers_of",
-    "map_command",
-    "opened",
-    "parameter_dims",
-    "parameter_name",
-    "parameter_of",
-    "patched",
-    "picture",
-    "plain",
-    "plain_symbol",
-    "planned",
-    "python_lines",
-    "run_command",
-    "sections_of",
-    "system_from",
-    "system_of",
-    "system_toml",
-    "values_of",
-    "visible_strides",
-]
+    "NOT_COMPUTED", "POINT", "Axis", "CheckpointSource", "DatasetSource", "MapLayer", "Picture", "Plane",
+    "Point", "ResultSource", "Scatter", "Source", "SystemSource", "Window", "chances", "compared",
+    "compute", "difference", "drawn_shares", "integration_of", "known_cells", "layers_of", "map_command",
+    "opened", "parameter_dims", "parameter_name", "parameter_of", "patched", "picture", "plain",
+    "plain_symbol", "planned", "python_lines", "run_command", "sections_of", "started", "system_from",
+    "system_of", "system_toml", "values_of", "visible_strides",
+]  # fmt: skip
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -212,6 +182,11 @@ def _number(value: Any) -> str:
 # ----------------------------------------------------------------------------------------------------
 
 
+_SMALL = 2**25
+"""Size of a map up to which it is read completely with its first point, bytes."""
+_Data = TypeVar("_Data", "xr.Dataset", "xr.DataArray")
+
+
 class Source:
     """A map: its coordinates and attributes, and its variables when they are asked for.
 
@@ -229,6 +204,8 @@ class Source:
     skeleton: xr.Dataset
     version = 0
     growing = False
+    _reading = threading.RLock()
+    """Held while a file is read."""
 
     @property
     def attrs(self) -> dict[str, Any]:
@@ -303,17 +280,23 @@ class Source:
         return None if layer is None else self.variable(layer.variable).isel(layer.where)
 
     def variable(self, name: str) -> xr.DataArray:
-        """A variable as the dataset has it, in memory."""
-        return self.skeleton[name]
+        """A variable as the dataset has it, read from its file the first time."""
+        return self._read(self.skeleton[name])
+
+    def _read(self, part: _Data) -> _Data:
+        try:
+            with self._reading:
+                return part.load()
+        except (OSError, ValueError, RuntimeError) as error:
+            raise InputError(f"{self.name}: cannot be read ({error})") from error
 
     def point(self, where: Mapping[str, int]) -> dict[str, Any]:
-        """All that the map holds of one point, by name."""
-        return self._numbers_of(self.skeleton, where)
-
-    def _numbers_of(self, dataset: xr.Dataset, where: Mapping[str, int]) -> dict[str, Any]:
-        inside = {name: at for name, at in where.items() if name in dataset.dims}
+        """All that the map holds of one point, by name; of a large file only that is read."""
+        if self.skeleton.nbytes <= _SMALL:
+            self._read(self.skeleton)
+        inside = {name: at for name, at in where.items() if name in self.skeleton.dims}
         names = dict.fromkeys(layer.variable for layer in self.layers.values())
-        part = dataset[list(names)].isel(inside).load()
+        part = self._read(self.skeleton[list(names)].isel(inside))
         return {
             name: (
                 part[layer.variable].isel(layer.where) if layer.where else part[layer.variable]
@@ -323,7 +306,7 @@ class Source:
 
     def whole(self) -> xr.Dataset:
         """All of the map, in memory."""
-        return self.skeleton
+        return self._read(self.skeleton)
 
     def refresh(self) -> bool:
         """Look whether there is more; True if there is."""
@@ -334,24 +317,41 @@ class DatasetSource(Source):
     """A map in memory."""
 
     def __init__(self, dataset: xr.Dataset, name: str = "map") -> None:
-        if not layers_of(dataset) or len(_axes_of(dataset)) < 2:
-            raise InputError(f"{name}: {_other_kind(dataset)}")
+        if not is_map(dataset):
+            raise InputError(f"{name}: must be a map over two parameters")
         self.skeleton = dataset
         self.name = name
 
 
-def _other_kind(dataset: xr.Dataset) -> str:
-    """Say of a dataset that is not a map which kind of result it is."""
-    from snapbeam.plot.dataset import figures_of
-
+def is_map(dataset: xr.Dataset) -> bool:
+    """Return whether a dataset has numbers over two parameters, and no figure of its own that shows more."""
     try:
-        kind, _ = figures_of(dataset)
-    except (InputError, ValueError, KeyError, IndexError, TypeError):
-        known = ", ".join(map(str, dataset.data_vars)) or "none"
-        return f"must be a map; it has no variable over swept parameters among {known}"
-    if kind == "map":
-        return "must be a map over parameters; neither its axes nor its coordinates name two of them"
-    return f"must be a map, and is a {kind}; draw it with snapbeam plot, or ds.snapbeam.plot()"
+        kind = figures_of(dataset)[0]
+    except InputError:
+        kind = "map"
+    return kind in _MAPS and bool(layers_of(dataset)) and len(_axes_of(dataset)) > 1
+
+
+_MAPS = ("map", "probability map", "lifetimes")
+
+
+class ResultSource(Source):
+    """A result that is no map: what ``snapbeam plot`` draws of it, and its run if it is one.
+
+    Raises
+    ------
+    InputError
+        If it is no result that has a figure.
+    """
+
+    def __init__(self, dataset: xr.Dataset, name: str = "result", run: sb.Run | None = None) -> None:
+        try:
+            self.kind, self.figures = figures_of(dataset)
+        except InputError as error:
+            raise InputError(f"{name}: {str(error).partition(': ')[2]}") from None
+        if not self.figures or self.kind in _MAPS[:1]:
+            raise InputError(f"{name}: a {self.kind} needs two parameters in its axes or coordinates")
+        self.skeleton, self.name, self.run = dataset, name, run
 
 
 class SystemSource(Source):
@@ -369,77 +369,6 @@ class SystemSource(Source):
             return names
         each = [f"{name}_contact_{number}" for number in range(1, self.strikers + 1) for name in names]
         return names + [name for name in each if name in STATISTICS]
-
-
-_SMALL = 2**25
-"""Size of a map up to which it is loaded completely on the first access, bytes."""
-
-
-class FileSource(DatasetSource):
-    """A map in a NetCDF file, of which a variable is read when it is first shown."""
-
-    def __init__(self, path: Path) -> None:
-        self._given, self._path = path, split_group(path)[0]
-        self._lock = threading.Lock()
-        self._all: xr.Dataset | None = None
-        self._held: dict[str, xr.DataArray] = {}
-        with self._open() as dataset:
-            self._stamp = self._stamped()
-            super().__init__(dataset.drop_vars([]), path.name)
-            coords = dataset.coords.to_dataset().load()
-            self.skeleton = coords.assign({
-                name: (item.dims, _unread(item), item.attrs) for name, item in dataset.data_vars.items()
-            }).assign_attrs(dataset.attrs)  # fmt: skip
-
-    def _stamped(self) -> tuple[int, int]:
-        found = self._path.stat()
-        return found.st_mtime_ns, found.st_size
-
-    def _open(self) -> xr.Dataset:
-        if not self._path.is_file():
-            raise InputError(f"{self._path.name}: there is no such file any more")
-        return read_result(self._given, "map", lazily=True)
-
-    def variable(self, name: str) -> xr.DataArray:
-        """A variable, read from the file the first time."""
-        with self._lock:
-            if name not in self._held:
-                with self._open() as dataset:
-                    if self._stamped() != self._stamp:
-                        raise InputError(f"{self.name}: the file was changed; load the page again")
-                    try:
-                        self._held[name] = dataset[name].load()
-                    except (OSError, ValueError, RuntimeError) as error:
-                        raise InputError(f"{self.name}: {name} cannot be read ({error})") from error
-            return self._held[name]
-
-    def point(self, where: Mapping[str, int]) -> dict[str, Any]:
-        """All that the file holds of one point; of a large file only that is read, each time."""
-        if self.skeleton.nbytes <= _SMALL:
-            if self._all is None:
-                self._all = self.whole()
-            elif not self._path.is_file():
-                raise InputError(f"{self._path.name}: there is no such file any more")
-            elif self._stamped() != self._stamp:
-                raise InputError(f"{self.name}: the file was changed; load the page again")
-            return self._numbers_of(self._all, where)
-        with self._lock, self._open() as dataset:
-            if self._stamped() != self._stamp:
-                raise InputError(f"{self.name}: the file was changed; load the page again")
-            try:
-                return self._numbers_of(dataset, where)
-            except (OSError, ValueError, RuntimeError) as error:
-                raise InputError(f"{self.name}: cannot be read ({error})") from error
-
-    def whole(self) -> xr.Dataset:
-        """All of the map, read now."""
-        with self._lock, self._open() as dataset:
-            if self._stamped() != self._stamp:
-                raise InputError(f"{self.name}: the file was changed; load the page again")
-            try:
-                return dataset.load()
-            except (OSError, ValueError, RuntimeError) as error:
-                raise InputError(f"{self.name}: cannot be read ({error})") from error
 
 
 def _axes_of(skeleton: xr.Dataset) -> list[str]:
@@ -464,9 +393,38 @@ def _axes_of(skeleton: xr.Dataset) -> list[str]:
     return [*found, *spare[: max(2 - len(found), 0)]]
 
 
-def _unread(item: xr.DataArray) -> NDArray[Any]:
-    """Stands for numbers that are not read: of the right shape and kind, and of no size in memory."""
-    return np.broadcast_to(np.zeros((), item.dtype), item.shape)
+def default_axes(system: System) -> dict[str, Any]:
+    """Two axes over a system: frequency and amplitude of its excitation, else the first parameters that it has.
+
+    Raises
+    ------
+    InputError
+        If a run of the system has fewer than two parameters.
+    """
+    from snapbeam.model.parameter_axes import parse_axis
+    from snapbeam.model.parameter_file import DEFAULT_AXES
+
+    if DEFAULT_AXES.keys() <= system.parameters.keys():
+        return {name: parse_axis(name, text) for name, text in DEFAULT_AXES.items()}
+    rows = [
+        row
+        for row in parameters().values()
+        if row.name in system.parameters
+        and row.is_run
+        and row.quantity.kind is float
+        and not row.short.endswith("phase")
+    ]
+    rows.sort(key=lambda row: (not row.name.endswith("frequency_ratio"), "amplitude" not in row.name))
+    if len(rows) < 2:
+        raise InputError(
+            "system: has no two parameters of a run, such as an excitation, for the axes of a map"
+        )
+    axes = {}
+    for row in rows[:2]:
+        value = float(system.parameters[row.name]) or 1.0
+        low, high = sorted((0.1 * value, min(3.0 * value, row.quantity.high)))
+        axes[row.name] = np.linspace(low, high, 40)
+    return axes
 
 
 def axes_dataset(system: System, axes: Mapping[str, Any], integration: Integration) -> xr.Dataset:
@@ -490,7 +448,7 @@ def axes_dataset(system: System, axes: Mapping[str, Any], integration: Integrati
         "modes": system.model.modes,
         "cycles": integration.cycles_or_default,
         "reference_frequency": system.model.reference_frequency,
-        "system": json.dumps(_plain(system.to_mapping())),
+        "system": json.dumps(plain(system.to_mapping())),
         "integration": json.dumps(integration_mapping(integration)),
         "snapbeam_version": "",
     }
@@ -505,9 +463,10 @@ def integration_mapping(integration: Integration) -> dict[str, Any]:
     return {name: value for name, value in found.items() if name != "threads"}
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Plain values of sections, without what follows from others."""
     if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items() if item is not None}
+        return {key: plain(item) for key, item in value.items() if item is not None}
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     return value
@@ -518,28 +477,29 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
 
     Parameters
     ----------
-    what : path, xarray.Dataset, System or None
-        A NetCDF file or a checkpoint; a map; a system; nothing, for the paper's beam or *system*.
+    what : path, xarray.Dataset, Run, System or None
+        A NetCDF file or a checkpoint; a result; a system; nothing, for the paper's beam or *system*.
     system, integration : optional
         What a map is computed of, where there is none.
 
     Raises
     ------
     InputError
-        If it cannot be read, or is no map.
+        If it cannot be read, or is no result that has a view.
     """
     from snapbeam.util.datasets import xr
 
     if what is None or isinstance(what, System):
-        from snapbeam.model.parameter_axes import parse_axis
-        from snapbeam.model.parameter_file import DEFAULT_AXES, Config
+        from snapbeam.model.parameter_file import Config
 
         chosen = what or system or Config().system
-        axes = {name: parse_axis(name, text) for name, text in DEFAULT_AXES.items()}
+        axes = default_axes(chosen)
         name = "the paper's beam" if what is None and system is None else "a system"
         return SystemSource(chosen, axes, integration or Integration(), name)
+    if isinstance(what, sb.Run):
+        return ResultSource(what.dataset, "run", what)
     if isinstance(what, xr.Dataset):
-        return DatasetSource(what)
+        return DatasetSource(what) if is_map(what) else ResultSource(what)
     if isinstance(what, (str, Path)):
         path = Path(what)
         try:
@@ -550,9 +510,13 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
             return CheckpointSource(path)
         if not split_group(path)[0].exists():
             raise InputError(f"map = {str(path)!r}: there is no such file or checkpoint")
-        return FileSource(path)
+        dataset = read_result(path, "map", lazily=True)
+        if is_map(dataset):
+            return DatasetSource(dataset, path.name)
+        run = sb.load(path) if "snapbeam_system" in dataset.attrs else None
+        return ResultSource(dataset.load() if run is None else run.dataset, path.name, run)
     raise InputTypeError(
-        f"map is a {type(what).__name__}: must be a map, a file, a checkpoint, a System, or None"
+        f"map is a {type(what).__name__}: must be a result, a file, a checkpoint, a System, or None"
     )
 
 
@@ -647,11 +611,17 @@ def parameter_of(skeleton: xr.Dataset, name: str) -> str:
     return parameter_of_axis(str(attrs.get("parameter", name))).name
 
 
+NOT_COMPUTED = "the map has no result here yet"
+"""Text of a cell that is not computed, as in an unfinished checkpoint."""
+
+
 def compared(expected: Mapping[str, Any], outcome: RunSummary, engine: str) -> tuple[bool, str]:
     """Return whether a run is bitwise equal to the values of a map, and a message."""
     expected = {name: value for name, value in expected.items() if name in outcome}
     if not expected:
         return True, ""
+    if expected.get("status") == RunStatus.NOT_RUN:
+        return True, NOT_COMPUTED
     differing = []
     for name, value in expected.items():
         found = outcome[name]
@@ -667,7 +637,7 @@ def compared(expected: Mapping[str, Any], outcome: RunSummary, engine: str) -> t
 
 
 def _why(expected: Mapping[str, Any], engine: str) -> str:
-    if int(expected.get("status", 0)) == 6:
+    if expected.get("status") == RunStatus.FILLED:
         return ": the map inferred it from its neighbours"
     if engine == "cuda":
         return ": the map was computed by another engine"
@@ -831,13 +801,13 @@ def picture(
 
 
 @dataclass(frozen=True, eq=False)
-class Plane:
-    """A cut through a map.
+class _Cut:
+    """A source along two axes.
 
     Attributes
     ----------
     x, y : Axis
-        Across and upward.
+        Across and upward; of a list, ``at`` are the places of the points, in the order of the list.
     fixed : dict of str to int
         Which point of each other axis.
     """
@@ -846,6 +816,27 @@ class Plane:
     x: Axis
     y: Axis
     fixed: dict[str, int]
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Dotted names of the two axes."""
+        return parameter_of(self.source.skeleton, self.x.name), parameter_of(
+            self.source.skeleton, self.y.name
+        )
+
+    @staticmethod
+    def check(source: Source, x: str, y: str) -> None:
+        """Refuse (InputError) names that are no two axes of a source."""
+        for name in (x, y):
+            if name not in source.dims:
+                raise InputError(f"{name}: is no axis of this map, whose axes are {', '.join(source.dims)}")
+        if x == y:
+            raise InputError(f"{x}: stands along both axes")
+
+
+@dataclass(frozen=True, eq=False)
+class Plane(_Cut):
+    """A cut through a map."""
 
     @classmethod
     def of(cls, source: Source, x: str, y: str, fixed: dict[str, int]) -> Plane:
@@ -856,20 +847,9 @@ class Plane:
         InputError
             If it has no such axes.
         """
-        for name in (x, y):
-            if name not in source.dims:
-                raise InputError(f"{name}: is no axis of this map, whose axes are {', '.join(source.dims)}")
-        if x == y:
-            raise InputError(f"{x}: stands along both axes")
+        cls.check(source, x, y)
         others = {name: fixed.get(name, 0) for name in source.dims if name not in (x, y)}
         return cls(source, Axis.of(source, x), Axis.of(source, y), others)
-
-    @property
-    def names(self) -> tuple[str, str]:
-        """Dotted names of the two axes."""
-        return parameter_of(self.source.skeleton, self.x.name), parameter_of(
-            self.source.skeleton, self.y.name
-        )
 
     def values(self, name: str) -> NDArray[Any] | None:
         """A variable on the cut, of shape (y, x)."""
@@ -890,7 +870,7 @@ class Plane:
     def fixed_values(self) -> dict[str, Any]:
         """The values of the other axes, by dotted name, and of axes of one point."""
         found = {
-            parameter_of(self.source.skeleton, name): _plain_plane(self.source.coordinate(name)[at])
+            parameter_of(self.source.skeleton, name): plain(self.source.coordinate(name)[at])
             for name, at in self.fixed.items()
         }
         for name in map(str, self.source.skeleton.dims):
@@ -899,15 +879,13 @@ class Plane:
                 and name not in (self.x.name, self.y.name)
                 and parameter_name(self.source.skeleton, name) is not None
             ):
-                found[parameter_of(self.source.skeleton, name)] = _plain_plane(
-                    self.source.coordinate(name)[0]
-                )
+                found[parameter_of(self.source.skeleton, name)] = plain(self.source.coordinate(name)[0])
         return found
 
     def at(self, row: int, column: int) -> Point:
         """The point of the map in a cell, without what the map holds of it."""
         across, upward = self.names
-        values = {across: _plain_plane(self.x.points[column]), upward: _plain_plane(self.y.points[row])}
+        values = {across: plain(self.x.points[column]), upward: plain(self.y.points[row])}
         return Point(values | self.fixed_values())
 
     def indexers(self, row: int, column: int) -> dict[str, int]:
@@ -960,28 +938,13 @@ class Plane:
         return all(parameter_of_axis(name).quantity.kind is float for name in self.names)
 
 
-def _plain_plane(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
-
-
 # ----------------------------------------------------------------------------------------------------
 # A list of points over two of its parameters: each point stands where its own values are.
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter:
-    """A list of points seen along two of its parameters; it has the interface of a cut through a grid.
-
-    Attributes
-    ----------
-    x, y : Axis
-        Across and upward; their ``at`` are the places of the points, in the order of the list.
-    """
-
-    source: Source
-    x: Axis
-    y: Axis
-    fixed: dict[str, int]
+class Scatter(_Cut):
+    """A list of points seen along two of its parameters; it has the interface of a cut through a grid."""
 
     @classmethod
     def of(cls, source: Source, x: str, y: str) -> Scatter:
@@ -992,21 +955,9 @@ class Scatter:
         InputError
             If its points have no such parameters.
         """
-        for name in (x, y):
-            if name not in source.dims:
-                raise InputError(
-                    f"{name}: is no parameter of these points, which are {', '.join(source.dims)}"
-                )
-        if x == y:
-            raise InputError(f"{x}: stands along both axes")
+        cls.check(source, x, y)
         size = source.skeleton.sizes[POINT]
         return cls(source, Axis.scattered(source, x, size), Axis.scattered(source, y, size), {})
-
-    @property
-    def names(self) -> tuple[str, str]:
-        """Dotted names of the two axes."""
-        skeleton = self.source.skeleton
-        return parameter_of(skeleton, self.x.name), parameter_of(skeleton, self.y.name)
 
     @property
     def parameters(self) -> list[str]:
@@ -1098,7 +1049,6 @@ class CheckpointSource(DatasetSource):
         self._path = path
         self._stamp = self._stamped()
         super().__init__(sb.read_checkpoint(path), path.name)
-        self._read = time.monotonic()
 
     def _stamped(self) -> tuple[int, int]:
         try:
@@ -1532,18 +1482,6 @@ def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) 
 _CONFIG = "system.toml"
 
 
-def plain(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """A system's sections as plain values, without what follows from others."""
-    return {
-        section: {
-            name: value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
-            for name, value in values.items()
-            if value is not None
-        }
-        for section, values in sections.items()
-    }
-
-
 def _integration_section(integration: Integration) -> dict[str, Any]:
     default = integration_mapping(Integration())
     return {
@@ -1574,6 +1512,12 @@ def system_from(sections: Mapping[str, Any], name: str = "sections") -> tuple[Sy
         system = System.from_mapping(system.to_mapping() | {"initial_state": start})
     check_run(system, integration)
     return system, integration
+
+
+def started(sections: Mapping[str, Any], state: Mapping[str, float]) -> System:
+    """The system of some sections, started from a *state* of amplitudes and velocities by name."""
+    own = {section: values for section, values in sections.items() if section != "initial_state"}
+    return config_from_mapping(own | {"initial_state": dict(state)}).system
 
 
 def difference(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ from snapbeam.explorer.jobs import (
     ADDRESS,
     RUN_SECONDS,
     Downloads,
+    Tab,
     Token,
     Waiting,
     check_run,
@@ -116,7 +116,7 @@ _LONGEST = 1.0
 """Seconds for which the rest of a run waits until its first look has been sent."""
 
 
-class Page:
+class Page(Tab):
     """Content of one tab of a browser.
 
     Parameters
@@ -128,9 +128,8 @@ class Page:
     """
 
     def __init__(self, shared: Shared, arguments: dict[str, list[bytes]]) -> None:
+        super().__init__()
         self.shared = shared
-        self.doc = pn.state.curdoc
-        self.closed = False
         self.address = Address.read(arguments)
         self.look: Look = look_of(self.address.theme, lecture=self.address.type == "large")
         self.card = MapCard(self.look, shared, self.address, self.post, self.later)
@@ -218,40 +217,9 @@ class Page:
             self._take.refresh()
         return self._take
 
-    # ------------------------------------------------------------------ the page's own thread
-
-    def post(self, work: Callable[[], None]) -> None:
-        """Do something on the page's own thread, unless the page is closed."""
-        if self.closed or self.doc is None:
-            return
-
-        def guarded() -> None:
-            if not self.closed:
-                with self._together():
-                    work()
-
-        with contextlib.suppress(Exception):  # the page was closed between the two lines
-            self.doc.add_next_tick_callback(guarded)
-
-    def later(self, work: Callable[[], None], milliseconds: int) -> None:
-        """Do something a little later."""
-
-        def guarded() -> None:
-            if not self.closed:
-                with self._together():
-                    work()
-
-        if not self.closed and self.doc is not None:
-            self.doc.add_timeout_callback(guarded, milliseconds)
-
-    def _together(self) -> contextlib.AbstractContextManager[None]:
-        """Context that sends all changes to the browser at once."""
-        held: contextlib.AbstractContextManager[None] = pn.io.hold(self.doc)
-        return held
-
     def close(self) -> None:
         """The tab is closed: compute nothing for it any more."""
-        self.closed = True
+        super().close()
         self.card.control.cancel("")
         for token in self._tokens:
             if token is not None:

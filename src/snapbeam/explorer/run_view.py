@@ -13,6 +13,7 @@ from bokeh.models import (
     CustomJS,
     DataTable,
     Label,
+    LegendItem,
     NumberFormatter,
     Range1d,
     Select,
@@ -41,27 +42,17 @@ from snapbeam.explorer.style import (
     sheet,
     styled,
 )
+from snapbeam.util.si_prefixes import scale_of
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from snapbeam import ReducedModel, Run
 
 __all__ = [
-    "BeamPanel",
-    "Energy",
-    "Impacts",
-    "Modal",
-    "Numbers",
-    "Phase",
-    "RunPanel",
-    "RunView",
-    "Spectrum",
-    "WaveformPanel",
-    "across",
-    "amplitude_spectrum",
-    "envelope",
-    "round_trip",
-    "within",
-]
+    "BeamPanel", "Energy", "Impacts", "Modal", "Numbers", "Phase", "RunPanel", "RunView", "Spectrum",
+    "WaveformPanel", "across", "amplitude_spectrum", "envelope", "round_trip", "within",
+]  # fmt: skip
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -162,11 +153,15 @@ for (let i = 0; i < M; i++) {
 const top = new Float64Array(P), low = new Float64Array(P);
 for (let j = 0; j < P; j++) { top[j] = w[j] + h; low[j] = w[j] - h; }
 beam.data = {x: S.x, top: top, low: low};
-const tip = ((1 - s) * F.striker[a] + s * F.striker[b]) , f = F.force[a];
-const side = m.side[0], far = -side * m.reach[0], e = tip - side * h, r = m.tip[0];
-striker.data = {x: [[m.at[0] - r, m.at[0] - r, m.at[0], m.at[0] + r, m.at[0] + r]],
-                y: [[far, e - side * m.taper[0], e, e - side * m.taper[0], far]],
-                color: [f > 0 ? m.hot[0] : m.cold[0]]};
+const S_ = {x: [], y: [], color: []}, f = F.force[a], r = m.tip[0], K = m.at[0].length;
+for (let k = 0; k < K; k++) {
+  const at = m.at[0][k], side = m.side[0][k], tips = rods.data.tip;
+  const e = (1 - s) * tips[a * K + k] + s * tips[b * K + k] - side * h, far = -side * m.reach[0];
+  S_.x.push([at - r, at - r, at, at + r, at + r]);
+  S_.y.push([far, e - side * m.taper[0], e, e - side * m.taper[0], far]);
+  S_.color.push(rods.data.force[a * K + k] > 0 ? m.hot[0] : m.cold[0]);
+}
+striker.data = S_;
 words.text = "τ = " + u.toFixed(3) + (f > 0 ? "   in contact, " + f.toPrecision(3) + " N" : "");
 """
 _PLAY = """
@@ -223,9 +218,8 @@ class BeamPanel(RunPanel):
         self.fresh = True
         self.count = 0
         empty: list[float] = []
-        self.frames = ColumnDataSource(
-            {"t": empty, "striker": empty, "force": empty}, name=self.named("frames")
-        )
+        self.frames = ColumnDataSource({"t": empty, "force": empty}, name=self.named("frames"))
+        self.rods = ColumnDataSource({"tip": empty, "force": empty}, name=self.named("rods"))
         self.amplitudes = ColumnDataSource({"q": empty})
         self.modes, self.shapes = ColumnDataSource({"phi": empty}), ColumnDataSource({"x": empty})
         self.meta = ColumnDataSource({"modes": [0]}, name=self.named("beam-meta"))
@@ -262,7 +256,7 @@ class BeamPanel(RunPanel):
         self.plot.add_layout(words)
         self.cursor.follow(
             _DRAW, self.meta, frames=self.frames, shapes=self.shapes, amplitudes=self.amplitudes, modes=self.modes,
-            meta=self.meta, beam=beam, striker=striker, words=words,
+            meta=self.meta, beam=beam, striker=striker, rods=self.rods, words=words,
         )  # fmt: skip
         sheets = [sheet(look), _CONTROLS]
         toggle = Toggle(label="► Play", name=self.named("play"), width=90, stylesheets=sheets)
@@ -324,25 +318,25 @@ class BeamPanel(RunPanel):
         part = slice(inside.start, inside.stop, step)
         kept = min(model.modes, _MODES)
         scale = 1e3 * float(dataset.attrs["length_scale"])
-        force = (
-            dataset["contact_force"].values[part] if "contact_force" in dataset else np.zeros(x[part].size)
-        )
+        tips, forces = (
+            _columns_of(dataset, plural if plural in dataset else single)[part]
+            if single in dataset
+            else np.zeros((x[part].size, 0))
+            for single, plural in (
+                ("striker_displacement", "striker_displacements"), ("contact_force", "striker_forces")
+            )
+        )  # fmt: skip
         along = np.linspace(0.0, 1e3 * model.beam.length, _POSITIONS)
         self.modes.data = {"phi": (1e3 * _shapes(model, _POSITIONS)[:kept]).astype(np.float32).ravel()}
         self.shapes.data = {"x": along}
         self.amplitudes.data = {
             "q": dataset["modal_amplitude"].values[part, :kept].astype(np.float32).ravel()
         }
-        shown = (
-            dataset["striker_displacement"].values[part]
-            if "striker_displacement" in dataset
-            else np.full(x[part].size, -1e3)
-        )
-        self.frames.data = {
-            "t": x[part],
-            "striker": (scale * shown).astype(np.float64),
-            "force": np.nan_to_num(force),
+        self.rods.data = {
+            "tip": scale * tips.ravel(),
+            "force": np.nan_to_num(forces[:, : tips.shape[1]].ravel()),
         }
+        self.frames.data = {"t": x[part], "force": np.nan_to_num(forces).max(axis=1, initial=0.0)}
         self.reach = 1.35 * scale * max(1.0, float(np.nanmax(np.abs(dataset["midspan_displacement"].values))))
         if (
             self.fresh
@@ -376,12 +370,11 @@ class BeamPanel(RunPanel):
             "left": [-0.02 * length, length], "right": [0.0, 1.02 * length], "low": [-tall] * 2, "top": [tall] * 2
         }  # fmt: skip
         self.count += 1
-        striker = run.system.striker
-        location = 0.5 if striker is None else striker.location
-        side = 1 if striker is None or striker.side == "below" else -1
+        strikers = [contact.striker for contact in run.system.contacts]
         self.meta.data = {
-            "modes": [min(run.system.model.modes, _MODES)], "half": [0.5e3 * beam.thickness if true else 0.0], "begin": [self.begin], "at": [location * length],
-            "side": [side], "reach": [1e3 * half], "tip": [0.008 * length], "taper": [0.05 * half],
+            "modes": [min(run.system.model.modes, _MODES)], "half": [0.5e3 * beam.thickness if true else 0.0], "begin": [self.begin],
+            "at": [[each.location * length for each in strikers]], "side": [[1 if each.side == "below" else -1 for each in strikers]],
+            "reach": [1e3 * half], "tip": [0.008 * length], "taper": [0.05 * half],
             "hot": [self.look.second], "cold": [self.look.striker], "count": [self.count],
         }  # fmt: skip
 
@@ -425,11 +418,13 @@ def round_trip(value: float) -> str:
 
 
 _CURVES = {
-    "striker_work": "work of the striker",
-    "energy_dissipated": "dissipated",
-    "energy_beam": "in the beam, above its well",
-    "energy_contact": "in the contact",
-}
+    "striker_work": ("work of the striker", "striker"), "base_work": ("work of the base", "striker"),
+    "load_work": ("work of the axial load", "second"), "force_work": ("work of external forces", "second"),
+    "energy_dissipated": ("dissipated", "faint"), "energy_harvested": ("harvested", "accent"),
+    "energy_beam": ("in the beam, above its well", "center"), "energy_contact": ("in the contact", "second"),
+    "energy_striker": ("of the striker", "striker"), "energy_circuit": ("in circuits", "accent"),
+}  # fmt: skip
+"""Label and colour; the works first.  Dashes tell stored energies from others."""
 
 
 class Energy(RunPanel):
@@ -440,17 +435,17 @@ class Energy(RunPanel):
     def build(self) -> list[Any]:
         """Return the models of this view."""
         look = self.look
-        colors = (look.striker, look.faint, look.center, look.second)
         self.sources = {name: columns(x=[], y=[]) for name in _CURVES}
         self.sources["striker_work"].name = self.named("energy")
         self.plot = figure(
             look, height=360, used=260, x_range=self.cursor.range, y_axis_label="energy (µJ)", y_range=(0.0, 1.0),
             tools="xpan,xbox_zoom,xwheel_zoom,reset", active_drag="xbox_zoom", active_scroll="xwheel_zoom",
         )  # fmt: skip
-        for (name, label), color in zip(_CURVES.items(), colors, strict=True):
+        for name, (label, color) in _CURVES.items():
             self.plot.line(
-                "x", "y", source=self.sources[name], color=color, line_width=1.4, legend_label=label
-            )
+                "x", "y", source=self.sources[name], color=getattr(look, color), line_width=1.4, legend_label=label,
+                line_dash="dashed" if name in ("energy_contact", "energy_striker", "energy_circuit") else "solid",
+            )  # fmt: skip
         legend(self.plot, look)
         self.cursor.attach(self.plot)
         self.words = Html("", sizing_mode="stretch_width")
@@ -462,25 +457,24 @@ class Energy(RunPanel):
         x, label = across(run)
         self.plot.xaxis.axis_label = label
         shown = []
-        for name, source in self.sources.items():
-            if name in dataset:
-                inside = envelope(x, dataset[name].values, low, high)
-                source.data = {"x": inside[0], "y": (1e6 * inside[1]).astype(np.float32)}
-                shown.append(1e6 * inside[1])
+        for (name, source), item in zip(self.sources.items(), self.plot.legend[0].items, strict=True):
+            own = [envelope(x, dataset[name].values, low, high)] if name in dataset else []
+            item.visible = bool(own)
+            source.data = _curve([(at, 1e6 * y) for at, y in own])
+            shown += [1e6 * y for _, y in own]
         fit(self.plot, *shown)
-        if all(name in dataset for name in _CURVES):
-            begun = float(dataset["energy_beam"][0] + dataset["energy_contact"][0])
-            parts = {name: float(dataset[name][-1]) for name in _CURVES}
-            left = (
-                parts["striker_work"] + begun - sum(parts[name] for name in _CURVES if name != "striker_work")
+        words = ""
+        ends = {name: dataset[name].values[[0, -1]] for name in _CURVES if name in dataset}
+        works = sum(float(each[1]) for name, each in ends.items() if name.endswith("_work"))
+        if "energy_dissipated" in ends:
+            left = works - sum(
+                float(each[1] - each[0]) for name, each in ends.items() if not name.endswith("_work")
             )
-            scale = max(abs(parts["striker_work"]), parts["energy_dissipated"], 1e-300)
-            barrier = run.system.model.saddle_energy - run.system.model.well_energy
-            words = (
-                f"At the end the energy balance has an error of {left:.2g} J, {abs(left) / scale:.1g} of the work. "
-                f"The barrier between the wells is {1e6 * barrier:.4g} µJ."
-            )
-            self.words.object = Markup('<p class="note">{}</p>').format(words)
+            scale = max(abs(works), float(ends["energy_dissipated"][1]), 1e-300)
+            words = f"At the end the energy balance has an error of {left:.2g} J, {abs(left) / scale:.1g} of the work. "
+        barrier = run.system.model.saddle_energy - run.system.model.well_energy
+        words += f"The barrier between the wells is {1e6 * barrier:.4g} µJ."
+        self.words.object = Markup('<p class="note">{}</p>').format(words)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -801,10 +795,12 @@ class Spectrum(RunPanel):
         x, _ = across(run)
         inside = within(x, low, high)
         time, first = run.dataset["time"].values[inside], run.system.model.reference_frequency
-        striker = run.system.striker
-        ratio = getattr(striker.drive, "frequency_ratio", None) if striker is not None else None
+        given = run.system.parameters
+        ratio = next((value for name, value in given.items() if name.endswith(".frequency_ratio")), None)
         self.drive.location = ratio
-        self.plot.title.text = f"Cycles {low:.4g} to {high:.4g}, Hann window; dashed: the drive, dotted: f₁"
+        self.plot.title.text = (
+            f"Cycles {low:.4g} to {high:.4g}, Hann window; dashed: the excitation, dotted: f₁"
+        )
         most = 1e-12
         for name, source in self.sources.items():
             frequency, amplitude = amplitude_spectrum(time, run.dataset[name].values[inside])
@@ -819,85 +815,125 @@ class Spectrum(RunPanel):
 # Displacements of beam and striker, and the force between them.
 
 
-_CURVES_WAVEFORM = ("midspan_displacement", "displacement_at_striker", "striker_displacement")
+_DISPLACEMENTS = {
+    "striker_displacement": ("striker", "striker", 1.3, "solid"),
+    "midspan_displacement": ("beam, centre", "center", 2.6, "solid"),
+    "displacement_at_striker": ("beam, at the striker", "beam", 1.2, "dashed"),
+}
+"""Label, colour, width and dashes of each curve, the striker first, so that it hides nothing."""
+_FIRST_BELOW = ("striker_forces", "contact_force", "voltage", "power_load")
+
+
+def _columns_of(dataset: xr.Dataset, name: str) -> _Array:
+    """A variable over time as columns, one for each striker where there are several."""
+    values = np.asarray(dataset[name].values, dtype=np.float64)
+    return values[:, None] if values.ndim == 1 else values
 
 
 class WaveformPanel(RunPanel):
-    """Displacements of beam and striker, and the contact force."""
+    """Displacements of beam and strikers, and below them any other variable over time."""
 
     title = "Waveform"
 
     def build(self) -> list[Any]:
         """Return the models of this view."""
         look = self.look
-        self.sources = {name: columns(x=[], y=[]) for name in (*_CURVES_WAVEFORM, "contact_force")}
+        self.run: Run | None = None
+        self.span = (0.0, 1.0)
+        self.sources = {name: columns(x=[], y=[]) for name in _DISPLACEMENTS}
         self.sources["midspan_displacement"].name = self.named("waveform")
-        self.sources["contact_force"].name = self.named("force")
+        self.force = ColumnDataSource({"x": [], "y": []}, name=self.named("force"))
+        self.further = [
+            ColumnDataSource({"x": [], "y": []}, name=self.named(name)) for name in ("strikers", "below")
+        ]
+        self.below = pn.widgets.Select(options={}, width=230, margin=(0, 10))
+        self.below.param.watch(lambda _: self.cursor.later(self._draw, 1), "value")
         common: dict[str, Any] = {
             "x_range": self.cursor.range, "tools": "xpan,xbox_zoom,xwheel_zoom,reset",
             "active_drag": "xbox_zoom", "active_scroll": "xwheel_zoom", "output_backend": "canvas",
         }  # fmt: skip
         top = figure(
-            look,
-            name=self.named("waveform-plot"),
-            height=265,
-            used=215,
-            share=0.6,
-            y_axis_label="displacement w (b)",
-            y_range=(-1.5, 1.5),
-            **common,
-        )
-        words = ("beam, centre", "beam, at the striker", "striker")
-        colors, widths = (look.center, look.beam, look.striker), (2.6, 1.2, 1.3)
-        dashes = ("solid", "dashed", "solid")
-        rows = list(zip(_CURVES_WAVEFORM, words, colors, widths, dashes, strict=True))
-        for name, label, color, width, dash in (
-            rows[2],
-            *rows[:2],
-        ):  # the striker below, so that it hides nothing
+            look, name=self.named("waveform-plot"), height=265, used=250, share=0.6, y_axis_label="displacement w (b)",
+            y_range=(-1.5, 1.5), **common,
+        )  # fmt: skip
+        for name, (label, color, width, dash) in _DISPLACEMENTS.items():
             top.line(
-                "x",
-                "y",
-                source=self.sources[name],
-                color=color,
-                line_width=width,
-                line_dash=dash,
+                "x", "y", source=self.sources[name], color=getattr(look, color), line_width=width, line_dash=dash,
                 legend_label=label,
-            )
-        legend(top, look)
+            )  # fmt: skip
         low = figure(
-            look,
-            height=165,
-            used=215,
-            share=0.4,
-            y_axis_label="force f (N)",
-            y_range=(0.0, 1.0),
-            x_axis_label="cycles of excitation τ",
-            **common,
-        )
-        low.line("x", "y", source=self.sources["contact_force"], color=look.beam, line_width=1.2)
+            look, height=165, used=250, share=0.4, y_range=(0.0, 1.0), x_axis_label="cycles of excitation τ", **common
+        )  # fmt: skip
+        low.line("x", "y", source=self.force, color=look.beam, line_width=1.2)
+        for plot, source in zip((top, low), self.further, strict=True):
+            plot.multi_line("x", "y", source=source, color=look.second, line_width=1.2, line_dash="dotdash")
+        self.others = top.renderers[-1]
+        legend(top, look)
+        top.legend[0].items.append(LegendItem(label="other strikers", renderers=[self.others], visible=False))
         for plot in (top, low):
             self.cursor.attach(plot)
         self.low, self.top = low, top
-        return [self.wrap(top), self.wrap(low)]
+        return [self.wrap(top), self.below, self.wrap(low)]
 
     def show(self, run: Run, low: float, high: float) -> None:
         """Show a run between two cycles."""
-        x, label = across(run)
+        self.run, self.span = run, (low, high)
+        data = run.dataset
+        names = [
+            str(name)
+            for name, item in data.data_vars.items()
+            if name not in _DISPLACEMENTS
+            and name != "striker_displacements"
+            and set(item.dims) <= {"time", "striker"}
+        ]
+        names.sort(key=lambda each: _FIRST_BELOW.index(each) if each in _FIRST_BELOW else len(_FIRST_BELOW))
+        options = {str(data[name].attrs.get("long_name", name)): name for name in names}
+        if options != self.below.options:
+            self.below.param.update(
+                options=options, value=self.below.value if self.below.value in names else names[0]
+            )
+        self._draw()
+
+    def _draw(self) -> None:
+        if self.run is None:
+            return
+        data = self.run.dataset
+        x, label = across(self.run)
         self.low.xaxis.axis_label = label
         shown = []
+        struck = "striker_displacement" in data or "midspan_displacement" not in data
         for name, source in self.sources.items():
-            if name in run.dataset:
-                y = np.asarray(run.dataset[name].values, dtype=np.float64)
-                inside = envelope(x, y, low, high)
-                source.data = {"x": inside[0].astype(np.float64), "y": inside[1].astype(np.float32)}
-                if name == "contact_force":
-                    fit(self.low, np.append(inside[1], 0.0))
-                else:
-                    shown.append(inside[1])
-            else:
-                source.data = {"x": [], "y": []}
-        fit(self.top, *shown)
+            there = name in data and (struck or name != "displacement_at_striker")
+            own = [envelope(x, each, *self.span) for each in _columns_of(data, name).T] if there else []
+            source.data = _curve(own)
+            shown += [y for _, y in own]
+        more = (
+            _columns_of(data, "striker_displacements")[:, 1:]
+            if "striker_displacements" in data
+            else x[:, None][:, 1:]
+        )
+        own = [envelope(x, each, *self.span) for each in more.T]
+        self.further[0].data = _curves(own)
+        self.top.legend[0].items[-1].visible = bool(own)
+        fit(self.top, *shown, *(y for _, y in own))
+        item = data[self.below.value]
+        factor, unit = scale_of(item.values, str(item.attrs.get("units", "1")).removesuffix("1"))
+        own = [envelope(x, each / factor, *self.span) for each in _columns_of(data, self.below.value).T]
+        self.force.data, self.further[1].data = _curve(own), _curves(own[1:])
+        words = str(self.below.value).replace("_", " ")
+        self.low.yaxis.axis_label = f"{words} ({unit})" if unit else words
+        fit(self.low, *(np.append(y, 0.0) for _, y in own))
+
+
+def _curve(curves: list[tuple[_Array, _Array]]) -> dict[str, Any]:
+    """Columns of the first of some curves."""
+    x, y = curves[0] if curves else (np.zeros(0), np.zeros(0))
+    return {"x": x.astype(np.float64), "y": y.astype(np.float32)}
+
+
+def _curves(curves: list[tuple[_Array, _Array]]) -> dict[str, Any]:
+    """Columns of several curves in one source."""
+    return {"x": [x for x, _ in curves], "y": [y.astype(np.float32) for _, y in curves]}
 
 
 # ----------------------------------------------------------------------------------------------------

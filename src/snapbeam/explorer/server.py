@@ -232,13 +232,16 @@ def make_server(
 
 def _factory(shared: Shared) -> Callable[[], Any]:
     def page() -> Any:
+        from snapbeam.explorer.maps import ResultSource
         from snapbeam.explorer.page import Page
+        from snapbeam.explorer.result_page import ResultPage
 
         shared.pages += 1
         pn.state.curdoc.template = _TEMPLATE
         pn.state.curdoc.template_variables.update(dist_url=_OWN, app_favicon=_ICON)
         try:
-            made = Page(shared, dict(pn.state.session_args))
+            kind = ResultPage if isinstance(shared.source, ResultSource) else Page
+            made = kind(shared, dict(pn.state.session_args))
         except BaseException:
             shared.pages -= 1
             raise
@@ -353,13 +356,13 @@ def _shared(what: Any, system: System | None, integration: Integration | None) -
 
 
 def explore(what: Any = None, *, integration: Integration | None = None, height: int = 900) -> Explorer:
-    """Open a map in the browser: click on a point, see its run, watch the beam.
+    """Open a result in the browser: click on a point of a map, see its run, watch the beam.
 
     Parameters
     ----------
-    what : xarray.Dataset, path, System, optional
-        A map as :func:`snapbeam.sweep` gives it, a file or a checkpoint of one, or a system, of which a map over frequency
-        ratio and velocity amplitude is computed while one looks at it; the paper's beam by default.
+    what : xarray.Dataset, Run, path, System, optional
+        A map as :func:`snapbeam.sweep` gives it or any other result, its file, a checkpoint, or a system, of which a map
+        over two parameters of its excitation is computed while one looks at it; the paper's beam by default.
     integration : Integration, optional
         Of a system.
     height : int
@@ -373,7 +376,7 @@ def explore(what: Any = None, *, integration: Integration | None = None, height:
     Raises
     ------
     InputError
-        If *what* is no map, or Panel is not installed.
+        If *what* is no result, or Panel is not installed.
     """
     if not isinstance(integration, (Integration, type(None))):
         raise InputTypeError(f"integration is a {type(integration).__name__}: must be an Integration or None")
@@ -428,7 +431,7 @@ def serve(
     Raises
     ------
     InputError
-        If *what* is no map, or the address cannot be served.
+        If *what* is no result, or the address cannot be served.
     """
     import matplotlib
 

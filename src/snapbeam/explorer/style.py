@@ -26,27 +26,10 @@ if TYPE_CHECKING:
     from snapbeam.explorer.run_view import RunView
 
 __all__ = [
-    "DARK",
-    "LIGHT",
-    "Cursor",
-    "Html",
-    "Look",
-    "blend",
-    "class_chip",
-    "colors_of",
-    "columns",
-    "figure",
-    "fit",
-    "focused",
-    "framed",
-    "framed_plot",
-    "inner_size",
-    "legend",
-    "look_of",
-    "sequential",
-    "sheet",
+    "DARK", "LIGHT", "Cursor", "Html", "Look", "blend", "class_chip", "colors_of", "columns", "figure",
+    "fit", "focused", "framed", "framed_plot", "inner_size", "legend", "look_of", "sequential", "sheet",
     "styled",
-]
+]  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -27,5 +27,6 @@ from .schematic import plot_system as plot_system
 from .style import CLASS_COLORS as CLASS_COLORS
 from .style import figure_style as figure_style
 from .style import new_figure as new_figure
+from .style import plot_style as plot_style
 from .style import save_figure as save_figure
 from .threshold import plot_threshold as plot_threshold

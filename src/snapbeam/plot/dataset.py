@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
+from snapbeam.model.parameters import lookup
 from snapbeam.plot.dynamics import (
     MAX_CURVES,
     plot_attractors,
@@ -37,7 +40,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["figures_of", "plot_dataset"]
+__all__ = ["Start", "figures_of", "plot_dataset", "start_of"]
 
 
 _Draws = Callable[..., "Axes"]
@@ -58,6 +61,49 @@ class _Kind(NamedTuple):
     variables: set[str]
     dimensions: set[str]
     figures: Callable[[xr.Dataset], dict[str, _Draws]]
+    start: _Starts | None = None
+    """Start of the run of a place in the first figure, for results that have the state of one."""
+
+
+class Start(NamedTuple):
+    """Start of a run: parameters by dotted name, amplitudes and velocities by name, and its cycles."""
+
+    parameters: dict[str, float]
+    state: dict[str, float]
+    cycles: int
+
+
+_Starts = Callable[["xr.Dataset", "tuple[float, float] | None"], "Start | None"]
+
+
+def _of_state(dataset: xr.Dataset, state: xr.DataArray, parameters: dict[str, float]) -> Start:
+    names = [str(name) for name in dataset["coordinate"].values]
+    return Start(
+        parameters, dict(zip(names, state.values.tolist(), strict=True)), int(dataset.attrs["period"])
+    )
+
+
+def _orbit_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start:
+    return _of_state(dataset, dataset["state"][0], {})
+
+
+def _branch_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start | None:
+    """Start of the orbit nearest to a place over the parameter and mid-span displacement."""
+    if place is None:
+        return None
+    name = str(dataset.attrs["parameter"])
+    away = np.zeros(dataset.sizes["orbit"])
+    for values, at in zip((dataset[name], dataset["midspan_displacement"]), place, strict=True):
+        away += ((values.values - at) / (np.ptp(values.values) or 1.0)) ** 2
+    nearest = dataset.isel(orbit=int(np.argmin(away)))
+    return _of_state(nearest, nearest["state"], {lookup(name).name: float(nearest[name])})
+
+
+def _basin_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start | None:
+    names = [str(name) for name in dataset["basin"].dims]
+    if place is None or len(names) != 2:
+        return None
+    return Start({}, dict(zip(names, map(float, place), strict=True)), 30)
 
 
 def _branch(dataset: xr.Dataset, ax: Axes | None = None, **options: Any) -> Axes:
@@ -136,20 +182,22 @@ _KINDS = (
     _Kind("edge state", {"orbit_state", "distance"}, set(), lambda _: {"state": plot_edge}),
     _Kind(
         "branch of orbits", {"multiplier_real", "stable"}, {"orbit"},
-        lambda _: {"midspan_displacement": _branch, "multipliers": plot_multipliers},
+        lambda _: {"midspan_displacement": _branch, "multipliers": plot_multipliers}, _branch_start,
     ),
     _Kind(
         "bifurcation curve", {"special_point_kind", "multiplier_real"}, {"point"},
         lambda ds: {str(list(ds.attrs["parameters"])[1]): plot_bifurcation_curve},
     ),
-    _Kind("periodic orbit", {"multiplier_real", "state"}, set(), lambda _: {"multipliers": plot_multipliers}),
+    _Kind(
+        "periodic orbit", {"multiplier_real", "state"}, set(), lambda _: {"multipliers": plot_multipliers}, _orbit_start
+    ),
     _Kind(
         "backbone curve", {"participation", "initial_amplitude"}, {"point"}, lambda _: {"frequency_ratio": plot_backbone}
     ),
     _Kind("manifold", {"saddle", "age"}, {"point"}, lambda _: {"state": plot_manifold}),
     _Kind("attractors", {"points", "share"}, {"attractor"}, lambda _: {"points": plot_attractors}),
     _Kind("Lyapunov exponents", {"exponent"}, set(), lambda _: {"exponent": plot_exponents}),
-    _Kind("basins of attraction", {"basin"}, set(), lambda _: {"basin": plot_basins}),
+    _Kind("basins of attraction", {"basin"}, set(), lambda _: {"basin": plot_basins}, _basin_start),
     _Kind("bifurcation diagram", set(), {"sweep", "period"}, _diagram),
     _Kind("section", {"drive_phase"}, {"point"}, _section),
     _Kind("statistics swept up and down", {"response_class"}, {"sweep"}, _swept),
@@ -165,6 +213,19 @@ _KINDS = (
 )  # fmt: skip
 
 
+def _kind_of(dataset: xr.Dataset) -> _Kind:
+    for kind in _KINDS:
+        if kind.variables <= set(map(str, dataset.variables)) and kind.dimensions <= set(
+            map(str, dataset.dims)
+        ):
+            return kind
+    known = ", ".join(map(str, dataset.data_vars)) or "none"
+    raise InputError(
+        f"dataset: must be a result of snapbeam that has a figure ({', '.join(k.words for k in _KINDS)}); "
+        f"its variables are {known}"
+    )
+
+
 def figures_of(dataset: xr.Dataset) -> tuple[str, dict[str, _Draws]]:
     """Return the kind of a dataset, and a function that draws for each name that can be drawn, the default first.
 
@@ -173,16 +234,13 @@ def figures_of(dataset: xr.Dataset) -> tuple[str, dict[str, _Draws]]:
     InputError
         If the dataset is not a result of snapbeam that has a figure.
     """
-    for kind in _KINDS:
-        if kind.variables <= set(map(str, dataset.variables)) and kind.dimensions <= set(
-            map(str, dataset.dims)
-        ):
-            return kind.words, kind.figures(dataset)
-    known = ", ".join(map(str, dataset.data_vars)) or "none"
-    raise InputError(
-        f"dataset: must be a result of snapbeam that has a figure ({', '.join(k.words for k in _KINDS)}); "
-        f"its variables are {known}"
-    )
+    kind = _kind_of(dataset)
+    return kind.words, kind.figures(dataset)
+
+
+def start_of(dataset: xr.Dataset) -> _Starts | None:
+    """Return the function that gives the start of the run of a place in the first figure; None if there is none."""
+    return _kind_of(dataset).start
 
 
 @checked

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from snapbeam.plot.axes import dress, edges_of, positions
-from snapbeam.plot.style import axes_or_new, figure_style, fix_ticks, set_title
+from snapbeam.plot.style import SERIES_COLORS, axes_or_new, figure_style, fix_ticks, frame, set_title
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, checked, choice, instance, shown
 
@@ -90,8 +90,7 @@ def plot_diagram(
         needed = {"sweep", "period"} if name == "dataset" else {"orbit"}
         if each is not None and not needed <= set(getattr(each, "dims", ())):
             raise InputError(f"{name}: must have the dimensions {', '.join(sorted(needed))}")
-    with figure_style():
-        ax = axes_or_new(ax, first, "double", 84.0)
+    with frame(ax, first, "double", 66.0) as ax:
         handles: list[Line2D] = []
         if dataset is not None:
             if variable not in dataset:
@@ -102,29 +101,32 @@ def plot_diagram(
             handles += _branch(branch, ax, along)
         if dataset is None:
             dress(ax.xaxis, branches[0].swap_dims(orbit=along).drop_duplicates(along), along)
-        words = {"midspan_displacement": "Centre displacement once a period, over $b$"}
-        ax.set_ylabel(words.get(variable, variable.replace("_", " ")))
+        kind = "Velocity" if "velocity" in variable else "Displacement"
+        unit = r"$\dot w\,/\,b\omega_1$" if kind == "Velocity" else "$w/b$"
+        ax.set_ylabel(
+            f"{kind} at {'mid-span' if variable.startswith('midspan') else 'the striker'}\nonce a period, {unit}"
+        )
         unique = {handle.get_label(): handle for handle in handles}
-        ax.legend(handles=list(unique.values()), loc="best", ncols=2)
-        fix_ticks(ax)
+        place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
+        ax.legend(handles=list(unique.values()), ncols=4, **place)
     return ax
 
 
 def _points(dataset: xr.Dataset, ax: Axes, along: str, variable: str) -> list[Line2D]:
+    """Draw the points, those swept down smaller and over those swept up, so that both are seen where they agree."""
     handles = []
-    colors = {"up": _UP, "down": _DOWN}
+    looks = {
+        "up": (_UP, "swept up", 2.0), "down": (_DOWN, "swept down", 1.0)
+    }  # fmt: skip
     sweeps = [str(name) for name in dataset["sweep"].values]
-    for name in sorted(sweeps, key=lambda each: each in colors):
+    for name in sorted(sweeps, key=list(looks).index if set(sweeps) <= set(looks) else str):
         part = dataset[variable].isel(sweep=sweeps.index(name)).transpose(along, "period")
         x = np.repeat(dataset[along].values, part.sizes["period"])
-        size = 1.1 if name == "down" else 2.0
-        color = colors.get(name, _STARTS)
-        ax.plot(x, part.values.ravel(), ",", color=color, alpha=0.9, rasterized=True)
-        ax.plot(
-            x, part.values.ravel(), ".", color=color, markersize=size, markeredgewidth=0.0, rasterized=True
-        )
-        text = {"up": "swept up", "down": "swept down"}.get(name, "from many starts")
-        handles.append(Line2D([], [], marker=".", linestyle="", color=color, label=text))
+        color, text, share = looks.get(name, (_STARTS, "from many starts", 2.0))
+        size = share * float(np.clip(260.0 / dataset.sizes[along], 0.6, 1.8))
+        look: dict[str, Any] = {"color": color, "markeredgewidth": 0.0, "linestyle": "", "marker": "o"}
+        ax.plot(x, part.values.ravel(), markersize=size, rasterized=True, **look)
+        handles.append(Line2D([], [], markersize=2.0 * share, label=text, **look))
     return handles
 
 
@@ -136,10 +138,11 @@ def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
     for y in returns:
         ax.plot(x, np.where(stable, y, np.nan), color=_LINE, linewidth=1.1)
         ax.plot(x, np.where(beside, y, np.nan), color=_LINE, linewidth=0.9, dashes=(3, 2))
-    handles = [
-        Line2D([], [], color=_LINE, linewidth=1.1, label="stable orbit"),
-        Line2D([], [], color=_LINE, linewidth=0.9, dashes=(3, 2), label="unstable orbit"),
-    ]
+    looks: tuple[tuple[bool, dict[str, Any]], ...] = (
+        (bool(stable.any()), {"linewidth": 1.1, "label": "stable orbit"}),
+        (not stable.all(), {"linewidth": 0.9, "dashes": (3, 2), "label": "unstable orbit"}),
+    )
+    handles = [Line2D([], [], color=_LINE, **look) for drawn, look in looks if drawn]
     for kind, value, after in zip(
         branch["special_point_kind"].values,
         branch["special_point_value"].values,
@@ -148,28 +151,13 @@ def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
     ):
         at = int(after)
         near = returns[:, at : at + 2].mean(axis=1)
-        mark = _SPECIAL_POINTS[str(kind)]
-        ax.plot(
-            np.full(near.size, value),
-            near,
-            mark,
-            color=_LINE,
-            markersize=3.5,
-            markerfacecolor="white",
-            linestyle="",
-        )
-        handles.append(
-            Line2D(
-                [],
-                [],
-                marker=mark,
-                linestyle="",
-                color=_LINE,
-                markersize=3.5,
-                markerfacecolor="white",
-                label=str(kind),
-            )
-        )
+        mark: dict[str, Any] = {
+            "marker": _SPECIAL_POINTS[str(kind)],
+            "linestyle": "",
+            "color": _LINE,
+            "markersize": 3.5,
+        }
+        handles += ax.plot(np.full(near.size, value), near, markerfacecolor="white", label=str(kind), **mark)
     return handles
 
 
@@ -217,8 +205,7 @@ def plot_lifetimes(
     dims = [str(name) for name in dataset["lifetime"].dims]
     if not 1 <= len(dims) <= 2 or "point" in dims:
         raise InputError(f"lifetime over {dims}: is drawn over one or two parameters")
-    with figure_style():
-        ax = axes_or_new(ax, dataset)
+    with frame(ax, dataset) as ax:
         if len(dims) == 1:
             x, _ = positions(dataset, dims[0])
             low, high = dataset["lifetime_low"].values, dataset["lifetime_high"].values
@@ -231,7 +218,6 @@ def plot_lifetimes(
             dress(ax.xaxis, dataset, dims[0])
         else:
             _lifetime_cells(dataset, ax, dims, limits, legend)
-        fix_ticks(ax)
     return ax
 
 
@@ -293,8 +279,7 @@ def plot_survival(
     if len(rows) > MAX_CURVES:
         raise InputError(f"dataset: has {len(rows)} points; choose at most {MAX_CURVES} of them")
     tau, delay = (np.atleast_1d(runs[name].values).ravel() for name in ("lifetime", "delay"))
-    with figure_style():
-        ax = axes_or_new(ax, dataset)
+    with frame(ax, dataset) as ax:
         seen = float(dataset.attrs["cycles"]) - float(dataset.attrs["settling_cycles"])
         settled = runs["final_well_proven"].values.astype(bool) | (
             runs["status"].values == int(RunStatus.EARLY_STOP)
@@ -341,7 +326,6 @@ def plot_survival(
             )  # fmt: skip
             handles.append(ring)
         ax.legend(handles=handles, loc="best", handlelength=1.0, fontsize=6)
-        fix_ticks(ax)
     return ax
 
 
@@ -401,8 +385,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     value, error = (factor * dataset[name].isel(first) for name in ("exponent", "exponent_error"))
     dims = [str(name) for name in dataset["exponent"].dims if name != "exponent_number"]
     value, error = (each.transpose(*dims) for each in (value, error))
-    with figure_style():
-        ax = axes_or_new(ax, dataset)
+    with frame(ax, dataset) as ax:
         if "running" in dataset:
             _running(factor * dataset["running"], ax)
             ax.set(
@@ -423,7 +406,6 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
             dress(ax.yaxis, dataset, dims[1])
         else:
             raise InputError(f"exponent over {dims}: is drawn over one or two parameters")
-        fix_ticks(ax)
     return ax
 
 
@@ -511,8 +493,7 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     if not {"multiplier_real", "multiplier_imag"} <= set(map(str, dataset.variables)):
         raise InputError(f"no multipliers among {list(map(str, dataset.variables))}")
     values = dataset["multiplier_real"].values + 1j * dataset["multiplier_imag"].values
-    with figure_style():
-        ax = axes_or_new(ax, dataset, height=84.0)
+    with frame(ax, dataset, height=84.0) as ax:
         if "orbit" in dataset.dims:
             _multipliers_along(dataset, ax, np.abs(values))
         else:
@@ -530,7 +511,6 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             ax.set_aspect("equal", adjustable="datalim")
             ax.set(xlabel="Floquet multiplier, real part", ylabel="Floquet multiplier, imaginary part")
             ax.legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=3)
-        fix_ticks(ax)
     return ax
 
 
@@ -541,7 +521,9 @@ def plot_backbone(
     *,
     labels: Sequence[str] | None = None,
 ) -> Axes:
-    """Draw backbone curves: the amplitude of the centre over the frequency; unstable motions are dashed, with dots.
+    """Draw backbone curves: the amplitude of the centre over the frequency; unstable motions are dashed.
+
+    Earlier curves are wider, so that each is seen where they agree.
 
     Parameters
     ----------
@@ -581,21 +563,25 @@ def plot_backbone(
     with figure_style():
         one_model = len({curve.attrs["modes"] for curve in curves}) == 1
         ax = axes_or_new(ax, curves[0] if one_model else None, height=70.0)
+        unstable = False
         for number, (curve, label) in enumerate(zip(curves, labels, strict=True)):
             frequency = curve["frequency_ratio"].values
             height = 0.5 * (curve["max_midspan"] - curve["min_midspan"]).values
             stable = curve["stable"].values
-            color = f"C{number}"
-            for which, line, name in ((stable, "-", label), (~stable, "--.", "")):
+            color = SERIES_COLORS[number % len(SERIES_COLORS)]
+            wide = 1.0 + 1.2 * (len(curves) - 1 - number)
+            for which, dashes, name in ((stable, (), label), (~stable, (3, 1.5), "")):
                 # a segment is drawn as its first point is
                 segments = which | np.append(False, which[:-1])
+                x, y = (np.where(segments, each, np.nan) for each in (frequency, height))
                 if which.any():
-                    ax.plot(
-                        np.where(segments, frequency, np.nan), np.where(segments, height, np.nan), line, color=color, label=name, markersize=3,
-                    )  # fmt: skip
-        ax.set(xlabel=r"Frequency $\Omega$", ylabel="Amplitude of the centre ($b$)")
+                    ax.plot(x, y, dashes=dashes, color=color, label=name, linewidth=wide)
+            unstable |= not stable.all()
+        ax.set(xlabel=r"Frequency $\Omega$ of free vibration", ylabel="Amplitude at mid-span $w/b$")
         ax.set_ylim(bottom=0.0)
-        if len(curves) > 1:
+        if unstable:
+            ax.plot([], [], color="0.3", dashes=(3, 1.5), label="unstable")
+        if len(curves) > 1 or unstable:
             ax.legend()
         fix_ticks(ax)
     return ax
@@ -664,10 +650,10 @@ def plot_bifurcation_curve(
     if len(labels) != len(curves) or not all(isinstance(label, str) for label in labels):
         raise InputError(f"labels = {shown(list(labels))}: must be one text for each of {len(curves)} curves")
     new = ax is None
-    with figure_style():
-        ax = axes_or_new(ax, curves[0], height=70.0)
+    with frame(ax, curves[0], height=70.0) as ax:
         for number, (curve, label) in enumerate(zip(curves, labels, strict=True)):
-            kind, color = curve.attrs["kind"], f"C{number}" if new else "black"
+            kind = curve.attrs["kind"]
+            color = SERIES_COLORS[number % len(SERIES_COLORS)] if new else "black"
             x, y = (curve[name].values for name in names)
             ax.plot(x, y, _CURVE_LINES[kind], color=color, label=label, linewidth=1.0)
             for at, words in enumerate(curve["special_point_kind"].values):
@@ -681,7 +667,6 @@ def plot_bifurcation_curve(
         unique = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
         if unique:
             ax.legend(unique.values(), unique.keys(), loc="best")
-        fix_ticks(ax)
     return ax
 
 
@@ -746,24 +731,22 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     pair = (0, modes if 0 < modes < len(names) else min(1, len(names) - 1))
     points = dataset["points"].transpose("attractor", "point", "coordinate").values
     count = dataset.sizes["attractor"]
-    with figure_style():
-        ax = axes_or_new(ax, dataset, height=88.0)
+    with frame(ax, dataset, height=88.0) as ax:
         for number in range(count):
-            color = cm.batlow(0.08 + 0.84 * number / max(count - 1, 1))
             period = int(dataset["period"][number])
             words = f"period {period}" if period else "chaotic"
             ax.plot(
-                points[number, :, pair[0]], points[number, :, pair[1]], "o" if period else ".", color=color,
-                markersize=4.0 if period else 1.5, label=f"{number}: {words}, {100 * float(dataset['share'][number]):.1f} % of the states",
+                points[number, :, pair[0]], points[number, :, pair[1]], "o" if period else ".", color=_attractor_colors(count)[number],
+                markersize=4.0 if period else 1.5, label=f"{number}: {words}{_well_of(names[0], points[number, :, 0])}, {100 * float(dataset['share'][number]):.1f} % of the states",
             )  # fmt: skip
         ax.set(xlabel=_coordinate(names[pair[0]]), ylabel=_coordinate(names[pair[1]]))
+        ax.margins(0.08)
         unseen = 100 * float(dataset.attrs["unseen_share_95"])
         words = f"Attractors not found: below {unseen:.2g} % of the states (95 %)"
         set_title(ax, f"{ax.get_title('left')}\n{words}".lstrip())
         figure = ax.get_figure(root=True)
         assert figure is not None
         figure.legend(loc="outside lower center", ncols=1)
-        fix_ticks(ax)
     return ax
 
 
@@ -783,8 +766,7 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
     y = x.replace("displacement", "velocity")
     if x not in dataset or y not in dataset:
         raise InputError(f"no {x} and {y} among {list(map(str, dataset.variables))}")
-    with figure_style():
-        ax = axes_or_new(ax, dataset)
+    with frame(ax, dataset) as ax:
         ax.plot(
             dataset[x].values,
             dataset[y].values,
@@ -804,7 +786,6 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
                 ax.set(**{limits: (middle - 10.0 * least, middle + 10.0 * least)})
         where = "Centre" if x.startswith("midspan") else "Contact point's"
         ax.set(xlabel=f"{where} displacement, over $b$", ylabel=rf"{where} velocity, over $b\,\omega_1$")
-        fix_ticks(ax)
     return ax
 
 
@@ -830,10 +811,12 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     names = [str(name) for name in dataset["basin"].dims]
     labels = dataset["basin"].values
     count = int(dataset["basin"].attrs["flag_values"].max()) + 1
-    colors = [_UNDECIDED, *(cm.batlow(0.08 + 0.84 * i / max(count - 1, 1)) for i in range(count))]
-    meanings = str(dataset["basin"].attrs["flag_meanings"]).split()
-    with figure_style():
-        ax = axes_or_new(ax, dataset, height=84.0)
+    colors = [_UNDECIDED, *_attractor_colors(count)]
+    meanings = [each.replace("_", " ") for each in str(dataset["basin"].attrs["flag_meanings"]).split()]
+    for i, points in enumerate(dataset["attractor_points"].values):
+        share = 100.0 * float((labels == i).mean())
+        meanings[i + 1] = f"{meanings[i + 1]}{_well_of(names[0], points[:, 0])}, {share:.3g} %"
+    with frame(ax, dataset, height=84.0) as ax:
         edges = [edges_of(dataset, name) for name in names]
         norm = BoundaryNorm(np.arange(-1.5, count), count + 1)
         ax.pcolormesh(*edges, labels.T, cmap=ListedColormap(colors), norm=norm, rasterized=True)
@@ -849,7 +832,7 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
                 facecolor=colors[i],
                 edgecolor="black",
                 linewidth=0.4,
-                label=(f"{i - 1}: " if i else "") + meanings[i].replace("_", " "),
+                label=meanings[i],
             )
             for i in range(count + 1)
             if i > 0 or (labels == -1).any()
@@ -864,8 +847,7 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
                 label=label,
             )  # fmt: skip
             handles.append(dots)
-        figure.legend(handles=handles, loc="outside lower center", ncols=3)
-        fix_ticks(ax)
+        figure.legend(handles=handles, loc="outside lower center", ncols=1)
     return ax
 
 
@@ -903,8 +885,7 @@ def plot_manifold(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     at = (0, next((i for i, name in enumerate(names) if name.startswith("velocity")), 1 % len(names)))
     stability, new = str(dataset.attrs["stability"]), ax is None
     line, color = ("-", _CHAOS) if stability == "unstable" else ("--", cm.batlow(0.15))
-    with figure_style():
-        ax = axes_or_new(ax, dataset, height=84.0)
+    with frame(ax, dataset, height=84.0) as ax:
         for side in np.unique(dataset["side"].values):
             points = dataset["state"].values[dataset["side"].values == side]
             label = f"{stability} manifold" if side > 0 else None
@@ -913,7 +894,6 @@ def plot_manifold(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         if new:
             ax.set(xlabel=_coordinate(names[at[0]]), ylabel=_coordinate(names[at[1]]))
         ax.legend(loc="best")
-        fix_ticks(ax)
     return ax
 
 
@@ -926,8 +906,7 @@ def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         raise InputError(f"no edge state among {list(map(str, dataset.variables))}")
     name = str(dataset["coordinate"].values[0])
     values = dataset["state"].values[:, 0]
-    with figure_style():
-        ax = axes_or_new(ax, dataset)
+    with frame(ax, dataset) as ax:
         for at, words in ((-1.0, "well"), (0.0, "straight")):
             if name == "amplitude[1]" and values.min() - 0.3 < at < values.max() + 0.3:
                 ax.axhline(at, color="0.75", linewidth=0.5, zorder=0)
@@ -973,14 +952,35 @@ def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         )
         figure.legend(handles, labels, loc="outside lower center", ncols=1)
         ax.set(xlabel="Period of the drive", ylabel=_coordinate(name))
-        fix_ticks(ax)
     return ax
 
 
+def _attractor_colors(count: int) -> list[Any]:
+    """A colour for each of some attractors."""
+    if count <= len(SERIES_COLORS) - 2:
+        return list(SERIES_COLORS[:count])
+    return [cm.batlow(0.08 + 0.84 * i / (count - 1)) for i in range(count)]
+
+
+def _well_of(name: str, amplitudes: np.ndarray) -> str:
+    """The well about which an attractor moves, by its amplitudes once a period."""
+    known = amplitudes[np.isfinite(amplitudes)]
+    if name != "amplitude[1]" or not known.size:
+        return ""
+    return (
+        " in the upper well"
+        if known.min() > 0.0
+        else " in the lower well"
+        if known.max() < 0.0
+        else ", interwell"
+    )
+
+
 def _coordinate(name: str) -> str:
-    """Symbol of a coordinate of a state."""
+    """Axis label of a coordinate of a state."""
+    mode, well = name[name.find("[") + 1 : -1], r"|\alpha_{1,\mathrm{well}}|"
     if name.startswith("amplitude["):
-        return rf"Amplitude $\alpha_{{{name[10:-1]}}}$ over that of the well"
+        return rf"Modal amplitude $\alpha_{{{mode}}}\,/\,{well}$"
     if name.startswith("velocity["):
-        return rf"Velocity $\dot\alpha_{{{name[9:-1]}}}$ over $\omega_1$ times that amplitude"
+        return rf"Modal velocity $\dot\alpha_{{{mode}}}\,/\,\omega_1{well}$"
     return name

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from snapbeam.model.parameters import lookup
-from snapbeam.plot.style import axes_or_new, figure_style, fix_ticks
+from snapbeam.plot.style import frame
 from snapbeam.util.si_prefixes import prefixed, scale_of
 from snapbeam.util.validation import InputError, checked
 
@@ -72,8 +72,7 @@ def plot_force_displacement(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
     kind = np.where(dataset["unstable_directions"].values == 0, 0, np.where(held, 1, 2))
     names = list(_STYLES)
     drawn = set()
-    with figure_style():
-        ax = axes_or_new(ax, height=84.0)
+    with frame(ax, height=84.0) as ax:
         secondary = np.flatnonzero(dataset["branch_kind"].values == "secondary")
         # the two halves of a secondary branch differ in a mode that does not move at the force
         for number in np.setdiff1d(np.arange(dataset.sizes["branch_number"]), secondary[1::2]):
@@ -131,7 +130,6 @@ def plot_force_displacement(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
         ax.set_xlim((place[seen].min() - margin) / prefix_w, (place[seen].max() + margin) / prefix_w)
         ax.set_ylim(low / prefix_f, high / prefix_f)
         ax.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=7.0)
-        fix_ticks(ax)
     return ax
 
 
@@ -220,8 +218,7 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
     prefix, unit = scale_of(place, "m")
     size, axis = _short_axis(value, row.quantity.unit)
     label = dataclasses.replace(row, quantity=dataclasses.replace(row.quantity, unit=axis)).label
-    with figure_style():
-        ax = axes_or_new(ax, height=70.0)
+    with frame(ax, height=70.0) as ax:
         for number in np.unique(dataset["branch"].values):
             index = np.flatnonzero(dataset["branch"].values == number)
             for part in np.split(np.arange(index.size), np.flatnonzero(np.diff(stable[index])) + 1):
@@ -244,7 +241,6 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
         ax.set_xlabel(label)
         ax.set_ylabel(f"Displacement of the centre ({unit})")
         ax.legend(handles=handles, loc="best")
-        fix_ticks(ax)
     return ax
 
 

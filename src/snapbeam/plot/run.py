@@ -15,10 +15,10 @@ from snapbeam.plot.style import (
     BEAM_COLOR,
     CENTER_COLOR,
     SHAKER_COLOR,
-    axes_or_new,
     caption,
     figure_style,
     fix_ticks,
+    frame,
     new_figure,
     set_title,
 )
@@ -249,8 +249,7 @@ def plot_spectrum(
 def _plot_density(dataset: xr.Dataset, ax: Axes | None) -> Axes:
     """Draw an estimated power spectral density with its interval, on logarithmic axes."""
     data = dataset.sel(frequency=dataset["frequency"] > 0.0)
-    with figure_style():
-        ax = axes_or_new(ax)
+    with frame(ax) as ax:
         f = data["frequency"].values
         inside = np.ones(f.size, dtype=bool)
         if "psd_target" in data:
@@ -265,7 +264,6 @@ def _plot_density(dataset: xr.Dataset, ax: Axes | None) -> Axes:
         ax.set(xscale="log", yscale="log", xlabel="Frequency (Hz)", ylabel="Acceleration PSD (g$^2$/Hz)")
         ax.set_title(f"{data.attrs['rms_g']:.3g} g root mean square")
         ax.legend()
-        fix_ticks(ax)
     return ax
 
 

@@ -213,8 +213,12 @@ def plot_system(system: System, title: str = "") -> Figure:
     figure = new_figure("double", 52.0)
     with figure_style():
         striker = system.striker
-        widths = [2.4, 1.0] if striker is not None or system.primary_excitation is not None else [1.0]
-        axes = figure.subplots(1, len(widths), squeeze=False, width_ratios=widths)[0]
+        widths = [2.6, 1.0] if striker is not None or system.primary_excitation is not None else [1.0]
+        # each part is laid out alone, so that the labels of the motion leave the beam its height
+        axes = [
+            part.subplots()
+            for part in figure.subfigures(1, len(widths), squeeze=False, width_ratios=widths)[0]
+        ]
         _draw_beam(axes[0], system)
         for number, each in enumerate(system.contacts, 1 if system.contacts[1:] else 0):
             _draw_striker(axes[0], system, each.striker, each.law, number)
@@ -318,10 +322,10 @@ def _draw_imperfection(ax: Axes, system: System, imperfection: Imperfection, res
         push = 1.0 if imperfection.point_load > 0.0 else -1.0
         at = imperfection.point_location * _WIDE
         ax.text(
-            at - 0.16,
-            float(np.interp(at, x, w)) - 0.22 * push,
+            at,
+            float(np.interp(at, x, w)) - 0.7 * push,
             "$F$",
-            ha="right",
+            ha="center",
             va="center",
             color=_LOAD_COLOR,
         )
@@ -336,7 +340,7 @@ def _draw_striker(ax: Axes, system: System, striker: Striker, contact: ContactLa
     gap = 0.0 if striker.gap is None else striker.gap / system.scale.length
     center = beam_there - sign * (float(np.clip(gap, -0.6, 0.6)) + _RADIUS)
     ax.add_patch(Circle((at, center), _RADIUS, facecolor=SHAKER_COLOR, edgecolor="none", zorder=4))
-    _caption(ax, at, sign, contact, striker, gap, number)
+    _caption(ax, at, sign, contact, striker, gap, number, system.striker)
     below = center - sign * _RADIUS
     if striker.mass is None:
         _rod(ax, at, below, below - sign * 0.45)
@@ -366,7 +370,14 @@ def _draw_striker(ax: Axes, system: System, striker: Striker, contact: ContactLa
 
 
 def _caption(
-    ax: Axes, at: float, sign: float, contact: ContactLaw, striker: Striker, gap: float, number: int
+    ax: Axes,
+    at: float,
+    sign: float,
+    contact: ContactLaw,
+    striker: Striker,
+    gap: float,
+    number: int,
+    first: Striker | None,
 ) -> None:
     """Write the contact law, gap and mass next to the striker, clear of the beam."""
     law = _LAWS.get(contact.name, contact.name)
@@ -377,10 +388,12 @@ def _caption(
         lines.append(r"$m_\mathrm{s}$ = " + _grams(striker.mass))
     lines = [", ".join(lines)] if number else lines
     right = at < 0.6 * _WIDE
-    x = at + 0.75 if right else at - 0.75
+    x, side = (at + 0.75, "left") if right else (at - 0.75, "right")
+    if number and sign != _sign(first):  # over the other well there is room at the tip
+        x, side = float(np.clip(at, 0.25 * _WIDE, 0.75 * _WIDE)), "center"
     for i, line in enumerate(lines):
         y = -sign * (1.35 + 0.42 * i)
-        ax.text(x, y, line, ha="left" if right else "right", va="center", color=SHAKER_COLOR)
+        ax.text(x, y, line, ha=side, va="center", color=SHAKER_COLOR)
 
 
 def _grams(mass: float) -> str:

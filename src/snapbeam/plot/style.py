@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 import os
 import textwrap
-from collections.abc import Iterable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +35,7 @@ __all__ = [
     "CLASS_COLORS",
     "COLUMN_WIDTHS",
     "FIGURE_SUFFIXES",
+    "SERIES_COLORS",
     "SHAKER_COLOR",
     "base_and_load",
     "beam_text",
@@ -46,8 +47,10 @@ __all__ = [
     "figure_legend",
     "figure_style",
     "fix_ticks",
+    "frame",
     "new_figure",
     "panel_letters",
+    "plot_style",
     "save_figure",
     "set_title",
 ]
@@ -73,6 +76,9 @@ CLASS_COLORS = {
 BEAM_COLOR = "#000000"
 SHAKER_COLOR = "#B03A27"
 CENTER_COLOR = "#70BBF0"
+
+SERIES_COLORS = ("#16245E", "#B03A27", "#70BBF0", "#858585", "#000000")
+"""Colours of curves and regions that are no response classes, in their order."""
 
 _RC: Any = {
     "axes.axisbelow": True,
@@ -100,6 +106,47 @@ _RC: Any = {
     "ytick.labelsize": 7,
     "ytick.major.width": 0.6,
 }
+
+
+_STYLES: dict[str, tuple[tuple[float, float], float, str]] = {
+    "elsevier": ((90.0, 190.0), 8.0, "DejaVu Sans"),
+    "ieee": ((88.9, 181.9), 8.0, "STIXGeneral"),
+    "talk": ((130.0, 254.0), 12.0, "DejaVu Sans"),
+}
+"""Widths of one and of two columns, mm; size of labels, points; font."""
+_BASE = dict(_RC)
+
+
+def plot_style(name: str) -> None:
+    """Choose widths, font and sizes of text and lines of all figures from now on.
+
+    Parameters
+    ----------
+    name : {"elsevier", "ieee", "talk"}
+        Columns of 90 and 190 mm, the default; of 88.9 and 181.9 mm with a serif font; of 130 and 254 mm with larger text.
+
+    Raises
+    ------
+    InputError
+        For another name.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> sb.plot.plot_style("ieee")
+    >>> f"{25.4 * sb.plot.new_figure('single').get_figwidth():.1f} mm"
+    '88.9 mm'
+    >>> sb.plot.plot_style("elsevier")
+    """
+    widths, size, font = _STYLES[choice("name", name, tuple(_STYLES))]
+    COLUMN_WIDTHS.update(zip(COLUMN_WIDTHS, widths, strict=True))
+    scale, serif = size / _BASE["font.size"], font == "STIXGeneral"
+    scaled = ("size", "width", "linewidth")  # of text and lines
+    _RC.update({key: scale * _BASE[key] for key in _BASE if key.endswith(scaled)})
+    _RC.update({
+        "font.sans-serif": [font], "font.serif": [font], "font.family": "serif" if serif else "sans-serif",
+        "mathtext.fontset": "stix" if serif else "dejavusans",
+    })  # fmt: skip
 
 
 def figure_style() -> AbstractContextManager[None]:
@@ -136,9 +183,9 @@ def new_figure(width: str = "single", height: float = 75.0) -> Figure:
     Parameters
     ----------
     width : {"single", "double"}
-        One column (90 mm) or two (190 mm).
+        One column (90 mm) or two (190 mm), unless :func:`snapbeam.plot.plot_style` chose others.
     height : float
-        Height, mm.
+        Height, mm, for columns of 90 mm; in proportion for others.
 
     Examples
     --------
@@ -150,8 +197,9 @@ def new_figure(width: str = "single", height: float = 75.0) -> Figure:
     import matplotlib.pyplot as plt
 
     millimetres = COLUMN_WIDTHS[choice("width", width, tuple(COLUMN_WIDTHS))]
+    tall = positive("height", height, "mm") * COLUMN_WIDTHS["single"] / _STYLES["elsevier"][0][0]
     with figure_style():
-        return plt.figure(figsize=(millimetres / 25.4, positive("height", height, "mm") / 25.4))
+        return plt.figure(figsize=(millimetres / 25.4, tall / 25.4))
 
 
 def axes_or_new(
@@ -166,9 +214,20 @@ def axes_or_new(
     return ax
 
 
+@contextmanager
+def frame(
+    ax: Axes | None, dataset: xr.Dataset | None = None, width: str = "single", height: float = 72.0
+) -> Iterator[Axes]:
+    """Axes to draw on in the style of this package, as :func:`axes_or_new` gives them, with its ticks in the end."""
+    with figure_style():
+        ax = axes_or_new(ax, dataset, width, height)
+        yield ax
+        fix_ticks(ax)
+
+
 def set_title(ax: Axes, text: str) -> None:
     """Write a title that begins at the left edge of *ax* and continues on a new line at the edge of the figure."""
-    ax.set_title(text, loc="left", fontsize=7, wrap=True)
+    ax.set_title(text, loc="left", fontsize=_RC["legend.fontsize"], wrap=True)
 
 
 def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:

@@ -394,11 +394,11 @@ def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
     half, low, high = (data[f"effect{end}"].values for end in ("", "_low", "_high"))
     for sign, color, label in ((-1.0, _DOWN, "parameter lower"), (1.0, _UP, "parameter higher")):
         ax.barh(place, sign * half, left=middle, height=0.62, color=color, label=label)
-    error = np.stack([half - low, high - half])
-    ax.errorbar(
-        middle + half, place, xerr=error, fmt="none", ecolor="black", elinewidth=0.8, capsize=2.0,
-        label=f"{100.0 * float(data.attrs['confidence']):g} % interval",
-    )  # fmt: skip
+        error = np.stack([half - low, high - half])[:: int(sign)]
+        interval = f"{100.0 * float(data.attrs['confidence']):g} % interval" if sign > 0.0 else None
+        ax.errorbar(
+            middle + sign * half, place, xerr=error, fmt="none", ecolor="black", elinewidth=0.8, capsize=2.0, label=interval
+        )  # fmt: skip
     ax.axvline(middle, color="black", linewidth=0.6)
     unit = str(data.attrs["quantity_units"])
     words = str(data.attrs["quantity"]).replace("omega_1", r"$\omega_1$")

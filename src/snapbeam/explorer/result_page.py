@@ -1,0 +1,220 @@
+"""The page of a result that is no map: its figures, a run of what is clicked on, and files of the figures."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import panel as pn
+from bokeh.events import Tap
+from bokeh.models import ColumnDataSource
+from bokeh.plotting import figure
+from markupsafe import Markup
+
+import snapbeam as sb
+from snapbeam import Run
+from snapbeam.explorer.address import Address
+from snapbeam.explorer.jobs import RUN_SECONDS, Downloads, Tab, Token, check_run, drawing, file_bytes
+from snapbeam.explorer.maps import ResultSource, sections_of, started
+from snapbeam.explorer.run_view import RunView
+from snapbeam.explorer.shared import Shared
+from snapbeam.explorer.style import Html, look_of, sheet, styled
+from snapbeam.plot.dataset import start_of
+from snapbeam.plot.style import save_figure
+
+__all__ = ["ResultPage"]
+
+
+_DOTS = 150
+"""Dots per inch of a figure on the page."""
+_CLICK = "Click on the figure to compute the run that starts there."
+
+
+class ResultPage(Tab):
+    """Figures of a result on the left, and a run of the stored or the clicked state on the right.
+
+    Parameters
+    ----------
+    shared : Shared
+        Its source is a :class:`ResultSource`.
+    arguments : mapping
+        Query string of the address: the look, and the figure.
+    """
+
+    def __init__(self, shared: Shared, arguments: dict[str, list[bytes]]) -> None:
+        super().__init__()
+        assert isinstance(shared.source, ResultSource)
+        self.shared, self.source = shared, shared.source
+        address = Address.read(arguments)
+        self.look = look_of(address.theme, lecture=address.type == "large")
+        names = list(self.source.figures)
+        self.shown = pn.widgets.Select(
+            options={name.replace("_", " "): name for name in names}, width=240,
+            value=address.show if address.show in names else names[0],
+        )  # fmt: skip
+        self.shown.param.watch(lambda _: self.post(self.draw), "value")
+        self.kind = pn.widgets.RadioButtonGroup(options=["png", "pdf", "svg"], value="png")
+        save = pn.widgets.Button(width=100, label="Save figure")
+        save.on_click(lambda _: self.post(self.save))
+        self.downloads = Downloads()
+        self.words = Html("", sizing_mode="stretch_width", css_classes=["take-words"])
+        self.image = ColumnDataSource({"image": [], "w": [], "h": []}, name="result")
+        self.plot = figure(toolbar_location=None, sizing_mode="stretch_width", tools="", name="result-plot")
+        self.plot.axis.visible = self.plot.grid.visible = False
+        self.plot.min_border = 0
+        self.plot.image_rgba("image", 0, 0, "w", "h", source=self.image)
+        self.plot.on_event(Tap, lambda event: self.tapped(event.x, event.y))
+        self.axes: Any = None
+        self.view = RunView(self.look, "A", self.post, self.later)
+        self.view.tabs.active = int(
+            "multiplier_real" in self.source.skeleton
+        )  # an orbit in its phase portrait
+        self._token: Token | None = None
+        pn.config.raw_css = [sheet(self.look)]
+        title = Markup('<h1>snapbeam <span class="faint">{}: {}</span></h1>').format(
+            self.source.name, self.source.kind
+        )
+        left = pn.Column(
+            pn.FlexBox(self.shown, save, self.kind, margin=0, align_items="center"), pn.pane.Bokeh(self.plot, sizing_mode="stretch_width"),
+            self.words, Html(self._facts(), sizing_mode="stretch_width"),
+            sizing_mode="stretch_width", css_classes=["card", "left"],
+        )  # fmt: skip
+        parts = [left]
+        if self.source.run is not None or start_of(self.source.skeleton) is not None:
+            parts.append(pn.FlexBox(self.view.layout, margin=0, css_classes=["right"]))
+        body = pn.FlexBox(
+            *parts, margin=0, sizing_mode="stretch_width", flex_wrap="wrap", css_classes=["body"]
+        )
+        self.layout = pn.Column(
+            Html(title, margin=0), body, sizing_mode="stretch_width", margin=0, css_classes=["whole"]
+        )
+        styled(self.layout, self.look)
+        if self.doc is not None:
+            self.doc.add_root(self.downloads.source)
+        pn.state.onload(self.stand)
+
+    def stand(self) -> None:
+        """Draw the figure, and show the run of the file or of the stored state."""
+        self.view.stand()
+        self.draw()
+        if self.source.run is not None:
+            self.show(self.source.run, "the run of the file")
+        elif start_of(self.source.skeleton) is not None:
+            self.ask(None)
+        self.later(self.view.complete, 700)
+
+    def _facts(self) -> Markup:
+        """The attributes that a line can hold."""
+        row = Markup('<tr><td class="faint">{}</td><td>{}</td></tr>')
+        held = {name: f"{v:.6g}" if isinstance(v, float) else str(v) for name, v in self.source.attrs.items()}
+        rows = [row.format(name.replace("_", " "), text) for name, text in held.items() if 0 < len(text) < 60]
+        return Markup('<table class="facts">{}</table>').format(Markup("").join(rows))
+
+    # ------------------------------------------------------------------ figures
+
+    def _paint(self) -> Any:
+        drawn = self.source.figures[self.shown.value](self.source.skeleton, ax=None)
+        return drawn.get_figure(root=True), drawn
+
+    def draw(self) -> None:
+        """Draw the chosen figure."""
+
+        def work(_: Token) -> tuple[Any, Any]:
+            from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+            with drawing:
+                whole, axes = self._paint()
+                canvas = FigureCanvasAgg(whole)
+                whole.set_dpi(_DOTS)
+                canvas.draw()
+                _close(whole)
+                return np.asarray(canvas.buffer_rgba())[::-1].copy(), axes
+
+        def done(found: Any, error: str) -> None:
+            self.post(lambda: self._drawn(found, error))
+
+        self.shared.jobs.export(work, done, Token())
+
+    def _drawn(self, found: Any, error: str) -> None:
+        if found is None:
+            self.words.object = Markup('<p class="bad" role="alert">{}</p>').format(error)
+            return
+        pixels, self.axes = found
+        height, width = pixels.shape[:2]
+        self.plot.x_range.update(start=0, end=width)
+        self.plot.y_range.update(start=0, end=height)
+        self.plot.aspect_ratio = width / height
+        image = pixels.view(np.uint32).reshape(height, width)
+        self.image.data = {"image": [image], "w": [width], "h": [height]}
+
+    def save(self) -> None:
+        """Give the figure as a file."""
+        suffix, name = f".{self.kind.value}", str(self.shown.value)
+
+        def write(path: Any) -> None:
+            with drawing:
+                whole, _ = self._paint()
+                save_figure(whole, path)
+                _close(whole)
+
+        def done(content: bytes | None, error: str) -> None:
+            self.post(lambda: self._saved(content, f"{name}{suffix}", error))
+
+        self.shared.jobs.export(lambda _: file_bytes(suffix, write), done, Token())
+
+    def _saved(self, content: bytes | None, name: str, error: str) -> None:
+        if content is not None:
+            self.downloads.give(name, content)
+        self.words.object = Markup('<p class="note">{}</p>').format(error or name)
+
+    # ------------------------------------------------------------------ runs
+
+    def tapped(self, x: float, y: float) -> None:
+        """Compute the run of a place in the figure."""
+        if self.axes is None or start_of(self.source.skeleton) is None:
+            return
+        if self.axes.bbox.contains(x, y):
+            self.ask(tuple(self.axes.transData.inverted().transform((x, y))))
+
+    def ask(self, place: tuple[float, float] | None) -> None:
+        """Compute the run that starts at a place of the first figure, or at the stored state."""
+        start, base, how = start_of(self.source.skeleton), self.shared.system, self.shared.integration
+        if base is None or start is None:
+            self.view.fail(self.shared.why_not)
+            return
+        if self._token is not None:
+            self._token.cancel()
+        self._token = token = Token(RUN_SECONDS)
+        self.view.begin("")
+
+        def work(token: Token) -> tuple[Run, str] | None:
+            found = start(self.source.skeleton, place)
+            if found is None:
+                return None
+            given = {**found.parameters, **found.state}
+            words = ", ".join(f"{name} {value:.5g}" for name, value in given.items())
+            system = started(sections_of(base.replace(**found.parameters), how), found.state)
+            integration = how.replace(cycles=found.cycles, engine="auto", threads=None)
+            check_run(system, integration)
+            return sb.simulate(system, integration, progress=token.check), words
+
+        def done(found: tuple[Run, str] | None, error: str) -> None:
+            self.post(lambda: self.view.fail(error or _CLICK) if found is None else self.show(*found))
+
+        self.shared.jobs.run(work, done, token)
+
+    def show(self, run: Run, words: str) -> None:
+        """Show a run."""
+        self.view.show(run, words, fresh=True)
+
+    def close(self) -> None:
+        """The tab is closed: compute nothing for it any more."""
+        super().close()
+        if self._token is not None:
+            self._token.cancel()
+
+
+def _close(whole: Any) -> None:
+    import matplotlib.pyplot as plt
+
+    plt.close(whole)
