@@ -10,8 +10,7 @@ import xarray as xr
 
 import snapbeam as sb
 from snapbeam.model import default_values
-from snapbeam.model.parameter_axes import PHYSICAL
-from snapbeam.model.parameters import parameters
+from snapbeam.model.parameters import PHYSICAL, parameters
 from snapbeam.simulation.dataset import SCHEMA
 from snapbeam.solver.statistics import STATISTICS
 

@@ -147,9 +147,8 @@ COMMANDS = {
 def test_every_command_takes_names_and_units(command, names, value, axis, harvester) -> None:
     for name in names:
         line = COMMANDS[command].format(name=name, value=value, axis=axis)
-        first, *rest = line.split()
-        at = 2 if first == "dynamics" else 1
         words = line.split()
+        at = 2 if words[0] == "dynamics" else 1
         result = CliRunner().invoke(app, [*words[:at], "--config", str(harvester), *words[at:]])
         assert result.exit_code == 0, f"{line}\n{result.output}"
 

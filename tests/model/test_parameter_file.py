@@ -7,7 +7,7 @@ import pytest
 
 from snapbeam.model.default_values import BEAM, CONTACT
 from snapbeam.model.integration import Integration
-from snapbeam.model.parameter_axes import PHYSICAL, from_physical, parse_axis, to_physical
+from snapbeam.model.parameter_axes import from_physical, parse_axis, to_physical
 from snapbeam.model.parameter_file import (
     DEFAULT_AXES,
     Config,
@@ -16,6 +16,7 @@ from snapbeam.model.parameter_file import (
     load_config,
     override,
 )
+from snapbeam.model.parameters import PHYSICAL
 from snapbeam.model.system import System
 from snapbeam.util.validation import InputError
 

@@ -15,7 +15,7 @@ from urllib.parse import urlencode
 
 from snapbeam import InputError
 from snapbeam.explorer.jobs import ADDRESS
-from snapbeam.model.parameter_axes import parameter_of_axis
+from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import split_name
 
 __all__ = ["Address", "number"]
@@ -154,7 +154,7 @@ def _pairs(text: str) -> dict[str, Any]:
         name, colon, value = part.partition(":")
         if not colon:
             raise InputError("must be name:value,name:value")
-        row = parameter_of_axis(name)
+        row = lookup(name)
         if row.quantity.kind in (str, bool):
             pairs[row.name] = row.quantity.check(name, value if row.quantity.kind is str else value == "True")
         else:

@@ -48,9 +48,9 @@ from snapbeam.explorer.maps import (
 )
 from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.style import Html, Look, framed_plot, styled
-from snapbeam.model.parameter_axes import CHANGES_UNITS, PHYSICAL, parameter_of_axis
+from snapbeam.model.parameter_axes import CHANGES_UNITS
 from snapbeam.model.parameter_file import Config, config_from_mapping
-from snapbeam.model.parameters import Parameter, parameters
+from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, parameters
 from snapbeam.plot.style import CLASS_COLORS
 from snapbeam.util.input_files import parsed_toml
 
@@ -183,7 +183,7 @@ class WindowControl:
             ((left, right), self.card.plane.names[0], self.card.plane.x),
             ((low, high), self.card.plane.names[1], self.card.plane.y),
         ):
-            item = parameter_of_axis(name).quantity
+            item = lookup(name).quantity
             least = max(a, item.low) if np.isfinite(item.low) else a
             most = min(b, item.high) if np.isfinite(item.high) else b
             if axis.log:
@@ -558,7 +558,7 @@ class MapCard:
 
     def _fixed_short(self) -> dict[str, Any]:
 
-        return {parameter_of_axis(name).short: value for name, value in self.plane.fixed_values().items()}
+        return {lookup(name).short: value for name, value in self.plane.fixed_values().items()}
 
     def _draw_dots(self, wanted: bool, words: list[str]) -> None:
         dots = self.dots
@@ -1081,7 +1081,7 @@ class TakeCard:
             over = {
                 name: value
                 for name, value in point.values.items()
-                if page.card.source.is_list or parameter_of_axis(name).short in skeleton.dims
+                if page.card.source.is_list or lookup(name).short in skeleton.dims
             }
             command = run_command(over if on_map else point.values, file, on_map)
             beside = "" if on_map else " (with the system saved as system.toml beside it)"
@@ -1333,7 +1333,7 @@ def window_dataset(window: Any) -> xr.Dataset:
     dataset = axes_dataset(
         window.system, {window.names[1]: window.y, window.names[0]: window.x}, window.integration
     )
-    dims = tuple(parameter_of_axis(name).short for name in (window.names[1], window.names[0]))
+    dims = tuple(lookup(name).short for name in (window.names[1], window.names[0]))
     own = window.own()
     for name, values in window.values.items():
         row = STATISTICS[name]

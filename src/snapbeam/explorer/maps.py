@@ -30,9 +30,9 @@ from snapbeam import (
     sweep,
 )
 from snapbeam.explorer.jobs import WINDOW_POINTS, Jobs, Token, check_run
-from snapbeam.model.parameter_axes import PHYSICAL, parameter_of_axis, to_physical
+from snapbeam.model.parameter_axes import to_physical
 from snapbeam.model.parameter_file import config_from_mapping, config_text
-from snapbeam.model.parameters import parameters
+from snapbeam.model.parameters import PHYSICAL, lookup, parameters
 from snapbeam.model.quantity import split_name
 from snapbeam.plot.axes import edges_of, is_geometric, positions
 from snapbeam.plot.dataset import figures_of
@@ -90,7 +90,7 @@ def parameter_name(skeleton: xr.Dataset, name: str) -> str | None:
         return None
     said = skeleton[name].attrs.get("parameter", "")
     try:
-        return parameter_of_axis(str(said)).name
+        return lookup(str(said)).name
     except InputError:
         return None
 
@@ -431,16 +431,16 @@ def axes_dataset(system: System, axes: Mapping[str, Any], integration: Integrati
     """Coordinates and attributes of a sweep that is not computed."""
     import json
 
-    from snapbeam.model.parameter_axes import parameter_of_axis
+    from snapbeam.model.parameters import lookup
     from snapbeam.util.datasets import xr
 
     coords: dict[str, Any] = {}
     for name, values in axes.items():
-        row = parameter_of_axis(name)
+        row = lookup(name)
         labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
         coords[row.short] = ((row.short,), np.asarray(values), labels)
     for name in ("drive.frequency_ratio", "drive.velocity_amplitude", "contact.location"):
-        row = parameter_of_axis(name)
+        row = lookup(name)
         if row.short not in coords and name in system.parameters:
             labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
             coords[row.short] = ((), system.parameters[name], labels)
@@ -558,8 +558,7 @@ class Point:
     def words(self) -> str:
         """The point for a person, in few digits."""
         return ", ".join(
-            f"{parameter_of_axis(name).short.replace('_', ' ')} {_brief(value)}"
-            for name, value in self.values.items()
+            f"{lookup(name).short.replace('_', ' ')} {_brief(value)}" for name, value in self.values.items()
         )
 
 
@@ -608,7 +607,7 @@ def integration_of(attrs: Mapping[str, Any]) -> Integration:
 def parameter_of(skeleton: xr.Dataset, name: str) -> str:
     """The dotted name of an axis."""
     attrs = skeleton[name].attrs if name in skeleton.coords else {}
-    return parameter_of_axis(str(attrs.get("parameter", name))).name
+    return lookup(str(attrs.get("parameter", name))).name
 
 
 NOT_COMPUTED = "the map has no result here yet"
@@ -721,14 +720,14 @@ class Axis:
     @staticmethod
     def words_of(source: Source, name: str) -> str:
         """Axis label: long name, symbol and unit."""
-        from snapbeam.model.parameter_axes import parameter_of_axis
+        from snapbeam.model.parameters import lookup
 
         attrs = source.skeleton[name].attrs
         text, unit = source.label(name)
         text = text.replace("omega_1", "ω₁")
         symbol = ""
         if "parameter" in attrs or name in ("frequency_ratio", "velocity_amplitude", "location"):
-            symbol = plain_symbol(parameter_of_axis(str(attrs.get("parameter", name))).quantity.symbol)
+            symbol = plain_symbol(lookup(str(attrs.get("parameter", name))).quantity.symbol)
         return " ".join(part for part in (text, symbol, "" if unit == "1" else f"({unit})") if part)
 
     @property
@@ -935,7 +934,7 @@ class Plane(_Cut):
     @property
     def can_zoom(self) -> bool:
         """True if both axes are continuous parameters."""
-        return all(parameter_of_axis(name).quantity.kind is float for name in self.names)
+        return all(lookup(name).quantity.kind is float for name in self.names)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -1455,9 +1454,9 @@ def _structure_order(
 
 
 def _is_run(name: str) -> bool:
-    from snapbeam.model.parameter_axes import parameter_of_axis
+    from snapbeam.model.parameters import lookup
 
-    return parameter_of_axis(name).is_run
+    return lookup(name).is_run
 
 
 def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) -> dict[str, NDArray[Any]]:
@@ -1562,7 +1561,7 @@ def _value(value: Any) -> str:
 def run_command(values: Mapping[str, Any], file: str, on_map: bool) -> str:
     """The command that computes a point: of a file's map, or of a parameter file stored next to it."""
     if file and on_map:
-        point = ",".join(f"{parameter_of_axis(name).short}={_value(value)}" for name, value in values.items())
+        point = ",".join(f"{lookup(name).short}={_value(value)}" for name, value in values.items())
         source = ["--from", file, "--point", point]
     else:
         source = ["--config", _CONFIG]

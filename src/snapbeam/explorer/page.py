@@ -34,7 +34,7 @@ from snapbeam.explorer.maps import chances as chances_of
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.style import Html, Look, framed, look_of, styled
-from snapbeam.model.parameter_axes import PHYSICAL
+from snapbeam.model.parameters import PHYSICAL
 
 __all__ = ["Answer", "Page", "answer"]
 
@@ -227,11 +227,11 @@ class Page(Tab):
 
     def _make_fields(self) -> None:
         names = self.card.plane.parameters
-        from snapbeam.model.parameter_axes import parameter_of_axis
+        from snapbeam.model.parameters import lookup
 
         self.fields, self.errors = {}, {}
         for name in dict.fromkeys(names):
-            row = parameter_of_axis(name)
+            row = lookup(name)
             unit = "" if row.quantity.unit == "1" else f" ({row.quantity.unit})"
             field = pn.widgets.TextInput(name=row.short.replace("_", " ") + unit, value="", width=170)
             field.param.watch(lambda _: self.post(self._ask_typed), "enter_pressed")
@@ -488,11 +488,11 @@ class Page(Tab):
             self._system.fill(keep=True)
 
     def _ask_typed(self) -> None:
-        from snapbeam.model.parameter_axes import parameter_of_axis
+        from snapbeam.model.parameters import lookup
 
         values: dict[str, Any] = {}
         for name, field in self.fields.items():
-            row = parameter_of_axis(name)
+            row = lookup(name)
             item, text = row.quantity, str(field.value_input or field.value).strip()
             self.errors[name].object = ""
             try:

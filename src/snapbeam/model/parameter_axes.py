@@ -27,12 +27,10 @@ from snapbeam.util.validation import (
 
 __all__ = [
     "CHANGES_UNITS",
-    "PHYSICAL",
     "Axis",
     "axis_that_changes_unit",
     "checked_physical",
     "from_physical",
-    "parameter_of_axis",
     "parse_axis",
     "ratios_of",
     "to_physical",
@@ -130,9 +128,6 @@ def _finite(name: str, text: str, value: float) -> float:
 
 CHANGES_UNITS = ("beam.", "boundary.", "imperfection.", "model.")
 """Sections of parameters that may change the first natural frequency and the length scale."""
-
-
-parameter_of_axis = lookup
 
 
 def unit_of(system: System, name: str) -> float:
