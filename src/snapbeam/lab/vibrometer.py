@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from snapbeam.lab.decay.poles import Line, without_lines
 from snapbeam.lab.diagnostics import KINDS_VIBROMETER
+from snapbeam.lab.least_squares import covariance, phasors, sines, solve
 from snapbeam.lab.sensor_errors import (
     LowPass,
     beyond_shakers,
@@ -287,24 +288,11 @@ def beside_lines(steady: SineFit, lines: DriveLines) -> SineFit:
     )
 
 
-def _design(time: _Array, frequencies: list[float]) -> _Array:
-    """Offset, cosine and sine of each frequency, then the harmonics of the first."""
-    turns = [2.0 * math.pi * f * time for f in frequencies]
-    turns += [2.0 * math.pi * k * frequencies[0] * time for k in range(2, _HARMONICS + 1)]
-    columns = [np.ones_like(time)]
-    for turn in turns:
-        columns += [np.cos(turn), np.sin(turn)]
-    return np.column_stack(columns)
-
-
 def _left(part: SignalSamples, frequencies: list[float], sound: NDArray[np.bool_]) -> tuple[_Array, _Array]:
     """Residual of a signal after subtraction of lines, 0 at invalid samples, and the amplitudes of the lines."""
-    design = _design(part.time, frequencies)
-    used = design[sound]
-    gram = used.T @ used
-    solution: _Array = np.asarray(
-        np.linalg.lstsq(gram, used.T @ part.values[sound], rcond=1e-12)[0], dtype=np.float64
-    )
+    harmonics = frequencies[0] * np.arange(2, _HARMONICS + 1)
+    design = sines(part.time, np.append(frequencies, harmonics))
+    solution = solve(design[sound], part.values[sound], 1e-12)
     left: _Array = np.asarray(part.values - design @ solution, dtype=np.float64)
     left[~sound] = 0.0
     return left, solution
@@ -314,9 +302,7 @@ def _phasors(
     part: SignalSamples, frequencies: list[float], sound: NDArray[np.bool_]
 ) -> NDArray[np.complex128]:
     """Complex amplitudes c of lines Re(c exp(i 2 pi f t))."""
-    solution = _left(part, frequencies, sound)[1]
-    count = len(frequencies)
-    return np.asarray(solution[1 : 2 * count + 1 : 2] - 1j * solution[2 : 2 * count + 2 : 2])
+    return phasors(_left(part, frequencies, sound)[1])[: len(frequencies)]
 
 
 def _peak(left: _Array, rate: float, rough: SineFit) -> float | None:
@@ -360,13 +346,10 @@ def _at_rest(
     count = len(frequencies)
     if time.size < 8 * (2 * count + 1) or (time[-1] - time[0]) * min(frequencies) < 1.0:
         return np.zeros(count, dtype=np.complex128), np.full(count, math.inf)
-    turns = 2.0 * math.pi * np.outer(time, frequencies)
-    design = np.column_stack([np.ones(time.size), np.cos(turns), np.sin(turns)])
-    solution, *_ = np.linalg.lstsq(design, values, rcond=1e-12)
-    noise = float(np.std(values - design @ solution))
-    spread = noise * np.sqrt(np.diag(np.linalg.pinv(design.T @ design, rcond=1e-12)))
-    error = np.hypot(spread[1 : count + 1], spread[count + 1 :])
-    return solution[1 : count + 1] - 1j * solution[count + 1 :], error
+    design = sines(time, frequencies)
+    solution = solve(design, values, 1e-12)
+    spread = float(np.std(values - design @ solution)) * np.sqrt(np.diag(covariance(design, 1e-12)))
+    return phasors(solution), np.hypot(spread[1::2], spread[2::2])
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -970,17 +953,15 @@ def _cycle_phasors(samples: SignalSamples, fit: SineFit, start: float, stop: flo
     """Middle [s] and complex amplitude, turning with the fitted sine, of each whole cycle."""
     period = 1.0 / fit.frequency
     count = int((stop - start) * fit.frequency + 1e-6)
-    turn = 2.0 * math.pi * fit.frequency * samples.time
-    design = np.column_stack((np.ones_like(turn), np.cos(turn), np.sin(turn)))
+    design = sines(samples.time, [fit.frequency])
     index = np.floor((samples.time - start) * fit.frequency + 1e-9).astype(np.int64)
     borders = np.searchsorted(index, np.arange(count + 1))
-    phasors = np.empty(count, dtype=np.complex128)
+    found = np.empty(count, dtype=np.complex128)
     for n in range(count):
         part = slice(borders[n], borders[n + 1])
-        _, c, s = np.linalg.lstsq(design[part], samples.values[part], rcond=None)[0]
-        phasors[n] = c - 1j * s
+        found[n : n + 1] = phasors(np.linalg.lstsq(design[part], samples.values[part], rcond=None)[0])
     middle: _Array = start + (np.arange(count, dtype=np.float64) + 0.5) * period
-    return middle, phasors
+    return middle, found
 
 
 # ----------------------------------------------------------------------------------------------------
