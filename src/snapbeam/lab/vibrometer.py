@@ -18,13 +18,15 @@ from snapbeam.lab.decay.poles import Line, without_lines
 from snapbeam.lab.diagnostics import KINDS_VIBROMETER
 from snapbeam.lab.least_squares import covariance, phasors, sines, solve
 from snapbeam.lab.sensor_errors import (
+    Hypothesis,
     LowPass,
+    Record,
     beyond_shakers,
     find_crosstalk,
+    find_errors,
     find_low_pass,
     noise_colour,
     one_sided,
-    saturation_loss,
     with_loss,
 )
 from snapbeam.lab.signals import SignalSamples, check_signal, make_signal
@@ -742,8 +744,14 @@ def measure_drive(
     everywhere = [Flaw(flaw.first + shift, flaw.last + shift) for flaw in flaws]
     steady, wander = with_wander(steady, times, cycles, everywhere, samples, begin)
     steady = beside_lines(steady, lines)
-    lost = 0.0 if clipping.found else saturation_loss(steady)
-    steady = with_loss(steady, lost)
+    left = part.values - steady.waveform(part.time)
+    left[~sound_samples(left.size, flaws)] = 0.0
+    others = tuple(line.frequency for line in (*lines.hum, *lines.beside))
+    errors = [] if clipping.found else find_errors(Record(steady, part, left, others, times, cycles))
+    if any(one.kind in ("samples_lost", "beat") for one in errors):
+        lines = DriveLines(lines.hum, ())  # which make the lines beside
+    for one in errors:
+        steady = with_loss(steady, one.loss, one.shift)
     if low_pass is not None:
         steady = with_loss(steady, low_pass.loss(steady.frequency))
     if crosstalk is not None:
@@ -761,7 +769,7 @@ def measure_drive(
         *_doubts(steady, limit, wander, stray, frequency, stated),
         *_start_diagnostics(startup, period),
         *_line_diagnostics(lines, steady),
-        *_sensor_diagnostics(steady, low_pass, crosstalk, lost, mean_moves),
+        *_sensor_diagnostics(steady, low_pass, crosstalk, errors, mean_moves),
         *_not_there(samples, steady, frequency),
         *beyond_shakers(steady, str(signal.attrs["units"])),
         *(
@@ -893,7 +901,7 @@ def _crosstalk(samples: SignalSamples, first: int, rough: SineFit) -> Line | Non
 
 
 def _sensor_diagnostics(
-    steady: SineFit, low_pass: LowPass | None, crosstalk: Line | None, lost: float, mean_moves: float
+    steady: SineFit, low_pass: LowPass | None, crosstalk: Line | None, errors: list[Hypothesis], mean_moves: float
 ) -> list[Diagnostic]:
     told = []
     if low_pass is not None:
@@ -908,9 +916,7 @@ def _sensor_diagnostics(
     if crosstalk is not None:
         share = 100.0 * crosstalk.amplitude / steady.amplitude
         told.append(KINDS_VIBROMETER["crosstalk"].found(share_percent=share))
-    if lost > 0.0:
-        third = 100.0 * float(steady.harmonic_amplitude[2]) / steady.amplitude
-        told.append(KINDS_VIBROMETER["saturated"].found(third_percent=third, loss_percent=100.0 * lost))
+    told += [KINDS_VIBROMETER[one.kind].found(**one.numbers) for one in errors]
     if mean_moves > 0.0:
         told.append(KINDS_VIBROMETER["one_sided"].found(share=mean_moves))
     return told
