@@ -613,6 +613,19 @@ KINDS_VIBROMETER = table(
         ("units", "sensitivity"),
     ),
     Kind(
+        "vibrometer.clocks", ERROR,
+        "frequency of the motion, against that of the acceleration of the same shaker",
+        "the shaker moves at {own:.6g} Hz, its acceleration (--acceleration) at {other:.6g} Hz, {ratio:.4g} times as "
+        "fast: another test, or a sampling frequency (sampling_frequency, --sampling-frequency) of one record is wrong",
+        ("acceleration", "sampling_frequency"),
+    ),
+    Kind(
+        "vibrometer.acceleration", ERROR,
+        "amplitude of the motion, against that of the acceleration of the same shaker, and factors of mistaken units",
+        "acceleration (--acceleration) is {ratio:.4g} times what belongs to this motion: {told}",
+        ("acceleration",),
+    ),
+    Kind(
         "vibrometer.slow_start", INFO,
         "how well the start of the motion is told",
         "the shaker starts so gently that its start is known to {uncertainty_ms:.2g} ms only",

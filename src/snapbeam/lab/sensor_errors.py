@@ -24,6 +24,7 @@ __all__ = [
     "Hypothesis",
     "LowPass",
     "Record",
+    "beside_acceleration",
     "beyond_shakers",
     "find_crosstalk",
     "find_errors",
@@ -194,6 +195,7 @@ _MATTERS = 0.004  # of the amplitude that an error must take, or move it by, to 
 _CURVE_ERROR = 0.05  # of its harmonics by which a curve may differ from a family's
 _CHANGES = 0.02  # of the amplitude, or rad, by which a steady motion may change
 _EXPLAINS = 0.75  # of the odd harmonics that a curve must explain
+_TAIL = 4.0  # cycles after the start-up whose transient is no noise
 _MAINS = (50.0, 60.0, 100.0, 120.0)
 
 
@@ -295,9 +297,11 @@ def _curves(record: Record) -> list[Hypothesis]:
 
 def _filters(record: Record) -> list[Hypothesis]:
     """Filters behind the source of the noise, by the shape of its spectrum about the drive (Whittle's likelihood)."""
-    rate, n, drive = record.part.sampling_frequency, record.left.size, record.fit.frequency
+    rate, drive = record.part.sampling_frequency, record.fit.frequency
+    left = record.left[min(round(_TAIL * rate / drive), record.left.size // 4) :]
+    n = left.size
     freq = np.fft.rfftfreq(n, 1.0 / rate)
-    power = np.abs(np.fft.rfft(record.left)) ** 2
+    power = np.abs(np.fft.rfft(left)) ** 2
     used = (freq > 2.5 * rate / n) & (freq < min(12.0 * drive, 0.4 * rate))
     for line in (*record.lines, *(drive * np.arange(1, 13))):
         used &= np.abs(freq - line) > 1.5 * rate / n
@@ -404,6 +408,45 @@ _FASTEST = 3.0  # m/s
 _HARDEST = 1500.0  # m/s^2
 _FARTHEST = 0.05  # m
 _G = 9.80665
+
+
+_SAME_RATE = 5e-3  # by which two clocks may differ
+_AGREE = 0.05  # by which two sensors may differ
+_UNITS = {
+    "one of the units is wrong by a power of ten": None,
+    "g was read as m/s^2": 1.0 / _G,
+    "m/s^2 was read as g": _G,
+    "inches were read as centimetres": 2.54,
+}
+
+
+def beside_acceleration(fit: SineFit, units: str, acceleration: SineFit) -> list[Diagnostic]:
+    """Diagnostics of a sine of displacement or velocity, against the acceleration of the same shaker."""
+    clocks = acceleration.frequency / fit.frequency
+    if abs(clocks - 1.0) > max(_SAME_RATE, 6.0 * (fit.frequency_se + acceleration.frequency_se) / fit.frequency):
+        return [
+            KINDS_VIBROMETER["clocks"].found(own=fit.frequency, other=acceleration.frequency, ratio=clocks)
+        ]
+    omega = 2.0 * math.pi * fit.frequency
+    ratio = acceleration.amplitude / (omega * fit.amplitude * (omega if units == "m" else 1.0))
+    if abs(ratio - 1.0) < _AGREE:
+        return []
+    turned = omega if units == "m/s" else 1.0 / omega
+    read = "a displacement was read as a velocity" if units == "m/s" else "a velocity was read as a displacement"
+    causes = {read: turned} | _UNITS
+    told = [
+        cause
+        for cause, factor in causes.items()
+        if _tens(ratio / (factor or 1.0), cause == read or factor is None)
+    ]
+    words = " or ".join(told) or "look at sensitivity (--sensitivity), units (--units) and channels (--channel)"
+    return [KINDS_VIBROMETER["acceleration"].found(told=words, ratio=ratio)]
+
+
+def _tens(ratio: float, powers: bool) -> bool:
+    """Return whether a ratio is 1, or any power of ten."""
+    exponent = math.log10(ratio)
+    return abs(exponent - (round(exponent) if powers else 0.0)) < math.log10(1.0 + _AGREE)
 
 
 def beyond_shakers(fit: SineFit, units: str) -> list[Diagnostic]:

@@ -21,6 +21,7 @@ from snapbeam.lab.sensor_errors import (
     Hypothesis,
     LowPass,
     Record,
+    beside_acceleration,
     beyond_shakers,
     find_crosstalk,
     find_errors,
@@ -655,6 +656,7 @@ def measure_drive(
     frequency: float | None = None,
     *,
     amplitude: float | None = None,
+    acceleration: xr.DataArray | None = None,
     snr_limit: float = SNR_LIMIT,
     tolerance: float = 0.05,
 ) -> DriveMeasurement:
@@ -670,6 +672,9 @@ def measure_drive(
         Set excitation frequency [Hz], the initial guess; by default the highest peak of the spectrum.
     amplitude : float, optional
         Set amplitude, in the unit of the signal, for a check.
+    acceleration : xarray.DataArray, optional
+        Acceleration of the same shaker in the same test [m/s^2], for a check of units and sampling rate, which the
+        record alone cannot tell.
     snr_limit : float
         Minimum ratio [dB] of the sine to noise and distortion of an acceptable test; the paper's 15 dB.
     tolerance : float
@@ -772,6 +777,7 @@ def measure_drive(
         *_sensor_diagnostics(steady, low_pass, crosstalk, errors, mean_moves),
         *_not_there(samples, steady, frequency),
         *beyond_shakers(steady, str(signal.attrs["units"])),
+        *_against(acceleration, steady, str(signal.attrs["units"])),
         *(
             [KINDS_VIBROMETER["interrupted"].found(outside_ms=1e3 * outside)]
             if outside > 3.0 * period
@@ -920,6 +926,16 @@ def _sensor_diagnostics(
     if mean_moves > 0.0:
         told.append(KINDS_VIBROMETER["one_sided"].found(share=mean_moves))
     return told
+
+
+def _against(acceleration: xr.DataArray | None, steady: SineFit, units: str) -> list[Diagnostic]:
+    """Diagnostics against the acceleration of the same shaker, if it is given."""
+    if acceleration is None:
+        return []
+    samples = check_signal(acceleration, "m/s^2", "acceleration")
+    guess = spectral_peak(samples)
+    first, last = moving_part(samples, guess)
+    return beside_acceleration(steady, units, robust_fit(_slice(samples, first + (last - first) // 3, last), guess, 3))
 
 
 _SAME_LINE = 0.02  # of the frequency by which the highest line may differ

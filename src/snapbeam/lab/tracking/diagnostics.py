@@ -64,8 +64,7 @@ KINDS = table(
     Kind(
         "camera.rest_moves", WARNING,
         "drift of the beam within the frames given as rest",
-        "the beam moves by {drift:.0f} standard errors within the rest_frames (--rest-frames) given, or right beside "
-        "them, so all displacements may be shifted by up to {shift_mm:.3g} mm, which is in their standard errors",
+        "{told}: all displacements may be shifted by up to {shift_mm:.3g} mm, which is in their standard errors",
         ("rest_frames",),
     ),
     Kind(
@@ -364,7 +363,15 @@ def _of_the_rest(seen: SeenMotion, settings: TrackingSettings, offset_mm: float)
     if seen.rest.found:
         return []
     if settings.rest_frames is not None:
-        return [KINDS["rest_moves"].found(drift=min(seen.rest.drift, 1e6), shift_mm=offset_mm)]
+        drift = seen.rest.drift
+        told = (
+            f"the beam moves within the rest_frames (--rest-frames) given, or right beside them, by {drift:.0f} times "
+            "the standard error of a frame"
+            if np.isfinite(drift)
+            else "the rest_frames (--rest-frames) given, and those measured beside them, are too few to show that the "
+            "beam rests"
+        )
+        return [KINDS["rest_moves"].found(told=told, drift=drift, shift_mm=offset_mm)]
     return [KINDS["no_rest"].found(quiet=2 * seen.rest.indices.size, shift_mm=offset_mm)]
 
 

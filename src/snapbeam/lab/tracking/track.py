@@ -81,7 +81,13 @@ def tracked_dataset(
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
     if not rest.indices.size:
         raise InputError(
-            f"{recording.path}: the beam was found in none of the frames at rest; set rest_frames (--rest-frames)"
+            f"{recording.path}: the beam was found in none of the frames at rest; "
+            + (
+                "set rest_frames (--rest-frames)"
+                if settings.rest_frames is None
+                else f"rest_frames = {settings.rest_frames}: must contain frames in which it is seen; look at "
+                "one (--picture) and narrow region (--region)"
+            )
         )
     turn = Orientation(settings.side, recording.shape)
     scale = recording.pixel_size * 1e3
