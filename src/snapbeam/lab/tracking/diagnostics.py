@@ -194,6 +194,43 @@ KINDS = table(
         "they were taken",
     ),
     Kind(
+        "camera.frames_exchanged", ERROR,
+        "the striker frame by frame against its steady sine, with frames exchanged and with frames shown again",
+        "{frames:.0f} pair(s) of frames are in the wrong order, the first from frame {first:.0f} on: write the images again "
+        "in the order of their numbers",
+    ),
+    Kind(
+        "camera.frames_copied", WARNING,
+        "the striker frame by frame against its steady sine, with frames exchanged and with frames shown again",
+        "{frames:.0f} frame(s) show the instant of the frame before, the first is frame {first:.0f}: a copy that was coded "
+        "again, or made by a program that changed the frame rate; keep the frames as they were taken",
+    ),
+    Kind(
+        "camera.time_jump", ERROR,
+        "the phase of the striker's drive before and after each frame, against a shift of the picture",
+        "the drive's phase jumps by {size:.2f} frames at about frame {first:.0f}: frames are missing, or two recordings were "
+        "joined; keep the frames before",
+    ),
+    Kind(
+        "camera.knocked", ERROR,
+        "the striker's rows before and after each frame, against a jump of the drive's phase",
+        "the picture shifts by {size:.2f} px at about frame {first:.0f}: the camera was knocked; keep the frames before, or "
+        "give a part with a stationary object (fixed_marks, --fixed-mark)",
+        ("fixed_mark",),
+    ),
+    Kind(
+        "camera.off_its_drive", WARNING,
+        "the striker before and after each frame, against a shift of the picture and a jump of the time",
+        "from about frame {first:.0f} on the striker is off its steady sine; a shift of the picture and a jump of the time "
+        "explain it alike: look at the frames about it",
+    ),
+    Kind(
+        "camera.scattered", WARNING,
+        "how the scatter of the striker about its steady sine grows with its speed",
+        "the striker scatters with its speed, by {size:.2f} frames: an uneven trigger, or edges that are found less well "
+        "while they move",
+    ),
+    Kind(
         "camera.curved", WARNING,
         "the beam's edge in its columns, against a straight line",
         "the beam's edge is curved: at the contact it lies {hollow_px:.2f} px off the line through its columns, which is "
@@ -356,6 +393,8 @@ def _of_the_order(order: FrameOrder, rate: float) -> list[Diagnostic]:
         )
     if order.repeated:
         told.append(KINDS["frames_repeated"].found(frames=len(order.repeated), first=order.repeated[0]))
+    if not order.missing:
+        told += [KINDS[kind].found(**numbers) for kind, numbers in order.clock]
     return told
 
 

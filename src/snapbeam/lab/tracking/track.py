@@ -18,6 +18,7 @@ from snapbeam.lab.tracking.diagnostics import (
     rounding_shift,
     tracking_diagnostics,
 )
+from snapbeam.lab.tracking.drive_clock import drive_clock
 from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.tracking.frame_order import FrameOrder, find_order, without_repeats
 from snapbeam.lab.tracking.measure import (
@@ -99,6 +100,7 @@ def tracked_dataset(
         )
         order = find_order(rows.row, rows.shaker, depth)
         rows = without_repeats(rows, order)
+        order = order._replace(clock=tuple(drive_clock(rows.shaker)))
     beam_mm = settings.rest * 1e3 - turn.sign * scale * (rows.row - rest.row)
     tip = rows.shaker + (shaker.tip_offset if shaker is not None else np.nan)
     shaker_mm = settings.rest * 1e3 - turn.sign * scale * (tip - beam.thickness - rest.row)
