@@ -248,15 +248,24 @@ def measured(scene, folder, rng):
 
 def _reordered(recording, kind, rng):
     """A recording with its frames in another order, or of a camera that was knocked."""
-    frames = recording.frames
-    k = int(rng.integers(60, len(frames) - 40))
+    k = int(rng.integers(60, len(recording) - 40))
     k += int(np.argmax(np.abs(np.diff(recording.truth["shaker_displacement_mm"].values[k : k + 30]))))
-    if kind == "frames exchanged":
-        frames[[k, k + 1]] = frames[[k + 1, k]]
-    elif kind == "frame copied":
-        frames[k] = np.clip(frames[k - 1] + rng.integers(-1, 2, frames[k].shape), 0, frames.max())
-    elif kind == "camera knocked":
-        frames[k:] = np.roll(frames[k:], int(rng.integers(1, 5)), axis=1 if frames.shape[1] > frames.shape[2] else 2)
+    as_taken, shift = recording.frame, int(rng.integers(1, 5))
+
+    def frame(index):
+        if kind == "frames exchanged":
+            return as_taken({k: k + 1, k + 1: k}.get(index, index))
+        if kind == "frame copied" and index == k:
+            before = as_taken(k - 1)
+            return np.clip(before + rng.integers(0, 3, before.shape), 1, before.max()).astype(np.uint16)
+        if kind == "camera knocked" and index >= k:
+            return np.roll(
+                as_taken(index), shift, axis=int(recording.camera.shape[1] > recording.camera.shape[0])
+            )
+        return as_taken(index)
+
+    if kind in ORDER_DEFECTS:
+        object.__setattr__(recording, "frame", frame)
     return recording
 
 

@@ -293,12 +293,19 @@ def test_a_third_harmonic_of_the_shaker_itself_is_no_saturation():
     for third in (0.06, 0.11, 0.11, 0.15):
         turn = np.pi + (0.05 if third == 0.11 else rng.uniform(-0.3, 0.3))
         found = measure_drive(
-            _of_the_sensor(lambda v, t: v + third * V * (t > 0.1) * np.cos(6e2 * np.pi * (t - 0.1) + turn)), 100.0
+            _of_the_sensor(
+                lambda v, t, third=third, turn=turn: (
+                    v + third * V * (t > 0.1) * np.cos(6e2 * np.pi * (t - 0.1) + turn)
+                )
+            ),
+            100.0,
         )
         assert "vibrometer.saturated" not in [one.code for one in found.diagnostics]
 
 
-@pytest.mark.parametrize("kind", ["slew", "crossover", "samples_lost", "drifts", "beat", "high_pass", "notch"])
+@pytest.mark.parametrize(
+    "kind", ["slew", "crossover", "samples_lost", "drifts", "beat", "high_pass", "notch"]
+)
 def test_an_error_of_electronics_is_named_and_covered(kind):
     rng = np.random.default_rng(5)
     frequency = 55.0 if kind == "notch" else 100.0

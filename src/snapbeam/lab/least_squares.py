@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["covariance", "phasors", "sines", "solve"]
 
 _Array = NDArray[np.float64]
 
 
-def sines(time: _Array, frequencies: Sequence[float] | _Array) -> _Array:
+def sines(time: _Array, frequencies: ArrayLike) -> _Array:
     """Columns of an offset, and of cosine and sine of each frequency [Hz]."""
-    turn = 2.0 * np.pi * np.outer(time, frequencies)
+    turn = 2.0 * np.pi * np.outer(time, np.asarray(frequencies))
     design = np.ones((time.size, 2 * turn.shape[1] + 1))
     design[:, 1::2], design[:, 2::2] = np.cos(turn), np.sin(turn)
     return design
@@ -41,6 +39,6 @@ def covariance(design: _Array, rcond: float = 1e-15) -> _Array:
 
 
 def _scale(design: _Array) -> _Array:
-    scale: _Array = np.linalg.norm(design, axis=0)
+    scale: _Array = np.asarray(np.linalg.norm(design, axis=0), dtype=np.float64)
     scale[scale == 0.0] = 1.0
     return scale

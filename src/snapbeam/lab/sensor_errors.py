@@ -309,7 +309,9 @@ def _filters(record: Record) -> list[Hypothesis]:
     if freq.size < 2 * _LINES or not power.min() > 0.0:
         return []
     # neighbours that differ in frequency by less than 1 % are averaged
-    edges = np.unique(np.searchsorted(freq, freq[0] * 1.01 ** np.arange(math.log(freq[-1] / freq[0]) / 0.00996)))
+    edges = np.unique(
+        np.searchsorted(freq, freq[0] * 1.01 ** np.arange(math.log(freq[-1] / freq[0]) / 0.00996))
+    )
     count = np.diff(np.append(edges, freq.size))
     freq, power = np.add.reduceat(freq, edges) / count, np.add.reduceat(power, edges) / count
 
@@ -323,13 +325,20 @@ def _filters(record: Record) -> list[Hypothesis]:
     colours = (freq / drive) ** -slope.reshape(-1, 1) + white.reshape(-1, 1)
     plain = misfit(np.ones_like(freq))
     told = [Hypothesis("", 0.0, 1)]
-    for kind, corners in (("high_pass", np.geomspace(0.02, 2.0, 24) * drive), ("low_pass", np.geomspace(0.5, 10.0, 16) * drive)):
+    for kind, corners in (
+        ("high_pass", np.geomspace(0.02, 2.0, 24) * drive),
+        ("low_pass", np.geomspace(0.5, 10.0, 16) * drive),
+    ):
         for corner in corners:
             sign = 2.0 if kind == "high_pass" else -2.0
             loss = 1.0 - 1.0 / math.sqrt(1.0 + (drive / corner) ** -sign)
             kept = 1.0 / (1.0 + (freq / corner) ** -sign)
             numbers = {"corner": corner, "loss_percent": 100.0 * loss, "limit": 0.05 * drive}
-            told.append(Hypothesis(kind if sign > 0.0 else "", plain - misfit(kept), 2, loss / (1.0 - loss), numbers=numbers))
+            told.append(
+                Hypothesis(
+                    kind if sign > 0.0 else "", plain - misfit(kept), 2, loss / (1.0 - loss), numbers=numbers
+                )
+            )
     for centre in _MAINS:
         for quality in (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0):
             off = quality * (freq / centre - centre / freq)
@@ -337,7 +346,9 @@ def _filters(record: Record) -> list[Hypothesis]:
             loss = 1.0 - abs(own) / math.hypot(1.0, own)
             numbers = {"centre": centre, "loss_percent": 100.0 * loss}
             kept = np.maximum(off**2 / (1.0 + off**2), 1e-4)
-            told.append(Hypothesis("notch", plain - misfit(kept), 2, loss / max(1.0 - loss, 1e-3), numbers=numbers))
+            told.append(
+                Hypothesis("notch", plain - misfit(kept), 2, loss / max(1.0 - loss, 1e-3), numbers=numbers)
+            )
     return told
 
 
@@ -385,7 +396,10 @@ def _courses(record: Record) -> list[Hypothesis]:
     bends = [np.diff(one, 2) for one in course]
     noise = [1.4826 * float(np.median(np.abs(one - np.median(one)))) / math.sqrt(6.0) + 1e-9 for one in bends]
     found = [np.linalg.lstsq(basis, one, rcond=None)[0] for one in course]
-    gain = [(coefficients * np.linalg.norm(basis, axis=0) / sd) ** 2 for coefficients, sd in zip(found, noise, strict=True)]
+    gain = [
+        (coefficients * np.linalg.norm(basis, axis=0) / sd) ** 2
+        for coefficients, sd in zip(found, noise, strict=True)
+    ]
     found[0][0] = found[1][0] = found[1][1] = 0.0
     change, bend = (float(np.ptp(basis @ coefficients)) for coefficients in found)
     line = float(np.ptp(basis[:, :2] @ found[0][:2]))
@@ -396,7 +410,14 @@ def _courses(record: Record) -> list[Hypothesis]:
     slow, close = float(gain[0][1:3].sum()), float(gain[0][1:].sum() + gain[1][2:].sum())
     return [
         Hypothesis("drifts", slow if line > 0.8 * change else 0.0, 2, 0.5 * change, numbers=numbers),
-        Hypothesis("beat", close if bend > _CHANGES else 0.0, 9, 0.5 * change, math.hypot(change, bend) / (2.0 * np.pi * span), numbers),
+        Hypothesis(
+            "beat",
+            close if bend > _CHANGES else 0.0,
+            9,
+            0.5 * change,
+            math.hypot(change, bend) / (2.0 * np.pi * span),
+            numbers,
+        ),
     ]
 
 
@@ -423,7 +444,9 @@ _UNITS = {
 def beside_acceleration(fit: SineFit, units: str, acceleration: SineFit) -> list[Diagnostic]:
     """Diagnostics of a sine of displacement or velocity, against the acceleration of the same shaker."""
     clocks = acceleration.frequency / fit.frequency
-    if abs(clocks - 1.0) > max(_SAME_RATE, 6.0 * (fit.frequency_se + acceleration.frequency_se) / fit.frequency):
+    if abs(clocks - 1.0) > max(
+        _SAME_RATE, 6.0 * (fit.frequency_se + acceleration.frequency_se) / fit.frequency
+    ):
         return [
             KINDS_VIBROMETER["clocks"].found(own=fit.frequency, other=acceleration.frequency, ratio=clocks)
         ]
@@ -432,14 +455,18 @@ def beside_acceleration(fit: SineFit, units: str, acceleration: SineFit) -> list
     if abs(ratio - 1.0) < _AGREE:
         return []
     turned = omega if units == "m/s" else 1.0 / omega
-    read = "a displacement was read as a velocity" if units == "m/s" else "a velocity was read as a displacement"
+    read = (
+        "a displacement was read as a velocity" if units == "m/s" else "a velocity was read as a displacement"
+    )
     causes = {read: turned} | _UNITS
     told = [
         cause
         for cause, factor in causes.items()
         if _tens(ratio / (factor or 1.0), cause == read or factor is None)
     ]
-    words = " or ".join(told) or "look at sensitivity (--sensitivity), units (--units) and channels (--channel)"
+    words = (
+        " or ".join(told) or "look at sensitivity (--sensitivity), units (--units) and channels (--channel)"
+    )
     return [KINDS_VIBROMETER["acceleration"].found(told=words, ratio=ratio)]
 
 

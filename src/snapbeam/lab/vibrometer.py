@@ -907,7 +907,11 @@ def _crosstalk(samples: SignalSamples, first: int, rough: SineFit) -> Line | Non
 
 
 def _sensor_diagnostics(
-    steady: SineFit, low_pass: LowPass | None, crosstalk: Line | None, errors: list[Hypothesis], mean_moves: float
+    steady: SineFit,
+    low_pass: LowPass | None,
+    crosstalk: Line | None,
+    errors: list[Hypothesis],
+    mean_moves: float,
 ) -> list[Diagnostic]:
     told = []
     if low_pass is not None:
@@ -935,7 +939,9 @@ def _against(acceleration: xr.DataArray | None, steady: SineFit, units: str) -> 
     samples = check_signal(acceleration, "m/s^2", "acceleration")
     guess = spectral_peak(samples)
     first, last = moving_part(samples, guess)
-    return beside_acceleration(steady, units, robust_fit(_slice(samples, first + (last - first) // 3, last), guess, 3))
+    return beside_acceleration(
+        steady, units, robust_fit(_slice(samples, first + (last - first) // 3, last), guess, 3)
+    )
 
 
 _SAME_LINE = 0.02  # of the frequency by which the highest line may differ

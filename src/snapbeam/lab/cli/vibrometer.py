@@ -146,7 +146,9 @@ def vibrometer(
     )
     console.print(f"  start-up     {summary['startup']}")
     if acceleration is None and (amplitude is None or frequency is None):
-        console.print("  not checked  unit, quantity and sampling rate: give --frequency and --amplitude, or --acceleration")
+        console.print(
+            "  not checked  unit, quantity and sampling rate: give --frequency and --amplitude, or --acceleration"
+        )
     diagnostics = drive.diagnostics
     alignment = None
     if camera is not None:

@@ -121,7 +121,9 @@ def plot_recorded_frame(recording: Recording, index: int = 0) -> Figure:
     return figure
 
 
-def _frame_axes(recording: Recording, picture: NDArray[Any], told: tuple[Diagnostic, ...]) -> tuple[Figure, Any]:
+def _frame_axes(
+    recording: Recording, picture: NDArray[Any], told: tuple[Diagnostic, ...]
+) -> tuple[Figure, Any]:
     """A figure of a frame with its scale bar and diagnostics, and its axes."""
     height, width = picture.shape
     size = 77.0 * min(max(height / width, 0.12), 1.4) + 26.0

@@ -167,7 +167,7 @@ KINDS = table(
         "camera.distorted", WARNING,
         "thickness of the beam and shape of its edges in each frame, against the usual ones",
         "{frames:.0f} frame(s) ({share_percent:.1f} %) in which the beam looks thicker or thinner, or its edge is no "
-        "step: light or another object lies on it; their standard errors are widened, or they are left out",
+        "step: light, dust, blur or another object may lie on it; their standard errors are widened, or they are left out",
     ),
     Kind(
         "camera.lost", WARNING,
@@ -394,7 +394,7 @@ def _of_the_order(order: FrameOrder, rate: float) -> list[Diagnostic]:
     if order.repeated:
         told.append(KINDS["frames_repeated"].found(frames=len(order.repeated), first=order.repeated[0]))
     if not order.missing:
-        told += [KINDS[kind].found(**numbers) for kind, numbers in order.clock]
+        told += [KINDS[kind].found(None, "", **numbers) for kind, numbers in order.clock]
     return told
 
 

@@ -80,7 +80,9 @@ def _frames(off: Floats, wave: Floats, noise: float, first: int) -> list[tuple[s
     return told
 
 
-def _steps(part: SignalSamples, off: Floats, noise: float, frequency: float) -> list[tuple[str, dict[str, float]]]:
+def _steps(
+    part: SignalSamples, off: Floats, noise: float, frequency: float
+) -> list[tuple[str, dict[str, float]]]:
     """A step of the time, or of the rows, from some frame on."""
     turn = 2.0 * np.pi * frequency * part.time
     wave = np.column_stack([np.cos(turn), np.sin(turn)])
@@ -123,5 +125,7 @@ def _jitter(off: Floats, slope: Floats) -> list[tuple[str, dict[str, float]]]:
     slow, fast = (float(np.median(off[part] ** 2)) / 0.455 for part in (order[:third], order[-third:]))
     if fast < slow * float(f.isf(_RATE, third / _MEDIAN, third / _MEDIAN)):
         return []
-    frames = math.sqrt((fast - slow) / float(np.mean(slope[order[-third:]] ** 2) - np.mean(slope[order[:third]] ** 2)))
+    frames = math.sqrt(
+        (fast - slow) / float(np.mean(slope[order[-third:]] ** 2) - np.mean(slope[order[:third]] ** 2))
+    )
     return [("scattered", {"size": frames})] if frames > _JITTER else []

@@ -98,9 +98,12 @@ def tracked_dataset(
         depth = (
             rows.row + beam.thickness - rows.shaker - (shaker.tip_offset if shaker is not None else np.nan)
         )
-        order = find_order(rows.row, rows.shaker, depth)
-        rows = without_repeats(rows, order)
-        order = order._replace(clock=tuple(drive_clock(rows.shaker)))
+        clock = tuple(drive_clock(rows.shaker))
+        if all(kind != "scattered" for kind, _ in clock):  # frames at uneven times look like lost ones
+            order = find_order(rows.row, rows.shaker, depth)
+            rows = without_repeats(rows, order)
+            clock = tuple(drive_clock(rows.shaker))
+        order = order._replace(clock=clock)
     beam_mm = settings.rest * 1e3 - turn.sign * scale * (rows.row - rest.row)
     tip = rows.shaker + (shaker.tip_offset if shaker is not None else np.nan)
     shaker_mm = settings.rest * 1e3 - turn.sign * scale * (tip - beam.thickness - rest.row)
