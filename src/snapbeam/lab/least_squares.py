@@ -34,7 +34,7 @@ def solve(design: _Array, values: _Array, rcond: float = 1e-14) -> _Array:
 def covariance(design: _Array, rcond: float = 1e-15) -> _Array:
     """Covariance of the solution for noise of variance 1."""
     scale = _scale(design)
-    inverse: _Array = np.linalg.pinv((design / scale).T @ (design / scale), rcond=rcond)
+    inverse = np.asarray(np.linalg.pinv((design / scale).T @ (design / scale), rcond=rcond), dtype=np.float64)
     return inverse / np.outer(scale, scale)
 
 

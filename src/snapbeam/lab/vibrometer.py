@@ -926,7 +926,7 @@ def _sensor_diagnostics(
     if crosstalk is not None:
         share = 100.0 * crosstalk.amplitude / steady.amplitude
         told.append(KINDS_VIBROMETER["crosstalk"].found(share_percent=share))
-    told += [KINDS_VIBROMETER[one.kind].found(**one.numbers) for one in errors]
+    told += [KINDS_VIBROMETER[one.kind].found(None, "", **one.numbers) for one in errors]
     if mean_moves > 0.0:
         told.append(KINDS_VIBROMETER["one_sided"].found(share=mean_moves))
     return told
@@ -987,7 +987,9 @@ def _cycle_phasors(samples: SignalSamples, fit: SineFit, start: float, stop: flo
     found = np.empty(count, dtype=np.complex128)
     for n in range(count):
         part = slice(borders[n], borders[n + 1])
-        found[n : n + 1] = phasors(np.linalg.lstsq(design[part], samples.values[part], rcond=None)[0])
+        found[n : n + 1] = phasors(
+            np.asarray(np.linalg.lstsq(design[part], samples.values[part], rcond=None)[0], dtype=np.float64)
+        )
     middle: _Array = start + (np.arange(count, dtype=np.float64) + 0.5) * period
     return middle, found
 

@@ -68,7 +68,7 @@ def _frames(off: Floats, wave: Floats, noise: float, first: int) -> list[tuple[s
     again = off**2 - (off - before) ** 2
     pair = off[:-1] ** 2 + off[1:] ** 2
     turned = pair - (off[:-1] - after[:-1]) ** 2 - (off[1:] - before[1:]) ** 2
-    told = []
+    told: list[tuple[str, dict[str, float]]] = []
     exchanged = (turned > limit) & (turned > _EXPLAINS * pair) & (off[:-1] ** 2 > 0.2 * pair)
     exchanged &= off[1:] ** 2 > 0.2 * pair
     shown = (again > limit) & (again > _EXPLAINS * off**2)
