@@ -33,6 +33,9 @@ DEFECTS = (
 )
 
 
+ORDER_DEFECTS = ("frames exchanged", "frame copied", "uneven trigger", "recordings joined", "camera knocked")
+
+
 @dataclass
 class Scene:
     """What is needed to draw a scene and to track it."""
@@ -44,6 +47,8 @@ class Scene:
     rest_frames: int = 24
     skip: int = 0
     name: str = "scene.cihx"
+    cycles: float = 0.0
+    order: str = ""
 
 
 @dataclass
@@ -61,14 +66,18 @@ class Outcome:
         return bool(self.codes) or bool(self.refusal)
 
 
-def motion(rng, pixel, rate):
-    """A beam struck again and again: it rides on the shaker for a while and flies off in between."""
+def motion(rng, pixel, rate, cycles=0.0):
+    """A beam struck again and again: it rides on the shaker for a while and flies off in between.
+
+    With *cycles* the shaker makes so many of them.
+    """
     contact, flight = rng.uniform(4.5, 9.0) / rate, rng.uniform(35.0, 60.0) / rate
     period, count = contact + flight, int(rng.integers(3, 5))
     time = np.arange(round((count * period + 0.5 * contact) * rate * 40)) / (rate * 40)
-    shaker = -LEVEL + rng.uniform(3.0, 7.0) * pixel * np.sin(
-        2.0 * np.pi * time / (rng.uniform(2.1, 3.5) * period)
-    )
+    period_of_drive = rng.uniform(2.1, 3.5) * period
+    if cycles:
+        period_of_drive = time[-1] / cycles
+    shaker = -LEVEL + rng.uniform(3.0, 7.0) * pixel * np.sin(2.0 * np.pi * time / period_of_drive)
     share = np.clip((np.mod(time, period) - contact) / flight, 0.0, 1.0)
     return time, shaker + 4.0 * rng.uniform(7.0, 12.0) * pixel * share * (1.0 - share), shaker
 
@@ -126,6 +135,9 @@ def good_scene(rng):
 def spoiled_scene(rng, kind):
     """A good scene with one thing wrong."""
     scene = good_scene(rng)
+    if kind in ORDER_DEFECTS or kind == "long":
+        scene.cycles, scene.order = rng.uniform(6.0, 10.0), kind
+        return scene
     frames = sorted({int(k) for k in rng.integers(30, 130, 25)})
     dark = scene.stage["background"] > scene.stage["beam"]
     if kind == "gamma":
@@ -212,17 +224,49 @@ def measured(scene, folder, rng):
     """Draw, write, read and track a scene; the tracked dataset (or the refusal) and the truth."""
     camera, stage = SyntheticCamera(**scene.camera), SyntheticStage(**scene.stage)
     sign = 1.0 if stage.side in ("below", "left") else -1.0
-    time, beam, shaker = motion(rng, camera.pixel_size, camera.frame_rate)
+    time, beam, shaker = motion(rng, camera.pixel_size, camera.frame_rate, scene.cycles)
     first = int(scene.skip * 40)
+    if scene.order in ("uneven trigger", "recordings joined"):
+        taken = time.copy()
+        middle = time.size // 2
+        if scene.order == "recordings joined":
+            taken[middle:] += rng.uniform(3.0, 8.0) / camera.frame_rate
+        else:
+            knots = np.arange(0.0, time[-1] + 1.0 / camera.frame_rate, 1.0 / camera.frame_rate)
+            taken += np.interp(time, knots, rng.normal(0.0, 0.3 / camera.frame_rate, knots.size))
+        beam, shaker = np.interp(taken, time, beam), np.interp(taken, time, shaker)
     recording = render_recording(
         time[first:] - time[first], sign * beam[first:], sign * shaker[first:], camera=camera, stage=stage,
         defects=Defects(**scene.defects), rest_frames=scene.rest_frames, rng=int(rng.integers(2**31)),
     )  # fmt: skip
-    path = write(recording, Path(folder) / scene.name)
+    path = write(_reordered(recording, scene.order, rng), Path(folder) / scene.name)
     rest = -sign * LEVEL  # what a person knows of the beam at rest
     with open_recording(path, frame_rate=camera.frame_rate, pixel_size=camera.pixel_size) as opened:
         settings = {"rest_displacement": rest, "side": stage.side, **scene.settings}
         return track(opened, **settings), recording
+
+
+def _reordered(recording, kind, rng):
+    """A recording with its frames in another order, or of a camera that was knocked."""
+    k = int(rng.integers(60, len(recording) - 40))
+    k += int(np.argmax(np.abs(np.diff(recording.truth["shaker_displacement_mm"].values[k : k + 30]))))
+    as_taken, shift = recording.frame, int(rng.integers(1, 5))
+
+    def frame(index):
+        if kind == "frames exchanged":
+            return as_taken({k: k + 1, k + 1: k}.get(index, index))
+        if kind == "frame copied" and index == k:
+            before = as_taken(k - 1)
+            return np.clip(before + rng.integers(0, 3, before.shape), 1, before.max()).astype(np.uint16)
+        if kind == "camera knocked" and index >= k:
+            return np.roll(
+                as_taken(index), shift, axis=int(recording.camera.shape[1] > recording.camera.shape[0])
+            )
+        return as_taken(index)
+
+    if kind in ORDER_DEFECTS:
+        object.__setattr__(recording, "frame", frame)
+    return recording
 
 
 def judged(scene, folder, rng):

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.signal import butter, iirnotch, lfilter
 
 from snapbeam import InputError
 from snapbeam.lab import identify_decay, make_signal, measure_drive, render_vibrometer
@@ -15,10 +19,15 @@ DRIVE_DEFECTS = (
     "dropout", "hold", "spikes", "clipped", "clipped on one side", "clipped before the noise", "gentle start",
     "begins in motion", "amplitude wanders", "interrupted", "wrong frequency set", "drifting zero",
 )  # fmt: skip
+SENSOR_DEFECTS = (
+    "slew limit", "crossover", "notch", "AC coupling", "amplitude drifts", "beat", "samples lost", "unit by ten",
+    "rate twice", "displacement as velocity",
+)  # fmt: skip
 DECAY_DEFECTS = (
     "clipped", "clipped before the noise", "drift", "close modes", "quadratic damping", "dry friction", "second hit",
     "hum", "dropout", "release within", "more modes", "asked off",
 )  # fmt: skip
+MODE_DEFECTS = ("frequency creeps", "shaker touches")
 
 
 @dataclass
@@ -94,6 +103,92 @@ def drive_signal(rng, kind):
     return make_signal(values, "m/s", time=time, name="velocity"), truth, options
 
 
+def tracking(values, step):
+    """The output of an amplifier that follows *values* by at most *step* a sample."""
+    out = np.empty_like(values)
+    at = values[0]
+    for k, value in enumerate(values.tolist()):
+        at += min(max(value - at, -step), step)
+        out[k] = at
+    return out
+
+
+def sensor_signal(rng, kind):
+    """A record through electronics with one thing wrong, or a hard but good one ("hard"); the noise is the laser's."""
+    rate, amplitude = 20_000.0, 0.03
+    freq = float(np.exp(rng.uniform(np.log(30.0), np.log(300.0))))
+    if kind == "notch":
+        freq = 50.0 * rng.uniform(0.9, 1.1)
+    onset, start_up = rng.uniform(0.1, 0.3), float(np.exp(rng.uniform(np.log(0.003), np.log(0.03))))
+    length = onset + max(80.0 / freq, 10.0 * start_up)
+    time = np.arange(int(length * rate)) / rate
+    since = np.maximum(time - onset, 0.0)
+    turn = 2.0 * np.pi * freq * since + rng.uniform(-3.0, 3.0)
+    second, third = rng.uniform(0.0, 0.03), rng.choice([0.0, rng.uniform(0.0, 0.02)])
+    if kind == "hard":
+        third = rng.uniform(0.0, 0.03)
+    wave = np.cos(turn) + second * np.cos(2.0 * turn + rng.uniform(-3.0, 3.0))
+    wave += third * np.cos(3.0 * turn + rng.uniform(-3.0, 3.0))
+    envelope = 1.0 - float(rng.choice([0.0, 0.4, -0.3])) * np.exp(-since / start_up)
+    if kind == "amplitude drifts":
+        envelope *= 1.0 + rng.choice([-1.0, 1.0]) * rng.uniform(0.03, 0.12) * since / since[-1]
+    elif kind == "beat":
+        other = freq + rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 1.5) / since[-1]
+        wave += rng.uniform(0.03, 0.2) * np.cos(2.0 * np.pi * other * since + rng.uniform(-3.0, 3.0))
+    clean = amplitude * envelope * wave * (time >= onset)
+    white = rng.standard_normal(time.size)
+    if kind == "hard" and rng.random() < 0.5:
+        spectrum = np.fft.rfft(white) / np.sqrt(np.maximum(np.fft.rfftfreq(white.size), 30.0 / rate))
+        white = np.fft.irfft(spectrum, white.size)
+        white /= white.std()
+    values = clean + amplitude / np.sqrt(2.0) * 10.0 ** (-rng.uniform(22.0, 50.0) / 20.0) * white
+    truth = {"amplitude": amplitude, "frequency": freq, "onset": onset}
+    known = {"frequency": freq * rng.uniform(0.999, 1.001), "amplitude": amplitude * rng.uniform(0.98, 1.02)}
+    options = known if rng.random() < 0.5 else {}
+    if kind == "slew limit":
+        share = float(np.exp(rng.uniform(np.log(0.7), np.log(0.97))))
+        values = tracking(values, share * amplitude * 2.0 * np.pi * freq / rate)
+    elif kind == "crossover":
+        dead = rng.uniform(0.02, 0.1) * amplitude
+        values = np.sign(values) * np.maximum(np.abs(values) - dead, 0.0)
+    elif kind == "notch":
+        values = lfilter(*iirnotch(50.0, rng.uniform(3.0, 10.0), rate), values)
+    elif kind == "AC coupling":
+        values = lfilter(*butter(1, freq * rng.uniform(0.1, 0.4), "high", fs=rate), values)
+    elif kind == "amplitude drifts":
+        truth["amplitude"] = amplitude * envelope[-1]  # in the end, or anything between it and the start
+    elif kind == "samples lost":
+        every = int(rng.integers(20, 200))
+        values = np.delete(values, np.arange(every, values.size, every))
+        truth["onset"] = None
+    elif kind == "unit by ten":
+        values = values * float(rng.choice([0.1, 10.0, 0.001]))
+    elif kind == "rate twice":
+        rate *= float(rng.choice([0.5, 2.0]))
+        truth["onset"] = None
+    elif kind == "displacement as velocity":
+        values = 50.0 * np.cumsum(values - values.mean()) / rate * 2.0 * np.pi
+    if kind in ("unit by ten", "rate twice", "displacement as velocity"):
+        options = known  # the record alone cannot tell
+    truth = {name: value for name, value in truth.items() if value is not None}
+    return make_signal(values, "m/s", rate, name="velocity"), truth, options
+
+
+def touching_decay(rng, freq, zeta, time):
+    """A free decay of a mode that still strikes a soft stop on one side while it is large."""
+    omega, gap = 2.0 * np.pi * freq, rng.uniform(0.1, 0.4)
+    stiff, damp = omega**2 * rng.uniform(0.05, 0.5), omega * rng.uniform(0.02, 0.2)
+
+    def moved(t, state):
+        x, v = state
+        force = max(stiff * (x - gap) + damp * v, 0.0) if x > gap else 0.0
+        return v, -(omega**2) * x - 2.0 * zeta * omega * v - force
+
+    start = [np.cos(rng.uniform(-3.0, 3.0)), 0.0]
+    start[1] = omega * np.sqrt(1.0 - start[0] ** 2)
+    return solve_ivp(moved, (0.0, time[-1]), start, t_eval=time, rtol=1e-8, max_step=0.1 / freq).y[0]
+
+
 def fading(time, freq, zeta):
     """A sine that dies away."""
     return np.exp(-zeta * 2.0 * np.pi * freq * time) * np.cos(2.0 * np.pi * freq * time)
@@ -153,6 +248,11 @@ def decay_signal(rng, kind):
         values = np.concatenate([before, values])
     elif kind == "asked off":
         options = {"frequencies": [freq * rng.uniform(0.93, 1.07)]}
+    elif kind == "frequency creeps":
+        creep = rng.choice([-1.0, 1.0]) * rng.uniform(0.002, 0.02)
+        values = fall * np.cos(omega * (time + 0.5 * creep * time**2 / length) + phase)
+    elif kind == "shaker touches":
+        values = touching_decay(rng, freq, zeta, time)
     level = rng.uniform(0.45, 0.8)
     if kind == "clipped before the noise":
         values = np.clip(values, -level, level)
@@ -167,7 +267,8 @@ def decay_signal(rng, kind):
 
 def judged_drive(rng, kind):
     """The outcome of a vibrometer's record."""
-    signal, truth, options = drive_signal(rng, kind)
+    made = sensor_signal if kind in (*SENSOR_DEFECTS, "hard", "easy") else drive_signal
+    signal, truth, options = made(rng, kind)
     with warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
         try:
@@ -199,3 +300,26 @@ def judged_decay(rng, kind):
     ratios = {name: abs(getattr(mode, name) - truth[name]) / getattr(mode, f"{name}_se") for name in truth}
     worst = max(ratios, key=ratios.get)
     return Outcome(ratios[worst], worst, tuple(one.code for one in doubtful(fit.diagnostics)))
+
+
+def figures(judged, kinds, count, seed=60):
+    """Print by kind: records, off by more than 5 standard errors in silence, doubted or refused, within two errors."""
+    for kind in kinds:
+        outcomes = [judged(np.random.default_rng((seed, hash_of(kind), k)), kind) for k in range(count)]
+        silent = [f"{one.worst} {one.ratio:.0f}" for one in outcomes if one.ratio > 5.0 and not one.flagged]
+        codes = Counter(code for one in outcomes for code in one.codes)
+        doubted, refused = sum(one.flagged for one in outcomes), sum(bool(one.refusal) for one in outcomes)
+        within = np.mean([one.ratio < 2.0 for one in outcomes if not one.refusal])
+        print(f"{kind or 'good':26} {count} silent {len(silent)} doubted {doubted} refused {refused} "
+              f"covered {within:.2f} {silent} {dict(codes)}", flush=True)  # fmt: skip
+
+
+def hash_of(kind):
+    """A number of a kind's name, alike in every process."""
+    return sum(ord(letter) * 31**k for k, letter in enumerate(kind)) % 2**31
+
+
+if __name__ == "__main__":
+    count = int(sys.argv[1])
+    figures(judged_drive, ("", "easy", "hard", *SENSOR_DEFECTS), count)
+    figures(judged_decay, ("", *MODE_DEFECTS), count)

@@ -541,9 +541,55 @@ KINDS_VIBROMETER = table(
     ),
     Kind(
         "vibrometer.saturated", WARNING,
-        "third harmonic with its crests opposite to those of the motion, and no other",
+        "odd harmonics, against a shaker's own third, saturation, a limited slew rate and a dead zone",
         "the tops are pressed flat as by an amplifier near its limit (third harmonic {third_percent:.2g} %): the amplitude "
         "may be {loss_percent:.2g} % too small, which is in its standard error; choose a larger range",
+    ),
+    Kind(
+        "vibrometer.slew", WARNING,
+        "odd harmonics, against a shaker's own third, saturation, a limited slew rate and a dead zone",
+        "the flanks are straight as of electronics with a limited slew rate (third harmonic {third_percent:.2g} %): the "
+        "amplitude may be {loss_percent:.2g} % too small, which is in its standard error; choose a larger range, or a "
+        "decoder for faster motion",
+    ),
+    Kind(
+        "vibrometer.crossover", WARNING,
+        "odd harmonics, against a shaker's own third, saturation, a limited slew rate and a dead zone",
+        "small values are suppressed as by an amplifier with a dead zone about zero (third harmonic "
+        "{third_percent:.2g} %): the amplitude may be {loss_percent:.2g} % too small, which is in its standard error; "
+        "look at the power supply of the amplifier, or record without it",
+    ),
+    Kind(
+        "vibrometer.high_pass", WARNING,
+        "spectrum of the noise about the drive, against coloured noise, low-pass, high-pass and notch filters",
+        "the noise falls below {corner:.3g} Hz as behind a high-pass filter (AC coupling): at the drive's frequency it may "
+        "take {loss_percent:.2g} % of the amplitude, which is in its standard error; switch to DC coupling, or to a "
+        "corner below {limit:.2g} Hz",
+    ),
+    Kind(
+        "vibrometer.notch", WARNING,
+        "spectrum of the noise about the drive, against coloured noise, low-pass, high-pass and notch filters",
+        "the noise has a hole at {centre:g} Hz as behind a notch filter: at the drive's frequency it may take "
+        "{loss_percent:.2g} % of the amplitude, which is in its standard error; switch the filter off",
+    ),
+    Kind(
+        "vibrometer.samples_lost", ERROR,
+        "phase within the record, against jumps by whole samples at even distances and a single line",
+        "{lost:.0f} of every {every:.0f} samples are lost: the time axis is too short, and the frequency "
+        "{share_percent:.2g} % too high, which is in its standard error; record with a slower rate or a faster disk",
+    ),
+    Kind(
+        "vibrometer.drifts", WARNING,
+        "amplitude and phase cycle by cycle, against constant ones, a drift and two close lines",
+        "the amplitude drifts by {change_percent:.2g} % over the steady part (temperature of shaker or amplifier): half of "
+        "that is in its standard error; let the shaker warm up, or cut the record",
+    ),
+    Kind(
+        "vibrometer.beat", WARNING,
+        "amplitude and phase cycle by cycle, against constant ones, a drift and two close lines",
+        "the amplitude changes by {change_percent:.2g} % and the phase bends by {bend:.2g} rad over the steady part, as "
+        "where two lines beat that lie closer than one over the length of the record: which is in the standard errors; "
+        "record longer",
     ),
     Kind(
         "vibrometer.one_sided", ERROR,
@@ -565,6 +611,19 @@ KINDS_VIBROMETER = table(
         "{travel_mm:.3g} mm): check the unit (units, --units; mm/s may have been read as m/s) and sensitivity "
         "(--sensitivity)",
         ("units", "sensitivity"),
+    ),
+    Kind(
+        "vibrometer.clocks", ERROR,
+        "frequency of the motion, against that of the acceleration of the same shaker",
+        "the shaker moves at {own:.6g} Hz, its acceleration (--acceleration) at {other:.6g} Hz, {ratio:.4g} times as "
+        "fast: another test, or a sampling frequency (sampling_frequency, --sampling-frequency) of one record is wrong",
+        ("acceleration", "sampling_frequency"),
+    ),
+    Kind(
+        "vibrometer.acceleration", ERROR,
+        "amplitude of the motion, against that of the acceleration of the same shaker, and factors of mistaken units",
+        "acceleration (--acceleration) is {ratio:.4g} times what belongs to this motion: {told}",
+        ("acceleration",),
     ),
     Kind(
         "vibrometer.slow_start", INFO,

@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from snapbeam.lab.decay.poles import Line
 from snapbeam.lab.diagnostics import KINDS_VIBROMETER
+from snapbeam.lab.least_squares import sines, solve
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import SineFit
 from snapbeam.util.diagnostics import Diagnostic
 
 __all__ = [
+    "FALSE_ALARM_RATE",
+    "Hypothesis",
     "LowPass",
+    "Record",
+    "beside_acceleration",
     "beyond_shakers",
     "find_crosstalk",
+    "find_errors",
     "find_low_pass",
     "noise_colour",
     "one_sided",
-    "saturation_loss",
     "with_loss",
 ]
 
@@ -133,12 +141,11 @@ def find_crosstalk(samples: SignalSamples, rest: int, fit: SineFit) -> Line | No
     halves = []
     for part in (slice(0, rest // 2), slice(rest // 2, rest), slice(0, rest)):
         time, values = samples.time[part], samples.values[part]
-        turn = 2.0 * math.pi * fit.frequency * time
-        design = np.column_stack([np.ones_like(time), time - time.mean(), np.cos(turn), np.sin(turn)])
-        solution = np.linalg.lstsq(design, values, rcond=None)[0]
+        design = np.column_stack([sines(time, [fit.frequency]), time - time.mean()])
+        solution = solve(design, values)
         noise = float(np.std(values - design @ solution))
         noise *= noise_colour(values - design @ solution, samples.sampling_frequency, fit.frequency)
-        halves.append((solution[2] - 1j * solution[3], noise * math.sqrt(2.0 / time.size)))
+        halves.append((solution[1] - 1j * solution[2], noise * math.sqrt(2.0 / time.size)))
     (one, _), (other, error), (whole, sure) = halves
     size = abs(whole)
     if size < max(_SURE * sure, _LEAST * fit.amplitude):
@@ -149,18 +156,10 @@ def find_crosstalk(samples: SignalSamples, rest: int, fit: SineFit) -> Line | No
 
 
 # ----------------------------------------------------------------------------------------------------
-# A signal that is no velocity: rectified or squared, or bent by an amplifier near its limit.
+# A signal that is no velocity: rectified or squared.
 
 
 _ONE_SIDED = 0.8  # of the amplitude by which the mean may move
-_THIRD = 0.004  # of the amplitude
-_IN_LINE = 0.1  # rad
-_STRONG = 0.03  # of the amplitude, third harmonic beside which saturation makes a fifth
-_FIFTH = (
-    0.3,
-    3.0,
-)  # times the square of the third harmonic; a hyperbolic tangent makes 1.2, an arc tangent 1.8
-_TIMES = 3.0  # times the third harmonic that saturation takes from the first
 
 
 def one_sided(samples: SignalSamples, rest: int, first: int, last: int, fit: SineFit) -> float:
@@ -176,34 +175,250 @@ def one_sided(samples: SignalSamples, rest: int, first: int, last: int, fit: Sin
     return share if share > _ONE_SIDED else 0.0
 
 
-def saturation_loss(fit: SineFit) -> float:
-    """Share of the amplitude that a saturating amplifier takes, as far as the third harmonic tells; 0 if it does not.
+def with_loss(fit: SineFit, share: float, shift: float = 0.0) -> SineFit:
+    """A sine whose amplitude is uncertain by *share* of it, and its frequency by *shift* of it."""
+    return dataclasses.replace(
+        fit,
+        amplitude_se=math.hypot(fit.amplitude_se, share * fit.amplitude),
+        frequency_se=math.hypot(fit.frequency_se, shift * fit.frequency),
+    )
 
-    To lowest order a symmetric saturation y - c y^3 takes three times as much from the first harmonic as it makes of
-    the third, whose crests are then opposite to those of the first.  A strong third harmonic comes with a fifth of
-    about its square; one without is the shaker's own.
+
+# ----------------------------------------------------------------------------------------------------
+# Errors of electronics, each as a hypothesis: the chi-square it explains, against the limit of its degrees of freedom
+# and against its alternatives.  Alternatives that are no errors, as a shaker's own harmonic, are among them.
+
+
+FALSE_ALARM_RATE = 1e-3
+"""Rate of false alarms of one detector on one record, for normal noise."""
+_MATTERS = 0.004  # of the amplitude that an error must take, or move it by, to be of concern
+_CURVE_ERROR = 0.05  # of its harmonics by which a curve may differ from a family's
+_CHANGES = 0.02  # of the amplitude, or rad, by which a steady motion may change
+_EXPLAINS = 0.75  # of the odd harmonics that a curve must explain
+_TAIL = 4.0  # cycles after the start-up whose transient is no noise
+_MAINS = (50.0, 60.0, 100.0, 120.0)
+
+
+class Record(NamedTuple):
+    """A record as detectors see it: its steady part, the sine fitted to it and what that leaves, and its cycles."""
+
+    fit: SineFit
+    part: SignalSamples
+    left: _Array
+    lines: tuple[float, ...]
+    times: _Array
+    cycles: NDArray[np.complex128]
+
+
+class Hypothesis(NamedTuple):
+    """One explanation of what a sine leaves: the chi-square it explains with so many degrees of freedom.
+
+    ``kind`` is that of its diagnostic, empty where nothing is wrong; ``loss`` the share of the amplitude and ``shift``
+    the share of the frequency that it puts in doubt.
     """
-    amplitude, phase = fit.harmonic_amplitude, fit.harmonic_phase
-    if amplitude.size < 3 or not amplitude[0] > 0.0:
-        return 0.0
-    third = float(amplitude[2] / amplitude[0])
-    others = max(float(amplitude[k] / amplitude[0]) for k in range(1, amplitude.size) if k != 2)
+
+    kind: str
+    gain: float
+    freedom: int
+    loss: float = 0.0
+    shift: float = 0.0
+    numbers: Mapping[str, float] = {}
+
+    @property
+    def score(self) -> float:
+        """Chi-square beyond what noise explains at the stated rate of false alarms."""
+        return self.gain - float(chi2.isf(FALSE_ALARM_RATE, self.freedom))
+
+
+def find_errors(record: Record) -> list[Hypothesis]:
+    """The best explanation of each detector, where it is an error that matters and not explained by chance.
+
+    What another error leaves is no noise, so clocks and filters are judged where there is none.
+    """
+    told: list[Hypothesis] = []
+    for detector in (_curves, _courses, _clocks, _filters):
+        if detector in (_clocks, _filters) and told:
+            break
+        best = max(detector(record), key=lambda one: one.score, default=None)
+        if best is not None and best.kind and best.score > 0.0 and max(best.loss, best.shift) > _MATTERS:
+            told.append(best)
+    return told
+
+
+@functools.cache
+def _families() -> dict[str, tuple[_Array, NDArray[np.complex128]]]:
+    """Loss of amplitude, and odd harmonics 3 to 9 over the first, of an amplifier's curves by their parameter."""
+    turn = 2.0 * np.pi * np.arange(720) / 720
+    wave = np.cos(turn)[:, None]
+    drive = np.geomspace(0.1, 3.0, 60)
+    dead = np.geomspace(2e-3, 0.3, 60)
+    share = np.linspace(0.4, 0.998, 80)
+    lagging = np.empty((1440, share.size))
+    at = np.zeros(share.size)
+    for k in range(1440):
+        at = at + np.clip(wave[k % 720] - at, -share * turn[1], share * turn[1])
+        lagging[k] = at
+    curves = {
+        "saturated": np.hstack([np.tanh(drive * wave) / drive, np.arctan(drive * wave) / drive]),
+        "crossover": np.sign(wave) * np.maximum(np.abs(wave) - dead, 0.0),
+        "slew": lagging[720:],
+    }
+    found = {}
+    for kind, values in curves.items():
+        lines = np.fft.rfft(values, axis=0)[1:10:2] * (2.0 / 720)
+        turned = lines * np.exp(-1j * np.angle(lines[0]) * np.arange(1, 10, 2)[:, None])
+        found[kind] = 1.0 - np.abs(lines[0]), turned[1:] / np.abs(lines[0])
+    return found
+
+
+def _curves(record: Record) -> list[Hypothesis]:
+    """Curves of an amplifier by the odd harmonics they make; a shaker's own third harmonic has any phase, and no fifth."""
+    fit = record.fit
+    at = np.arange(2, fit.harmonic_amplitude.size, 2)[:4]
+    if at.size < 2:
+        return []
+    turned = fit.harmonic_phase[at] - (at + 1) * fit.harmonic_phase[0]
+    seen = fit.harmonic_amplitude[at] / fit.amplitude * np.exp(1j * turned)
     noise = fit.noise_rms * math.sqrt(2.0 / fit.samples) / fit.amplitude
-    turned = math.remainder(float(phase[2]) - 3.0 * float(phase[0]) - math.pi, 2.0 * math.pi)
-    told = third > max(_THIRD, 6.0 * noise, 2.0 * others) and abs(turned) < _IN_LINE + 3.0 * noise / third
-    if (
-        third > _STRONG and third**2 > 6.0 * noise and amplitude.size > 4
-    ):  # else a shaker's own third harmonic
-        fifth = float(amplitude[4] / amplitude[0]) * math.cos(float(phase[4]) - 5.0 * float(phase[0]))
-        told = told and _FIFTH[0] * third**2 < fifth < _FIFTH[1] * third**2
-    return _TIMES * third if told else 0.0
+    variance = noise**2 + (_CURVE_ERROR * float(np.linalg.norm(seen))) ** 2
+    total = float((np.abs(seen) ** 2).sum()) / variance
+    third = 100.0 * abs(seen[0])
+    told = [Hypothesis("", abs(seen[0]) ** 2 / variance, 2)]
+    for kind, (loss, templates) in _families().items():
+        left = (np.abs(seen[:, None] - templates[: at.size]) ** 2).sum(0) / variance
+        best = int(np.argmin(left))
+        lost = float(loss[best] / (1.0 - loss[best]))
+        numbers = {"third_percent": third, "loss_percent": 100.0 * lost}
+        explained = total - float(left[best])
+        if explained > _EXPLAINS * total:
+            told.append(Hypothesis(kind, explained, 1, lost, numbers=numbers))
+    return told
 
 
-def with_loss(fit: SineFit, share: float) -> SineFit:
-    """A sine whose amplitude is uncertain by *share* of it."""
-    if share == 0.0:
-        return fit
-    return dataclasses.replace(fit, amplitude_se=math.hypot(fit.amplitude_se, share * fit.amplitude))
+def _filters(record: Record) -> list[Hypothesis]:
+    """Filters behind the source of the noise, by the shape of its spectrum about the drive (Whittle's likelihood)."""
+    rate, drive = record.part.sampling_frequency, record.fit.frequency
+    left = record.left[min(round(_TAIL * rate / drive), record.left.size // 4) :]
+    n = left.size
+    freq = np.fft.rfftfreq(n, 1.0 / rate)
+    power = np.abs(np.fft.rfft(left)) ** 2
+    used = (freq > 2.5 * rate / n) & (freq < min(12.0 * drive, 0.4 * rate))
+    for line in (*record.lines, *(drive * np.arange(1, 13))):
+        used &= np.abs(freq - line) > 1.5 * rate / n
+    freq, power = freq[used], power[used]
+    if freq.size < 2 * _LINES or not power.min() > 0.0:
+        return []
+    # neighbours that differ in frequency by less than 1 % are averaged
+    edges = np.unique(
+        np.searchsorted(freq, freq[0] * 1.01 ** np.arange(math.log(freq[-1] / freq[0]) / 0.00996))
+    )
+    count = np.diff(np.append(edges, freq.size))
+    freq, power = np.add.reduceat(freq, edges) / count, np.add.reduceat(power, edges) / count
+
+    def misfit(response: _Array) -> float:
+        """Twice the negative logarithm of the likelihood behind *response*, least over colours of the noise."""
+        shape = colours * response
+        level = (count * power / shape).sum(-1) / count.sum()
+        return 2.0 * float(np.min(count.sum() * np.log(level) + (count * np.log(shape)).sum(-1)))
+
+    slope, white = np.meshgrid(np.linspace(-2.0, 2.0, 9), [0.0, 0.1, 1.0, 10.0])
+    colours = (freq / drive) ** -slope.reshape(-1, 1) + white.reshape(-1, 1)
+    plain = misfit(np.ones_like(freq))
+    told = [Hypothesis("", 0.0, 1)]
+    for kind, corners in (
+        ("high_pass", np.geomspace(0.02, 2.0, 24) * drive),
+        ("low_pass", np.geomspace(0.5, 10.0, 16) * drive),
+    ):
+        for corner in corners:
+            sign = 2.0 if kind == "high_pass" else -2.0
+            loss = 1.0 - 1.0 / math.sqrt(1.0 + (drive / corner) ** -sign)
+            kept = 1.0 / (1.0 + (freq / corner) ** -sign)
+            numbers = {"corner": corner, "loss_percent": 100.0 * loss, "limit": 0.05 * drive}
+            told.append(
+                Hypothesis(
+                    kind if sign > 0.0 else "", plain - misfit(kept), 2, loss / (1.0 - loss), numbers=numbers
+                )
+            )
+    for centre in _MAINS:
+        for quality in (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0):
+            off = quality * (freq / centre - centre / freq)
+            own = quality * (drive / centre - centre / drive)
+            loss = 1.0 - abs(own) / math.hypot(1.0, own)
+            numbers = {"centre": centre, "loss_percent": 100.0 * loss}
+            kept = np.maximum(off**2 / (1.0 + off**2), 1e-4)
+            told.append(
+                Hypothesis("notch", plain - misfit(kept), 2, loss / max(1.0 - loss, 1e-3), numbers=numbers)
+            )
+    return told
+
+
+def _clocks(record: Record) -> list[Hypothesis]:
+    """Samples lost at even distances: the phase rises evenly and jumps by whole samples."""
+    fit, n = record.fit, record.left.size
+    turn = 2.0 * np.pi * fit.frequency * record.part.time + fit.phase
+    phase = -2.0 * record.left * np.sin(turn) / fit.amplitude
+    sample = 2.0 * np.pi * fit.frequency / record.part.sampling_frequency
+    power = np.abs(np.fft.rfft(phase * np.hanning(n))) ** 2 * (8.0 / 3.0)
+    power[:8] = 0.0
+    at = int(np.argmax(power))
+    noise = max(float(np.median(power)) / math.log(2.0), 1e-300)
+    if power[at] < math.log(n / FALSE_ALARM_RATE) * noise:
+        return []
+    told = [Hypothesis("", 2.0 * power[at] / noise, 3)]
+    about = n / at
+    for multiple in (1, 2, 3):
+        middle = multiple * about
+        reach = int(middle * middle / n) + 2
+        for length in range(max(int(middle) - reach, 6), min(int(middle) + reach, n // 4) + 1):
+            rows = n // length
+            mean = phase[: rows * length].reshape(rows, length).mean(0)
+            saw = np.fft.rfft((np.arange(length) + 0.5) / length - 0.5)
+            match = np.fft.irfft(np.fft.rfft(mean - mean.mean()) * np.conj(saw), length)
+            height = -float(match.min()) / (length / 12.0) / sample
+            lost = round(height)
+            if lost < 1 or abs(height - lost) > 0.2 * lost:
+                continue
+            gain = 12.0 * float(match.min()) ** 2 / length * rows * n / max(noise, 1e-300)
+            share = lost / (length + lost)
+            numbers = {"lost": lost, "every": length + lost, "share_percent": 100.0 * lost / length}
+            told.append(Hypothesis("samples_lost", gain, 3, shift=share, numbers=numbers))
+    return told
+
+
+def _courses(record: Record) -> list[Hypothesis]:
+    """Amplitude and phase over the steady part: constant, drifting, or bent as by a line too close to be parted."""
+    inside = (record.times > record.fit.start) & (record.times < record.fit.stop)
+    cycles, t = record.cycles[inside], record.times[inside]
+    if t.size < 24 or not np.abs(cycles).min() > 0.0:
+        return []
+    basis = np.polynomial.legendre.legvander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, 5)
+    course = np.log(np.abs(cycles)), np.unwrap(np.angle(cycles))
+    bends = [np.diff(one, 2) for one in course]
+    noise = [1.4826 * float(np.median(np.abs(one - np.median(one)))) / math.sqrt(6.0) + 1e-9 for one in bends]
+    found = [np.linalg.lstsq(basis, one, rcond=None)[0] for one in course]
+    gain = [
+        (coefficients * np.linalg.norm(basis, axis=0) / sd) ** 2
+        for coefficients, sd in zip(found, noise, strict=True)
+    ]
+    found[0][0] = found[1][0] = found[1][1] = 0.0
+    change, bend = (float(np.ptp(basis @ coefficients)) for coefficients in found)
+    line = float(np.ptp(basis[:, :2] @ found[0][:2]))
+    if max(change, bend) < _CHANGES:
+        return []
+    span = float(t[-1] - t[0]) * record.fit.frequency
+    numbers = {"change_percent": 100.0 * change, "bend": bend}
+    slow, close = float(gain[0][1:3].sum()), float(gain[0][1:].sum() + gain[1][2:].sum())
+    return [
+        Hypothesis("drifts", slow if line > 0.8 * change else 0.0, 2, 0.5 * change, numbers=numbers),
+        Hypothesis(
+            "beat",
+            close if bend > _CHANGES else 0.0,
+            9,
+            0.5 * change,
+            math.hypot(change, bend) / (2.0 * np.pi * span),
+            numbers,
+        ),
+    ]
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -214,6 +429,51 @@ _FASTEST = 3.0  # m/s
 _HARDEST = 1500.0  # m/s^2
 _FARTHEST = 0.05  # m
 _G = 9.80665
+
+
+_SAME_RATE = 5e-3  # by which two clocks may differ
+_AGREE = 0.05  # by which two sensors may differ
+_UNITS = {
+    "one of the units is wrong by a power of ten": None,
+    "g was read as m/s^2": 1.0 / _G,
+    "m/s^2 was read as g": _G,
+    "inches were read as centimetres": 2.54,
+}
+
+
+def beside_acceleration(fit: SineFit, units: str, acceleration: SineFit) -> list[Diagnostic]:
+    """Diagnostics of a sine of displacement or velocity, against the acceleration of the same shaker."""
+    clocks = acceleration.frequency / fit.frequency
+    if abs(clocks - 1.0) > max(
+        _SAME_RATE, 6.0 * (fit.frequency_se + acceleration.frequency_se) / fit.frequency
+    ):
+        return [
+            KINDS_VIBROMETER["clocks"].found(own=fit.frequency, other=acceleration.frequency, ratio=clocks)
+        ]
+    omega = 2.0 * math.pi * fit.frequency
+    ratio = acceleration.amplitude / (omega * fit.amplitude * (omega if units == "m" else 1.0))
+    if abs(ratio - 1.0) < _AGREE:
+        return []
+    turned = omega if units == "m/s" else 1.0 / omega
+    read = (
+        "a displacement was read as a velocity" if units == "m/s" else "a velocity was read as a displacement"
+    )
+    causes = {read: turned} | _UNITS
+    told = [
+        cause
+        for cause, factor in causes.items()
+        if _tens(ratio / (factor or 1.0), cause == read or factor is None)
+    ]
+    words = (
+        " or ".join(told) or "look at sensitivity (--sensitivity), units (--units) and channels (--channel)"
+    )
+    return [KINDS_VIBROMETER["acceleration"].found(told=words, ratio=ratio)]
+
+
+def _tens(ratio: float, powers: bool) -> bool:
+    """Return whether a ratio is 1, or any power of ten."""
+    exponent = math.log10(ratio)
+    return abs(exponent - (round(exponent) if powers else 0.0)) < math.log10(1.0 + _AGREE)
 
 
 def beyond_shakers(fit: SineFit, units: str) -> list[Diagnostic]:

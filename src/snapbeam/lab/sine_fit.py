@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from snapbeam.lab.least_squares import covariance, sines, solve
 from snapbeam.lab.signals import SignalSamples, check_signal
 from snapbeam.util.validation import InputError, integer, positive
 
@@ -231,12 +232,12 @@ def fit_sine(
     where, target = t[used], y[used]
     omega = 2.0 * math.pi * guess
     for _ in range(1 if fixed else 30):
-        design = _design(where, omega, count)
-        solution = _least_squares(design, target)
+        design = sines(where, omega / (2.0 * math.pi) * np.arange(1, count + 1))
+        solution = solve(design, target)
         slope = _slope(where, design, solution)
         if fixed:
             break
-        step = _least_squares(np.column_stack((design, slope)), target - design @ solution)[-1]
+        step = solve(np.column_stack((design, slope)), target - design @ solution)[-1]
         limit = math.pi / span
         omega += float(np.clip(step, -limit, limit))
         if abs(omega / (2.0 * math.pi) - guess) > 2.0 / span:
@@ -245,17 +246,16 @@ def fit_sine(
             )
         if abs(step) < 1e-11 * omega:
             break
-    design = _design(where, omega, count)
-    solution = _least_squares(design, target)
+    design = sines(where, omega / (2.0 * math.pi) * np.arange(1, count + 1))
+    solution = solve(design, target)
     slope = _slope(where, design, solution)
     residual = np.zeros(n)
     residual[used] = (target - design @ solution) * math.sqrt(n / target.size)
     full = design if fixed else np.column_stack((design, slope * (2.0 * math.pi)))
-    scale = np.linalg.norm(full, axis=0)
     free = full.shape[1]
     freq = omega / (2.0 * math.pi)
     variance = white_variance(residual, rate, freq, freq * np.arange(count + 1), free)
-    covariance = np.linalg.pinv((full / scale).T @ (full / scale)) / np.outer(scale, scale) * variance
+    spread = covariance(full) * variance
     cosine, sine = solution[1::2], solution[2::2]
     amplitudes = np.hypot(cosine, sine)
     if not amplitudes[0] > 0.0:
@@ -271,13 +271,13 @@ def fit_sine(
     phases = np.arctan2(-sine, cosine) - multiple * omega * middle
     return SineFit(
         amplitude=float(amplitudes[0]),
-        amplitude_se=float(np.sqrt(a @ covariance @ a)),
+        amplitude_se=float(np.sqrt(a @ spread @ a)),
         frequency=freq,
-        frequency_se=0.0 if fixed else float(np.sqrt(covariance[-1, -1])),
+        frequency_se=0.0 if fixed else float(np.sqrt(spread[-1, -1])),
         phase=_wrap(float(phases[0])),
-        phase_se=float(np.sqrt(p @ covariance @ p)),
+        phase_se=float(np.sqrt(p @ spread @ p)),
         offset=float(solution[0]),
-        offset_se=float(np.sqrt(covariance[0, 0])),
+        offset_se=float(np.sqrt(spread[0, 0])),
         noise_rms=float(np.sqrt(residual @ residual / max(n - free, 1))),
         harmonic_amplitude=amplitudes,
         harmonic_phase=np.array([_wrap(float(phase)) for phase in phases]),
@@ -285,27 +285,6 @@ def fit_sine(
         stop=float(time[0] + n / rate),
         samples=n,
     )
-
-
-def _least_squares(design: _Array, y: _Array) -> _Array:
-    """Linear least squares by scaled normal equations: the columns are nearly orthogonal."""
-    scale = np.linalg.norm(design, axis=0)
-    scale[scale == 0.0] = 1.0
-    gram = (design.T @ design) / np.outer(scale, scale)
-    solution: _Array = np.linalg.lstsq(gram, (design.T @ y) / scale, rcond=1e-14)[0] / scale
-    return solution
-
-
-def _design(t: _Array, omega: float, count: int) -> _Array:
-    design = np.empty((t.size, 2 * count + 1))
-    design[:, 0] = 1.0
-    turn = np.exp(1j * omega * t)
-    power = np.ones_like(turn)
-    for k in range(1, count + 1):
-        power = power * turn
-        design[:, 2 * k - 1] = power.real
-        design[:, 2 * k] = power.imag
-    return design
 
 
 def _slope(t: _Array, design: _Array, solution: _Array) -> _Array:

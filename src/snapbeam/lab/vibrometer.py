@@ -16,14 +16,18 @@ from numpy.typing import NDArray
 
 from snapbeam.lab.decay.poles import Line, without_lines
 from snapbeam.lab.diagnostics import KINDS_VIBROMETER
+from snapbeam.lab.least_squares import covariance, phasors, sines, solve
 from snapbeam.lab.sensor_errors import (
+    Hypothesis,
     LowPass,
+    Record,
+    beside_acceleration,
     beyond_shakers,
     find_crosstalk,
+    find_errors,
     find_low_pass,
     noise_colour,
     one_sided,
-    saturation_loss,
     with_loss,
 )
 from snapbeam.lab.signals import SignalSamples, check_signal, make_signal
@@ -287,24 +291,11 @@ def beside_lines(steady: SineFit, lines: DriveLines) -> SineFit:
     )
 
 
-def _design(time: _Array, frequencies: list[float]) -> _Array:
-    """Offset, cosine and sine of each frequency, then the harmonics of the first."""
-    turns = [2.0 * math.pi * f * time for f in frequencies]
-    turns += [2.0 * math.pi * k * frequencies[0] * time for k in range(2, _HARMONICS + 1)]
-    columns = [np.ones_like(time)]
-    for turn in turns:
-        columns += [np.cos(turn), np.sin(turn)]
-    return np.column_stack(columns)
-
-
 def _left(part: SignalSamples, frequencies: list[float], sound: NDArray[np.bool_]) -> tuple[_Array, _Array]:
     """Residual of a signal after subtraction of lines, 0 at invalid samples, and the amplitudes of the lines."""
-    design = _design(part.time, frequencies)
-    used = design[sound]
-    gram = used.T @ used
-    solution: _Array = np.asarray(
-        np.linalg.lstsq(gram, used.T @ part.values[sound], rcond=1e-12)[0], dtype=np.float64
-    )
+    harmonics = frequencies[0] * np.arange(2, _HARMONICS + 1)
+    design = sines(part.time, np.append(frequencies, harmonics))
+    solution = solve(design[sound], part.values[sound], 1e-12)
     left: _Array = np.asarray(part.values - design @ solution, dtype=np.float64)
     left[~sound] = 0.0
     return left, solution
@@ -314,9 +305,7 @@ def _phasors(
     part: SignalSamples, frequencies: list[float], sound: NDArray[np.bool_]
 ) -> NDArray[np.complex128]:
     """Complex amplitudes c of lines Re(c exp(i 2 pi f t))."""
-    solution = _left(part, frequencies, sound)[1]
-    count = len(frequencies)
-    return np.asarray(solution[1 : 2 * count + 1 : 2] - 1j * solution[2 : 2 * count + 2 : 2])
+    return phasors(_left(part, frequencies, sound)[1])[: len(frequencies)]
 
 
 def _peak(left: _Array, rate: float, rough: SineFit) -> float | None:
@@ -360,13 +349,10 @@ def _at_rest(
     count = len(frequencies)
     if time.size < 8 * (2 * count + 1) or (time[-1] - time[0]) * min(frequencies) < 1.0:
         return np.zeros(count, dtype=np.complex128), np.full(count, math.inf)
-    turns = 2.0 * math.pi * np.outer(time, frequencies)
-    design = np.column_stack([np.ones(time.size), np.cos(turns), np.sin(turns)])
-    solution, *_ = np.linalg.lstsq(design, values, rcond=1e-12)
-    noise = float(np.std(values - design @ solution))
-    spread = noise * np.sqrt(np.diag(np.linalg.pinv(design.T @ design, rcond=1e-12)))
-    error = np.hypot(spread[1 : count + 1], spread[count + 1 :])
-    return solution[1 : count + 1] - 1j * solution[count + 1 :], error
+    design = sines(time, frequencies)
+    solution = solve(design, values, 1e-12)
+    spread = float(np.std(values - design @ solution)) * np.sqrt(np.diag(covariance(design, 1e-12)))
+    return phasors(solution), np.hypot(spread[1::2], spread[2::2])
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -670,6 +656,7 @@ def measure_drive(
     frequency: float | None = None,
     *,
     amplitude: float | None = None,
+    acceleration: xr.DataArray | None = None,
     snr_limit: float = SNR_LIMIT,
     tolerance: float = 0.05,
 ) -> DriveMeasurement:
@@ -685,6 +672,9 @@ def measure_drive(
         Set excitation frequency [Hz], the initial guess; by default the highest peak of the spectrum.
     amplitude : float, optional
         Set amplitude, in the unit of the signal, for a check.
+    acceleration : xarray.DataArray, optional
+        Acceleration of the same shaker in the same test [m/s^2], for a check of units and sampling rate, which the
+        record alone cannot tell.
     snr_limit : float
         Minimum ratio [dB] of the sine to noise and distortion of an acceptable test; the paper's 15 dB.
     tolerance : float
@@ -759,8 +749,14 @@ def measure_drive(
     everywhere = [Flaw(flaw.first + shift, flaw.last + shift) for flaw in flaws]
     steady, wander = with_wander(steady, times, cycles, everywhere, samples, begin)
     steady = beside_lines(steady, lines)
-    lost = 0.0 if clipping.found else saturation_loss(steady)
-    steady = with_loss(steady, lost)
+    left = part.values - steady.waveform(part.time)
+    left[~sound_samples(left.size, flaws)] = 0.0
+    others = tuple(line.frequency for line in (*lines.hum, *lines.beside))
+    errors = [] if clipping.found else find_errors(Record(steady, part, left, others, times, cycles))
+    if any(one.kind in ("samples_lost", "beat") for one in errors):
+        lines = DriveLines(lines.hum, ())  # which make the lines beside
+    for one in errors:
+        steady = with_loss(steady, one.loss, one.shift)
     if low_pass is not None:
         steady = with_loss(steady, low_pass.loss(steady.frequency))
     if crosstalk is not None:
@@ -778,9 +774,10 @@ def measure_drive(
         *_doubts(steady, limit, wander, stray, frequency, stated),
         *_start_diagnostics(startup, period),
         *_line_diagnostics(lines, steady),
-        *_sensor_diagnostics(steady, low_pass, crosstalk, lost, mean_moves),
+        *_sensor_diagnostics(steady, low_pass, crosstalk, errors, mean_moves),
         *_not_there(samples, steady, frequency),
         *beyond_shakers(steady, str(signal.attrs["units"])),
+        *_against(acceleration, steady, str(signal.attrs["units"])),
         *(
             [KINDS_VIBROMETER["interrupted"].found(outside_ms=1e3 * outside)]
             if outside > 3.0 * period
@@ -910,7 +907,11 @@ def _crosstalk(samples: SignalSamples, first: int, rough: SineFit) -> Line | Non
 
 
 def _sensor_diagnostics(
-    steady: SineFit, low_pass: LowPass | None, crosstalk: Line | None, lost: float, mean_moves: float
+    steady: SineFit,
+    low_pass: LowPass | None,
+    crosstalk: Line | None,
+    errors: list[Hypothesis],
+    mean_moves: float,
 ) -> list[Diagnostic]:
     told = []
     if low_pass is not None:
@@ -925,12 +926,22 @@ def _sensor_diagnostics(
     if crosstalk is not None:
         share = 100.0 * crosstalk.amplitude / steady.amplitude
         told.append(KINDS_VIBROMETER["crosstalk"].found(share_percent=share))
-    if lost > 0.0:
-        third = 100.0 * float(steady.harmonic_amplitude[2]) / steady.amplitude
-        told.append(KINDS_VIBROMETER["saturated"].found(third_percent=third, loss_percent=100.0 * lost))
+    told += [KINDS_VIBROMETER[one.kind].found(None, "", **one.numbers) for one in errors]
     if mean_moves > 0.0:
         told.append(KINDS_VIBROMETER["one_sided"].found(share=mean_moves))
     return told
+
+
+def _against(acceleration: xr.DataArray | None, steady: SineFit, units: str) -> list[Diagnostic]:
+    """Diagnostics against the acceleration of the same shaker, if it is given."""
+    if acceleration is None:
+        return []
+    samples = check_signal(acceleration, "m/s^2", "acceleration")
+    guess = spectral_peak(samples)
+    first, last = moving_part(samples, guess)
+    return beside_acceleration(
+        steady, units, robust_fit(_slice(samples, first + (last - first) // 3, last), guess, 3)
+    )
 
 
 _SAME_LINE = 0.02  # of the frequency by which the highest line may differ
@@ -970,17 +981,17 @@ def _cycle_phasors(samples: SignalSamples, fit: SineFit, start: float, stop: flo
     """Middle [s] and complex amplitude, turning with the fitted sine, of each whole cycle."""
     period = 1.0 / fit.frequency
     count = int((stop - start) * fit.frequency + 1e-6)
-    turn = 2.0 * math.pi * fit.frequency * samples.time
-    design = np.column_stack((np.ones_like(turn), np.cos(turn), np.sin(turn)))
+    design = sines(samples.time, [fit.frequency])
     index = np.floor((samples.time - start) * fit.frequency + 1e-9).astype(np.int64)
     borders = np.searchsorted(index, np.arange(count + 1))
-    phasors = np.empty(count, dtype=np.complex128)
+    found = np.empty(count, dtype=np.complex128)
     for n in range(count):
         part = slice(borders[n], borders[n + 1])
-        _, c, s = np.linalg.lstsq(design[part], samples.values[part], rcond=None)[0]
-        phasors[n] = c - 1j * s
+        found[n : n + 1] = phasors(
+            np.asarray(np.linalg.lstsq(design[part], samples.values[part], rcond=None)[0], dtype=np.float64)
+        )
     middle: _Array = start + (np.arange(count, dtype=np.float64) + 0.5) * period
-    return middle, phasors
+    return middle, found
 
 
 # ----------------------------------------------------------------------------------------------------

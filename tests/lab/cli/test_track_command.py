@@ -72,4 +72,13 @@ def test_refusals_are_one_line_and_leave_no_file(recorded, tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     result = run(recorded[1], *arguments)
     assert result.exit_code == 2 and message in result.output
-    assert "Traceback" not in result.output and list(tmp_path.iterdir()) == []
+    assert (
+        "Traceback" not in result.output
+        and [file for file in tmp_path.iterdir() if file.suffix != ".png"] == []
+    )
+
+
+def test_a_recording_in_which_nothing_is_found_leaves_a_picture_with_rows_and_columns(recorded, tmp_path):
+    result = run(recorded[1], "--region", "140:158,0:64", "-o", tmp_path / "t.nc")
+    assert result.exit_code == 2 and "t.png" in result.output
+    assert [file.name for file in tmp_path.iterdir()] == ["t.png"]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -248,7 +250,8 @@ def track(
 
     The command finds the beam, the shaker and a sticker on it, fits their edges to a fraction of a pixel, and writes the
     displacements with standard errors and flags to a NetCDF file.  Frames without a valid edge are NaN and have a flag.
-    Diagnostics report doubtful results; with --strict they are errors.
+    Diagnostics report doubtful results; with --strict they are errors.  Where tracking fails, the command writes a
+    picture of the frame with rows and columns for --region, to the file of --picture or beside --output.
 
     Example: snapbeam track test.cihx --pixel-size 12e-6 --buckling-level 0.335e-3 -o test.nc --picture
     frame.png --report quality.png
@@ -287,7 +290,7 @@ def track(
             integer("frame", frame, 0, len(opened) - 1)
         if background is not None:
             settings = settings.changed(background=_picture(background, opened))
-        with progress(len(opened), "track", "frames") as tell:
+        with progress(len(opened), "track", "frames") as tell, _pictured(opened, frame, picture or output):
             dataset = track_recording(opened, settings, progress=tell)
         elapsed = time.monotonic() - start
         files = []
@@ -364,6 +367,27 @@ def _opened(
         size, error = pixel_size_from_marks(once, (first[0], first[1]), (second[0], second[1]), distance)
     out().print(f"pixel size {size * 1e6:.4f} +- {error * 1e6:.4f} um from the marks")
     return open_recording(path, frame_rate=frame_rate, pixel_size=size, region=part)
+
+
+@contextmanager
+def _pictured(recording: Recording, frame: int, path: Path) -> Iterator[None]:
+    """Write a picture of a frame as it was recorded if tracking fails, beside *path* unless that is a figure."""
+    from snapbeam.util.validation import InputError
+
+    try:
+        yield
+    except InputError as error:
+        import matplotlib
+
+        matplotlib.use("Agg")
+        from snapbeam.lab.plot.tracking import plot_recorded_frame
+        from snapbeam.plot.style import save_figure
+        from snapbeam.util.files import check_writable
+
+        path = path.with_suffix(".png") if path.suffix == ".nc" else path
+        check_writable(path, "picture")
+        save_figure(plot_recorded_frame(recording, min(frame, len(recording) - 1)), path)
+        raise InputError(f"{error}; see the rows and columns in {path}") from error
 
 
 def _picture(path: Path, recording: Recording) -> Any:

@@ -12,6 +12,7 @@ from snapbeam.cli.console import add_json, cli_command, file_line, out
 from snapbeam.lab.cli import options as lab
 
 __all__ = [
+    "Acceleration",
     "Amplitude",
     "AmplitudeFrom",
     "Camera",
@@ -56,6 +57,14 @@ Near = Annotated[
         "Approximate delay of the camera's clock, s, to half a cycle, such as from a trigger.", "Drive"
     ),
 ]
+Acceleration = Annotated[
+    Path | None,
+    typer.Option(
+        help="Acceleration of the same shaker, for a check of units and sampling rate.",
+        metavar="FILE",
+        rich_help_panel="Drive",
+    ),
+]
 Amplitude = Annotated[float | None, opt.number_option("Set amplitude, m/s (or m), for a check.", "Drive")]
 AmplitudeFrom = Annotated[
     str,
@@ -91,6 +100,7 @@ def vibrometer(
     polarity: Polarity = None,
     near: Near = None,
     amplitude: Amplitude = None,
+    acceleration: Acceleration = None,
     amplitude_from: AmplitudeFrom = "vibrometer",
     drive_output: DriveOutput = None,
     drive_sampling_frequency: DriveSamplingFreq = None,
@@ -119,7 +129,8 @@ def vibrometer(
             check_writable(path, name, suffixes)
     data = lab.open_signal(signal, channel, units, sensitivity, sampling_frequency, columns)
     limit = SNR_LIMIT if snr_limit is None else snr_limit
-    drive = measure_drive(data, frequency, amplitude=amplitude, snr_limit=limit)
+    other = None if acceleration is None else lab.open_signal(acceleration, None, None, None, None, None)
+    drive = measure_drive(data, frequency, amplitude=amplitude, acceleration=other, snr_limit=limit)
     fit, summary = drive.steady, drive.summary()
     console = out()
     verdict = "[green]accepted[/]" if drive.accepted else "[bold red]not accepted[/]"
@@ -134,6 +145,10 @@ def vibrometer(
         f"  distortion   {100.0 * fit.distortion:.3f} % (noise alone: {100.0 * fit.distortion_floor:.3f} %)"
     )
     console.print(f"  start-up     {summary['startup']}")
+    if acceleration is None and (amplitude is None or frequency is None):
+        console.print(
+            "  not checked  unit, quantity and sampling rate: give --frequency and --amplitude, or --acceleration"
+        )
     diagnostics = drive.diagnostics
     alignment = None
     if camera is not None:

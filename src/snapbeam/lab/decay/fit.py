@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from snapbeam.lab.decay.model import DampingLaw, ModeEstimate, envelope, law_priors
+from snapbeam.lab.least_squares import covariance, solve
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import white_variance
 from snapbeam.util.packages import needs
@@ -102,7 +103,7 @@ def fit_decay(
 
     def residual(value: dict[str, float]) -> _Array:
         design = _design(t, value, len(guesses), soften, name)
-        solution = _solve(design, y)
+        solution = solve(design, y, 1e-12)
         parts = [(y - design @ solution) / sigma]
         if soften:
             parts.append(np.array([(value[k] - m) / sd for k, (m, sd) in prior.items()]))
@@ -117,7 +118,7 @@ def fit_decay(
     search = lmfit.Minimizer(wrapped, parameters, scale_covar=False, calc_covar=False)
     value = dict(search.leastsq(xtol=1e-9, ftol=1e-9).params.valuesdict())
     design = _design(t, value, len(guesses), soften, name)
-    solution = _solve(design, y)
+    solution = solve(design, y, 1e-12)
     rest = y - design @ solution
     fitted = [value[f"f{i}"] for i in range(len(guesses))]
     lines = [0.0, *fitted, *(2.0 * f for f in fitted)]
@@ -125,7 +126,7 @@ def fit_decay(
     near = [math.sqrt(white_variance(rest, samples.sampling_frequency, f, lines, free)) for f in fitted]
     sigma = max(near[0], trifle)
     error = _errors(residual, value)
-    linear = _linear_errors(design, sigma)
+    linear = sigma * np.sqrt(np.diag(covariance(design, 1e-12)))
     modes = []
     columns = _columns(len(guesses), soften)
     for i in range(len(guesses)):
@@ -168,7 +169,7 @@ def explain(samples: SignalSamples, modes: list[ModeEstimate], units: str, softe
         }
     value["h"] = modes[0].law_strength
     design = _design(t, value, len(modes), soften, modes[0].law)
-    solution = _solve(design, samples.values)
+    solution = solve(design, samples.values, 1e-12)
     rest = samples.values - design @ solution
     free = design.shape[1] + 3 * len(modes)
     frequencies = [mode.natural_frequency for mode in modes]
@@ -186,11 +187,9 @@ def _errors(residual: Callable[[dict[str, float]], _Array], value: dict[str, flo
         sides = [residual({**value, name: center + sign * step}) for sign in (1.0, -1.0)]
         columns.append((sides[0] - sides[1]) / (2.0 * step))
     jacobian = np.column_stack(columns)
-    scale = np.linalg.norm(jacobian, axis=0)
-    if not np.isfinite(jacobian).all() or not (scale > 0.0).all():
+    if not np.isfinite(jacobian).all() or not jacobian.any(axis=0).all():
         raise InputError("signal: the fit of decaying modes found no minimum; fewer modes may be there")
-    inverse = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale), rcond=1e-14)
-    return dict(zip(value, np.sqrt(np.diag(inverse)) / scale, strict=True))
+    return dict(zip(value, np.sqrt(np.diag(covariance(jacobian, 1e-14))), strict=True))
 
 
 def _columns(count: int, soften: bool) -> list[int]:
@@ -245,19 +244,3 @@ def _alone(design: _Array, solution: _Array, rest: _Array, columns: list[int]) -
         first[column : column + 2] = False
     alone: _Array = rest + design[:, first] @ solution[first]
     return alone
-
-
-def _solve(design: _Array, y: _Array) -> _Array:
-    scale = np.linalg.norm(design, axis=0)
-    scale[scale == 0.0] = 1.0
-    gram = (design.T @ design) / np.outer(scale, scale)
-    solution: _Array = np.linalg.lstsq(gram, (design.T @ y) / scale, rcond=1e-12)[0] / scale
-    return solution
-
-
-def _linear_errors(design: _Array, sigma: float) -> _Array:
-    scale = np.linalg.norm(design, axis=0)
-    scale[scale == 0.0] = 1.0
-    inverse = np.linalg.pinv((design.T @ design) / np.outer(scale, scale), rcond=1e-12)
-    errors: _Array = np.sqrt(np.diag(inverse)) / scale * sigma
-    return errors

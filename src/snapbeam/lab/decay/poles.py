@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.signal import fftconvolve
 
+from snapbeam.lab.least_squares import solve
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import fit_sine
 from snapbeam.util.validation import InputError
@@ -227,9 +228,7 @@ def _parts(samples: SignalSamples, poles: list[Pole]) -> tuple[list[float], list
         wave = np.exp((-zeta * omega + 1j * omega * math.sqrt(1.0 - zeta * zeta)) * t)
         columns += [wave.real, wave.imag]
     design = np.column_stack(columns)
-    scale = np.linalg.norm(design, axis=0)
-    gram = (design.T @ design) / np.outer(scale, scale)
-    solution = np.linalg.lstsq(gram, (design.T @ samples.values) / scale, rcond=1e-10)[0] / scale
+    solution = solve(design, samples.values, 1e-10)
     amplitudes, parts = [], []
     for k in range(len(poles)):
         c, s = solution[1 + 2 * k], solution[2 + 2 * k]

@@ -203,7 +203,7 @@ def one_sided(samples: SignalSamples, frequency: float) -> bool:
 # A natural frequency that changes with time, as with temperature, told from one that changes with amplitude.
 
 
-_CERTAIN = 7.0  # standard errors
+_CERTAIN = 5.0  # standard errors
 _EXPLAINED = 2.0  # times the noise that a drift may leave
 _MATTERS = 1e-4  # of the frequency, over the record
 _SECOND = 2.0  # times the square of the softening that its next order may be, to a standard deviation

@@ -23,7 +23,7 @@ from snapbeam.plot.style import (
     figure_style,
     new_figure,
 )
-from snapbeam.util.diagnostics import diagnostics_of, doubtful
+from snapbeam.util.diagnostics import Diagnostic, diagnostics_of, doubtful
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError, integer, positive
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from snapbeam.lab.camera import Recording
 
-__all__ = ["annotated_video", "found_edges", "plot_frame", "plot_tracking_quality"]
+__all__ = ["annotated_video", "found_edges", "plot_frame", "plot_recorded_frame", "plot_tracking_quality"]
 
 
 # Bright colours that stand out on grey pictures and differ for every kind of colour vision (Okabe and Ito).
@@ -99,30 +99,43 @@ def plot_frame(recording: Recording, dataset: xr.Dataset, frame: int = 0) -> Fig
     dataset = check_tracked(dataset)
     index, at = _check_pair(recording, dataset, frame)
     picture = recording.frame(at)
-    height, width = picture.shape
     told = doubtful(diagnostics_of(dataset))
-    size = (
-        77.0 * min(max(height / width, 0.12), 1.4)
-        + 26.0
-        + diagnostics_height(told, COLUMN_WIDTHS["single"], 3)
-    )
     with figure_style():
-        figure = new_figure("single", size)
-        draw_diagnostics(figure, told, 3)
-        axes = figure.subplots()
-        low, high = np.percentile(picture, (0.2, 99.8))
-        axes.imshow(picture, cmap="gray", vmin=low, vmax=max(high, low + 1), interpolation="nearest")
+        figure, axes = _frame_axes(recording, picture, told)
         seen: set[str] = set()
         for name, color, style, rows, columns in found_edges(dataset, index, recording.shape):
             axes.plot(columns, rows, style, color=color, lw=1.2, label=None if name in seen else name)
             seen.add(name)
-        axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5), xlabel="column (px)", ylabel="row (px)")
         flags = int(dataset["flags"][index])
         axes.set_title(f"frame {index}, {1e3 * float(dataset['time'][index]):.2f} ms: {flag_words(flags)}")
-        _scale_bar(axes, recording, width, height)
         if seen:
             figure.legend(loc="outside upper center", ncols=2, handlelength=1.8)
     return figure
+
+
+def plot_recorded_frame(recording: Recording, index: int = 0) -> Figure:
+    """One frame of a recording as it is, with rows and columns."""
+    with figure_style():
+        figure, axes = _frame_axes(recording, recording.frame(index), ())
+        axes.set_title(f"frame {index}, not tracked")
+    return figure
+
+
+def _frame_axes(
+    recording: Recording, picture: NDArray[Any], told: tuple[Diagnostic, ...]
+) -> tuple[Figure, Any]:
+    """A figure of a frame with its scale bar and diagnostics, and its axes."""
+    height, width = picture.shape
+    size = 77.0 * min(max(height / width, 0.12), 1.4) + 26.0
+    figure = new_figure("single", size + diagnostics_height(told, COLUMN_WIDTHS["single"], 3))
+    draw_diagnostics(figure, told, 3)
+    axes = figure.subplots()
+    low, high = np.percentile(picture, (0.2, 99.8))
+    axes.imshow(picture, cmap="gray", vmin=low, vmax=max(high, low + 1), interpolation="nearest")
+    axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5), xlabel="column (px)", ylabel="row (px)")
+    axes.autoscale(False)
+    _scale_bar(axes, recording, width, height)
+    return figure, axes
 
 
 def _scale_bar(axes: Any, recording: Recording, width: int, height: int) -> None:

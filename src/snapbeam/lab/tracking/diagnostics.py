@@ -64,8 +64,7 @@ KINDS = table(
     Kind(
         "camera.rest_moves", WARNING,
         "drift of the beam within the frames given as rest",
-        "the beam moves by {drift:.0f} standard errors within the rest_frames (--rest-frames) given, or right beside "
-        "them, so all displacements may be shifted by up to {shift_mm:.3g} mm, which is in their standard errors",
+        "{told}: all displacements may be shifted by up to {shift_mm:.3g} mm, which is in their standard errors",
         ("rest_frames",),
     ),
     Kind(
@@ -168,7 +167,7 @@ KINDS = table(
         "camera.distorted", WARNING,
         "thickness of the beam and shape of its edges in each frame, against the usual ones",
         "{frames:.0f} frame(s) ({share_percent:.1f} %) in which the beam looks thicker or thinner, or its edge is no "
-        "step: light or another object lies on it; their standard errors are widened, or they are left out",
+        "step: light, dust, blur or another object may lie on it; their standard errors are widened, or they are left out",
     ),
     Kind(
         "camera.lost", WARNING,
@@ -193,6 +192,43 @@ KINDS = table(
         "the motion of striker and beam over ten frames, with and without a frame in which both stand still",
         "at least {frames:.0f} frame(s) show the frame before again, the first is frame {first:.0f}: left out; keep the frames as "
         "they were taken",
+    ),
+    Kind(
+        "camera.frames_exchanged", ERROR,
+        "the striker frame by frame against its steady sine, with frames exchanged and with frames shown again",
+        "{frames:.0f} pair(s) of frames are in the wrong order, the first from frame {first:.0f} on: write the images again "
+        "in the order of their numbers",
+    ),
+    Kind(
+        "camera.frames_copied", WARNING,
+        "the striker frame by frame against its steady sine, with frames exchanged and with frames shown again",
+        "{frames:.0f} frame(s) show the instant of the frame before, the first is frame {first:.0f}: a copy that was coded "
+        "again, or made by a program that changed the frame rate; keep the frames as they were taken",
+    ),
+    Kind(
+        "camera.time_jump", ERROR,
+        "the phase of the striker's drive before and after each frame, against a shift of the picture",
+        "the drive's phase jumps by {size:.2f} frames at about frame {first:.0f}: frames are missing, or two recordings were "
+        "joined; keep the frames before",
+    ),
+    Kind(
+        "camera.knocked", ERROR,
+        "the striker's rows before and after each frame, against a jump of the drive's phase",
+        "the picture shifts by {size:.2f} px at about frame {first:.0f}: the camera was knocked; keep the frames before, or "
+        "give a part with a stationary object (fixed_marks, --fixed-mark)",
+        ("fixed_mark",),
+    ),
+    Kind(
+        "camera.off_its_drive", WARNING,
+        "the striker before and after each frame, against a shift of the picture and a jump of the time",
+        "from about frame {first:.0f} on the striker is off its steady sine; a shift of the picture and a jump of the time "
+        "explain it alike: look at the frames about it",
+    ),
+    Kind(
+        "camera.scattered", WARNING,
+        "how the scatter of the striker about its steady sine grows with its speed",
+        "the striker scatters with its speed, by {size:.2f} frames: an uneven trigger, or edges that are found less well "
+        "while they move",
     ),
     Kind(
         "camera.curved", WARNING,
@@ -357,6 +393,8 @@ def _of_the_order(order: FrameOrder, rate: float) -> list[Diagnostic]:
         )
     if order.repeated:
         told.append(KINDS["frames_repeated"].found(frames=len(order.repeated), first=order.repeated[0]))
+    if not order.missing:
+        told += [KINDS[kind].found(None, "", **numbers) for kind, numbers in order.clock]
     return told
 
 
@@ -364,7 +402,15 @@ def _of_the_rest(seen: SeenMotion, settings: TrackingSettings, offset_mm: float)
     if seen.rest.found:
         return []
     if settings.rest_frames is not None:
-        return [KINDS["rest_moves"].found(drift=min(seen.rest.drift, 1e6), shift_mm=offset_mm)]
+        drift = seen.rest.drift
+        told = (
+            f"the beam moves within the rest_frames (--rest-frames) given, or right beside them, by {drift:.0f} times "
+            "the standard error of a frame"
+            if np.isfinite(drift)
+            else "the rest_frames (--rest-frames) given, and those measured beside them, are too few to show that the "
+            "beam rests"
+        )
+        return [KINDS["rest_moves"].found(told=told, drift=drift, shift_mm=offset_mm)]
     return [KINDS["no_rest"].found(quiet=2 * seen.rest.indices.size, shift_mm=offset_mm)]
 
 

@@ -34,11 +34,15 @@ _LEAST_NOISE = 0.005  # px
 
 
 class FrameOrder(NamedTuple):
-    """Frames shown twice, the frames before which others are ``missing``, and how ``many`` at each."""
+    """Frames shown twice, the frames before which others are ``missing``, and how ``many`` at each.
+
+    ``clock`` holds kinds and numbers of what the drive shows beside (:mod:`~snapbeam.lab.tracking.drive_clock`).
+    """
 
     repeated: tuple[int, ...]
     missing: tuple[int, ...]
     many: tuple[int, ...]
+    clock: tuple[tuple[str, dict[str, float]], ...] = ()
 
 
 def find_order(row: Floats, shaker: Floats, penetration: Floats) -> FrameOrder:

@@ -18,6 +18,7 @@ from snapbeam.lab.tracking.diagnostics import (
     rounding_shift,
     tracking_diagnostics,
 )
+from snapbeam.lab.tracking.drive_clock import drive_clock
 from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.tracking.frame_order import FrameOrder, find_order, without_repeats
 from snapbeam.lab.tracking.measure import (
@@ -81,7 +82,13 @@ def tracked_dataset(
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
     if not rest.indices.size:
         raise InputError(
-            f"{recording.path}: the beam was found in none of the frames at rest; set rest_frames (--rest-frames)"
+            f"{recording.path}: the beam was found in none of the frames at rest; "
+            + (
+                "set rest_frames (--rest-frames)"
+                if settings.rest_frames is None
+                else f"rest_frames = {settings.rest_frames}: must contain frames in which it is seen; look at "
+                "one (--picture) and narrow region (--region)"
+            )
         )
     turn = Orientation(settings.side, recording.shape)
     scale = recording.pixel_size * 1e3
@@ -91,8 +98,12 @@ def tracked_dataset(
         depth = (
             rows.row + beam.thickness - rows.shaker - (shaker.tip_offset if shaker is not None else np.nan)
         )
-        order = find_order(rows.row, rows.shaker, depth)
-        rows = without_repeats(rows, order)
+        clock = tuple(drive_clock(rows.shaker))
+        if all(kind != "scattered" for kind, _ in clock):  # frames at uneven times look like lost ones
+            order = find_order(rows.row, rows.shaker, depth)
+            rows = without_repeats(rows, order)
+            clock = tuple(drive_clock(rows.shaker))
+        order = order._replace(clock=clock)
     beam_mm = settings.rest * 1e3 - turn.sign * scale * (rows.row - rest.row)
     tip = rows.shaker + (shaker.tip_offset if shaker is not None else np.nan)
     shaker_mm = settings.rest * 1e3 - turn.sign * scale * (tip - beam.thickness - rest.row)

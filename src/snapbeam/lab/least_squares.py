@@ -1,0 +1,44 @@
+"""Linear least squares of waves: the design of sines, solution and covariance by scaled normal equations."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["covariance", "phasors", "sines", "solve"]
+
+_Array = NDArray[np.float64]
+
+
+def sines(time: _Array, frequencies: ArrayLike) -> _Array:
+    """Columns of an offset, and of cosine and sine of each frequency [Hz]."""
+    turn = 2.0 * np.pi * np.outer(time, np.asarray(frequencies))
+    design = np.ones((time.size, 2 * turn.shape[1] + 1))
+    design[:, 1::2], design[:, 2::2] = np.cos(turn), np.sin(turn)
+    return design
+
+
+def phasors(solution: _Array) -> NDArray[np.complex128]:
+    """Complex amplitudes c of sines Re(c exp(i 2 pi f t)) from what :func:`solve` finds for :func:`sines`."""
+    return np.asarray(solution[1::2] - 1j * solution[2::2])
+
+
+def solve(design: _Array, values: _Array, rcond: float = 1e-14) -> _Array:
+    """Solution by scaled normal equations: the columns of waves are nearly orthogonal."""
+    scale = _scale(design)
+    gram = (design.T @ design) / np.outer(scale, scale)
+    solution: _Array = np.linalg.lstsq(gram, (design.T @ values) / scale, rcond=rcond)[0] / scale
+    return solution
+
+
+def covariance(design: _Array, rcond: float = 1e-15) -> _Array:
+    """Covariance of the solution for noise of variance 1."""
+    scale = _scale(design)
+    inverse = np.asarray(np.linalg.pinv((design / scale).T @ (design / scale), rcond=rcond), dtype=np.float64)
+    return inverse / np.outer(scale, scale)
+
+
+def _scale(design: _Array) -> _Array:
+    scale: _Array = np.asarray(np.linalg.norm(design, axis=0), dtype=np.float64)
+    scale[scale == 0.0] = 1.0
+    return scale

@@ -1,0 +1,131 @@
+"""Order and spacing of frames by the drive: the steady sine of the striker is a clock inside the picture.
+
+Each error leaves its own pattern in what the sine leaves: a frame shown again or exchanged with the next one in one or
+two frames, time that jumps (frames lost, recordings joined) a step along the slope of the motion from there on, a camera
+that was knocked a step along the rows.  A pattern is named where it explains more than chance and more than the others.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.stats import chi2, f
+
+from snapbeam.lab.signals import SignalSamples
+from snapbeam.lab.sine_fit import fit_sine, spectral_peak
+from snapbeam.lab.tracking.edges import Floats
+from snapbeam.lab.vibrometer import moving_part
+from snapbeam.util.validation import InputError
+
+__all__ = ["drive_clock"]
+
+
+_RATE = 1e-4  # of false alarms of a pattern over a recording with normal noise
+_CYCLES = 4.0  # of steady motion, at least
+_MOST = 3000  # frames of a recording that are looked at
+_LEAST_NOISE = 0.01  # px
+_EXPLAINS = 0.8  # of what one or two frames are off that a pattern must explain
+_SURER = 10.0  # chi-square by which one kind of step must explain more than the other
+_FRAMES, _PIXELS = 0.3, 0.2  # that a step is at least
+_JITTER = 0.05  # frames
+_MEDIAN = 2.7  # times as many squares a median needs for the error of a mean
+_BLOCK = 8  # frames, for noise that is alike in neighbours
+
+
+def drive_clock(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
+    """Kinds and numbers of what is wrong with the order of the frames, from the rows [px] of the striker."""
+    known = np.flatnonzero(np.isfinite(shaker))
+    if known.size < 64 or known.size < 0.8 * shaker.size:
+        return []
+    frames = np.arange(shaker.size, dtype=np.float64)
+    samples = SignalSamples(np.interp(frames, frames[known], shaker[known]), frames, 1.0)
+    try:
+        guess = spectral_peak(samples)
+        first, last = moving_part(samples, guess)
+        first = min(first + round(2.0 / guess), last)
+        last = min(last, first + _MOST)
+        if (last - first) * guess < _CYCLES:
+            return []
+        part = SignalSamples(samples.values[first:last], frames[first:last], 1.0)
+        fit = fit_sine(part, guess, 5, keep=np.isfinite(shaker[first:last]))
+    except InputError:
+        return []
+    wave = fit.waveform(np.arange(first - 1, last + 1, dtype=np.float64))
+    off = np.where(np.isfinite(shaker[first:last]), part.values - wave[1:-1], 0.0)
+    told = _jitter(off, 0.5 * (wave[2:] - wave[:-2]))
+    if told:
+        return told
+    noise = max(1.4826 * float(np.median(np.abs(np.diff(off, 2)))) / math.sqrt(6.0), _LEAST_NOISE)
+    whole = max(1.4826 * float(np.median(np.abs(off))), noise)
+    return _frames(off, wave, whole, first) or _steps(part, off, noise, fit.frequency)
+
+
+def _frames(off: Floats, wave: Floats, noise: float, first: int) -> list[tuple[str, dict[str, float]]]:
+    """Frames shown again, and frames exchanged with the next."""
+    before, after = wave[:-2] - wave[1:-1], wave[2:] - wave[1:-1]
+    limit = float(chi2.isf(_RATE / off.size, 1)) * noise**2
+    again = off**2 - (off - before) ** 2
+    pair = off[:-1] ** 2 + off[1:] ** 2
+    turned = pair - (off[:-1] - after[:-1]) ** 2 - (off[1:] - before[1:]) ** 2
+    told: list[tuple[str, dict[str, float]]] = []
+    exchanged = (turned > limit) & (turned > _EXPLAINS * pair) & (off[:-1] ** 2 > 0.2 * pair)
+    exchanged &= off[1:] ** 2 > 0.2 * pair
+    shown = (again > limit) & (again > _EXPLAINS * off**2)
+    shown[:-1] &= ~exchanged
+    shown[1:] &= ~exchanged
+    for kind, found in (("frames_exchanged", exchanged), ("frames_copied", shown)):
+        if found.any():
+            told.append((kind, {"frames": int(found.sum()), "first": first + int(np.argmax(found))}))
+    return told
+
+
+def _steps(
+    part: SignalSamples, off: Floats, noise: float, frequency: float
+) -> list[tuple[str, dict[str, float]]]:
+    """A step of the time, or of the rows, from some frame on."""
+    turn = 2.0 * np.pi * frequency * part.time
+    wave = np.column_stack([np.cos(turn), np.sin(turn)])
+    since = part.time - part.time.mean()
+    slope = part.values - part.values.mean()
+    slope = wave @ np.linalg.lstsq(wave, slope, rcond=None)[0]
+    slope = np.gradient(slope)
+    base = np.linalg.qr(np.column_stack([np.ones_like(turn), wave, since * slope]))[0]
+    left = off - base @ (base.T @ off)
+    places = np.arange(_BLOCK, off.size - _BLOCK)
+    after = (np.arange(off.size)[:, None] >= places).astype(np.float64)
+    best: dict[str, tuple[float, float, int, float]] = {}
+    alike = math.inf
+    for kind, column, least in (("time_jump", slope, _FRAMES), ("knocked", np.ones_like(slope), _PIXELS)):
+        steps = after * column[:, None]
+        steps -= base @ (base.T @ steps)
+        power = np.maximum((steps**2).sum(0), 1e-12)
+        size = steps.T @ left / power
+        gain = size**2 * power / noise**2
+        at = int(np.argmax(gain))
+        best[kind] = (float(gain[at]), float(size[at]), int(part.time[0]) + int(places[at]), least)
+        blocks = (left - size[at] * steps[:, at])[: left.size // _BLOCK * _BLOCK].reshape(-1, _BLOCK).mean(1)
+        alike = min(alike, max(float(np.mean(blocks**2)) * _BLOCK / noise**2, 1.0))
+    kind = max(best, key=lambda one: best[one][0])
+    gain, size, at, least = best[kind]
+    gain /= alike
+    if gain < float(chi2.isf(_RATE / off.size, 1)) or abs(size) < least:
+        return []
+    other = min(one[0] for one in best.values()) / alike
+    named = kind if gain - other > max(_SURER, 0.2 * gain) else "off_its_drive"
+    return [(named, {"size": abs(size), "first": at})]
+
+
+def _jitter(off: Floats, slope: Floats) -> list[tuple[str, dict[str, float]]]:
+    """Scatter that grows with the speed, as of frames taken at uneven times."""
+    off, slope = np.diff(off, 4) / math.sqrt(70.0), slope[2:-2]  # what moves slowly is no scatter
+    order = np.argsort(np.abs(slope))
+    third = off.size // 3
+    # medians, which a few frames in the wrong order do not move; of the square of normal noise it is 0.455
+    slow, fast = (float(np.median(off[part] ** 2)) / 0.455 for part in (order[:third], order[-third:]))
+    if fast < slow * float(f.isf(_RATE, third / _MEDIAN, third / _MEDIAN)):
+        return []
+    frames = math.sqrt(
+        (fast - slow) / float(np.mean(slope[order[-third:]] ** 2) - np.mean(slope[order[:third]] ** 2))
+    )
+    return [("scattered", {"size": frames})] if frames > _JITTER else []
