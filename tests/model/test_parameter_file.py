@@ -18,6 +18,7 @@ from snapbeam.model.parameter_file import (
 )
 from snapbeam.model.parameters import PHYSICAL
 from snapbeam.model.system import System
+from snapbeam.sweeps.points import points_of
 from snapbeam.util.validation import InputError
 
 
@@ -364,9 +365,11 @@ def test_physical_units_are_ratios_of_the_system():
         0.031 / (2.0 * np.pi * freq * level), rel=1e-14
     )
     assert system.get("contact.location") == pytest.approx(0.04 / 0.161, rel=1e-14)
-    axes = config_from_mapping(
+    given = config_from_mapping(
         {"sweep": {"frequency_hz": "50:100:3", "velocity_m_s": [0.01, 0.03], "location_m": "0.02:0.08:4"}}
-    ).axes()
+    )
+    assert list(given.axes()) == ["drive.frequency_hz", "drive.velocity_m_s", "contact.location_m"]
+    axes = points_of(given.axes(), given.system).axes
     assert list(axes) == ["drive.frequency_ratio", "drive.velocity_amplitude", "contact.location"]
     np.testing.assert_allclose(axes["drive.frequency_ratio"] * freq, [50.0, 75.0, 100.0], rtol=1e-14)
     np.testing.assert_allclose(axes["contact.location"] * 0.161, [0.02, 0.04, 0.06, 0.08], rtol=1e-14)
@@ -401,7 +404,8 @@ def test_a_base_in_hz_and_g():
         config = config_from_mapping(
             extends | {"base_excitation": base, "sweep": {"base_excitation.frequency_hz": [30.0, 40.0]}}
         )
-        hertz = config.axes()["base_excitation.frequency_ratio"] * config.system.model.reference_frequency
+        axes = points_of(config.axes(), config.system).axes
+        hertz = axes["base_excitation.frequency_ratio"] * config.system.model.reference_frequency
         np.testing.assert_allclose(hertz, [30.0, 40.0], rtol=1e-14)
     both = {"type": "acceleration_sine", "frequency_hz": 35.0, "frequency_ratio": 0.4, "amplitude_g": 0.3}
     with pytest.raises(InputError, match="give frequency_ratio or frequency_hz, not both"):

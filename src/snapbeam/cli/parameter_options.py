@@ -6,7 +6,7 @@ import inspect
 import math
 import re
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -154,17 +154,13 @@ def with_parameters(
             if name != "given"
         }
         added = {_identifier(name): (name, _option(name, name in axes)) for name in names}
+        general = _general(bool(axes))
 
         def command(**arguments: Any) -> Any:
             given = {full: arguments.pop(key) for key, (full, _) in added.items()}
-            given |= {
-                key: arguments.pop(key)
-                for key in ("config", "set_", "sweep", "from_", "point", "print_config")
-                if key in arguments
-            }
+            given |= {key: arguments.pop(key) for key in general if key in arguments}
             return function(given=given, **arguments)
 
-        general = _general(bool(axes))
         command.__name__, command.__doc__ = function.__name__, function.__doc__
         command.__module__ = function.__module__
         parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own.values()]
@@ -180,6 +176,51 @@ def with_parameters(
         return command
 
     return decorate
+
+
+Law = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--law",
+        help="Python file of your own with contact laws, drives, forces or statistics, which the parameters name by their "
+        "type; FILE:CLASS requires this class of it. Repeat for further files. The file is executed.",
+        metavar="FILE[:CLASS]",
+    ),
+]
+
+
+def import_laws(given: Sequence[str] | None) -> None:
+    """Execute Python files of the user's own, which register the laws that they define.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be executed, or does not define the class that is named.
+    """
+    import importlib.util
+    import sys
+
+    from snapbeam.util.validation import InputError
+
+    for text in given or ():
+        file, _, name = text.partition(".py:")
+        path = Path(file + ".py" if name else text)
+        where = f"law = {text!r}"
+        if path.suffix != ".py" or not path.is_file():
+            raise InputError(f"{where}: must be an existing Python file, such as mylaw.py or mylaw.py:Magnet")
+        module = sys.modules.get(path.stem)
+        if module is None or Path(getattr(module, "__file__", None) or "").resolve() != path.resolve():
+            spec = importlib.util.spec_from_file_location(path.stem, path.resolve())
+            assert spec is not None and spec.loader is not None
+            module = importlib.util.module_from_spec(spec)
+            sys.modules[path.stem] = module
+            try:
+                spec.loader.exec_module(module)
+            except Exception as error:
+                del sys.modules[path.stem]
+                raise InputError(f"{where}: cannot be executed: {type(error).__name__}: {error}") from error
+        if name and not isinstance(getattr(module, name, None), type):
+            raise InputError(f"{where}: the file does not define a class {name!r}")
 
 
 def _identifier(name: str) -> str:
@@ -211,6 +252,7 @@ def _general(with_axes: bool) -> dict[str, tuple[Any, Any]]:
         "point": (None, Annotated[str | None, point]),
         "set_": (None, Annotated[list[str] | None, anything]),
         "print_config": (False, Annotated[bool, shown]),
+        "law": (None, Law),
     }
     if with_axes:
         sweep = typer.Option(
@@ -312,6 +354,7 @@ def configured(
     from snapbeam.model.quantity import split_name
     from snapbeam.util.validation import InputError
 
+    import_laws(given.get("law"))
     file = given.get("config")
     config = load_config(file, complete=False) if file is not None else Config()
     if given.get("from_") is not None:

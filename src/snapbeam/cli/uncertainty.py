@@ -66,7 +66,9 @@ Output = typer.Option(
 )
 
 
-def read(file: Path, section: str) -> tuple[Config, ParameterUncertainty, dict[str, Any]]:
+def read(
+    file: Path, section: str, law: list[str] | None = None
+) -> tuple[Config, ParameterUncertainty, dict[str, Any]]:
     """The system, its parameter uncertainty and the section of the command.
 
     Raises
@@ -79,6 +81,7 @@ def read(file: Path, section: str) -> tuple[Config, ParameterUncertainty, dict[s
     from snapbeam.util.input_files import read_toml
     from snapbeam.util.validation import InputError
 
+    opt.import_laws(law)
     sections = read_toml("file", file)
     if "uncertainty" not in sections:
         raise InputError(
@@ -156,6 +159,7 @@ def design(
     checkpoint: Checkpoint = None,
     estimate_cost: EstimateCost = False,
     yes: Yes = False,
+    law: opt.Law = None,
     threads: opt.Threads = None,
 ) -> None:
     """Optimise the excitation, under constraints that hold with a stated probability.
@@ -171,7 +175,7 @@ def design(
     from snapbeam.uncertainty.optimization import optimize_design
     from snapbeam.util.files import check_writable
 
-    settings, uncertainty, asked = read(file, "design")
+    settings, uncertainty, asked = read(file, "design", law)
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
     variables, objectives, constraints, optimizer = _question(asked)
@@ -267,6 +271,7 @@ def probability(
     checkpoint: Checkpoint = None,
     estimate_cost: EstimateCost = False,
     yes: Yes = False,
+    law: opt.Law = None,
     threads: opt.Threads = None,
 ) -> None:
     """Map the probability of snap-through and final wells, under parameter uncertainty.
@@ -282,7 +287,7 @@ def probability(
     from snapbeam.uncertainty.probability import SamplingPlan, probability_map
     from snapbeam.util.files import check_writable
 
-    settings, uncertainty, asked = read(file, "probability")
+    settings, uncertainty, asked = read(file, "probability", law)
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
     runs: Any = asked["runs"] if set(asked) == {"runs"} else taken(SamplingPlan, asked, "probability")

@@ -190,14 +190,23 @@ def checked_sections(
     return found, lines
 
 
-def _known(section: str, found: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Names that a section may hold."""
+def _known(section: str, values: Mapping[str, Any]) -> list[str]:
+    """Names that a section may hold, those of its type if that is given."""
     kind = numbered(section)[0]
-    names = [split_name(row.name)[1] for row in parameters().values() if row.section == kind]
+    rows = [row for row in parameters().values() if row.section == kind]
+    rows = [row for row in rows if not _is_of_other_type(row, values)]
+    names = [split_name(row.name)[1] for row in rows]
     names += ["type"] if kinds_of(kind) else []
     names += ["label"] if kind in ("contact", "force") else []
     names += [*MATERIALS, *WANTED] if kind == "contact" else []
-    return names + [field for of, field in map(split_name, PHYSICAL) if of == section]
+    return names + [split_name(full)[1] for full in physical_names(f"{section}.{name}" for name in names)]
+
+
+def _is_of_other_type(row: Parameter, values: Mapping[str, Any]) -> bool:
+    """Return whether a parameter belongs to other types of a section than that of its values; sums have those of all."""
+    kind = values.get("type")
+    known = isinstance(kind, str) and "+" not in kind and kind in kinds_of(row.section)
+    return known and bool(row.kinds) and kind not in row.kinds
 
 
 def _checked(
@@ -217,9 +226,11 @@ def _checked(
         except InputError:
             return f"{name}: unknown key; must be amplitude[i], velocity[i] or striker_position"
     else:
-        known = _known(section, found)
-        if name not in known and row_of(f"{section}.{name}") is None:
-            return f"{name}: unknown key{_nearest(name, known)}"
+        known = _known(section, flat[section])
+        row = row_of(ratio_of(f"{section}.{name}"))
+        if name not in known and (row is None or _is_of_other_type(row, flat[section])):
+            what = "unknown key" if row is None else f"is not a key of type {flat[section]['type']!r}"
+            return f"{name}: {what}{_nearest(name, known)}"
         row = row_of(f"{section}.{name}")
     if row is None:
         message, checked = _special(section, name, value)

@@ -37,9 +37,10 @@ def checked_request(system: Any, integration: Any) -> tuple[System, Integration]
     return system, integration
 
 
-def require_motion(system: System) -> None:
-    """Refuse a system without excitation and initial state."""
-    if system.striker is None and system.initial_state is None and not system.moving:
+def require_motion(system: System, started: bool = False) -> None:
+    """Refuse a system without excitation, force and initial state; *started* by a sweep that gives one."""
+    parts = (system.contacts, system.moving, system.forces)
+    if not started and system.initial_state is None and not any(parts):
         raise InputError(
             "contacts = []: without a striker the beam needs an initial_state; give one, or a contact"
         )

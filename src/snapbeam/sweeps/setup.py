@@ -17,6 +17,7 @@ from snapbeam.model.parameters import PHYSICAL, lookup, ratio_of
 from snapbeam.model.quantity import quantities, split_name
 from snapbeam.model.state import State, started
 from snapbeam.model.system import System
+from snapbeam.simulation.request import require_motion
 from snapbeam.simulation.save import code_flags
 from snapbeam.simulation.simulate import attributes_of
 from snapbeam.solver.assemble import cycles_of, make_ensemble, plans_of, run_columns
@@ -67,15 +68,7 @@ def require_parameters(system: System, points: Points) -> None:
             raise InputError(
                 f"{name}: is not a parameter of this system; its parameters are {', '.join(system.parameters)}"
             )
-    if (
-        system.striker is None
-        and system.initial_state is None
-        and not system.moving
-        and not any(name.startswith("initial_state.") for name in first)
-    ):
-        raise InputError(
-            "contacts = []: without a striker the beam needs an initial_state; give one, or a contact"
-        )
+    require_motion(system, any(name.startswith("initial_state.") for name in first))
     _at(system, first)
 
 
