@@ -74,6 +74,8 @@ class _OutputOptions:
     quiet: bool = False
     json: Path | None = None
     found: dict[str, Any] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    """Warnings of the command, which its JSON contains too."""
 
     @property
     def silent(self) -> bool:
@@ -132,7 +134,7 @@ def write_json_now(**found: Any) -> None:
     """Add results and write the JSON now, for a command that runs until it is stopped."""
     asked = _OUTPUT_OPTIONS.get()
     if asked.json is not None:
-        write_json(asked.json, asked.found | found)
+        write_json(asked.json, asked.found | found | {"notes": asked.notes})
         asked.found.clear()
 
 
@@ -218,7 +220,7 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
                     return command(*args, **kwargs)
                 finally:
                     if asked.json is not None and asked.found:
-                        write_json(asked.json, asked.found)
+                        write_json(asked.json, asked.found | {"notes": asked.notes})
         except InputError as error:
             errors().print(f"[bold red]error:[/] {escape(str(error))}")
             raise typer.Exit(REFUSED) from None
@@ -268,6 +270,7 @@ def _named(values: Iterable[Any]) -> list[Path]:
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
+    _OUTPUT_OPTIONS.get().notes.append(str(message))
     errors().print(f"[bold yellow]note:[/] {escape(str(message))}")
 
 

@@ -140,7 +140,9 @@ def simulate(
     if run is not None and animate is not None:
         console.print(f"Written: {file_line(_animated(run.dataset, animate, part))}")
     files = [path for path in (output, plot, animate) if path is not None]
-    add_json(summary=summary, seconds=time.monotonic() - start, system=system.hash, files=files)
+    wells = 2 if system.model.is_bistable else 1
+    shown = dict(summary) | {"response_class": summary.response_class.label_of(wells)}
+    add_json(summary=shown, seconds=time.monotonic() - start, system=system.hash, files=files)
     if summary.status not in (sb.RunStatus.OK, sb.RunStatus.EARLY_STOP):
         raise typer.Exit(FAILED)
 

@@ -81,4 +81,4 @@ def number_in_unit(text: str, unit: str) -> float | None:
     if factor is None:
         must = "a number without a unit" if unit == "1" else f"in {unit}"
         raise InputError(f"the unit {found[3]!r} does not fit; must be {must}")
-    return value * factor
+    return float(f"{value * factor:.15g}")  # 10 um is 1e-5 m to the last digit
