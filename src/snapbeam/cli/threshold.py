@@ -151,6 +151,8 @@ def _kinds(dataset: xr.Dataset) -> list[str]:
 def _curve(curve: xr.Dataset, parameter: str, across: str | None, chosen: dict[str, int]) -> list[str]:
     """Return the lines that describe one curve."""
     first, always = curve["lower_threshold"], curve["upper_threshold"]
+    from snapbeam.plot.axes import is_geometric
+
     word = "snap-through" if wells_of(curve.attrs) == 1 else "interwell response"
     named = [coordinate_text(curve, name, curve[name].item()) for name in chosen]
     if "modes" in curve.attrs and "modes" not in chosen:
@@ -166,8 +168,11 @@ def _curve(curve: xr.Dataset, parameter: str, across: str | None, chosen: dict[s
         width = always - first
         if bool(width.notnull().any()):
             of = f" over {int(width.notnull().sum())} points" if bool(width.isnull().any()) else ""
-            step = float(np.max(np.diff(curve[parameter].values)))
-            wide, steps = (value_text(curve, parameter, each, 2) for each in (float(width.mean()), step))
+            values = curve[parameter].values
+            steps = value_text(curve, parameter, float(np.max(np.diff(values))), 2)
+            if is_geometric(values):
+                steps = f"a factor of {values[1] / values[0]:.3g}"
+            wide = value_text(curve, parameter, float(width.mean()), 2)
             line += f"; band {wide} wide{'' if across is None else ' on average'}{of}, in steps of {steps}"
     lines = [line]
     for kind, text in (

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.ticker import MaxNLocator
 
+from snapbeam.model.drive.shock import GRAVITY
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CENTER_COLOR,
@@ -329,6 +330,7 @@ _PANELS = {
     "contact_force": ("Contact\nforce $f$", "N"),
     "voltage": ("Voltage\n$v$", "V"),
     "power_load": ("Power in\nthe load", "W"),
+    "base_acceleration": ("Base\nacceleration", "g"),
 }
 """Variables below the displacements: label and unit."""
 _ENVELOPE = 100
@@ -381,6 +383,10 @@ def plot_run(
     dataset = dataset_of(run, "displacement_at_striker")
     axis_name, label = across(dataset)
     part = _cut(dataset, axis_name, window)
+    if _is_of_one_event(dataset):
+        part, axis_name = _with_base_acceleration(part), "time"
+        own, unit = scale_of(part["time"].values, "s")
+        part, label = part.assign_coords(time=part["time"] / own), f"Time ({unit})"
     has_force = "contact_force" in part and bool((part["contact_force"] > 0.0).any())
     rows = 1 + sum(name in part for name in _PANELS)
     if ax is not None:
@@ -392,7 +398,9 @@ def plot_run(
             height_ratios=(1.6, *(1.0,) * (rows - 1)),
         )  # fmt: skip
         scales = {
-            name: scale_of(part[name].values, unit) for name, (_, unit) in _PANELS.items() if name in part
+            name: (1.0, "g") if unit == "g" else scale_of(part[name].values, unit)
+            for name, (_, unit) in _PANELS.items()
+            if name in part
         }
         left = _column(figure, grid, 0, part, part[axis_name].values, scales)
         if "power_load" in part:
@@ -401,6 +409,14 @@ def plot_run(
         first, last = float(part[axis_name][0]), float(part[axis_name][-1])
         left[0].set_xlim(_from(first, last), last)
         left[0].set_ylabel("Displacement $w/b$")
+        if axis_name == "time" and "length_scale" in dataset.attrs:
+            size, unit = scale_of([float(dataset.attrs["length_scale"])], "m")
+            metres = float(dataset.attrs["length_scale"]) / size
+            beside = left[0].secondary_yaxis(
+                "right",
+                functions=(lambda w: np.multiply(w, metres), lambda w: np.divide(w, metres)),
+            )
+            beside.set_ylabel(f"Displacement ({unit})")
         handles, labels = left[0].get_legend_handles_labels()
         figure.legend(
             handles, labels, loc="outside lower left", ncols=3,
@@ -418,6 +434,22 @@ def plot_run(
             right[-1].xaxis.set_major_locator(MaxNLocator(3))
             right[0].set_xlim(min(around[0], -0.12 * around[-1]), around[-1])
     return left[0]
+
+
+_ONE_EVENT = ("shock", "half_sine", "recorded_acceleration", "random_vibration")
+"""Types of excitation without a cycle: their runs are drawn over seconds."""
+
+
+def _is_of_one_event(dataset: xr.Dataset) -> bool:
+    """Return whether a base without a striker moves the beam by a shock or a record, which has no cycle."""
+    return dataset.attrs.get("base_excitation_type") in _ONE_EVENT and "striker_displacement" not in dataset
+
+
+def _with_base_acceleration(part: xr.Dataset) -> xr.Dataset:
+    """The run with the acceleration of its base, g."""
+    unit = part.attrs["length_scale"] * 2.0 * np.pi * part.attrs["reference_frequency"]
+    values = unit * np.gradient(part["base_velocity"].values, part["time"].values) / GRAVITY
+    return part.assign(base_acceleration=("time", values))
 
 
 def _curves(part: xr.Dataset) -> list[tuple[str, str, str]]:
@@ -474,7 +506,7 @@ def _column(
         axes[-1].tick_params(labelbottom=row == rows - 1)
         axes[-1].margins(x=0.0)
     pixels = x.size > _MANY
-    far = at == 0 and "cycle" in part.variables and float(x[-1] - x[0]) > _ENVELOPE
+    far = at == 0 and "cycle" in part.variables and float(np.ptp(part["cycle"].values)) > _ENVELOPE
     for name, label, color in _curves(part):
         if far:
             _envelope(axes[0], x, part[name].values, color, f"{label} (range)")
@@ -497,7 +529,7 @@ def _column(
             axes[row].plot(x, values, ".", color=BEAM_COLOR, markersize=2.5)
         else:
             axes[row].plot(x, values, color=BEAM_COLOR, rasterized=pixels)
-        if name != "voltage":
+        if name not in ("voltage", "base_acceleration"):
             axes[row].set_ylim(bottom=0.0)
         if at == 0:
             axes[row].set_ylabel(f"{_PANELS[name][0]} ({unit})")

@@ -42,7 +42,8 @@ def plot_threshold(
     Parameters
     ----------
     dataset : xarray.Dataset
-        Result of :func:`snapbeam.threshold` along one axis, or a curve for each point of a second axis.
+        Result of :func:`snapbeam.threshold` along one axis, or a curve for each point of a second axis; without an axis
+        the classes along the parameter are drawn.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
     quasi_static : bool
@@ -74,7 +75,15 @@ def plot_threshold(
     if not set(_NEEDED) <= set(dataset.variables):
         raise InputError(f"no threshold curve among {list(map(str, dataset.variables))}")
     dims = [str(name) for name in dataset["lower_threshold"].squeeze().dims]
-    if not 1 <= len(dims) <= 2:
+    if not dims:  # one threshold: the classes along its parameter
+        from snapbeam.plot.map import plot_response_map
+
+        ax = plot_response_map(dataset, ax, legend=legend)
+        for name in ("lower_threshold", "upper_threshold"):
+            if np.isfinite(float(dataset[name])):
+                ax.axvline(float(dataset[name]), color="black", linewidth=0.8, linestyle="--")
+        return ax
+    if len(dims) > 2:
         raise InputError(
             f"threshold over {dims}: is drawn along one axis, a curve for each point of another one"
         )

@@ -228,7 +228,7 @@ def run_attributes(run: Prepared, summary: RunSummary, accumulators_of_runs: Any
     """Return the attributes of a run that ended; reports an energy-balance error."""
     lasted = run.end / run.period
     more: dict[str, Any] = _own_attributes(run.system, run.integration, lasted)
-    more["response_class"] = summary.response_class.label
+    more["response_class"] = summary.response_class.label_of(2 if run.system.model.is_bistable else 1)
     more["status"] = f"{summary.status.name}: {summary.status.advice}"
     attrs = attributes_of("run of a struck bistable beam", run.system, run.integration, run.plan, more)
     attrs["gross_work"] = float(accumulators_of_runs["gross_work"][0])

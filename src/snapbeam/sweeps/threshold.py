@@ -93,7 +93,8 @@ def threshold(
           ``highest_run_is_intrawell``, ``undecided`` (no run is known to be interwell, but runs failed) and
           ``not_searched`` (no run has a response class).
 
-        Over the axes and the values: ``response`` and ``status`` of every run.
+        Over the axes and the values: ``response_class`` and ``status`` of every run; without axes also the extremes of
+        the centre's displacement.
 
     Raises
     ------
@@ -170,7 +171,8 @@ def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
         "flag_meanings": " ".join(_OUTCOMES),
     }
     dataset["outcome"] = (dims, rows["outcome"].astype(np.int8), flags)
-    for name in ("response_class", "status"):
+    extremes = () if dims else ("min_midspan_displacement", "max_midspan_displacement")
+    for name in ("response_class", "status", *extremes):
         dataset[name] = (whole, computed[name].transpose(*whole).values, variable_attributes(name))
     return dataset
 
