@@ -1018,7 +1018,7 @@ def _dataset(
         "refinements": effort.refinements, "seed": effort.seed, "uncertainty_seed": trials.uncertainty.seed, "runs_made": trials.runs,
         "cycles": trials.integration.cycles_or_default, "modes": trials.system.model.modes,
     }  # fmt: skip
-    attrs |= {f"fixed_{lookup(name).short}": value for name, value in trials.system.parameters.items()
+    attrs |= {f"fixed_{lookup(name).short}": +value for name, value in trials.system.parameters.items()
               if isinstance(value, (int, float)) and name not in problem.bounds}  # fmt: skip
     dataset = xr.Dataset(attrs=attrs)
     x, objectives, violation = tried
