@@ -262,7 +262,7 @@ _INTERFACE = {
     "Basic": ("system", "contact", "excitation", "forces", "runs", "sweeps", "figures", "errors"),
     "Advanced": (
         "orbits", "basins", "probability", "design", "figure_style", "lab_recordings", "lab_signals", "lab_comparison",
-        "lab_figures", "parameters", "paper", "provenance",
+        "lab_figures", "parameters", "paper",
     ),
 }  # fmt: skip
 """Pages of the interface: those that most scripts need, and the others."""

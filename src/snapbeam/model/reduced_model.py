@@ -620,11 +620,6 @@ class ReducedModel(Wells):
         imperfection : Imperfection, optional
             Imperfection, which makes the wells unequal; a zero one is ignored.  Damping is that of the linear
             modes about the well that the striker pushes away from, and the same matrix everywhere.
-
-        Raises
-        ------
-        InputError
-            For a number of modes or a damping ratio out of range.
         """
         if not isinstance(beam, Beam):
             raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")

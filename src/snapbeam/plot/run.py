@@ -363,11 +363,6 @@ def plot_run(
     matplotlib.axes.Axes
         Of the displacements.
 
-    Raises
-    ------
-    InputError
-        If the dataset is not a run, or the window contains fewer than two samples.
-
     Examples
     --------
     >>> import snapbeam as sb

@@ -50,11 +50,6 @@ def plot_threshold(
     legend : bool
         Whether to name the curves.
 
-    Raises
-    ------
-    InputError
-        If the dataset contains no threshold curve.
-
     Examples
     --------
     >>> import snapbeam as sb
