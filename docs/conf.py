@@ -166,7 +166,13 @@ def summarise_claims(app: Any) -> None:
     for topic in dict.fromkeys(row["topic"] for row in claims if row["verdict"] != "open"):
         counts = Counter(row["verdict"] for row in claims if row["topic"] == topic)
         lines.append(f"| {topic} | " + " | ".join(str(counts[each]) for each in verdicts) + " |")
-    lines += ["", "These claims fail:", "", "| # | statement | value in the paper | measured |", "| --- | --- | --- | --- |"]
+    lines += [
+        "",
+        "These claims fail:",
+        "",
+        "| # | statement | value in the paper | measured |",
+        "| --- | --- | --- | --- |",
+    ]
     for row in claims:
         if row["verdict"] == "fails":
             cells = (row[name].replace("|", "\\|") for name in ("number", "says", "paper", "measured"))
