@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import csv
 import importlib.util
 import logging
 import os
 import re
 import shutil
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +56,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 autodoc_mock_imports = ["bokeh", "panel", "param", "tornado"]  # of the explorer, which a build does not need
 napoleon_google_docstring = False
+napoleon_use_ivar = True  # one list of attributes, not an entry for each
 napoleon_use_param = False  # types are words: "array of shape (N,)" names no class
 napoleon_use_rtype = False
 
@@ -149,6 +152,34 @@ def draw_paper(app: Any) -> None:
             plt.close(figure)
 
 
+def summarise_claims(app: Any) -> None:
+    """Count the verdicts on the claims of the paper by topic, and list the claims that fail."""
+    with (DATA / "claims.csv").open(encoding="utf-8", newline="") as stream:
+        claims = list(csv.DictReader(stream))
+    verdicts = ("holds", "in part", "fails")
+    lines = [
+        (DATA / "claims.md").read_text(encoding="utf-8").partition("\n")[0],
+        "",
+        "| topic | hold | hold in part | fail |",
+        "| --- | --- | --- | --- |",
+    ]
+    for topic in dict.fromkeys(row["topic"] for row in claims if row["verdict"] != "open"):
+        counts = Counter(row["verdict"] for row in claims if row["topic"] == topic)
+        lines.append(f"| {topic} | " + " | ".join(str(counts[each]) for each in verdicts) + " |")
+    lines += [
+        "",
+        "These claims fail:",
+        "",
+        "| # | statement | value in the paper | measured |",
+        "| --- | --- | --- | --- |",
+    ]
+    for row in claims:
+        if row["verdict"] == "fails":
+            cells = (row[name].replace("|", "\\|") for name in ("number", "says", "paper", "measured"))
+            lines.append("| " + " | ".join(cells) + " |")
+    (_HERE / "_generated" / "claims.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
 def link_gallery(app: Any, name: str, source: list[str]) -> None:
     """Lead links of a page to scripts of the gallery to the pages that show them."""
     source[0] = re.sub(r"\]\(\.\./examples/(ex\d\d_\w+)\.py\)", r"](gallery/\1.rst)", source[0])
@@ -165,5 +196,6 @@ shutil.copyfile(
 def setup(app: Any) -> None:
     """Connect to Sphinx."""
     app.connect("builder-inited", draw_paper)
+    app.connect("builder-inited", summarise_claims)
     app.connect("source-read", link_gallery)
     app.connect("doctree-read", with_dashes)

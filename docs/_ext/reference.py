@@ -26,7 +26,8 @@ __all__ = [
 
 _SECTIONS = {
     "beam": "Geometry and material. Give one of `buckling_level` and `axial_load`.",
-    "model": "The reduced model.",
+    "model": 'The reduced model. `modes = "auto"` takes the smallest power of two with an estimated error of the frequencies below 1 %, '
+    '`"auto 0.1 %"` below 0.1 %.',
     "boundary": "Stiffness of the supports; without this section both ends are clamped.",
     "imperfection": "Initial deflection and constant transverse loads, which make the wells unequal; without this section the "
     "beam is perfect.",
@@ -262,7 +263,7 @@ _INTERFACE = {
     "Basic": ("system", "contact", "excitation", "forces", "runs", "sweeps", "figures", "errors"),
     "Advanced": (
         "orbits", "basins", "probability", "design", "figure_style", "lab_recordings", "lab_signals", "lab_comparison",
-        "lab_figures", "parameters", "paper", "provenance",
+        "lab_figures", "parameters", "paper",
     ),
 }  # fmt: skip
 """Pages of the interface: those that most scripts need, and the others."""

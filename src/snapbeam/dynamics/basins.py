@@ -89,11 +89,6 @@ def basins_of_attraction(
         has no step.  The attribute ``undecided`` is the share of undecided states, ``termination_reason`` the number of
         periods and its rule; ``sensitive_share``, ``sensitive_share_low`` and ``sensitive_share_high``.
 
-    Raises
-    ------
-    InputError
-        If an axis of the grid or the number of periods is out of range.
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -495,11 +490,6 @@ def uncertainty_exponent(labels: ArrayLike, sizes: ArrayLike | None = None) -> U
         A negative label is undecided.
     sizes : array_like of int, optional
         epsilon in cells; powers of two up to an eighth of the shortest side by default.
-
-    Raises
-    ------
-    InputError
-        For a grid that is too small, and one without borders.
 
     Examples
     --------

@@ -80,11 +80,6 @@ def bifurcation_diagram(
         ``impacts_per_period``, ``crossings_per_period`` and ``minimal_period`` (0: none seen).  Runs that
         failed are NaN, as are all that follow them in their sweep; ``failed`` marks them.
 
-    Raises
-    ------
-    InputError
-        If *name* is not a numeric parameter, values are out of range, or there is neither a sweep nor an initial condition.
-
     Examples
     --------
     >>> import snapbeam as sb

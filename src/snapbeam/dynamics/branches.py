@@ -499,11 +499,6 @@ def continuation(
     -------
     Branch
 
-    Raises
-    ------
-    InputError
-        If the bounds do not contain the orbit, or the direction, a step or the number of points is out of range.
-
     Examples
     --------
     >>> import snapbeam as sb

@@ -156,11 +156,6 @@ def edge_tracking(
         With the unstable periodic orbit that it settles on, if it does; ``termination_reason`` gives the reason
         why it stopped.
 
-    Raises
-    ------
-    InputError
-        If both states have the same outcome, a threshold is out of range, or a run fails.
-
     Examples
     --------
     >>> import snapbeam as sb

@@ -406,8 +406,6 @@ def lifetime_map(
 
     Raises
     ------
-    InputError
-        If an axis is not valid, or the checkpoint belongs to another sweep.
     CheckpointError
         If the checkpoint is in use, cannot be written or is damaged beyond repair.
 

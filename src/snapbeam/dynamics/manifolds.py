@@ -300,11 +300,6 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         Over ``point``, along the unstable manifold: ``state``, known to the attribute ``chord_error``, and the ``arclength`` of both.
 
-    Raises
-    ------
-    InputError
-        For manifolds that are not in a plane, or are not one unstable and one stable.
-
     Examples
     --------
     >>> import snapbeam as sb

@@ -557,11 +557,6 @@ class PeriodicOrbit:
         Returns
         -------
         matplotlib.axes.Axes
-
-        Raises
-        ------
-        InputError
-            For another kind, and for the phase portrait of an orbit of a map.
         """
         if choice("kind", kind, ("phase_portrait", "multipliers")) == "multipliers":
             return plotter("plot_multipliers")(self.to_dataset(), ax=ax, **options)

@@ -76,11 +76,6 @@ def poincare_section(
         is the maximum distance from the level, in its unit.  The attribute ``termination_reason`` states the transient
         that was left out and its rule, and why the search for passages stopped.
 
-    Raises
-    ------
-    InputError
-        If the system has no excitation, a number is out of range, or the run fails during the transient.
-
     Examples
     --------
     >>> import snapbeam as sb

@@ -552,11 +552,6 @@ def calibrate(
     -------
     Calibration
 
-    Raises
-    ------
-    InputError
-        If nothing was measured that the parameters could be fitted to, or an argument is unusable.
-
     Notes
     -----
     Weighted least squares in the logarithms of the parameters (``scipy.optimize.least_squares``).  The

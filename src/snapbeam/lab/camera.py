@@ -370,11 +370,6 @@ def pixel_size_from_marks(
     reach
         Half the side [px] of the square in which the centre of each mark is located.
 
-    Raises
-    ------
-    InputError
-        If a mark has no contrast, or the two are the same.
-
     Examples
     --------
     >>> import numpy as np

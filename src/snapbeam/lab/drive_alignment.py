@@ -106,11 +106,6 @@ def align(
         A delay [s] known beforehand to better than half a cycle, as from a common trigger; it then decides
         the cycle.
 
-    Raises
-    ------
-    InputError
-        If a signal is unfit, or the two do not oscillate at the same frequency.
-
     Examples
     --------
     >>> from snapbeam import lab

@@ -119,11 +119,6 @@ def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -
         A map: ``response_class`` over some of frequency_ratio, velocity_amplitude and location; the others are
         scalar coordinates or attributes.
 
-    Raises
-    ------
-    InputError
-        If the dataset is not a map.
-
     Notes
     -----
     A point does not count if it lies more than half a step outside the map, was measured at another value of a

@@ -48,11 +48,6 @@ def read_channels(
         Keys ``data``, ``name``, ``unit_str``, and ``fs`` [Hz] or ``time`` [s].  ``unit_str`` is None where the
         file states no unit.  ``diagnostics`` lists contradictions with the header.
 
-    Raises
-    ------
-    InputError
-        If the file is missing, cut short, of no known kind, without sampling rate, or without a channel.
-
     Examples
     --------
     >>> from snapbeam import lab

@@ -213,11 +213,6 @@ def make_signal(
     attrs : mapping, optional
         More attributes.
 
-    Raises
-    ------
-    InputError
-        For an unknown unit, numbers that are not finite, or a time axis that is not even.
-
     Examples
     --------
     >>> from snapbeam import lab

@@ -195,11 +195,6 @@ def fit_sine(
         Standard errors are those of least squares with the noise found near the frequency in the residual;
         they hold for noise that is white over a band of about 50 lines.
 
-    Raises
-    ------
-    InputError
-        If the signal spans fewer than two cycles, is constant, or no steady sine is found near the guess.
-
     Notes
     -----
     IEEE Std 1057-2017, Annex B; the standard errors reach the bound of Rife and Boorstyn, IEEE Trans. Inf.

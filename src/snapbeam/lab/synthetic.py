@@ -553,13 +553,7 @@ class Defects:
         within("drift", self.drift, -1e3, 1e3, unit="px")
 
     def frames(self, count: int) -> dict[str, frozenset[int]]:
-        """The spoiled frames by kind, of a recording of *count* frames.
-
-        Raises
-        ------
-        InputError
-            For a number that is no frame of the recording.
-        """
+        """The spoiled frames by kind, of a recording of *count* frames."""
         chosen = {}
         for name in FRAME_LISTS:
             values = getattr(self, name)

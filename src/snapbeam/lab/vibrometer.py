@@ -681,11 +681,6 @@ def measure_drive(
         Maximum deviation of a steady cycle from the steady sine, as a fraction of its amplitude.  Raised to
         four times the noise of one cycle's amplitude where that is more.
 
-    Raises
-    ------
-    InputError
-        If the signal has another quantity, or contains fewer than five cycles of steady motion.
-
     Examples
     --------
     >>> from snapbeam import lab
@@ -1015,11 +1010,6 @@ def displacement_from_velocity(
         Velocity [m/s].
     measurement : DriveMeasurement, optional
         Result of :func:`measure_drive` for this velocity; measured by default.
-
-    Raises
-    ------
-    InputError
-        As :func:`measure_drive`.
 
     Examples
     --------

@@ -177,11 +177,6 @@ def compare_waveforms(
     measured_onsets, simulated_onsets : array_like, optional
         Times of impacts [s], to be shown over cycles.
 
-    Raises
-    ------
-    InputError
-        If a run lacks the shaker, the two share fewer than two cycles, or no frequency is known.
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -479,11 +474,6 @@ def measure_response(
         left out.
     start : float, optional
         Start of the excitation [s]; the first sample by default.
-
-    Raises
-    ------
-    InputError
-        If the dataset is not a run, or has neither *frequency* nor ``cycle``.
 
     Examples
     --------

@@ -168,11 +168,6 @@ class Beam:
 
         Of ``buckling_level`` and ``axial_load`` the given one is unchanged, unless either is among the
         *changes*.
-
-        Raises
-        ------
-        InputError
-            For a name that is not a parameter of a beam, and as for a new beam.
         """
         names = [field.name for field in dataclasses.fields(self) if field.init]
         for name in changes:

@@ -49,11 +49,6 @@ def equilibrium_branches(system: System, parameter: str, values: tuple[float, fl
         ("limit" or "bifurcation"), ``critical_value``, ``critical_displacement`` (m), ``critical_branch``, and
         ``critical_unstable_directions``, 0 where a stable part of the branch ends.
 
-    Raises
-    ------
-    InputError
-        For a parameter that is no number of the system, and for a range without equilibria.
-
     Examples
     --------
     Pull-in of a plate on a spring, V^2 = 8 k g^3/(27 eps_0 A) at a third of the gap:

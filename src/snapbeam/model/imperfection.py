@@ -101,11 +101,6 @@ class Imperfection:
     gravity : float
         Acceleration of gravity, m/s^2, that pulls towards the lower well: 9.81 for a beam that lies.
 
-    Raises
-    ------
-    InputError
-        For values that are not finite or out of range, and for a profile that does not go from end to end.
-
     Examples
     --------
     >>> import snapbeam as sb

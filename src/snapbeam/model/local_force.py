@@ -199,13 +199,7 @@ class LocalForce:
         return kind(*(float(getattr(self, name)) for name in kind._fields))
 
     def row(self, model: ReducedModel) -> _Array:
-        """Return the shape that gives u of the modal amplitudes, u = shape . alpha; shape (N,).
-
-        Raises
-        ------
-        InputError
-            For a beam without a location, and for a shape that does not fit the model.
-        """
+        """Return the shape that gives u of the modal amplitudes, u = shape . alpha; shape (N,)."""
         if model.beam is not None:
             if self.shape is not None or self.location is None:
                 raise InputError(

@@ -45,7 +45,7 @@ def modal_error(system: System, quantity: Callable[[System], ArrayLike] = well_f
     The quantity q is computed with N modes and with N' = max(2 N, N + 4).  Of a quantity whose error decreases with the
     second order of N or faster, Richardson's extrapolation bounds the error of q(N) by
 
-        4/3 |q(N') - q(N)| / |q(N)|,
+        4/3 abs(q(N') - q(N)) / abs(q(N)),
 
     the largest of its components.  The frequencies about a well of a clamped beam converge with the order 2.5 to 3.
 

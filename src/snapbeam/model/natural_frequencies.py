@@ -180,11 +180,6 @@ def exact_natural_frequencies(beam: Beam, count: int = 10) -> _Array:
     Returns
     -------
     array of shape (count,)
-
-    Raises
-    ------
-    InputError
-        For a count out of range or something that is no beam.
     """
     if not isinstance(beam, Beam):
         raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")

@@ -914,13 +914,7 @@ def same_axis(name: str) -> set[str]:
 
 
 def load_config(path: str | os.PathLike[str], *, complete: bool = True) -> Config:
-    """Read a parameter file; unless it must be *complete*, options may add what a system needs.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read or is no TOML, and for anything :func:`config_from_mapping` refuses.
-    """
+    """Read a parameter file; unless it must be *complete*, options may add what a system needs."""
     file = file_path("config", path)
     return config_from_mapping(read_toml("config", file), file.name, complete=complete, folder=file.parent)
 

@@ -265,11 +265,6 @@ def lookup(name: str) -> Parameter:
 
     ``drive.frequency_hz`` and ``frequency_hz`` are rows of their own, whose values are made into ratios.
     ``initial_state.amplitude[i]`` and ``initial_state.velocity[i]`` apply to every mode i.
-
-    Raises
-    ------
-    InputError
-        If there is none: the message names the nearest.
     """
     if not isinstance(name, str):
         raise InputError(f"parameter {shown(name)}: must be a name, such as 'drive.frequency_ratio'")

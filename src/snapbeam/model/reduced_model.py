@@ -518,41 +518,23 @@ class ReducedModel(Wells):
     makes the wells unequal: it adds B to the right side and -B . alpha to U.  Use :meth:`from_beam` or
     :meth:`from_matrices` to create a model; its arrays are read-only.
 
+    The arguments of :meth:`from_matrices` are attributes; for a beam w = alpha . phi (m), with alpha and phi in m^0.5, mass in
+    kg m, stiffness in N and nonlinear_stiffness in N/m.
+
     Attributes
     ----------
-    mass : array of shape (N, N)
-        Mass matrix m; kg m for a beam, whose displacement w = alpha . phi (m) has alpha and phi in m^0.5.
-    stiffness : array of shape (N,) or (N, N)
-        Linear stiffness K0 of the straight structure, N for a beam: its diagonal, or the full matrix if one
-        was given.
-    nonlinear_stiffness : float
-        gamma, N/m for a beam.
     well_amplitude : array of shape (N,)
         Amplitudes at rest in the lower well, (-sqrt((P - P_cr)/gamma), 0, ...); of a structure with one equilibrium
         that one, zeros if it is perfect.
     length_scale : float or None
         Length that normalises displacements, m: the buckling level b; of a beam that the load alone would not buckle
         the height of the centre in the well of minimum energy; None for a straight beam.
-    damping_ratio : array of shape (N,)
-        Damping ratio of each linear mode about a well, by ascending frequency.
-    midspan_shape : array of shape (N,)
-        phi_i at mid-span, whose displacement distinguishes the wells.
-    contact_shape : array of shape (N,) or None
-        phi_i at the shaker if it does not depend on the location (given by matrices).
     beam : Beam or None
         Beam from which the model was reduced.
     given_reference_frequency : float or None
         Frequency to normalise with, Hz, if it is not the first natural frequency.
-    transverse_force : array of shape (N,) or None
-        B, of a structure whose wells are unequal.
     imperfection : Imperfection or None
-        Imperfection from which B follows.
-    base_shape : array of shape (N,) or None
-        Displacement of each coordinate per unit of the base's, of a structure given by matrices.
-    elongation_matrix : array of shape (N, N) or None
-        S of the term gamma (alpha . S alpha) S alpha, of a structure given by matrices; None for the identity.
-    patch_shape : array of shape (N,) or None
-        Difference of the slopes at the ends of piezoelectric layers, of a structure given by matrices.
+        Imperfection from which *transverse_force* follows.
 
     Examples
     --------
@@ -620,11 +602,6 @@ class ReducedModel(Wells):
         imperfection : Imperfection, optional
             Imperfection, which makes the wells unequal; a zero one is ignored.  Damping is that of the linear
             modes about the well that the striker pushes away from, and the same matrix everywhere.
-
-        Raises
-        ------
-        InputError
-            For a number of modes or a damping ratio out of range.
         """
         if not isinstance(beam, Beam):
             raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")

@@ -83,11 +83,6 @@ class State:
     modal : ModalState, optional
         The same in an engine's coordinates.
 
-    Raises
-    ------
-    InputError
-        For shapes that do not fit each other, or numbers that are not finite.
-
     Examples
     --------
     >>> import numpy as np

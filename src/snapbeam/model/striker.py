@@ -180,11 +180,6 @@ class Contact:
     label : str, optional
         Name in parameter names, in place of the number of the contact: ``"stop"`` in ``contact.stop.gap``.
 
-    Raises
-    ------
-    InputError
-        For a law or a striker that is none, and for a label that is no identifier.
-
     Examples
     --------
     >>> import snapbeam as sb

@@ -81,11 +81,6 @@ class System:
     initial_state : State, optional
         Where runs begin, one state; by default at rest in the well that the striker pushes away from, touched by it.
 
-    Raises
-    ------
-    InputError
-        For parts that are none, that do not fit the model, or two with the same label.
-
     Notes
     -----
     A system may have parts that the solver cannot integrate; a run then raises an error; its potential energy
@@ -175,11 +170,6 @@ class System:
         ``drive.2.frequency_ratio``, or its label, ``contact.stop.gap``.  Whole parts are ``beam``, ``model``, ``contacts``,
         ``forces``, ``base_excitation``, ``axial_load``, ``harvesters`` and ``initial_state``; one of several is ``contact``,
         ``contact.law``, ``contact.striker``, ``drive``, ``force`` or ``harvester``, with its number after the first word.
-
-        Raises
-        ------
-        InputError
-            For a name that the system does not have, and for values as the parts refuse them.
         """
         from snapbeam.model.parameter_axes import ratios_of
 
@@ -198,13 +188,7 @@ class System:
         return dataclasses.replace(found, initial_state=started(found.model, found.start_state, start))
 
     def get(self, name: str) -> Any:
-        """The value of a parameter by its dotted name.
-
-        Raises
-        ------
-        InputError
-            For a name that the system does not have.
-        """
+        """The value of a parameter by its dotted name."""
         from snapbeam.model.parameter_axes import to_physical
 
         found, name = self.parameters, resolved(instance("name", name, str, "text"), self.labels)
@@ -218,11 +202,6 @@ class System:
 
         A last part that one part of the system alone has is that part's: ``frequency_hz`` is that of the base if nothing
         else has a frequency.
-
-        Raises
-        ------
-        InputError
-            If there is none: the message names the nearest.
         """
         instance("name", name, str, "text")
         return lookup(named_in(resolved(name, self.labels), self.to_mapping() if "." not in name else {}))
@@ -413,13 +392,7 @@ class System:
 
     @classmethod
     def from_mapping(cls, sections: Mapping[str, Mapping[str, Any]]) -> System:
-        """The system that such sections describe.
-
-        Raises
-        ------
-        InputError
-            For sections, names or values that are none of a system.
-        """
+        """The system that such sections describe."""
         return cls(**parts_from_mapping(sections))
 
     @cached_property
@@ -447,11 +420,6 @@ class System:
         """Read a parameter file, or a file that :meth:`save` wrote.
 
         Sections of commands, such as ``integration`` and ``probability``, are left out.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be read, is no TOML or describes no system.
         """
         from snapbeam.model.parameter_file import system_of_file
 

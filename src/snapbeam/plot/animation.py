@@ -99,11 +99,6 @@ def animate_run(
     -------
     pathlib.Path
         The file, written whole or not at all.
-
-    Raises
-    ------
-    InputError
-        If the dataset is no run, the window holds less than two samples, or the file cannot be written.
     """
     target = check_writable(path, "animate", ANIMATION_SUFFIXES)
     times = frame_times(dataset, window, duration=duration, slow_motion=slow_motion, fps=fps)

@@ -264,11 +264,6 @@ def plot_dataset(
     -------
     matplotlib.axes.Axes
 
-    Raises
-    ------
-    InputError
-        If the dataset has no such figure; the message lists those that it has.
-
     Examples
     --------
     >>> import snapbeam as sb

@@ -62,11 +62,6 @@ def plot_diagram(
     variable : str
         Variable to draw; branches have ``midspan_displacement`` alone, at every return.
 
-    Raises
-    ------
-    InputError
-        If there is nothing to draw, or branches are combined with another variable.
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -180,11 +175,6 @@ def plot_lifetimes(
 
     Points without a lifetime are white where nothing snapped and hatched where runs snap on with no end seen.  *limits*
     are those of the colours, in cycles.
-
-    Raises
-    ------
-    InputError
-        If the dataset contains no lifetimes over one or two parameters.
 
     Examples
     --------
@@ -357,11 +347,6 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     per : {"second", "period"}
         Unit of time: 1 s, or one period of the excitation.
 
-    Raises
-    ------
-    InputError
-        If the dataset has no exponents over at most two parameters, or does not contain the period.
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -475,11 +460,6 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
 
-    Raises
-    ------
-    InputError
-        If the dataset has no multipliers.
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -533,11 +513,6 @@ def plot_backbone(
         Where to draw; a new figure one column wide by default.
     labels : sequence of str, optional
         Of the curves, in a legend; the wells by default if there are several.
-
-    Raises
-    ------
-    InputError
-        If a dataset is no backbone curve, or *labels* is not one text for each.
 
     Examples
     --------
@@ -614,11 +589,6 @@ def plot_bifurcation_curve(
         Where to draw, such as a map over these parameters; a new figure one column wide by default.
     labels : sequence of str, optional
         Of the curves; their kinds by default.
-
-    Raises
-    ------
-    InputError
-        If a dataset is no bifurcation curve, the parameters differ, or *labels* is not one text for each.
 
     Examples
     --------
@@ -708,11 +678,6 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         Of :meth:`snapbeam.dynamics.Attractors.to_dataset`.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
-
-    Raises
-    ------
-    InputError
-        If the dataset has no attractors.
 
     Examples
     --------
@@ -863,11 +828,6 @@ def plot_manifold(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         Of :func:`snapbeam.dynamics.invariant_manifold`.
     ax : matplotlib.axes.Axes, optional
         Where to draw, such as basins or another manifold; a new figure one column wide by default.
-
-    Raises
-    ------
-    InputError
-        If the dataset has no manifold.
 
     Examples
     --------

@@ -47,11 +47,6 @@ def plot_force_displacement(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
     -------
     matplotlib.axes.Axes
 
-    Raises
-    ------
-    InputError
-        If the dataset is not a force-displacement curve.
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -194,11 +189,6 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
     Returns
     -------
     matplotlib.axes.Axes
-
-    Raises
-    ------
-    InputError
-        If the dataset is not of that function.
 
     Examples
     --------

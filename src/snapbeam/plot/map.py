@@ -100,11 +100,6 @@ def plot_response_map(
     -------
     matplotlib.axes.Axes
 
-    Raises
-    ------
-    InputError
-        If the dataset is not a map of one or two axes.
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -390,11 +385,6 @@ def plot_statistic(
     -------
     matplotlib.axes.Axes
 
-    Raises
-    ------
-    InputError
-        If there is no such variable, or it is over more than two axes.
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -548,11 +538,6 @@ def plot_points(
     Returns
     -------
     matplotlib.axes.Axes
-
-    Raises
-    ------
-    InputError
-        If the dataset is not a list of points, or its points have no such variable or parameters.
 
     Examples
     --------

@@ -365,11 +365,6 @@ def plot_run(
     matplotlib.axes.Axes
         Of the displacements.
 
-    Raises
-    ------
-    InputError
-        If the dataset is not a run, or the window contains fewer than two samples.
-
     Examples
     --------
     >>> import snapbeam as sb

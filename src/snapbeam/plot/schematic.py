@@ -192,11 +192,6 @@ def plot_system(system: System, title: str = "") -> Figure:
         Of a beam; a structure given by matrices has no shape to draw.
     title : str
 
-    Raises
-    ------
-    InputError
-        For a structure given by matrices.
-
     Examples
     --------
     >>> import snapbeam as sb

@@ -51,11 +51,6 @@ def plot_threshold(
     legend : bool
         Whether to name the curves.
 
-    Raises
-    ------
-    InputError
-        If the dataset contains no threshold curve.
-
     Examples
     --------
     >>> import snapbeam as sb

@@ -48,11 +48,6 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     over : str, optional
         A variable, such as ``"location"``; the second objective by default, or the first variable if there is one objective.
     ax : matplotlib.axes.Axes, optional
-
-    Raises
-    ------
-    InputError
-        If the dataset holds no designs, or nothing of that name.
     """
     from snapbeam.util.datasets import xr
 
@@ -152,11 +147,6 @@ def plot_probability(
         Measured responses to lay over it, in the colours of their classes.
     levels : tuple of float
         Probabilities, increasing, each in (0, 1).
-
-    Raises
-    ------
-    InputError
-        If the dataset holds no such map.
     """
     from snapbeam.util.datasets import xr
 
@@ -280,11 +270,6 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
     ax : matplotlib.axes.Axes, optional
     quasi_static : bool
         Whether to draw V_QS1 (Eq. 21) too, over frequency ratio or location.
-
-    Raises
-    ------
-    InputError
-        If the dataset holds no such thresholds, or those over more than one parameter.
     """
     from snapbeam.util.datasets import xr
 
@@ -359,11 +344,6 @@ def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     Locally, bars reach from the mean answer to those with the parameter one standard score down and up; how
     much that is in the unit of the parameter is next to its name.  Of indices, the first order and, if there is
     one, the total.
-
-    Raises
-    ------
-    InputError
-        If the dataset holds no sensitivities.
     """
     from snapbeam.util.datasets import xr
 

@@ -80,11 +80,6 @@ def advance(
         numbers of impacts.  A contact that has not ended does not count as an impact.  If a state could not be reached,
         ``statistics["status"]`` gives the reason, and its numbers are NaN.
 
-    Raises
-    ------
-    InputError
-        If the state has another number of modes, or a number of periods is not positive or exceeds the recorded motion.
-
     Examples
     --------
     >>> import snapbeam as sb

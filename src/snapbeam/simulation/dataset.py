@@ -121,11 +121,6 @@ def trajectory_dataset(
     xarray.Dataset
         With dimensions ``time`` and, if there are modal amplitudes, ``mode`` counted from 1; every variable
         carries ``units`` and ``long_name``.
-
-    Raises
-    ------
-    InputError
-        For an unknown name, a wrong shape, times that do not increase, or numbers that are not finite.
     """
     from snapbeam.util.datasets import xr
 

@@ -95,13 +95,7 @@ class Run:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the run to a NetCDF file atomically; :func:`snapbeam.load` reads it.
-
-        Raises
-        ------
-        InputError
-            If *path* cannot be written or does not end in ``.nc``.
-        """
+        """Write the run to a NetCDF file atomically; :func:`snapbeam.load` reads it."""
         from snapbeam.simulation.save import save_run
 
         save_run(self, path)

@@ -64,11 +64,6 @@ def description(
 def load(path: str | os.PathLike[str]) -> Run:
     """Read a run that :meth:`snapbeam.Run.save` wrote.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read or does not contain a run.
-
     Examples
     --------
     >>> import snapbeam as sb

@@ -117,11 +117,6 @@ def perturbation_growth(
         Over ``time`` (s) and ``cycle``: ``separation``, the maximum change up to that time of the displacement
         at the striker and at mid-span, in units of b.
 
-    Raises
-    ------
-    InputError
-        If the perturbation is not positive, or the accuracy level does not exist.
-
     Examples
     --------
     >>> import snapbeam as sb

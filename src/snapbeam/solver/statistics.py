@@ -412,11 +412,6 @@ def updated() -> tuple[Statistic, ...]:
 def register_statistic(statistic: Statistic) -> None:
     """Add a statistic to the table; every run and map from now on has it.
 
-    Raises
-    ------
-    InputError
-        If the name is taken or cannot name a variable.
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -440,11 +435,6 @@ def register_statistic(statistic: Statistic) -> None:
 
 def unregister_statistic(name: str) -> None:
     """Take a registered statistic out of the table again.
-
-    Raises
-    ------
-    InputError
-        If there is none of that name, or it is one of the package's own.
 
     Examples
     --------

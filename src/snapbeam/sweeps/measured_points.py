@@ -108,11 +108,6 @@ def read_measured_points(
     buckling_level : float, optional
         Buckling level b, m, wanted for ``velocity_m_s``: V = velocity / (2 pi b f_1).
 
-    Raises
-    ------
-    InputError
-        If the file has an invalid entry; the message names file, line and column.
-
     Examples
     --------
     >>> from pathlib import Path

@@ -106,11 +106,6 @@ def estimate_cost(
     trial : float
         Seconds that the trial may take, after compilation; at most 600.  The trial also stops at 100,000 runs.
 
-    Raises
-    ------
-    InputError
-        If the function has no cost estimate, or its own arguments are not valid.
-
     Examples
     --------
     >>> import snapbeam as sb

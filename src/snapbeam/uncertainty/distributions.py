@@ -250,11 +250,6 @@ class ParameterUncertainty:
         and length.  ``"normalised"``: the same Omega, V and x_s.
     seed : int
 
-    Raises
-    ------
-    InputError
-        For unknown names, parameters that cannot be uncertain, and matrices that are not correlations.
-
     Notes
     -----
     With a phase or a ringing start the tip's mid-position is fixed in space, as everywhere in dynamics.

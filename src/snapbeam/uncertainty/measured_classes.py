@@ -74,11 +74,6 @@ def score_measurements(
         ``p_value``, the share of those that are no likelier than the measured ones; ``agree``, measurements of the most
         likely class, with ``agree_expected``, as many as a right map lets expect.
 
-    Raises
-    ------
-    InputError
-        If the dataset is not such a map, or a measurement is outside it or none has a class.
-
     Examples
     --------
     >>> import snapbeam as sb

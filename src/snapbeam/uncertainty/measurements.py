@@ -190,11 +190,6 @@ def load_measurements(path: str | os.PathLike[str]) -> tuple[Measurements, dict[
     (Measurements, dict)
         The dictionary contains the other sections.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or has an unknown or invalid entry; the message names file and entry.
-
     Examples
     --------
     >>> from pathlib import Path

@@ -708,11 +708,6 @@ def design_problem(
         Its ``evaluate(designs)`` gives objectives and violations of rows of designs, on the same samples each time; its
         ``estimate(design, numbers)`` intervals on samples of any numbers.
 
-    Raises
-    ------
-    InputError
-        For variables, objectives and constraints that cannot be, and an uncertainty without uncertain parameters.
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -791,11 +786,6 @@ def optimize_design(
         quantity of the design from its limit.  Along ``tried``: every design that was evaluated, its objectives
         and ``violation``. The attribute ``termination_reason`` gives the reason why the search and the
         refinement stopped.
-
-    Raises
-    ------
-    InputError
-        If an argument is out of range, or no tested design satisfies the constraints.
 
     Examples
     --------

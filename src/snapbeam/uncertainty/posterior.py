@@ -469,11 +469,6 @@ def estimate_posterior(
     Posterior
         ``posterior.effective_sample_size`` is the number of independent samples that the weighted ones are worth.
 
-    Raises
-    ------
-    InputError
-        If a value is out of range, there are no measurements, or a parameter cannot be estimated.
-
     Notes
     -----
     Population Monte Carlo (Cappe et al., J. Comput. Graph. Stat. 13 (2004) 907): samples of a Student's t about the
@@ -695,11 +690,6 @@ def class_likelihood(
     Returns
     -------
     array of shape (samples,)
-
-    Raises
-    ------
-    InputError
-        If the uncertainty contains a parameter of the posterior, or no measurement has a response class.
 
     Examples
     --------

@@ -59,11 +59,6 @@ class SamplingPlan:
         Of the intervals, in (0, 1).
     interval : {"wilson", "jeffreys"}
 
-    Raises
-    ------
-    InputError
-        If a value is out of range, or an outcome or interval does not exist.
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -242,8 +237,6 @@ def probability_map(
 
     Raises
     ------
-    InputError
-        If no parameter is uncertain, an axis is not valid, or the checkpoint belongs to another computation.
     CheckpointError
         If the checkpoint is in use, cannot be written or is damaged beyond repair.
 

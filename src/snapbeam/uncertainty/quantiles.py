@@ -440,11 +440,6 @@ def quantile_threshold(
         threshold is that of the fitted curve, and not of the isotonic regression alone.  ``is_monotonic``, with
         the probability ``monotonicity_p_value`` of so much falling if it rises; ``runs``, ``runs_failed``.
 
-    Raises
-    ------
-    InputError
-        If the parameter changes the structure, bounds are out of range, or the checkpoint belongs to another computation.
-
     Examples
     --------
     >>> import snapbeam as sb

@@ -101,11 +101,6 @@ def sobol_indices_from_samples(
     Indices
         Of inputs that matter little, the estimate may be less than 0 by chance.
 
-    Raises
-    ------
-    InputError
-        For fewer than 200 runs, or an output that is constant up to rounding.
-
     Examples
     --------
     >>> import numpy as np
@@ -208,11 +203,6 @@ def sobol_indices(
     confidence : float
     rng : int, numpy.random.Generator or None
         A seed; a generator, which gives one; None takes one from the system.
-
-    Raises
-    ------
-    InputError
-        If a number is out of range, or the result has another shape or is constant up to rounding.
 
     Examples
     --------

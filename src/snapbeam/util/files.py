@@ -137,12 +137,6 @@ def refuse_foreign(target: Path, name: str, begin: str = "") -> None:
     """Refuse a file to be written if a guard is up and it would replace what is not snapbeam's, or another result.
 
     What was allowed once stays so: a file that appears while a result is computed does not cost the result.
-
-    Raises
-    ------
-    InputError
-        If *target* exists and snapbeam did not write it, it is named twice, or it is a default output and has other
-        parameters.
     """
     guard = _GUARD.get()
     if guard is None or guard.force or (there := target.resolve()) in guard.allowed:

@@ -114,12 +114,6 @@ def canonical_json(parameters: Any) -> str:
     Keys are sorted, numbers are written by value (``4``, ``4.0`` and ``np.float32(4)`` alike, a float to
     the last digit that tells it from its neighbours, negative zero as 0), arrays as lists, enumerations as
     their values, dataclasses as their fields.
-
-    Raises
-    ------
-    InputError
-        If something in it is not a number, text, truth value, ``None`` or a collection of these, or is not
-        finite.
     """
     return json.dumps(
         _plain(parameters, "parameters"), sort_keys=True, separators=(",", ":"), allow_nan=False

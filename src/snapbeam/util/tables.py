@@ -107,11 +107,6 @@ def write_table(dataset: xr.Dataset, path: str | os.PathLike[str]) -> list[str]:
     list of str
         Names of the variables that the table does not contain, since their dimensions are other ones.
 
-    Raises
-    ------
-    InputError
-        If the dataset has no rows, or *path* cannot be written.
-
     Examples
     --------
     >>> import snapbeam as sb

@@ -456,11 +456,6 @@ def mode_shapes(first: xr.DataArray, second: xr.DataArray, fit: DecayFit) -> tup
     fit : DecayFit
         Result of :func:`snapbeam.lab.identify_decay` for the first signal.
 
-    Raises
-    ------
-    InputError
-        If the records differ in length or rate.
-
     Examples
     --------
     >>> import numpy as np

@@ -208,25 +208,13 @@ class TrackingSettings:
             object.__setattr__(self, name, check(value))
 
     def changed(self, **changes: Any) -> TrackingSettings:
-        """Copy of the settings with some changed, by name.
-
-        Raises
-        ------
-        InputError
-            For a name that is no setting.
-        """
+        """Copy of the settings with some changed, by name."""
         for name in changes:
             choice("setting", name, tuple(field.name for field in dataclasses.fields(self)))
         return dataclasses.replace(self, **changes)
 
     def checked_for(self, shape: tuple[int, int], frames: int) -> TrackingSettings:
-        """Settings, checked for a recording of *frames* frames of *shape*.
-
-        Raises
-        ------
-        InputError
-            For a background of another shape, or frames, columns or marks outside the recording.
-        """
+        """Settings, checked for a recording of *frames* frames of *shape*."""
         if self.background is not None and np.shape(self.background) != shape:
             raise InputError(
                 f"background of shape {np.shape(self.background)}: must be of shape {shape}, that of the region"

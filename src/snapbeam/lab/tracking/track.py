@@ -284,11 +284,6 @@ def track(
         numbering, are NaN and have a flag. The attribute ``diagnostics`` contains the diagnostics;
         :func:`snapbeam.lab.diagnostics_of` reads it.
 
-    Raises
-    ------
-    InputError
-        For settings out of range, or a recording in which beam or shaker cannot be found.
-
     Examples
     --------
     >>> import numpy as np
@@ -575,11 +570,6 @@ def contact_onsets(
     xarray.Dataset
         Over ``impact``: ``onset`` and ``duration`` [s] with their standard errors, ``frames`` in contact,
         ``closing_speed`` [m/s] before the onset (NaN where fewer than two frames precede it), ``bounded``.
-
-    Raises
-    ------
-    InputError
-        If the dataset contains no penetration.
 
     Examples
     --------

@@ -230,11 +230,6 @@ class RecordedAcceleration(FileKeys, SampledAcceleration):
     sampling_frequency : float
         Samples per second, Hz.
 
-    Raises
-    ------
-    InputError
-        For fewer than four samples and for values that are not finite.
-
     Examples
     --------
     >>> import numpy as np

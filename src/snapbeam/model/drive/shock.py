@@ -49,11 +49,6 @@ class Shock(Timed):
     rise_fraction : float
         Of a trapezoid: rise time and fall time over the duration, 0.1 by default.
 
-    Raises
-    ------
-    InputError
-        If a value is out of range.
-
     Examples
     --------
     >>> import snapbeam as sb
