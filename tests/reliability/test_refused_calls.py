@@ -153,3 +153,17 @@ def test_results_of_another_kind(system, run, tmp_path):
     ):
         with pytest.raises(InputError):
             call()
+
+
+def test_values_that_are_no_amplitudes_equilibria_or_errors(system):
+    for call in (
+        lambda: system.poles(-1),
+        lambda: system.model.tangent_magnitude("1/0"),
+        lambda: system.model.tangent_magnitude(np.float32(0.1)),
+        lambda: system.model.side_of(np.ones((2, 1))),
+        lambda: sb.model.converged_modes(system, [0.1, 0.2]),
+        lambda: sb.model.converged_modes(system, "a"),
+        lambda: sb.model.modal_error(system, lambda each: each),
+    ):
+        with pytest.raises(InputError, match="equilibrium|alpha|amplitude|error|quantity"):
+            call()

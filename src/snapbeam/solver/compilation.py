@@ -18,6 +18,7 @@ import stat
 import sys
 import tempfile
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import cache
 from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
@@ -445,6 +446,8 @@ def _function_marks(function: FunctionType, seen: set[int]) -> Iterable[str]:
 
 
 _LOG = logging.getLogger("snapbeam")
+_LONGEST_WAIT = 600.0
+"""Seconds to wait for another process that compiles the same kernel, which takes 20 s on a free core."""
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
 _PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **pipeline()}
 INLINE: dict[str, Any] = {"error_model": "numpy", "forceinline": True}
@@ -528,8 +531,10 @@ class _Telling(event.Listener):
 def is_compiled(march: Any, *arguments: Any) -> bool:
     """True if a kernel for such arguments is in memory or on the disk."""
     signature = tuple(typeof(value) for value in arguments)
-    if signature in getattr(march, "overloads", ()):
-        return True
+    return signature in getattr(march, "overloads", ()) or _is_on_disk(march, signature)
+
+
+def _is_on_disk(march: Any, signature: tuple[Any, ...]) -> bool:
     cache = getattr(march, "_cache", None)
     if not isinstance(cache, _KeptCode):
         return False
@@ -540,13 +545,40 @@ def is_compiled(march: Any, *arguments: Any) -> bool:
         return False
 
 
+def _turn(march: Any) -> AbstractContextManager[Any]:
+    """Lock that the one process holds which compiles a kernel; nothing where the code is not kept.
+
+    A process that waited loads what the other one has compiled.  After the time-out, or where the folder has no locks,
+    it compiles for itself.
+    """
+    from filelock import FileLock
+
+    cache = getattr(march, "_cache", None)
+    if not isinstance(cache, _KeptCode):
+        return nullcontext()
+    lock = FileLock(f"{cache._cache_file._index_path}.lock", timeout=_LONGEST_WAIT)
+    with suppress(OSError):
+        try:
+            return lock.acquire(timeout=0.0)
+        except TimeoutError:
+            _LOG.info("compiling %s in another process: waiting for it", march.py_func.__name__)
+            return lock.acquire()
+    return nullcontext()
+
+
 def ready(march: Any, *arguments: Any) -> None:
     """Compile a kernel for such arguments, or fetch it from the disk, before anything is timed; says so in the log."""
+    signature = tuple(typeof(value) for value in arguments)
+    if signature in getattr(march, "overloads", ()):
+        return
     collecting = gc.isenabled()
     gc.disable()  # a compiler's garbage has no cycles worth a tenth of the time
     try:
-        with event.install_listener("numba:compile", _Telling(march.py_func.__name__)):
-            march.compile(tuple(typeof(value) for value in arguments))
+        with (
+            nullcontext() if _is_on_disk(march, signature) else _turn(march),
+            event.install_listener("numba:compile", _Telling(march.py_func.__name__)),
+        ):
+            march.compile(signature)
     finally:
         if collecting:
             gc.enable()

@@ -168,16 +168,16 @@ class CheckpointLock:
         self._handle: int | None = None
 
     def __enter__(self) -> Self:
+        from filelock import lock_descriptor
+
         handle = open_own(self.path, os.O_RDWR)
-        try:
-            _lock(handle)
-        except OSError:
+        if not lock_descriptor(handle, blocking=False):
             holder = _holder(handle)
             os.close(handle)
             raise CheckpointError(
                 f"checkpoint = {str(self.path.parent)!r}: another process is writing it ({holder}); "
                 "wait for it, or stop it"
-            ) from None
+            )
         self._handle = handle
         with suppress(OSError):  # a full disk: the lock holds without its holder's name
             os.ftruncate(handle, 0)
@@ -204,17 +204,6 @@ def _holder(handle: int) -> str:
             return holder
         time.sleep(0.05)
     return holder or "unknown"
-
-
-def _lock(handle: int) -> None:
-    try:
-        import fcntl
-    except ImportError:
-        import msvcrt
-
-        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
-        return
-    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 # ----------------------------------------------------------------------------------------------------
