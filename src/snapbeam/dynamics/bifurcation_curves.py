@@ -342,7 +342,6 @@ def _tangent(table: _Array, before: _Array) -> _Array:
     return found if found @ before >= 0.0 else -found
 
 
-# ----------------------------------------------------------------------------------------------------
 # Points of codimension two between two points of a curve.
 
 
@@ -427,9 +426,6 @@ def _between(curve: _Curve, one: _Point, other: _Point) -> list[tuple[str, _Poin
                 break
         found.append((kind, nearest))
     return found
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 @checked

@@ -46,17 +46,22 @@ __all__ = [
     "ready",
 ]
 
+_IDLE = frozenset({"inline_inlinables", "inline_overloads", "nopython_rewrites", "with_lifting"})
+"""Passes for array expressions, for blocks with a context and for functions that are inlined as source."""
+_CHECK = hashlib.sha256
+_SIZE = _CHECK().digest_size
+_said: set[str] = set()
+_LOG = logging.getLogger("snapbeam")
+_LONGEST_WAIT = 600.0
+"""Seconds to wait for another process that compiles the same kernel, which takes 20 s on a free core."""
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
 
-# ----------------------------------------------------------------------------------------------------
+
 # How a part of a kernel is compiled: into the kernel that calls it, and nowhere else.
 #
 # Numba optimises each function and makes machine code of it by itself before it is linked into its callers, where it is
 # optimised again.  A kernel has more than a hundred parts that nothing but the kernel calls; done once, with the kernel,
 # the same machine code takes half the time to compile.
-
-
-_IDLE = frozenset({"inline_inlinables", "inline_overloads", "nopython_rewrites", "with_lifting"})
-"""Passes for array expressions, for blocks with a context and for functions that are inlined as source."""
 
 
 class _Nobody:
@@ -152,18 +157,12 @@ def pipeline() -> dict[str, Any]:
     return {"pipeline_class": PartCompiler}
 
 
-# ----------------------------------------------------------------------------------------------------
 # Compiled code on disk: checked before it is loaded, and never a reason for a run to fail.
 #
 # Machine code that is loaded is run, so a file of it that was damaged could do anything.  Every file here begins with
 # the check sum of what follows; one that does not agree counts for nothing, and the code is compiled and written again.
 # The check sum does not tell who wrote a file: code is kept only in folders that nobody else can write.  Where there is
 # none, it goes into a private folder of the temporary ones, or is not kept at all; that is said once.
-
-
-_CHECK = hashlib.sha256
-_SIZE = _CHECK().digest_size
-_said: set[str] = set()
 
 
 def keep_code(dispatcher: Any, mark: str) -> Any:
@@ -346,7 +345,6 @@ class _CheckedFiles(IndexDataCacheFile):
         return data if _CHECK(data).digest() == check else None
 
 
-# ----------------------------------------------------------------------------------------------------
 # A mark of everything that a kernel bakes in, under which its machine code is kept.
 
 
@@ -442,13 +440,6 @@ def _function_marks(function: FunctionType, seen: set[int]) -> Iterable[str]:
         yield from _marks(value, seen)
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-_LOG = logging.getLogger("snapbeam")
-_LONGEST_WAIT = 600.0
-"""Seconds to wait for another process that compiles the same kernel, which takes 20 s on a free core."""
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
 _PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **pipeline()}
 INLINE: dict[str, Any] = {"error_model": "numpy", "forceinline": True}
 """Options of an overload that is to be written into its callers, on every engine."""

@@ -46,6 +46,12 @@ __all__ = [
     "updated",
 ]
 
+_MADE = 0.01
+"""Tolerance of the energy balance over the gross work: a run that gains more energy is not accepted."""
+_ROUNDED = 1e-6
+"""The same over the energies, for rounding."""
+_Array = NDArray[np.float64]
+
 
 Values = NDArray[Any]
 
@@ -493,7 +499,6 @@ def lost_in_circuits(accumulators_of_runs: Any) -> NDArray[np.float64]:
     return np.asarray(accumulators_of_runs["circuits"][:, :, CIRCUIT_LOSS].sum(axis=1))
 
 
-# ----------------------------------------------------------------------------------------------------
 # Statistics of each of several strikers: rows beside the table's, whose names bear the striker's number.
 
 
@@ -533,14 +538,7 @@ def _of_one(name: str, number: int) -> Statistic:
     )
 
 
-# ----------------------------------------------------------------------------------------------------
 # What engines answer: the accumulators of many runs, read as statistics in the units and signs of a map.
-
-
-_MADE = 0.01
-"""Tolerance of the energy balance over the gross work: a run that gains more energy is not accepted."""
-_ROUNDED = 1e-6
-"""The same over the energies, for rounding."""
 
 
 @dataclass(frozen=True)
@@ -692,11 +690,7 @@ def statistics_of(ensemble: Ensemble, accumulators_of_runs: NDArray[Any]) -> dic
     return found
 
 
-# ----------------------------------------------------------------------------------------------------
 # What engines hand over beside accumulators: output states, and pieces of a recorded run.
-
-
-_Array = NDArray[np.float64]
 
 
 class OutputStates(NamedTuple):

@@ -37,8 +37,14 @@ __all__ = [
     "refuse_links",
 ]
 
+PARTIAL = ".partial"
+"""Suffix of a file that is being written."""
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+_CHECK_DIGITS = 16
+_LARGEST_LOG = 2**30
+"""Largest task log, bytes: about a million tasks."""
 
-# ----------------------------------------------------------------------------------------------------
+
 # Errors of checkpoints and clusters.
 
 
@@ -56,13 +62,7 @@ class CheckpointError(OSError):
     """
 
 
-# ----------------------------------------------------------------------------------------------------
 # Files of a checkpoint: each is on the disk when the call returns, and only one process writes them.
-
-
-PARTIAL = ".partial"
-"""Suffix of a file that is being written."""
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 
 
 def durable_write(path: Path, data: bytes | memoryview) -> None:
@@ -204,14 +204,6 @@ def _holder(handle: int) -> str:
             return holder
         time.sleep(0.05)
     return holder or "unknown"
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_CHECK_DIGITS = 16
-_LARGEST_LOG = 2**30
-"""Largest task log, bytes: about a million tasks."""
 
 
 @dataclass(frozen=True, kw_only=True)

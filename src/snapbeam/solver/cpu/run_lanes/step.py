@@ -170,7 +170,6 @@ def _tension(modes: Modes) -> list[str]:
     return lines
 
 
-# ----------------------------------------------------------------------------------------------------
 # The operations that the step is built from.  Rows are tuples of registers, one for each mode.
 
 
@@ -312,9 +311,6 @@ def _step_of(shape: Any) -> Any:
         return increment.contact
 
     return take_step
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 def _signals(modes: Modes) -> list[str]:
@@ -509,7 +505,6 @@ TEXTS = {
 }  # fmt: skip
 
 
-# ----------------------------------------------------------------------------------------------------
 # Functions over modes, each written out for the shape that it is called with.
 
 
