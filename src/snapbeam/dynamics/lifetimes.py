@@ -496,7 +496,8 @@ def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Da
 
     setup, points = work.setup, work.setup.points
     more = made | {
-        f"starts_{name}": _plain(value) for name, value in work.initial_conditions.describe().items()
+        f"starts_{name}": int(value) if isinstance(value, bool) else value
+        for name, value in work.initial_conditions.describe().items()
     }
     attrs = setup.attributes(TITLE, more)
     dataset = xr.Dataset(coords=setup.coordinates(), attrs=attrs)
@@ -521,10 +522,6 @@ def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Da
         array = points.arranged(np.asarray(values).astype(kinds.get(name, "int8")))
         dataset[name] = (dims, array, {"units": unit, "long_name": words} | labels)
     return dataset
-
-
-def _plain(value: Any) -> Any:
-    return int(value) if isinstance(value, bool) else value
 
 
 def refit(

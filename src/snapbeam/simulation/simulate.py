@@ -137,7 +137,7 @@ def attributes_of(
     """
     attrs: dict[str, Any] = {"Conventions": CONVENTIONS, "title": title}
     attrs |= describe_system(system, plan) | more
-    own = _plain(integration)
+    own = {name: getattr(integration, name) for name in quantities(Integration) if name != "threads"}
     attrs["system_hash"] = system.hash
     attrs["system"] = json.dumps(_short_arrays(system.to_mapping()), sort_keys=True)
     attrs["integration"] = json.dumps(own, sort_keys=True)
@@ -154,10 +154,6 @@ def _short_arrays(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _short_arrays(item) for key, item in value.items()}
     return value
-
-
-def _plain(integration: Integration) -> dict[str, Any]:
-    return {name: getattr(integration, name) for name in quantities(Integration) if name != "threads"}
 
 
 # Preparation of a recorded run, and its attributes.

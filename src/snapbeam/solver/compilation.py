@@ -50,7 +50,7 @@ _IDLE = frozenset({"inline_inlinables", "inline_overloads", "nopython_rewrites",
 """Passes for array expressions, for blocks with a context and for functions that are inlined as source."""
 _CHECK = hashlib.sha256
 _SIZE = _CHECK().digest_size
-_said: set[str] = set()
+_warned: set[str] = set()
 _LOG = logging.getLogger("snapbeam")
 _LONGEST_WAIT = 600.0
 """Seconds to wait for another process that compiles the same kernel, which takes 20 s on a free core."""
@@ -64,7 +64,7 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False
 # the same machine code takes half the time to compile.
 
 
-class _Nobody:
+class _NoLibrary:
     """Placeholder for the code library of a part, which is never called on its own."""
 
     def set_env(self, name: str, env: Any) -> None:
@@ -90,7 +90,7 @@ def pipeline() -> dict[str, Any]:
 
         @property
         def codegen(self) -> Any:
-            return _Nobody()
+            return _NoLibrary()
 
         def _optimize_functions(self, module: Any) -> None:
             module.data_layout = self._codegen._data_layout
@@ -181,14 +181,14 @@ def keep_code(dispatcher: Any, mark: str) -> Any:
         alone = dispatcher.targetoptions.get("_nrt") is False
         dispatcher._cache = _KeptCode(dispatcher.py_func, mark, alone)
     except Exception as error:  # no folder anywhere, or a Numba that keeps code in another way
-        _say(f"compiled code is not kept, each start compiles anew ({error})")
+        _warn_once(f"compiled code is not kept, each start compiles anew ({error})")
     return dispatcher
 
 
-def _say(words: str) -> None:
+def _warn_once(words: str) -> None:
     """Once a process."""
-    if words not in _said:
-        _said.add(words)
+    if words not in _warned:
+        _warned.add(words)
         _LOG.warning(words)
 
 
@@ -270,7 +270,7 @@ class _Implementation(CompileResultCacheImpl):
             if self._locator is None:
                 raise PermissionError(why)
         if isinstance(self._locator, _PrivateFolder):
-            _say(f"compiled code is kept in {self._locator.get_cache_path()}: {why}")
+            _warn_once(f"compiled code is kept in {self._locator.get_cache_path()}: {why}")
 
 
 class _KeptCode(FunctionCache):
@@ -304,7 +304,7 @@ class _KeptCode(FunctionCache):
             super().save_overload(sig, data)
         except Exception as error:
             why = getattr(error, "strerror", None) or error
-            _say(
+            _warn_once(
                 f"compiled code is not kept, each start compiles anew: {self._cache_path} cannot be written "
                 f"({why}); set NUMBA_CACHE_DIR to a folder with 20 MB of room"
             )
@@ -353,7 +353,7 @@ _BAKED_IN = ("util/status_codes.py", "solver/**/*.py")
 _CONSTANTS = (int, float, complex, str, bytes, type(None), type(Ellipsis))
 
 
-class _Unknown(Exception):
+class _NoFingerprint(Exception):
     """Something that a kernel may bake in and that has no mark."""
 
 
@@ -381,7 +381,7 @@ def fingerprint(kinds: tuple[type, ...]) -> str | None:
         for kind in kinds:
             for mark in _marks_of_class(kind):
                 digest.update(mark.encode() + b"\0")
-    except _Unknown:
+    except _NoFingerprint:
         return None
     return digest.hexdigest()[:20]
 
@@ -390,7 +390,7 @@ def _marks_of_class(kind: type) -> Iterable[str]:
     """Fingerprint of a class that can be imported by name."""
     module = sys.modules.get(kind.__module__)
     if kind.__module__ == "__main__" or getattr(module, kind.__qualname__, None) is not kind:
-        raise _Unknown(kind.__qualname__)
+        raise _NoFingerprint(kind.__qualname__)
     seen: set[int] = set()
     for each in kind.__mro__[:-1]:
         yield f"{each.__module__}.{each.__qualname__}"
@@ -426,7 +426,7 @@ def _marks(value: Any, seen: set[int]) -> Iterable[str]:
     elif isinstance(getattr(value, "py_func", None), FunctionType):
         yield from _function_marks(value.py_func, seen)
     else:
-        raise _Unknown(repr(value))
+        raise _NoFingerprint(repr(value))
 
 
 def _function_marks(function: FunctionType, seen: set[int]) -> Iterable[str]:
@@ -503,16 +503,16 @@ def kernel(function: Callable[..., Any], kinds: tuple[type, ...]) -> Any:
     return dispatcher if mark is None else keep_code(dispatcher, mark)
 
 
-class _Telling(event.Listener):
+class _CompilationMessage(event.Listener):
     """Says once that a kernel is being compiled."""
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.told = False
+        self.shown = False
 
     def on_start(self, event: Any) -> None:
-        if not self.told:
-            self.told = True
+        if not self.shown:
+            self.shown = True
             _LOG.info("compiling %s, once on this machine: 10 to 20 s on a free core", self.name)
 
     def on_end(self, event: Any) -> None:
@@ -567,7 +567,7 @@ def ready(march: Any, *arguments: Any) -> None:
     try:
         with (
             nullcontext() if _is_on_disk(march, signature) else _turn(march),
-            event.install_listener("numba:compile", _Telling(march.py_func.__name__)),
+            event.install_listener("numba:compile", _CompilationMessage(march.py_func.__name__)),
         ):
             march.compile(signature)
     finally:

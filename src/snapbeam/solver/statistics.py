@@ -164,7 +164,7 @@ class Statistic:
     comment: str = ""
 
 
-def _plain(column: str) -> Callable[[Reading], Values]:
+def _column(column: str) -> Callable[[Reading], Values]:
     return lambda reading: reading.accumulators[column]
 
 
@@ -296,11 +296,11 @@ _SHARE = _ERROR.format("5e-4", "1e-5")
 _ROWS = (
     Statistic("response_class", "int8", "1", "response class", _response),
     Statistic("status", "int8", "1", "status of the run", lambda reading: reading.status),
-    Statistic("zero_crossings", "int32", "1", "zero crossings of the centre displacement", _plain("zero_crossings")),
+    Statistic("zero_crossings", "int32", "1", "zero crossings of the centre displacement", _column("zero_crossings")),
     Statistic(
-        "zero_crossings_last_quarter", "int32", "1", "zero crossings in the last quarter", _plain("zero_crossings_last_quarter")
+        "zero_crossings_last_quarter", "int32", "1", "zero crossings in the last quarter", _column("zero_crossings_last_quarter")
     ),
-    Statistic("last_zero_crossing", "float64", "s", "time of the last zero crossing", _plain("last_zero_crossing")),
+    Statistic("last_zero_crossing", "float64", "s", "time of the last zero crossing", _column("last_zero_crossing")),
     Statistic(
         "final_well", "int8", "1", "sign of the centre displacement at the end",
         lambda reading: reading.sign * reading.accumulators["side"],
@@ -329,9 +329,9 @@ _ROWS = (
         _low_high("min_center", "max_center", greatest=True),
     ),
     Statistic("peak_force", "float64", "N", "peak contact force", lambda reading: reading.peak_force),
-    Statistic("impacts", "int32", "1", "impacts", _plain("impacts")),
+    Statistic("impacts", "int32", "1", "impacts", _column("impacts")),
     Statistic("contact_time_fraction", "float64", "1", "fraction of time in contact", _contact_share),
-    Statistic("early_stop_time", "float64", "s", "time at which the class became certain", _plain("early_stop_time")),
+    Statistic("early_stop_time", "float64", "s", "time at which the class became certain", _column("early_stop_time")),
     Statistic(
         "peak_displacement", "float64", "1", "maximum distance of the contact point from the straight beam, over b",
         _peak("min_displacement", "max_displacement"),

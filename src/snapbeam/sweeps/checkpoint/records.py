@@ -28,8 +28,8 @@ __all__ = [
     "PARTIAL",
     "CheckpointError",
     "CheckpointLock",
-    "Record",
     "TaskLog",
+    "TaskRecord",
     "append_line",
     "durable_write",
     "member",
@@ -207,7 +207,7 @@ def _holder(handle: int) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Record:
+class TaskRecord:
     """Entry of the task log: how one task ended, and what computed it."""
 
     stage: str
@@ -238,7 +238,7 @@ class Record:
         return f"{text}\t{_check(text)}"
 
     @classmethod
-    def from_line(cls, line: str) -> Record | None:
+    def from_line(cls, line: str) -> TaskRecord | None:
         """Return the record of a line; None if the line is torn or altered."""
         text, tab, check = line.rstrip("\n").rpartition("\t")
         if not tab or check != _check(text):
@@ -265,21 +265,21 @@ class TaskLog:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.records: dict[tuple[str, int], Record] = {}
+        self.records: dict[tuple[str, int], TaskRecord] = {}
         self.torn = 0
         if path.exists():
             if path.stat().st_size > _LARGEST_LOG:
                 raise InputError(f"checkpoint = {str(path.parent)!r}: {path.name!r} is larger than 1 GiB")
             with path.open(encoding="utf-8", errors="replace") as stream:
                 for line in stream:
-                    record = Record.from_line(line)
+                    record = TaskRecord.from_line(line)
                     if record is None:
                         self.torn += bool(line.strip())
                     else:
                         self.records[member(record.stage), record.task] = record
 
-    def write(self, record: Record) -> None:
+    def write(self, record: TaskRecord) -> None:
         """Append a record and sync the file."""
-        record = Record(**(asdict(record) | {"created": record.created or created_now()}))
+        record = TaskRecord(**(asdict(record) | {"created": record.created or created_now()}))
         append_line(self.path, record.line())
         self.records[record.stage, record.task] = record

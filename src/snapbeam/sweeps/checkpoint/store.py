@@ -33,8 +33,8 @@ from snapbeam.sweeps.checkpoint.records import (
     PARTIAL,
     CheckpointError,
     CheckpointLock,
-    Record,
     TaskLog,
+    TaskRecord,
     durable_write,
     member,
     refuse_links,
@@ -603,7 +603,7 @@ class Checkpoint:
     def _record(self, stage: Stage, task: int, state: str, content: str, provenance: Provenance) -> None:
         setup = self.work.setup
         self.task_log.write(
-            Record(
+            TaskRecord(
                 stage=stage.name,
                 task=task,
                 state=state,
@@ -651,7 +651,7 @@ class Checkpoint:
         return attrs
 
 
-def _recorded_provenance(record: Record) -> Provenance:
+def _recorded_provenance(record: TaskRecord) -> Provenance:
     return Provenance(**{field.name: getattr(record, field.name) for field in fields(Provenance)})
 
 
@@ -704,7 +704,7 @@ class CheckpointRows:
 # The Zarr arrays of a checkpoint: one row for each run, one chunk with a check sum for each task.
 
 
-def read_task(folder: Path, stage: Stage, work: PointWork, record: Record) -> ResultTable | None:
+def read_task(folder: Path, stage: Stage, work: PointWork, record: TaskRecord) -> ResultTable | None:
     """Return the results of a finished task; None if they are missing or do not match its record.
 
     The descriptions of the Zarr arrays, which could request any codec and any size, are not used.
