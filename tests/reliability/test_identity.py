@@ -9,7 +9,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.model.contact.base import LAWS
-from snapbeam.sweeps.checkpoint.records import Record, TaskLog
+from snapbeam.sweeps.checkpoint.records import TaskLog, TaskRecord
 from snapbeam.sweeps.tasks import differences, provenance_of
 from snapbeam.util.provenance import arithmetic_hash, code_hash
 from snapbeam.util.validation import InputError
@@ -116,7 +116,7 @@ def test_parts_that_something_else_computed_are_told(tmp_path, name, value, word
     sb.sweep(system(), axes, how, checkpoint=sb.CheckpointOptions(store, points_per_task=2))
     ledger = store / "tasks.jsonl"
     records = list(TaskLog(ledger).records.values())
-    changed = Record(**vars(records[0]) | {name: value})
+    changed = TaskRecord(**vars(records[0]) | {name: value})
     ledger.write_text("".join(f"{record.line()}\n" for record in (changed, records[1])), encoding="utf-8")
     with pytest.warns(UserWarning, match=words):
         found = sb.sweep(system(), axes, how, checkpoint=sb.CheckpointOptions(store))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib.util
 import os
 import random
@@ -9,8 +10,9 @@ import subprocess
 import sys
 
 import pytest
+from filelock import FileLock
 
-from snapbeam.solver.compilation import is_private, private_folder
+from snapbeam.solver.compilation import is_private, private_folder, ready
 
 RUN = """
 import snapbeam as sb
@@ -66,10 +68,15 @@ def started(folder):
     file = folder / "small.py"
     if not file.exists():
         file.write_text(SMALL.replace("print", "answer = "), encoding="utf-8")
-    spec = importlib.util.spec_from_file_location("small", file)
+    return loaded(folder).answer
+
+
+def loaded(folder):
+    """Module of a folder, made anew."""
+    spec = importlib.util.spec_from_file_location("small", folder / "small.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module.answer
+    return module
 
 
 def kept_files(folder):
@@ -286,3 +293,48 @@ def test_code_that_needs_numbas_runtime_is_loaded_in_a_fresh_process(python, tmp
         done = python("import arrays", f"{tmp_path}{os.pathsep}{python.package}", timeout=120)
         assert done.returncode == 0, done.stderr
         assert done.stdout.split() == ["12.0", how]
+
+
+READY = """
+import logging
+from small import twice
+from snapbeam.solver.compilation import ready
+
+logging.basicConfig(level=logging.INFO)
+ready(twice, 21.0)
+print("loaded" if twice.stats.cache_hits else "compiled")
+"""
+
+
+def test_one_process_compiles_and_the_others_wait(tmp_path, python, tried):
+    """The test holds the lock of the code until it is on the disk again."""
+    (tmp_path / "small.py").write_text(SMALL.partition("print")[0], encoding="utf-8")
+    path = f"{tmp_path}{os.pathsep}{python.package}"
+    assert python(READY, path).stdout == "compiled\n"
+    kept = {file: file.read_bytes() for file in kept_files(tmp_path)}
+    for file in kept:
+        file.unlink()
+    with FileLock(next(tmp_path.rglob("*.nbi.lock"))):
+        waiting = subprocess.Popen(
+            [sys.executable, "-c", READY], env=os.environ | {"PYTHONPATH": path}, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        assert "compiling twice in another process" in waiting.stderr.readline()
+        for file, content in kept.items():
+            file.write_bytes(content)
+    assert waiting.communicate(timeout=60)[0] == "loaded\n"
+    tried("processes that waited for compiled code", 1)
+
+
+@pytest.mark.parametrize("error", [TimeoutError(), OSError(errno.ENOLCK, "no locks")])
+def test_a_process_that_cannot_wait_compiles(tmp_path, monkeypatch, error):
+    (tmp_path / "small.py").write_text(SMALL.partition("print")[0], encoding="utf-8")
+    module, asked = loaded(tmp_path), []
+
+    def acquire(lock, **_):
+        asked.append(lock)
+        raise error
+
+    monkeypatch.setattr("filelock.FileLock.acquire", acquire)
+    ready(module.twice, 21.0)
+    assert asked and kept_files(tmp_path) and module.twice.stats.cache_misses

@@ -153,3 +153,18 @@ def test_results_of_another_kind(system, run, tmp_path):
     ):
         with pytest.raises(InputError):
             call()
+
+
+def test_values_out_of_their_kind_or_range(system):
+    for call in (
+        lambda: system.poles(-1),
+        lambda: system.model.tangent_magnitude("1/0"),
+        lambda: system.model.tangent_magnitude(np.float32(0.1)),
+        lambda: system.model.side_of(np.ones((2, 1))),
+        lambda: sb.model.converged_modes(system, [0.1, 0.2]),
+        lambda: sb.model.converged_modes(system, "a"),
+        lambda: sb.model.modal_error(system, lambda each: each),
+        lambda: sb.plot.new_figure(height=1e308),
+    ):
+        with pytest.raises(InputError, match=r"equilibrium|alpha|amplitude|error|quantity|height"):
+            call()

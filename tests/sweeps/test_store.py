@@ -22,7 +22,13 @@ from snapbeam.cli.app import app
 from snapbeam.sweeps.checkpoint import records as durable
 from snapbeam.sweeps.checkpoint import records as ledger
 from snapbeam.sweeps.checkpoint import store as tables
-from snapbeam.sweeps.checkpoint.records import CheckpointError, CheckpointLock, Record, TaskLog, append_line
+from snapbeam.sweeps.checkpoint.records import (
+    CheckpointError,
+    CheckpointLock,
+    TaskLog,
+    TaskRecord,
+    append_line,
+)
 from snapbeam.sweeps.checkpoint.store import Checkpoint
 from snapbeam.sweeps.compute import SweepReport
 from snapbeam.sweeps.tasks import PointWork, Stage
@@ -187,7 +193,7 @@ def test_a_pipe_for_a_description_is_refused(tmp_path):
 
 @pytest.mark.parametrize("text", ["[" * 100_000, '{"task":' + "1" * 5000 + "}"])
 def test_a_record_that_cannot_be_parsed_counts_as_damaged(text):
-    assert Record.from_line(f"{text}\t{durable._check(text)}\n") is None
+    assert TaskRecord.from_line(f"{text}\t{durable._check(text)}\n") is None
 
 
 def test_a_damaged_description_is_told(stored, work):
@@ -218,7 +224,7 @@ def test_links_are_refused(stored, work, tmp_path, where):
 def test_names_that_leave_the_store_are_refused(stored, work, name):
     path, stage = stored
     good = TaskLog(path / "tasks.jsonl").records["base", 0]
-    append_line(path / "tasks.jsonl", Record(**(vars(good) | {"stage": name})).line())
+    append_line(path / "tasks.jsonl", TaskRecord(**(vars(good) | {"stage": name})).line())
     with pytest.raises(InputError, match="is not a name of a member of a checkpoint"):
         Checkpoint(path, work)
     (path / "tasks.jsonl").unlink()
@@ -357,7 +363,7 @@ def test_another_version_is_told(stored, work, small):
     path, _ = stored
     lines = []
     for record in TaskLog(path / "tasks.jsonl").records.values():
-        lines.append(Record(**(vars(record) | {"version": "0.0.1", "processor": "i386"})).line())
+        lines.append(TaskRecord(**(vars(record) | {"version": "0.0.1", "processor": "i386"})).line())
     (path / "tasks.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
     with pytest.warns(UserWarning, match=r"started with snapbeam 0\.0\.1 on a i386 processor"):
         result = swept(**small, path=path)

@@ -52,11 +52,6 @@ __all__ = [
     "spread_states",
 ]
 
-
-# ----------------------------------------------------------------------------------------------------
-# When a state is certainly on its way to an attractor: norms in which orbits contract, and clouds of chaotic ones.
-
-
 _TRIED = 48
 """States on each shell that are tried."""
 _SHELLS = 9
@@ -65,6 +60,21 @@ _LARGEST = 0.5
 _SHARE = 0.5
 """Fraction of the tested radius within which a state counts as captured."""
 _SEED = 20240817
+_Array = NDArray[np.float64]
+UNDECIDED = -1
+"""Label of a state of which it is not certain where it goes."""
+KINDS = ("periodic", "chaotic")
+_REPEATS = 2e-3
+"""Maximum coordinate by which states may differ that are taken to repeat before they are shot at."""
+_SAME = 1e-5
+_SIGMAS = 3.0
+_TRANSIENT = 1000
+"""Minimum number of periods to leave out."""
+_FEW = 8
+"""Irregular runs of a group that exponents are taken of."""
+
+
+# When a state is certainly on its way to an attractor: norms in which orbits contract, and clouds of chaotic ones.
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,23 +164,6 @@ def cloud_of(points: _Array) -> Cloud:
     first, second = points[::2], points[1::2]
     away, _ = cKDTree(first).query(second)
     return Cloud(points, cKDTree(points), 1.5 * float(np.quantile(away, 0.99)))
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_Array = NDArray[np.float64]
-UNDECIDED = -1
-"""Label of a state of which it is not certain where it goes."""
-KINDS = ("periodic", "chaotic")
-_REPEATS = 2e-3
-"""Maximum coordinate by which states may differ that are taken to repeat before they are shot at."""
-_SAME = 1e-5
-_SIGMAS = 3.0
-_TRANSIENT = 1000
-"""Minimum number of periods to leave out."""
-_FEW = 8
-"""Irregular runs of a group that exponents are taken of."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -372,7 +372,6 @@ def _stop_of(system: System) -> tuple[Any, float, float, float] | None:
     return law, striker.location, gap, 1.0 if striker.side == "below" else -1.0
 
 
-# ----------------------------------------------------------------------------------------------------
 # Newton's method and steps of arc length.  A point is (y, half period): a motion that begins at rest and turns back.
 
 

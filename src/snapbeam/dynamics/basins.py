@@ -29,6 +29,8 @@ __all__ = [
     "uncertainty_exponent",
 ]
 
+_SIGMAS = 3.0
+
 
 _Array = NDArray[np.float64]
 _AMONG = 8
@@ -309,11 +311,7 @@ def _long_name(name: str) -> str:
     return name
 
 
-# ----------------------------------------------------------------------------------------------------
 # How rough the borders between outcomes are, and how safe the inside is: measures of any array of labels.
-
-
-_SIGMAS = 3.0
 
 
 class BasinEntropy(NamedTuple):

@@ -86,7 +86,7 @@ class _Plane(Family):
         return self.flow.advance(x, periods, tangents=tangents, points=points)
 
 
-class _Point(NamedTuple):
+class _CurvePoint(NamedTuple):
     """One point of a curve."""
 
     y: _Array
@@ -211,7 +211,7 @@ class _Curve:
             for x, moved, hits in zip(advanced.states, advanced.tangents, impacts, strict=True)
         ]
 
-    def correct(self, guess: _Array, row: _Array, before: _Array, known: _Array | None = None) -> _Point:
+    def correct(self, guess: _Array, row: _Array, before: _Array, known: _Array | None = None) -> _CurvePoint:
         """The point of the curve on the plane through *guess* across *row*, as well as its residual allows.
 
         Raises
@@ -239,7 +239,7 @@ class _Curve:
         _, came, table = self.derivative(shot.x)
         if not np.isfinite(table).all():
             raise OrbitNotFoundError("a run beside the orbit failed")
-        return _Point(shot.x, _tangent(table, before), came, table, shot.iterations, shot.residual)
+        return _CurvePoint(shot.x, _tangent(table, before), came, table, shot.iterations, shot.residual)
 
     def at(self, y: _Array) -> Flow:
         """The flow at the parameters of a point."""
@@ -251,7 +251,7 @@ class _Curve:
             flow = flow.neighbour(name, value)
         return flow
 
-    def state(self, point: _Point, flow: Flow) -> _Array:
+    def state(self, point: _CurvePoint, flow: Flow) -> _Array:
         """The state of a point at the phase at which another flow takes states."""
         if not isinstance(flow, Stroboscope) or flow is self.plane.flow:
             return point.y[:-2]
@@ -259,7 +259,7 @@ class _Curve:
         assert isinstance(here, Stroboscope)
         return here.carried(point.y[:-2], flow.striker_phase)
 
-    def between_contacts(self, point: _Point) -> tuple[_Curve, _Point]:
+    def between_contacts(self, point: _CurvePoint) -> tuple[_Curve, _CurvePoint]:
         """The point at the phase farthest from contacts, if one is near the phase of the flow; itself otherwise.
 
         Raises
@@ -286,7 +286,7 @@ class _Curve:
         along = _tangent(table, np.append(np.zeros(y.size - 2), point.tangent[-2:]))
         return moved, moved.correct(y, along, along, table)
 
-    def error(self, point: _Point, relative: float) -> _Array:
+    def error(self, point: _CurvePoint, relative: float) -> _Array:
         """Uncertainty of the parameters from the residual and the error of the map's derivative."""
         size = point.y.size - 2
         steep = float(np.abs(point.came.jacobian).sum())
@@ -322,7 +322,7 @@ def _without_contact_force(grazing: SpecialPoint, names: tuple[str, str]) -> Flo
     return Stroboscope(flow.system.replace(contacts=recorded), flow.integration, flow.phase)
 
 
-_Seen = tuple[_Curve, _Point]
+_Seen = tuple[_Curve, _CurvePoint]
 """A point, and the curve at whose phase of observation it is seen."""
 
 
@@ -342,11 +342,10 @@ def _tangent(table: _Array, before: _Array) -> _Array:
     return found if found @ before >= 0.0 else -found
 
 
-# ----------------------------------------------------------------------------------------------------
 # Points of codimension two between two points of a curve.
 
 
-def _monitors(curve: _Curve, one: _Point, point: _Point) -> dict[str, float]:
+def _monitors(curve: _Curve, one: _CurvePoint, point: _CurvePoint) -> dict[str, float]:
     """Functions that change their sign at points of codimension two, from the point *one* on."""
     found, came = dict[str, float](), point.came
     signs = {
@@ -376,7 +375,7 @@ _SIGNS = {"fold": 1.0, "flip": -1.0}
 """Critical multipliers."""
 
 
-def _flip_coefficient(curve: _Curve, point: _Point) -> float:
+def _flip_coefficient(curve: _Curve, point: _CurvePoint) -> float:
     """The cubic coefficient of the normal form of a flip; NaN where the states beside the orbit have other impacts.
 
     A doubled orbit is stable if it is positive.
@@ -403,7 +402,7 @@ def _flip_coefficient(curve: _Curve, point: _Point) -> float:
     return float(w @ third / 6.0 + w @ mixed / 2.0)
 
 
-def _between(curve: _Curve, one: _Point, other: _Point) -> list[tuple[str, _Point]]:
+def _between(curve: _Curve, one: _CurvePoint, other: _CurvePoint) -> list[tuple[str, _CurvePoint]]:
     """Points of codimension two between two points, by halving."""
     found = []
     ahead = _monitors(curve, one, other)
@@ -427,9 +426,6 @@ def _between(curve: _Curve, one: _Point, other: _Point) -> list[tuple[str, _Poin
                 break
         found.append((kind, nearest))
     return found
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 @checked
@@ -557,14 +553,14 @@ def bifurcation_curve(
 
 def _follow(
     curve: _Curve,
-    first: _Point,
+    first: _CurvePoint,
     limits: _Array,
     max_points: int,
     length: float,
     longest: float,
     progress: Callable[[int, int], object] | None,
-) -> tuple[list[_Seen], list[tuple[str, _Point]], str]:
-    points, events = [(curve, first)], list[tuple[str, _Point]]()
+) -> tuple[list[_Seen], list[tuple[str, _CurvePoint]], str]:
+    points, events = [(curve, first)], list[tuple[str, _CurvePoint]]()
     while len(points) < max_points:
         try:
             points[-1] = curve.between_contacts(points[-1][1])
@@ -621,7 +617,7 @@ def _dataset(
     curve: _Curve,
     names: tuple[str, str],
     seen: list[_Seen],
-    special: list[tuple[str, _Point]],
+    special: list[tuple[str, _CurvePoint]],
     ends: list[str],
     flow: Flow,
 ) -> xr.Dataset:

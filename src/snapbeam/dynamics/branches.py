@@ -43,12 +43,19 @@ __all__ = [
     "switch_branch",
 ]
 
-
-# ----------------------------------------------------------------------------------------------------
-# A branch of periodic orbits and its special points, as datasets.
-
-
 SPECIAL_POINTS = ("fold", "flip", "Neimark-Sacker", "branch point", "grazing")
+_LOCATED = 1e-9
+"""Tolerance of a multiplier at an event."""
+_CRITICAL = 1e-3
+"""Distance of the critical multiplier at an event from where it is in theory, at most."""
+_HALVINGS = 20
+_TOUCHES = 5e-3
+"""Clearance, over the length scale, below which a branch that goes no further ends by grazing."""
+_Array = NDArray[np.float64]
+_TOLERANCE = 1e-10
+
+
+# A branch of periodic orbits and its special points, as datasets.
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,20 +260,12 @@ def _centers(orbit: PeriodicOrbit) -> NDArray[np.float64]:
     return np.asarray(amplitudes @ flow.system.model.midspan_shape / flow.system.scale.length)
 
 
-# ----------------------------------------------------------------------------------------------------
 # Special points, located between two orbits of a branch, with an error.
 #
 # The error of a value holds what is left of the bracket, what the residual of the orbit moves, and what the error of the
 # return map's derivative moves; that of the steps themselves, which other steps show, it does not hold.
 
 
-_LOCATED = 1e-9
-"""Tolerance of a multiplier at an event."""
-_CRITICAL = 1e-3
-"""Distance of the critical multiplier at an event from where it is in theory, at most."""
-_HALVINGS = 20
-_TOUCHES = 5e-3
-"""Clearance, over the length scale, below which a branch that goes no further ends by grazing."""
 _FINE, _ROUNDING = 1e-5, 1e-13
 """Relative error of tangents at level "reference", and of what is known exactly."""
 _ACROSS = 10.0
@@ -443,11 +442,6 @@ def grazing_end(spots: list[tuple[Corrector, Spot]]) -> SpecialPoint | None:
     return SpecialPoint("grazing", orbit, found, len(spots) - 1, error)
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-_Array = NDArray[np.float64]
-_TOLERANCE = 1e-10
 _SHORTEST, _LONGEST = 1e-8, 1.0
 """Allowed range of the distance between orbits."""
 _EASY, _HARD = 4, 9

@@ -52,8 +52,16 @@ __all__ = [
     "starts_of",
 ]
 
+_Array = NDArray[np.float64]
+_REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
+_SAME_PHASE = 1e-6
+"""Difference of two phases, rad, that rounding can make."""
+_NEAR_CONTACT = 0.25
+"""Distance of a contact from the instant of observation that is small, over that of the instant farthest from contacts."""
+_BYTES = 2**27
+"""Maximum memory of the stored states."""
 
-# ----------------------------------------------------------------------------------------------------
+
 # Many starts of one system, each from its own number alone: a beam that rings faintly, a drive at any phase.
 
 
@@ -247,19 +255,6 @@ def common_cycles(system: System, columns: Mapping[str, NDArray[np.float64]]) ->
                         "frequencies in ratios of small whole numbers, or use sb.advance or simulate"
                     )
     return found
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_Array = NDArray[np.float64]
-_REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
-_SAME_PHASE = 1e-6
-"""Difference of two phases, rad, that rounding can make."""
-_NEAR_CONTACT = 0.25
-"""Distance of a contact from the instant of observation that is small, over that of the instant farthest from contacts."""
-_BYTES = 2**27
-"""Maximum memory of the stored states."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,8 +41,19 @@ __all__ = [
     "require_excitation",
 ]
 
+_Array = NDArray[np.float64]
+_JEFFREYS = 0.5
+_REFUSED = 0.01
+"""Goodness below which a later delay is tried."""
+_PER_START = ("status", "zero_crossings", "late_crossings", "well", "final")
+"""Whole numbers kept of each run: how it ended, crossings in all and in the last quarter, +1 for the well opposite to
+the first one and -1 for that, and whether that end is proved."""
+TITLE = "lifetimes of the snapping of a struck bistable beam"
+CYCLES = 1000
+"""Default number of cycles of a run."""
+WELLS = ("first", "other")
 
-# ----------------------------------------------------------------------------------------------------
+
 # How long something lasts that ends at random: censored maximum likelihood with intervals, and whether it fits.
 #
 # After a delay t0 a transient that forgets its past ends at a constant rate kappa = 1/tau: the share that lasts longer
@@ -50,10 +61,6 @@ __all__ = [
 # Statistical Models and Methods for Lifetime Data, 2nd ed., 2003, section 4.1).
 
 
-_Array = NDArray[np.float64]
-_JEFFREYS = 0.5
-_REFUSED = 0.01
-"""Goodness below which a later delay is tried."""
 _FEWEST, _TRIALS = 8, 40
 """Ends that are left at least, beside half of them; delays that are tried at most, about."""
 
@@ -235,13 +242,7 @@ def checked_cycles(name: str, values: ArrayLike, most: float) -> NDArray[np.int6
     return np.array(found, dtype=np.int64)
 
 
-# ----------------------------------------------------------------------------------------------------
 # What a sweep keeps of many starts at every point: when each snapped last, and where it ended.
-
-
-_PER_START = ("status", "zero_crossings", "late_crossings", "well", "final")
-"""Whole numbers kept of each run: how it ended, crossings in all and in the last quarter, +1 for the well opposite to
-the first one and -1 for that, and whether that end is proved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,13 +348,6 @@ class LifetimeWork(PointWork):
         return found | {"last_snap": table.numbers}
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-TITLE = "lifetimes of the snapping of a struck bistable beam"
-CYCLES = 1000
-"""Default number of cycles of a run."""
-WELLS = ("first", "other")
 START, WELL, AFTER = "start", "well", "after"
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
 
@@ -500,7 +494,8 @@ def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Da
 
     setup, points = work.setup, work.setup.points
     more = made | {
-        f"starts_{name}": _plain(value) for name, value in work.initial_conditions.describe().items()
+        f"starts_{name}": int(value) if isinstance(value, bool) else value
+        for name, value in work.initial_conditions.describe().items()
     }
     attrs = setup.attributes(TITLE, more)
     dataset = xr.Dataset(coords=setup.coordinates(), attrs=attrs)
@@ -525,10 +520,6 @@ def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Da
         array = points.arranged(np.asarray(values).astype(kinds.get(name, "int8")))
         dataset[name] = (dims, array, {"units": unit, "long_name": words} | labels)
     return dataset
-
-
-def _plain(value: Any) -> Any:
-    return int(value) if isinstance(value, bool) else value
 
 
 def refit(

@@ -56,11 +56,6 @@ __all__ = [
     "turning_points",
 ]
 
-
-# ----------------------------------------------------------------------------------------------------
-# Newton shooting: states that a flow brings back, and the derivative of the flow there.
-
-
 _LARGEST_ERROR = 1e-3
 """Error of a derivative by differences beyond which it counts as unknown."""
 _SPLIT = 16
@@ -73,6 +68,18 @@ LARGEST_TOLERANCE = 1e-3
 """Maximum tolerance of an orbit: with a larger one the guess itself would count as an orbit."""
 _SLOW = 0.25
 """Factor by which a step must lessen the residual, or else the derivative is computed again."""
+_SAMPLES = 400
+"""A period."""
+_Array = NDArray[np.float64]
+_Complex = NDArray[np.complex128]
+_SAME = 1e-7
+"""Distance, over the well's amplitude, below which an orbit closes after fewer periods already."""
+_ITERATIONS = 14
+_DIFFERENCE = 2e-6
+"""Step of the difference by the parameter, over its range."""
+
+
+# Newton shooting: states that a flow brings back, and the derivative of the flow there.
 
 
 class OrbitNotFoundError(RuntimeError):
@@ -317,12 +324,7 @@ def _deflated(x: _Array, step: _Array, known: tuple[_Array, ...]) -> _Array:
     return step / (1.0 - along)
 
 
-# ----------------------------------------------------------------------------------------------------
 # What a run does within its periods: impacts, how near it passes the tip without touching, how far it goes.
-
-
-_SAMPLES = 400
-"""A period."""
 
 
 class Passage(NamedTuple):
@@ -441,15 +443,6 @@ def _maximum(values: _Array) -> tuple[_Array, _Array]:
             place[i] = inner[np.argmax(curve(inner))]
             top[i] += curve(place[i])
     return place, top
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_Array = NDArray[np.float64]
-_Complex = NDArray[np.complex128]
-_SAME = 1e-7
-"""Distance, over the well's amplitude, below which an orbit closes after fewer periods already."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -773,13 +766,7 @@ def shoot(
     )
 
 
-# ----------------------------------------------------------------------------------------------------
 # Orbits on planes across a branch: the prediction along its tangent is corrected there (Keller 1977).
-
-
-_ITERATIONS = 14
-_DIFFERENCE = 2e-6
-"""Step of the difference by the parameter, over its range."""
 
 
 class Spot(NamedTuple):

@@ -46,6 +46,22 @@ __all__ = [
     "take_header",
 ]
 
+TIFF_SUFFIXES = (".tif", ".tiff")
+_LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micron": 1e-6, "µm": 1e-6, "\\u00b5m": 1e-6}
+ARRAY_SUFFIXES = (".npy", ".h5", ".hdf5")
+_RATES = ("frame_rate", "fps", "record_rate", "frame_rate_hz")
+_SIZES = ("pixel_size", "pixel_size_m")
+_EVEN = 0.02  # share by which the kinds of pixels under a mosaic may differ and count as one
+IMAGE_SUFFIXES = (*TIFF_SUFFIXES, ".png", ".bmp", ".jpg", ".jpeg")
+VIDEO_SUFFIXES = (".avi", ".mp4", ".mov", ".mkv", ".cine")
+LOSSLESS = (
+    "rawvideo", "ffv1", "huffyuv", "ffvhuff", "utvideo", "magicyuv", "lagarith", "png", "tiff", "bmp", "qtrle",
+    "v210", "v410", "r210", "r10k", "zmbv", "flashsv",
+)  # fmt: skip
+"""Names of the codecs that give back the pictures that went in."""
+RECORDING_SUFFIXES = (".cih", ".cihx", ".mraw", *VIDEO_SUFFIXES, *TIFF_SUFFIXES, *ARRAY_SUFFIXES)
+"""Ends of names of recordings that are one file."""
+
 
 _LUMA = np.array([0.299, 0.587, 0.114])
 
@@ -103,12 +119,7 @@ def scaled_floats(values: NDArray[np.floating], full: float) -> NDArray[np.uint1
     return levels
 
 
-# ----------------------------------------------------------------------------------------------------
 # TIFF files of many pages.
-
-
-TIFF_SUFFIXES = (".tif", ".tiff")
-_LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micron": 1e-6, "µm": 1e-6, "\\u00b5m": 1e-6}
 
 
 def _is_picture(shape: tuple[int, ...], dtype: Any) -> bool:
@@ -232,13 +243,7 @@ class TiffSource(FrameSource):
         self._file.close()
 
 
-# ----------------------------------------------------------------------------------------------------
 # Stacks of pictures in arrays: NumPy's .npy and HDF5.
-
-
-ARRAY_SUFFIXES = (".npy", ".h5", ".hdf5")
-_RATES = ("frame_rate", "fps", "record_rate", "frame_rate_hz")
-_SIZES = ("pixel_size", "pixel_size_m")
 
 
 class ArraySource(FrameSource):
@@ -357,11 +362,7 @@ def _is_stack(shape: tuple[int, ...], dtype: Any) -> bool:
     return size and all(shape) and (dtype.kind == "f" or (dtype.kind == "u" and dtype.itemsize <= 2))
 
 
-# ----------------------------------------------------------------------------------------------------
 # Photron recordings: a header with its .mraw.
-
-
-_EVEN = 0.02  # share by which the kinds of pixels under a mosaic may differ and count as one
 
 
 def take_header(source: FrameSource, header: CameraHeader) -> None:
@@ -425,11 +426,7 @@ def _mosaic(frame: NDArray[Any]) -> tuple[NDArray[np.float64] | None, float]:
     return (kinds.max() / kinds if spread > _EVEN else None), spread
 
 
-# ----------------------------------------------------------------------------------------------------
 # Numbered images, one a frame.
-
-
-IMAGE_SUFFIXES = (*TIFF_SUFFIXES, ".png", ".bmp", ".jpg", ".jpeg")
 
 
 def load_image(file: Path, *, grey: bool = True) -> NDArray[Any]:
@@ -583,16 +580,7 @@ class ImageSource(FrameSource):
         return out
 
 
-# ----------------------------------------------------------------------------------------------------
 # Video files and Phantom's .cine, decoded by PyAV.
-
-
-VIDEO_SUFFIXES = (".avi", ".mp4", ".mov", ".mkv", ".cine")
-LOSSLESS = (
-    "rawvideo", "ffv1", "huffyuv", "ffvhuff", "utvideo", "magicyuv", "lagarith", "png", "tiff", "bmp", "qtrle",
-    "v210", "v410", "r210", "r10k", "zmbv", "flashsv",
-)  # fmt: skip
-"""Names of the codecs that give back the pictures that went in."""
 
 
 def _lossless_h264(context: Any) -> bool:
@@ -729,12 +717,7 @@ class VideoSource(FrameSource):
         self._decoder = None
 
 
-# ----------------------------------------------------------------------------------------------------
 # The source for a path, chosen by its suffix.
-
-
-RECORDING_SUFFIXES = (".cih", ".cihx", ".mraw", *VIDEO_SUFFIXES, *TIFF_SUFFIXES, *ARRAY_SUFFIXES)
-"""Ends of names of recordings that are one file."""
 
 
 def open_source(path: Path) -> FrameSource:

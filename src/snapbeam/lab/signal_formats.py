@@ -63,15 +63,9 @@ __all__ = [
     "write_wav",
 ]
 
-
-# ----------------------------------------------------------------------------------------------------
-# One channel as it comes out of a file, and what a reader is told beside the path.
-
-
 Channel = dict[str, Any]
 """One channel in the units of the file: ``data``, ``name``, ``unit_str`` (None where the file states
 none), and ``fs`` [Hz] or ``time`` [s] where it has them."""
-
 UNIT_NAMES = ("units", "unit", "unit_str", "unit_string", "NI_UnitDescription")
 TIME_NAMES = (
     "time", "times", "t", "zeit", "temps", "xaxis", "second", "seconds", "xvalue", "timedomain", "timeaxis",
@@ -87,6 +81,63 @@ _SECONDS = {
     "day": 86400.0,
     "days": 86400.0,
 }
+_LONGEST_SIDE = 64  # channels in a matrix
+_SCALES = (
+    "scale", "scalefactor", "scaling", "gain", "factor", "slope", "multiplier", "conversion", "conversionfactor", "lsb",
+)  # fmt: skip
+_OFFSETS = ("offset", "addoffset", "intercept", "zerooffset", "bias")
+_COMMENT = ("#", "%", "//", "!")
+_LOOK = 400  # lines in which the table must begin
+_ABOVE = 20
+"""Rows at the end whose numbers are compared."""
+_STAMP = re.compile(
+    r"(?<![\d.])(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ]+\d{1,2}:\d{2}(:\d{2})?([.,:]\d{2,})?)?|\d{1,2}:\d{2}(:\d{2})?([.,:]\d{2,})?)"
+)
+_GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?([eE][-+]?\d+)?")
+_SEPARATORS = {"tab": "\t", "comma": ",", "semicolon": ";"}
+_END = "***end_of_header***"
+_RATES = (
+    "samplingfreq", "samplingfrequency", "samplerate", "samplingrate", "samplefrequency", "samplefreq", "fs", "fsample",
+    "fsampling", "timesamplerate", "wfsamplerate", "abtastrate", "samplespersecond", "daqrate",
+)  # fmt: skip
+_STEPS = (
+    "sampleinterval", "samplingintervall", "samplinginterval", "sampleperiod", "samplingperiod",  "timestep", "timeincrement", "timeinterval", "deltat", "dt", "tinterval", "tsample",
+    "xincrement", "xincr", "increment", "resolutionx", "wfincrement",
+)  # fmt: skip
+_LONGEST_LINE = 2000
+"""Letters of a line of a header that is looked into."""
+_PER_SECOND = {
+    "": 1.0,
+    "hz": 1.0,
+    "khz": 1e3,
+    "mhz": 1e6,
+    "s/s": 1.0,
+    "sa/s": 1.0,
+    "ks/s": 1e3,
+    "ms/s": 1e6,
+    "1/s": 1.0,
+}
+_LONGEST_NAME = 500
+"""Letters of a name of a column that a unit is looked for in."""
+_SUFFIX_UNITS = {
+    "_m_s": "m/s",
+    "_mm_s": "mm/s",
+    "_um_s": "um/s",
+    "_mm": "mm",
+    "_um": "um",
+    "_ms": "ms",
+    "_us": "us",
+    "_m": "m",
+    "_s": "s",
+    "_v": "V",
+    "_n": "N",
+    "_hz": "Hz",
+}
+_UFF_UNITS = {8: "m", 11: "m/s", 12: "m/s^2", 13: "N"}
+_INTEGER_SCALE = {"int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "uint8": (128.0, 128.0)}
+
+
+# One channel as it comes out of a file, and what a reader is told beside the path.
 
 
 class Told(NamedTuple):
@@ -183,7 +234,6 @@ def numbered(channels: list[Channel]) -> list[Channel]:
     return channels
 
 
-# ----------------------------------------------------------------------------------------------------
 # NumPy's files: .npy with one channel, .npz with several, their units and their rate.
 
 
@@ -231,16 +281,8 @@ def write_npz(path: Path, signal: xr.DataArray, _full_scale: float | None) -> No
     np.savez(path, **arrays)
 
 
-# ----------------------------------------------------------------------------------------------------
 # Arrays with names: vectors, and matrices with a channel in each row or column.  Attributes, and arrays of one number or
 # text, state units and sampling rates; CF attributes state how numbers are packed.
-
-
-_LONGEST_SIDE = 64  # channels in a matrix
-_SCALES = (
-    "scale", "scalefactor", "scaling", "gain", "factor", "slope", "multiplier", "conversion", "conversionfactor", "lsb",
-)  # fmt: skip
-_OFFSETS = ("offset", "addoffset", "intercept", "zerooffset", "bias")
 
 
 class _Stored(NamedTuple):
@@ -399,7 +441,6 @@ def _text(value: Any) -> str:
     return item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item)
 
 
-# ----------------------------------------------------------------------------------------------------
 # HDF5 and NetCDF files.
 
 
@@ -521,23 +562,12 @@ def write_hdf5(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
         data.attrs["units"] = signal.attrs["units"]
 
 
-# ----------------------------------------------------------------------------------------------------
 # Text tables of many dialects: where the header ends, what separates cells, what the header says.
 #
 # A table is a block of rows of numbers with the same count of cells, after any header.  Cells are separated by
 # semicolons, tabs, commas or blanks; with all but commas a comma may be the decimal sign, and points between
 # groups of three digits before it are left out.  Nothing is dropped: after the first row of numbers every line
 # must be one.
-
-
-_COMMENT = ("#", "%", "//", "!")
-_LOOK = 400  # lines in which the table must begin
-_ABOVE = 20
-"""Rows at the end whose numbers are compared."""
-_STAMP = re.compile(
-    r"(?<![\d.])(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ]+\d{1,2}:\d{2}(:\d{2})?([.,:]\d{2,})?)?|\d{1,2}:\d{2}(:\d{2})?([.,:]\d{2,})?)"
-)
-_GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?([eE][-+]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -780,12 +810,7 @@ def _like_unit(cell: str) -> bool:
     return True
 
 
-# ----------------------------------------------------------------------------------------------------
 # LabVIEW's text files (.lvm): a header of the file, then for each segment its own and a table.
-
-
-_SEPARATORS = {"tab": "\t", "comma": ",", "semicolon": ";"}
-_END = "***end_of_header***"
 
 
 def read_lvm(path: Path, _told: Told) -> list[Channel]:
@@ -887,7 +912,6 @@ def _header(lines: list[str], at: int, separator: str | None) -> tuple[dict[str,
     raise InputError("the header has no end (***End_of_Header***)")
 
 
-# ----------------------------------------------------------------------------------------------------
 # MATLAB files: version 5 by SciPy, version 7.3 by h5py.  Numbers and text only; objects are left alone.
 
 
@@ -990,31 +1014,7 @@ def _version_73(path: Path) -> dict[str, Any]:
     return values
 
 
-# ----------------------------------------------------------------------------------------------------
 # What the lines above a table say: sampling rate and units, under the names that instruments give them.
-
-
-_RATES = (
-    "samplingfreq", "samplingfrequency", "samplerate", "samplingrate", "samplefrequency", "samplefreq", "fs", "fsample",
-    "fsampling", "timesamplerate", "wfsamplerate", "abtastrate", "samplespersecond", "daqrate",
-)  # fmt: skip
-_STEPS = (
-    "sampleinterval", "samplingintervall", "samplinginterval", "sampleperiod", "samplingperiod",  "timestep", "timeincrement", "timeinterval", "deltat", "dt", "tinterval", "tsample",
-    "xincrement", "xincr", "increment", "resolutionx", "wfincrement",
-)  # fmt: skip
-_LONGEST_LINE = 2000
-"""Letters of a line of a header that is looked into."""
-_PER_SECOND = {
-    "": 1.0,
-    "hz": 1.0,
-    "khz": 1e3,
-    "mhz": 1e6,
-    "s/s": 1.0,
-    "sa/s": 1.0,
-    "ks/s": 1e3,
-    "ms/s": 1e6,
-    "1/s": 1.0,
-}
 
 
 def header_values(lines: Iterable[str]) -> dict[str, str]:
@@ -1108,26 +1108,7 @@ def _quantity(text: str) -> tuple[float, str]:
     return to_number(found[1], comma), found[2].strip()
 
 
-# ----------------------------------------------------------------------------------------------------
 # Time series as text tables: one column a channel, units in the header, faults named by line and column.
-
-
-_LONGEST_NAME = 500
-"""Letters of a name of a column that a unit is looked for in."""
-_SUFFIX_UNITS = {
-    "_m_s": "m/s",
-    "_mm_s": "mm/s",
-    "_um_s": "um/s",
-    "_mm": "mm",
-    "_um": "um",
-    "_ms": "ms",
-    "_us": "us",
-    "_m": "m",
-    "_s": "s",
-    "_v": "V",
-    "_n": "N",
-    "_hz": "Hz",
-}
 
 
 class Table(NamedTuple):
@@ -1313,7 +1294,6 @@ def split_unit(column: str) -> tuple[str, str | None]:
     return column, None
 
 
-# ----------------------------------------------------------------------------------------------------
 # LabVIEW's TDMS files.
 
 
@@ -1365,11 +1345,9 @@ def write_tdms(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
         writer.write_segment([ChannelObject("snapbeam", str(signal.name), values, properties=properties)])
 
 
-# ----------------------------------------------------------------------------------------------------
 # Universal files, dataset 58, ASCII or binary.
 
 
-_UFF_UNITS = {8: "m", 11: "m/s", 12: "m/s^2", 13: "N"}
 _UFF_TYPES = {unit: code for code, unit in _UFF_UNITS.items()}
 
 
@@ -1512,11 +1490,7 @@ def _first(text: Any, otherwise: str) -> str:
     return otherwise if word.upper() in ("", "NONE") else word
 
 
-# ----------------------------------------------------------------------------------------------------
 # Sound files: whole numbers are fractions of full scale, floating point numbers what the caller says.
-
-
-_INTEGER_SCALE = {"int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "uint8": (128.0, 128.0)}
 
 
 def read_wav(path: Path, _told: Told) -> list[Channel]:
@@ -1565,9 +1539,6 @@ def write_wav(path: Path, signal: xr.DataArray, full_scale: float | None) -> Non
     if np.abs(values).max() >= scale:
         raise InputError(f"full_scale = {scale:g}: must exceed the largest value, {np.abs(values).max():g}")
     wavfile.write(path, round(rate), np.round(values / scale * 2.0**31).astype(np.int32))
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 READERS: dict[str, Callable[[Path, Told], list[Channel]]] = {

@@ -79,8 +79,15 @@ def modal_error(system: System, quantity: Callable[[System], ArrayLike] = well_f
     return _change(with_modes(system, modes), with_modes(system, max(2 * modes, modes + _MORE)), quantity)
 
 
+def _numbers(value: ArrayLike) -> NDArray[np.float64]:
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InputTypeError(f"quantity: must return numbers, not {shown(value)}") from None
+
+
 def _change(system: System, more: System, quantity: Callable[[System], ArrayLike]) -> float:
-    here, there = (np.atleast_1d(np.asarray(quantity(each), dtype=np.float64)) for each in (system, more))
+    here, there = (np.atleast_1d(_numbers(quantity(each))) for each in (system, more))
     if here.shape[:-1] != there.shape[:-1] or not here.size:
         return float("nan")
     common = min(here.shape[-1], there.shape[-1])  # one mode has one frequency
@@ -109,7 +116,11 @@ def error_of_auto(text: object) -> float | None:
         raise InputError(
             f"modes = {shown(text)}: must be a number of modes, auto, or auto with an error, such as auto 0.2%"
         ) from None
-    return within("error of modes = auto", error, 1e-5, 0.5, closed="both")
+    return _checked_error("error of modes = auto", error)
+
+
+def _checked_error(name: str, error: float) -> float:
+    return within(name, error, 1e-5, 0.5, closed="both")
 
 
 def converged_modes(system: System, error: float = AUTO_ERROR) -> int:
@@ -139,6 +150,7 @@ def converged_modes(system: System, error: float = AUTO_ERROR) -> int:
         raise InputError(
             "modes = 'auto': a structure given by matrices has the modes of its matrices; give none"
         )
+    error = _checked_error("error", error)
     modes, here = 2, with_modes(system, 2)
     while modes <= _MAX_MODES:
         more = with_modes(system, max(2 * modes, modes + _MORE))

@@ -243,8 +243,8 @@ class Wells:
         energy: _Array = 0.5 * np.sum(v * (v @ self.mass), axis=-1)
         return energy
 
-    def _amplitudes(self, name: str, value: ArrayLike) -> _Array:
-        array = finite_array(name, value)
+    def _amplitudes(self, name: str, value: ArrayLike, ndim: int | None = None) -> _Array:
+        array = finite_array(name, value, ndim)
         if array.ndim == 0 or array.shape[-1] != self.well_amplitude.size:
             raise InputError(
                 f"{name} of shape {array.shape}: must have the shape (..., {self.well_amplitude.size}), a number a mode"
@@ -369,7 +369,7 @@ class Wells:
         """The well on whose side of :attr:`dividing_height` the centre is, "lower" or "upper"; "only" of one well."""
         if not self.is_bistable:
             return "only"
-        height = float(self.midspan_shape @ self._amplitudes("amplitude", amplitude))
+        height = float(self.midspan_shape @ self._amplitudes("amplitude", amplitude, 1))
         return "upper" if height > self.dividing_height else "lower"
 
     @cached_property
@@ -804,10 +804,11 @@ class ReducedModel(Wells):
             parity,
         )
 
-    def tangent_magnitude(self, alpha: _Array) -> _Array:
+    def tangent_magnitude(self, alpha: ArrayLike) -> _Array:
         """Sum of the magnitudes of the terms of the tangent stiffness, shape (N, N): the measure of its rounding."""
+        alpha = np.abs(self._amplitudes("alpha", alpha, 1))
         stretch = None if self.elongation_matrix is None else np.abs(self.elongation_matrix)
-        return tangent_stiffness(np.abs(self.stiffness), self.nonlinear_stiffness, np.abs(alpha), stretch)
+        return tangent_stiffness(np.abs(self.stiffness), self.nonlinear_stiffness, alpha, stretch)
 
     @cached_property
     def _linear(self) -> LinearModes:

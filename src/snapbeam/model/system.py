@@ -350,6 +350,8 @@ class System:
         1.118034
         """
         model, potential = self.model, self.potential
+        if equilibrium is not None:
+            instance("equilibrium", equilibrium, Equilibrium, "an Equilibrium or None")
         alpha = self.rest_state.amplitude if equilibrium is None else equilibrium.amplitude
         n, modes = model.modes, model.linear_modes
         damping = modes.T @ model.damping_matrix @ modes

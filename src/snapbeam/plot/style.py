@@ -24,7 +24,7 @@ from snapbeam.util.diagnostics import Diagnostic, Severity
 from snapbeam.util.files import MADE_BY, atomic_path, check_writable
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import ResponseClass
-from snapbeam.util.validation import InputError, choice, finite_array, positive
+from snapbeam.util.validation import InputError, choice, finite_array, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -185,7 +185,7 @@ def new_figure(width: str = "single", height: float = 75.0) -> Figure:
     width : {"single", "double"}
         One column (90 mm) or two (190 mm), unless :func:`snapbeam.plot.plot_style` chose others.
     height : float
-        Height, mm, for columns of 90 mm; in proportion for others.
+        Height, mm, at most 10,000, for columns of 90 mm; in proportion for others.
 
     Examples
     --------
@@ -197,7 +197,11 @@ def new_figure(width: str = "single", height: float = 75.0) -> Figure:
     import matplotlib.pyplot as plt
 
     millimetres = COLUMN_WIDTHS[choice("width", width, tuple(COLUMN_WIDTHS))]
-    tall = positive("height", height, "mm") * COLUMN_WIDTHS["single"] / _STYLES["elsevier"][0][0]
+    tall = (
+        within("height", height, 0.0, 1e4, closed="right", unit="mm")
+        * COLUMN_WIDTHS["single"]
+        / _STYLES["elsevier"][0][0]
+    )
     with figure_style():
         return plt.figure(figsize=(millimetres / 25.4, tall / 25.4))
 

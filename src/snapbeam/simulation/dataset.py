@@ -38,6 +38,8 @@ __all__ = [
     "trajectory_dataset",
 ]
 
+_Array = NDArray[np.float64]
+
 
 class Variable(NamedTuple):
     """Variable of a run: dimensions, unit and long name."""
@@ -209,7 +211,6 @@ def check_trajectory(
     return dataset
 
 
-# ----------------------------------------------------------------------------------------------------
 # Displacement, penetration and force of each of several strikers.
 
 
@@ -276,11 +277,8 @@ def _follows(ensemble: Ensemble, system: System, recorded: Recorded) -> tuple[_A
     return -ensemble.structure.sign * moved, -ensemble.structure.sign * velocity
 
 
-# ----------------------------------------------------------------------------------------------------
 # Datasets of a run from the pieces that an engine recorded.
 
-
-_Array = NDArray[np.float64]
 
 _COLUMN = {
     name: number

@@ -134,16 +134,16 @@ def compressed(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
 
 
 def _json(value: Any) -> str:
-    return json.dumps(_plain(value), sort_keys=True)
+    return json.dumps(_without_nan(value), sort_keys=True)
 
 
-def _plain(value: Any) -> Any:
+def _without_nan(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: _without_nan(item) for key, item in value.items()}
     if isinstance(value, (np.ndarray, np.generic)):
-        return _plain(value.tolist())
+        return _without_nan(value.tolist())
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [_without_nan(item) for item in value]
     if isinstance(value, float) and value != value:
         return None
     return value

@@ -51,14 +51,22 @@ __all__ = [
     "simulate",
 ]
 
-
-# ----------------------------------------------------------------------------------------------------
-# Attributes of datasets: all parameters by name.
-
-
 CONVENTIONS = "CF-1.11"
 _LONGEST = 1024
 """Maximum size of an array in an attribute."""
+_Array = NDArray[np.float64]
+_SAMPLES_PER_CYCLE = 200
+"""Regular samples per cycle of the excitation or of the first mode, whichever is shorter."""
+_BLOCK = 2**22
+"""Instants in a block."""
+MEMORY_LIMIT = 4 * 2**30
+"""Maximum memory of the samples of a run, bytes."""
+_ENERGY_ERROR = 1e-3
+"""Energy-balance error, over the gross work, above which a run gets a diagnostic."""
+_ENDED = (RunStatus.OK, RunStatus.EARLY_STOP)
+
+
+# Attributes of datasets: all parameters by name.
 
 
 def describe_system(system: System, plan: Plan) -> dict[str, Any]:
@@ -129,7 +137,7 @@ def attributes_of(
     """
     attrs: dict[str, Any] = {"Conventions": CONVENTIONS, "title": title}
     attrs |= describe_system(system, plan) | more
-    own = _plain(integration)
+    own = {name: getattr(integration, name) for name in quantities(Integration) if name != "threads"}
     attrs["system_hash"] = system.hash
     attrs["system"] = json.dumps(_short_arrays(system.to_mapping()), sort_keys=True)
     attrs["integration"] = json.dumps(own, sort_keys=True)
@@ -148,25 +156,7 @@ def _short_arrays(value: Any) -> Any:
     return value
 
 
-def _plain(integration: Integration) -> dict[str, Any]:
-    return {name: getattr(integration, name) for name in quantities(Integration) if name != "threads"}
-
-
-# ----------------------------------------------------------------------------------------------------
 # Preparation of a recorded run, and its attributes.
-
-
-_Array = NDArray[np.float64]
-
-_SAMPLES_PER_CYCLE = 200
-"""Regular samples per cycle of the excitation or of the first mode, whichever is shorter."""
-_BLOCK = 2**22
-"""Instants in a block."""
-MEMORY_LIMIT = 4 * 2**30
-"""Maximum memory of the samples of a run, bytes."""
-_ENERGY_ERROR = 1e-3
-"""Energy-balance error, over the gross work, above which a run gets a diagnostic."""
-_ENDED = (RunStatus.OK, RunStatus.EARLY_STOP)
 
 
 class Prepared(NamedTuple):
@@ -352,9 +342,6 @@ def end_state(ensemble: Ensemble, recorded: Recorded, summary: RunSummary) -> St
         np.array([time]),
     )
     return states[0]
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 @overload

@@ -46,8 +46,10 @@ __all__ = [
     "tip_of",
 ]
 
+_Array = NDArray[np.float64]
+_Integers = NDArray[np.int64]
 
-# ----------------------------------------------------------------------------------------------------
+
 # The strikers beside the first one, for every run of an ensemble.
 
 
@@ -112,7 +114,6 @@ def _speed(drive: Drive, columns: Mapping[str, _Array], section: str, system: Sy
     return speed
 
 
-# ----------------------------------------------------------------------------------------------------
 # What moves in every run of an ensemble, and as which drive kernels integrate it.
 
 
@@ -306,13 +307,6 @@ def begun_at(driven: Driven, phase: _Array) -> _Array:
         for row, at in zip(driven.numbers, phase, strict=True)
     ]
     return np.array(begun)
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_Array = NDArray[np.float64]
-_Integers = NDArray[np.int64]
 
 
 def _is_around(section: str) -> bool:

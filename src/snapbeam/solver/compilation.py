@@ -18,6 +18,7 @@ import stat
 import sys
 import tempfile
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import cache
 from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
@@ -45,8 +46,17 @@ __all__ = [
     "ready",
 ]
 
+_IDLE = frozenset({"inline_inlinables", "inline_overloads", "nopython_rewrites", "with_lifting"})
+"""Passes for array expressions, for blocks with a context and for functions that are inlined as source."""
+_CHECK = hashlib.sha256
+_SIZE = _CHECK().digest_size
+_warned: set[str] = set()
+_LOG = logging.getLogger("snapbeam")
+_LONGEST_WAIT = 600.0
+"""Seconds to wait for another process that compiles the same kernel, which takes 20 s on a free core."""
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
 
-# ----------------------------------------------------------------------------------------------------
+
 # How a part of a kernel is compiled: into the kernel that calls it, and nowhere else.
 #
 # Numba optimises each function and makes machine code of it by itself before it is linked into its callers, where it is
@@ -54,11 +64,7 @@ __all__ = [
 # the same machine code takes half the time to compile.
 
 
-_IDLE = frozenset({"inline_inlinables", "inline_overloads", "nopython_rewrites", "with_lifting"})
-"""Passes for array expressions, for blocks with a context and for functions that are inlined as source."""
-
-
-class _Nobody:
+class _NoLibrary:
     """Placeholder for the code library of a part, which is never called on its own."""
 
     def set_env(self, name: str, env: Any) -> None:
@@ -84,7 +90,7 @@ def pipeline() -> dict[str, Any]:
 
         @property
         def codegen(self) -> Any:
-            return _Nobody()
+            return _NoLibrary()
 
         def _optimize_functions(self, module: Any) -> None:
             module.data_layout = self._codegen._data_layout
@@ -151,18 +157,12 @@ def pipeline() -> dict[str, Any]:
     return {"pipeline_class": PartCompiler}
 
 
-# ----------------------------------------------------------------------------------------------------
 # Compiled code on disk: checked before it is loaded, and never a reason for a run to fail.
 #
 # Machine code that is loaded is run, so a file of it that was damaged could do anything.  Every file here begins with
 # the check sum of what follows; one that does not agree counts for nothing, and the code is compiled and written again.
 # The check sum does not tell who wrote a file: code is kept only in folders that nobody else can write.  Where there is
 # none, it goes into a private folder of the temporary ones, or is not kept at all; that is said once.
-
-
-_CHECK = hashlib.sha256
-_SIZE = _CHECK().digest_size
-_said: set[str] = set()
 
 
 def keep_code(dispatcher: Any, mark: str) -> Any:
@@ -181,14 +181,14 @@ def keep_code(dispatcher: Any, mark: str) -> Any:
         alone = dispatcher.targetoptions.get("_nrt") is False
         dispatcher._cache = _KeptCode(dispatcher.py_func, mark, alone)
     except Exception as error:  # no folder anywhere, or a Numba that keeps code in another way
-        _say(f"compiled code is not kept, each start compiles anew ({error})")
+        _warn_once(f"compiled code is not kept, each start compiles anew ({error})")
     return dispatcher
 
 
-def _say(words: str) -> None:
+def _warn_once(words: str) -> None:
     """Once a process."""
-    if words not in _said:
-        _said.add(words)
+    if words not in _warned:
+        _warned.add(words)
         _LOG.warning(words)
 
 
@@ -270,7 +270,7 @@ class _Implementation(CompileResultCacheImpl):
             if self._locator is None:
                 raise PermissionError(why)
         if isinstance(self._locator, _PrivateFolder):
-            _say(f"compiled code is kept in {self._locator.get_cache_path()}: {why}")
+            _warn_once(f"compiled code is kept in {self._locator.get_cache_path()}: {why}")
 
 
 class _KeptCode(FunctionCache):
@@ -304,7 +304,7 @@ class _KeptCode(FunctionCache):
             super().save_overload(sig, data)
         except Exception as error:
             why = getattr(error, "strerror", None) or error
-            _say(
+            _warn_once(
                 f"compiled code is not kept, each start compiles anew: {self._cache_path} cannot be written "
                 f"({why}); set NUMBA_CACHE_DIR to a folder with 20 MB of room"
             )
@@ -345,7 +345,6 @@ class _CheckedFiles(IndexDataCacheFile):
         return data if _CHECK(data).digest() == check else None
 
 
-# ----------------------------------------------------------------------------------------------------
 # A mark of everything that a kernel bakes in, under which its machine code is kept.
 
 
@@ -354,7 +353,7 @@ _BAKED_IN = ("util/status_codes.py", "solver/**/*.py")
 _CONSTANTS = (int, float, complex, str, bytes, type(None), type(Ellipsis))
 
 
-class _Unknown(Exception):
+class _NoFingerprint(Exception):
     """Something that a kernel may bake in and that has no mark."""
 
 
@@ -382,7 +381,7 @@ def fingerprint(kinds: tuple[type, ...]) -> str | None:
         for kind in kinds:
             for mark in _marks_of_class(kind):
                 digest.update(mark.encode() + b"\0")
-    except _Unknown:
+    except _NoFingerprint:
         return None
     return digest.hexdigest()[:20]
 
@@ -391,7 +390,7 @@ def _marks_of_class(kind: type) -> Iterable[str]:
     """Fingerprint of a class that can be imported by name."""
     module = sys.modules.get(kind.__module__)
     if kind.__module__ == "__main__" or getattr(module, kind.__qualname__, None) is not kind:
-        raise _Unknown(kind.__qualname__)
+        raise _NoFingerprint(kind.__qualname__)
     seen: set[int] = set()
     for each in kind.__mro__[:-1]:
         yield f"{each.__module__}.{each.__qualname__}"
@@ -427,7 +426,7 @@ def _marks(value: Any, seen: set[int]) -> Iterable[str]:
     elif isinstance(getattr(value, "py_func", None), FunctionType):
         yield from _function_marks(value.py_func, seen)
     else:
-        raise _Unknown(repr(value))
+        raise _NoFingerprint(repr(value))
 
 
 def _function_marks(function: FunctionType, seen: set[int]) -> Iterable[str]:
@@ -441,11 +440,6 @@ def _function_marks(function: FunctionType, seen: set[int]) -> Iterable[str]:
         yield from _marks(value, seen)
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-_LOG = logging.getLogger("snapbeam")
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
 _PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **pipeline()}
 INLINE: dict[str, Any] = {"error_model": "numpy", "forceinline": True}
 """Options of an overload that is to be written into its callers, on every engine."""
@@ -509,16 +503,16 @@ def kernel(function: Callable[..., Any], kinds: tuple[type, ...]) -> Any:
     return dispatcher if mark is None else keep_code(dispatcher, mark)
 
 
-class _Telling(event.Listener):
+class _CompilationMessage(event.Listener):
     """Says once that a kernel is being compiled."""
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.told = False
+        self.shown = False
 
     def on_start(self, event: Any) -> None:
-        if not self.told:
-            self.told = True
+        if not self.shown:
+            self.shown = True
             _LOG.info("compiling %s, once on this machine: 10 to 20 s on a free core", self.name)
 
     def on_end(self, event: Any) -> None:
@@ -528,8 +522,10 @@ class _Telling(event.Listener):
 def is_compiled(march: Any, *arguments: Any) -> bool:
     """True if a kernel for such arguments is in memory or on the disk."""
     signature = tuple(typeof(value) for value in arguments)
-    if signature in getattr(march, "overloads", ()):
-        return True
+    return signature in getattr(march, "overloads", ()) or _is_on_disk(march, signature)
+
+
+def _is_on_disk(march: Any, signature: tuple[Any, ...]) -> bool:
     cache = getattr(march, "_cache", None)
     if not isinstance(cache, _KeptCode):
         return False
@@ -540,13 +536,40 @@ def is_compiled(march: Any, *arguments: Any) -> bool:
         return False
 
 
+def _turn(march: Any) -> AbstractContextManager[Any]:
+    """Lock that the one process holds which compiles a kernel; nothing where the code is not kept.
+
+    A process that waited loads what the other one has compiled.  After the time-out, or where the folder has no locks,
+    it compiles for itself.
+    """
+    from filelock import FileLock
+
+    cache = getattr(march, "_cache", None)
+    if not isinstance(cache, _KeptCode):
+        return nullcontext()
+    lock = FileLock(f"{cache._cache_file._index_path}.lock", timeout=_LONGEST_WAIT)
+    with suppress(OSError):
+        try:
+            return lock.acquire(timeout=0.0)
+        except TimeoutError:
+            _LOG.info("compiling %s in another process: waiting for it", march.py_func.__name__)
+            return lock.acquire()
+    return nullcontext()
+
+
 def ready(march: Any, *arguments: Any) -> None:
     """Compile a kernel for such arguments, or fetch it from the disk, before anything is timed; says so in the log."""
+    signature = tuple(typeof(value) for value in arguments)
+    if signature in getattr(march, "overloads", ()):
+        return
     collecting = gc.isenabled()
     gc.disable()  # a compiler's garbage has no cycles worth a tenth of the time
     try:
-        with event.install_listener("numba:compile", _Telling(march.py_func.__name__)):
-            march.compile(tuple(typeof(value) for value in arguments))
+        with (
+            nullcontext() if _is_on_disk(march, signature) else _turn(march),
+            event.install_listener("numba:compile", _CompilationMessage(march.py_func.__name__)),
+        ):
+            march.compile(signature)
     finally:
         if collecting:
             gc.enable()

@@ -36,12 +36,10 @@ __all__ = [
     "turned_motion",
 ]
 
-
-# ----------------------------------------------------------------------------------------------------
-# Motions of a tip, a base and an axial load that are integrated as one drive: each by its own kind, from one argument.
-
-
 _TWO_PI = 2.0 * math.pi
+
+
+# Motions of a tip, a base and an axial load that are integrated as one drive: each by its own kind, from one argument.
 
 
 @inlined
@@ -273,9 +271,6 @@ def _joined_motion(drive, memory, argument):
         return moved, speed
 
     return both
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 class Tip(NamedTuple):

@@ -55,6 +55,10 @@ __all__ = [
 
 
 WIDTH = 8
+ALL = (1 << WIDTH) - 1
+"""Every lane, as a whole number."""
+_MASK = ir.VectorType(ir.IntType(1), WIDTH)
+_I64 = ir.IntType(64)
 
 _DOUBLE = ir.DoubleType()
 _VECTOR = ir.VectorType(_DOUBLE, WIDTH)
@@ -293,18 +297,10 @@ for _operator, _name in (
     _arithmetic(_operator, _name)
 
 
-# ----------------------------------------------------------------------------------------------------
 # Eight truth values side by side: what is asked of eight numbers at once, and which of them it is true of.
 #
 # A :class:`Mask` is one bit a lane.  As a whole number (:func:`bits`) it can be kept, combined with ``&``, ``|`` and
 # ``~`` of whole numbers, and walked through lane by lane with :func:`lowest`.
-
-
-ALL = (1 << WIDTH) - 1
-"""Every lane, as a whole number."""
-
-_MASK = ir.VectorType(ir.IntType(1), WIDTH)
-_I64 = ir.IntType(64)
 
 
 class Mask(types.Type):

@@ -46,6 +46,12 @@ __all__ = [
     "updated",
 ]
 
+_MADE = 0.01
+"""Tolerance of the energy balance over the gross work: a run that gains more energy is not accepted."""
+_ROUNDED = 1e-6
+"""The same over the energies, for rounding."""
+_Array = NDArray[np.float64]
+
 
 Values = NDArray[Any]
 
@@ -158,7 +164,7 @@ class Statistic:
     comment: str = ""
 
 
-def _plain(column: str) -> Callable[[Reading], Values]:
+def _column(column: str) -> Callable[[Reading], Values]:
     return lambda reading: reading.accumulators[column]
 
 
@@ -290,11 +296,11 @@ _SHARE = _ERROR.format("5e-4", "1e-5")
 _ROWS = (
     Statistic("response_class", "int8", "1", "response class", _response),
     Statistic("status", "int8", "1", "status of the run", lambda reading: reading.status),
-    Statistic("zero_crossings", "int32", "1", "zero crossings of the centre displacement", _plain("zero_crossings")),
+    Statistic("zero_crossings", "int32", "1", "zero crossings of the centre displacement", _column("zero_crossings")),
     Statistic(
-        "zero_crossings_last_quarter", "int32", "1", "zero crossings in the last quarter", _plain("zero_crossings_last_quarter")
+        "zero_crossings_last_quarter", "int32", "1", "zero crossings in the last quarter", _column("zero_crossings_last_quarter")
     ),
-    Statistic("last_zero_crossing", "float64", "s", "time of the last zero crossing", _plain("last_zero_crossing")),
+    Statistic("last_zero_crossing", "float64", "s", "time of the last zero crossing", _column("last_zero_crossing")),
     Statistic(
         "final_well", "int8", "1", "sign of the centre displacement at the end",
         lambda reading: reading.sign * reading.accumulators["side"],
@@ -323,9 +329,9 @@ _ROWS = (
         _low_high("min_center", "max_center", greatest=True),
     ),
     Statistic("peak_force", "float64", "N", "peak contact force", lambda reading: reading.peak_force),
-    Statistic("impacts", "int32", "1", "impacts", _plain("impacts")),
+    Statistic("impacts", "int32", "1", "impacts", _column("impacts")),
     Statistic("contact_time_fraction", "float64", "1", "fraction of time in contact", _contact_share),
-    Statistic("early_stop_time", "float64", "s", "time at which the class became certain", _plain("early_stop_time")),
+    Statistic("early_stop_time", "float64", "s", "time at which the class became certain", _column("early_stop_time")),
     Statistic(
         "peak_displacement", "float64", "1", "maximum distance of the contact point from the straight beam, over b",
         _peak("min_displacement", "max_displacement"),
@@ -483,7 +489,6 @@ def lost_in_circuits(accumulators_of_runs: Any) -> NDArray[np.float64]:
     return np.asarray(accumulators_of_runs["circuits"][:, :, CIRCUIT_LOSS].sum(axis=1))
 
 
-# ----------------------------------------------------------------------------------------------------
 # Statistics of each of several strikers: rows beside the table's, whose names bear the striker's number.
 
 
@@ -523,14 +528,7 @@ def _of_one(name: str, number: int) -> Statistic:
     )
 
 
-# ----------------------------------------------------------------------------------------------------
 # What engines answer: the accumulators of many runs, read as statistics in the units and signs of a map.
-
-
-_MADE = 0.01
-"""Tolerance of the energy balance over the gross work: a run that gains more energy is not accepted."""
-_ROUNDED = 1e-6
-"""The same over the energies, for rounding."""
 
 
 @dataclass(frozen=True)
@@ -682,11 +680,7 @@ def statistics_of(ensemble: Ensemble, accumulators_of_runs: NDArray[Any]) -> dic
     return found
 
 
-# ----------------------------------------------------------------------------------------------------
 # What engines hand over beside accumulators: output states, and pieces of a recorded run.
-
-
-_Array = NDArray[np.float64]
 
 
 class OutputStates(NamedTuple):

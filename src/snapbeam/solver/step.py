@@ -68,7 +68,6 @@ __all__ = [
 ]
 
 
-# ----------------------------------------------------------------------------------------------------
 # One mode: layouts call these in their loops over modes.
 
 
@@ -90,7 +89,6 @@ def rotate_phase(sine, cosine, sine_ahead, cosine_ahead):
     return sine * cosine_ahead + cosine * sine_ahead, cosine * cosine_ahead - sine * sine_ahead
 
 
-# ----------------------------------------------------------------------------------------------------
 # The values that pass from stage to stage.
 
 
@@ -188,9 +186,6 @@ class StepFunctions(NamedTuple):
     """``take_stage(data, stage, state, products, increment)``: both after a stage."""
     take_step: Any
     """``take_step(data)``: both at the end of the step."""
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 def build_step(layout: Primitives, compiled_part: Callable[..., Any] = inlined) -> StepFunctions:

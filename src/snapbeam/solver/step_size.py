@@ -32,20 +32,7 @@ __all__ = [
     "seconds_of",
 ]
 
-
-# ----------------------------------------------------------------------------------------------------
-# Steps in free flight, measured on the structure itself.
-#
-# How long a step may be follows from how the tension detunes the modes, from which of them come in step with the kicks,
-# and from how much energy there is; no formula holds from one mode to a hundred and from shallow beams to deep ones.  So
-# it is tried: the structure in its well gets a weak and a strong impulse at one point and is integrated for two periods
-# of its first mode with steps of many lengths.  A step serves if its result differs by less than a limit from that of
-# steps shorter than all of them, where the error is
-# counted in the relative change of velocity at the start that would have done as much.
-
-
 _Array = NDArray[np.float64]
-
 _FEWEST = 30.0
 """Flight steps in a period of the first mode, at least."""
 _MOST = 2.0**17
@@ -73,6 +60,37 @@ _MOST_MODES = 48
 _CHOSEN: OrderedDict[tuple[object, ...], float] = OrderedDict()
 """Steps that were chosen, by all that the choice depends on."""
 _MOST_CHOSEN = 4096
+# Free flight: the error allowed a step, as it is measured on the structure, by level of accuracy.
+_LIMIT = {"standard": 2.5e-7, "reference": 2e-11}
+_LIMIT_OF_HITS = {"standard": 1e-9, "reference": 1e-13}
+"""Error limit of impacts of zero duration: there are no contact steps to share the error, and only one mode."""
+_ORDER = {"standard": 4, "reference": 6}
+_FREE_TURN = 4.0
+"""Maximum phase of the fastest mode in a flight step of level "reference", rad."""
+_MOST_DECAY = 1.8
+"""Maximum decay of the fastest decaying mode in a flight step."""
+# Contact: longest step over the time of an impact at the speed 0.2 b omega_1, by level, and how many
+# halvings below it the shortest step is, by order.
+_CONTACT_SHARE = {"standard": 1.0 / 8.0, "reference": 1.0 / 32.0}
+_CONTACT_SPEED = 0.2
+_HALVINGS = {4: 4, 6: 10}
+_MOST_HALVINGS = {"standard": 5, "reference": 7}
+_CONTACT_TURN = math.pi
+"""Maximum phase of the fastest mode in the longest contact step, rad; beyond half a turn, kicks are in resonance."""
+SUBDIVISION = 1 << 20
+"""Ticks of a flight step."""
+_MOST_TICKS = 2.0**61
+_HOUR = 3600.0
+
+
+# Steps in free flight, measured on the structure itself.
+#
+# How long a step may be follows from how the tension detunes the modes, from which of them come in step with the kicks,
+# and from how much energy there is; no formula holds from one mode to a hundred and from shallow beams to deep ones.  So
+# it is tried: the structure in its well gets a weak and a strong impulse at one point and is integrated for two periods
+# of its first mode with steps of many lengths.  A step serves if its result differs by less than a limit from that of
+# steps shorter than all of them, where the error is
+# counted in the relative change of velocity at the start that would have done as much.
 
 
 def flight_step(model: ReducedModel, order: int, limit: float, impact: float = math.inf) -> float:
@@ -253,28 +271,6 @@ def _march(counts, flows, kicks, columns, well, gamma, start, work, out):
             out[run, i] = q[i]
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-# Free flight: the error allowed a step, as it is measured on the structure, by level of accuracy.
-_LIMIT = {"standard": 2.5e-7, "reference": 2e-11}
-_LIMIT_OF_HITS = {"standard": 1e-9, "reference": 1e-13}
-"""Error limit of impacts of zero duration: there are no contact steps to share the error, and only one mode."""
-_ORDER = {"standard": 4, "reference": 6}
-_FREE_TURN = 4.0
-"""Maximum phase of the fastest mode in a flight step of level "reference", rad."""
-_MOST_DECAY = 1.8
-"""Maximum decay of the fastest decaying mode in a flight step."""
-# Contact: longest step over the time of an impact at the speed 0.2 b omega_1, by level, and how many
-# halvings below it the shortest step is, by order.
-_CONTACT_SHARE = {"standard": 1.0 / 8.0, "reference": 1.0 / 32.0}
-_CONTACT_SPEED = 0.2
-_HALVINGS = {4: 4, 6: 10}
-_MOST_HALVINGS = {"standard": 5, "reference": 7}
-_CONTACT_TURN = math.pi
-"""Maximum phase of the fastest mode in the longest contact step, rad; beyond half a turn, kicks are in resonance."""
-
-
 class Plan(NamedTuple):
     """Order of the composition and lengths of its steps."""
 
@@ -334,14 +330,9 @@ def choose_base_step(
     return Plan(order, flight, min_contact_halvings, min_contact_halvings + _HALVINGS[order])
 
 
-# ----------------------------------------------------------------------------------------------------
 # The clock of a run: time in ticks, so that halved steps and located events are whole numbers.
 
 
-SUBDIVISION = 1 << 20
-"""Ticks of a flight step."""
-_MOST_TICKS = 2.0**61
-_HOUR = 3600.0
 _STEP_COST, _MODE_COST = 0.5e-6, 0.07e-6
 """Seconds of one core for a step, and more of it for each mode."""
 _FEWEST_CLOCK = 4.0

@@ -39,6 +39,9 @@ __all__ = [
     "uncertainty_from_mapping",
 ]
 
+HOLD_FIXED = ("physical", "normalised")
+_OWN = ("displacement", "phase", "hold_fixed", "seed", "correlation")
+
 
 _Array = NDArray[np.float64]
 
@@ -216,12 +219,9 @@ KINDS: dict[str, type[Distribution]] = {
 """Distributions by the names that files use."""
 
 
-# ----------------------------------------------------------------------------------------------------
 # Parameter uncertainty: distributions of any parameters of a system, and numbered samples of them.
 
 
-HOLD_FIXED = ("physical", "normalised")
-_OWN = ("displacement", "phase", "hold_fixed", "seed", "correlation")
 _PHASE = UniformRange(math.pi, 2.0 * math.pi)
 
 

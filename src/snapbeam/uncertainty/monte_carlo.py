@@ -43,6 +43,12 @@ __all__ = [
     "wilson",
 ]
 
+Statistics = dict[str, NDArray[Any]]
+_REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
+_FIRST = (ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_1)
+_Array = NDArray[np.float64]
+INTERVALS = ("wilson", "jeffreys")
+
 
 _Numbers = NDArray[np.int64]
 
@@ -361,13 +367,7 @@ Ask = Callable[[_Numbers, _Numbers], dict[str, NDArray[Any]]]
 """Given points and samples, by number, the statistics of their runs."""
 
 
-# ----------------------------------------------------------------------------------------------------
 # What a run may come to, read from its class: outcomes that have a probability.
-
-
-Statistics = dict[str, NDArray[Any]]
-_REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
-_FIRST = (ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_1)
 
 
 class Event(NamedTuple):
@@ -415,12 +415,7 @@ def require_held(names: Iterable[str], system: System) -> None:
             )
 
 
-# ----------------------------------------------------------------------------------------------------
 # A probability from counts, with its interval.
-
-
-_Array = NDArray[np.float64]
-INTERVALS = ("wilson", "jeffreys")
 
 
 def wilson(hits: ArrayLike, runs: ArrayLike, confidence: float = 0.95) -> tuple[_Array, _Array, _Array]:

@@ -60,12 +60,15 @@ __all__ = [
     "quantity_of",
 ]
 
-
-# ----------------------------------------------------------------------------------------------------
-# What a design is judged by: quantities of its runs or of itself, objectives to make small, constraints to satisfy.
-
-
 Values = dict[str, NDArray[Any]]
+_SURE = 0.99
+"""Confidence level at which a design is discarded after a quarter of its runs."""
+_Array = NDArray[np.float64]
+_REPORT_FACTOR = 4
+"""Samples from which a single design is reported, over validation_samples."""
+
+
+# What a design is judged by: quantities of its runs or of itself, objectives to make small, constraints to satisfy.
 
 
 class DesignQuantity(NamedTuple):
@@ -344,12 +347,7 @@ def require_kinds(objectives: Any, constraints: Any) -> tuple[tuple[Objective, .
     return made, kept
 
 
-# ----------------------------------------------------------------------------------------------------
 # A design problem: what may be chosen, what is to be small, what must hold; anything that optimises can drive it.
-
-
-_SURE = 0.99
-"""Confidence level at which a design is discarded after a quarter of its runs."""
 
 
 class Worth(NamedTuple):
@@ -613,12 +611,6 @@ def problem_of(
     return DesignProblem(trials, bounds, made, kept, samples, validation_samples)
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-_Array = NDArray[np.float64]
-_REPORT_FACTOR = 4
-"""Samples from which a single design is reported, over validation_samples."""
 _STALLED, _IMPROVED = 10, 1e-4
 """Generations without an improvement of the best design by more than this share after which the search stops."""
 _CLOSE = 1e-3

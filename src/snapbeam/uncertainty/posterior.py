@@ -49,12 +49,35 @@ if TYPE_CHECKING:
 
 __all__ = ["Forward", "Posterior", "Waveform", "class_likelihood", "estimate_posterior"]
 
-
-# ----------------------------------------------------------------------------------------------------
-# The frequencies that a beam would show, beside those that were measured.
-
-
 _STATES = ("straight", "lower_well", "upper_well")
+_TINY = 1e-13
+"""Relative change of the drive whose response is measured."""
+_LOST = 1e3
+"""Standard errors of a run that fails, at every sample."""
+_SEEN = {"striker": "displacement_at_striker", "midspan": "midspan_displacement"}
+_Array = NDArray[np.float64]
+_FREEDOM = 5.0
+"""Degrees of freedom of the proposals: their tails are wider than those of what is sought."""
+_STAGES = 3
+_EVALUATIONS = 200
+"""Maximum number of evaluations of the search for the most likely beam."""
+_FEWEST = 100.0
+"""Samples that weighted ones must be worth."""
+_BEAM = ("thickness", "young_modulus", "density", "length", "buckling_level")
+_STEP = 2e-5
+"""Relative step of the logarithms by which runs are compared: beyond what steps in time make of them."""
+_BESIDE = {"damping_ratio": "model.damping_ratio", "contact_stiffness": "contact.stiffness"}
+"""Parameters in addition to the beam that a waveform determines."""
+_KINDS = (
+    ResponseClass.INTRAWELL,
+    ResponseClass.TRANSIENT_1,
+    ResponseClass.TRANSIENT_2,
+    ResponseClass.CONTINUOUS,
+)
+_PRIOR = 0.5
+
+
+# The frequencies that a beam would show, beside those that were measured.
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,15 +149,7 @@ class Forward:
         return (self.frequencies(beam) - self.target) / self.errors
 
 
-# ----------------------------------------------------------------------------------------------------
 # A tracked waveform as a measurement: what a beam would have done, sample by sample, as far as that can be known.
-
-
-_TINY = 1e-13
-"""Relative change of the drive whose response is measured."""
-_LOST = 1e3
-"""Standard errors of a run that fails, at every sample."""
-_SEEN = {"striker": "displacement_at_striker", "midspan": "midspan_displacement"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -282,24 +297,6 @@ def _untold() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiagnosticWarning)
         yield
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_Array = NDArray[np.float64]
-_FREEDOM = 5.0
-"""Degrees of freedom of the proposals: their tails are wider than those of what is sought."""
-_STAGES = 3
-_EVALUATIONS = 200
-"""Maximum number of evaluations of the search for the most likely beam."""
-_FEWEST = 100.0
-"""Samples that weighted ones must be worth."""
-_BEAM = ("thickness", "young_modulus", "density", "length", "buckling_level")
-_STEP = 2e-5
-"""Relative step of the logarithms by which runs are compared: beyond what steps in time make of them."""
-_BESIDE = {"damping_ratio": "model.damping_ratio", "contact_stiffness": "contact.stiffness"}
-"""Parameters in addition to the beam that a waveform determines."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -640,17 +637,7 @@ def _quantiles(values: _Array, weights: _Array, shares: tuple[float, ...]) -> _A
     return np.interp(shares, ranks, values[order])
 
 
-# ----------------------------------------------------------------------------------------------------
 # What measured response classes say of a beam: how likely each sample of it makes them.
-
-
-_KINDS = (
-    ResponseClass.INTRAWELL,
-    ResponseClass.TRANSIENT_1,
-    ResponseClass.TRANSIENT_2,
-    ResponseClass.CONTINUOUS,
-)
-_PRIOR = 0.5
 
 
 @checked

@@ -27,15 +27,15 @@ if TYPE_CHECKING:
 
 __all__ = ["Counts", "SamplingPlan", "allocate", "allocation_of", "probability_map"]
 
-
-# ----------------------------------------------------------------------------------------------------
-# How many runs each point of a probability map gets: more where its interval is wide, until all are narrow enough.
-
-
 _Array = NDArray[np.float64]
 _Index = NDArray[np.int64]
 Ask = Callable[[_Index, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]
 """Given points and numbers of samples, what happened, of shape (outcomes, runs), and which runs failed."""
+TITLE = "probabilities of the response of a struck bistable beam"
+OUTCOME = "outcome"
+
+
+# How many runs each point of a probability map gets: more where its interval is wide, until all are narrow enough.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,13 +183,6 @@ def _affordable(counts: Counts, wanted: _Index, allocation: SamplingPlan, made: 
     before = np.cumsum(wanted[order]) - wanted[order]
     granted[order] = np.clip(left - before, 0, wanted[order])
     return granted
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-TITLE = "probabilities of the response of a struck bistable beam"
-OUTCOME = "outcome"
 
 
 @checked

@@ -49,17 +49,6 @@ __all__ = [
     "spans",
 ]
 
-
-# ----------------------------------------------------------------------------------------------------
-# Where a probability that rises passes a value, from single runs at many values, with an interval.
-#
-# Whether a run at v is a hit is a coin with the probability P(v).  If P does not fall, its most likely form is the
-# isotonic regression; the interval of the value at which it passes q holds every v for which the best P with P(v) = q
-# is not much less likely than the best of all.  Twice the difference of their log likelihoods has one limiting
-# distribution whatever P is (Banerjee and Wellner, Ann. Stat. 29 (2001) 1699), so that
-# nothing has to be assumed of its shape.
-
-
 _Array = NDArray[np.float64]
 _TABLE = {
     0.5: 0.28506,
@@ -71,6 +60,28 @@ _TABLE = {
     0.99: 3.83630,
 }
 """Quantiles of the limiting distribution (Banerjee and Wellner 2001, Table 1)."""
+_Index = NDArray[np.int64]
+Ask = Callable[[_Index, _Array, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]
+"""Given columns, values and numbers of samples: which runs hit, and which failed."""
+_WIDER = 0.5
+"""Fraction of an interval by which the next round extends it on either side."""
+_SURE = 0.99
+TITLE = "quantile thresholds of a struck bistable beam"
+LEVEL = "quantile"
+_FALLS = 0.01
+"""Probability of so much falling below which a threshold is not called one."""
+_REACH = 3.0
+"""Half widths of the interval within which runs count for the curve."""
+_FOUND = "found not_reached_in_range exceeded_in_whole_range"
+
+
+# Where a probability that rises passes a value, from single runs at many values, with an interval.
+#
+# Whether a run at v is a hit is a coin with the probability P(v).  If P does not fall, its most likely form is the
+# isotonic regression; the interval of the value at which it passes q holds every v for which the best P with P(v) = q
+# is not much less likely than the best of all.  Twice the difference of their log likelihoods has one limiting
+# distribution whatever P is (Banerjee and Wellner, Ann. Stat. 29 (2001) 1699), so that
+# nothing has to be assumed of its shape.
 
 
 class Crossing(NamedTuple):
@@ -196,7 +207,6 @@ def _lack(good: _Array, runs: _Array) -> float:
     return float(2.0 * np.sum(free - held))
 
 
-# ----------------------------------------------------------------------------------------------------
 # The value at which a probability passes another, from a logistic curve fitted nearby.
 
 
@@ -246,16 +256,7 @@ def local_crossing(
     return float(middle + half * (special.logit(probability) - beta[0]) / beta[1])
 
 
-# ----------------------------------------------------------------------------------------------------
 # Where to run next so that quantile thresholds become narrow: rounds, each within what the last left open.
-
-
-_Index = NDArray[np.int64]
-Ask = Callable[[_Index, _Array, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]
-"""Given columns, values and numbers of samples: which runs hit, and which failed."""
-_WIDER = 0.5
-"""Fraction of an interval by which the next round extends it on either side."""
-_SURE = 0.99
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -375,18 +376,6 @@ def _windows(
         reach = _WIDER * (high - low)
         found.append((max(low - reach, bounds[0]), min(high + reach, bounds[1])))
     return found
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-TITLE = "quantile thresholds of a struck bistable beam"
-LEVEL = "quantile"
-_FALLS = 0.01
-"""Probability of so much falling below which a threshold is not called one."""
-_REACH = 3.0
-"""Half widths of the interval within which runs count for the curve."""
-_FOUND = "found not_reached_in_range exceeded_in_whole_range"
 
 
 @checked

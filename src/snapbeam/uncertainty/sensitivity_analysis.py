@@ -53,12 +53,16 @@ __all__ = [
     "sobol_indices_from_samples",
 ]
 
-
-# ----------------------------------------------------------------------------------------------------
-# Which of some inputs moves an output most, from any sample of both.
-
-
 _GROUPS = 20
+_Numbers = NDArray[np.int64]
+_Array = NDArray[np.float64]
+METHODS = ("local", "sobol", "given_data")
+_DEFAULT = {"local": 16, "sobol": 128, "given_data": 1000}
+_REPLICATES = 4
+PARAMETER = "parameter"
+
+
+# Which of some inputs moves an output most, from any sample of both.
 
 
 class Indices(NamedTuple):
@@ -163,7 +167,6 @@ def _epsilon(binned: NDArray[np.int64], y: _Array, count: int) -> float:
     return (between - (count - 1) * within_bins) / total
 
 
-# ----------------------------------------------------------------------------------------------------
 # Sobol's indices of independent inputs, with intervals from sequences scrambled independently.
 
 
@@ -260,11 +263,7 @@ def _mean(table: _Array, confidence: float) -> Indices:
     return Indices(middle, middle - reach, middle + reach)
 
 
-# ----------------------------------------------------------------------------------------------------
 # What is asked of a system as one number: a statistic, a threshold, the notch of the threshold, a lifetime.
-
-
-_Numbers = NDArray[np.int64]
 
 
 class QuantityOfInterest(Protocol):
@@ -554,16 +553,6 @@ def quantity_of_interest(given: QuantityOfInterest | str) -> QuantityOfInterest:
             f"quantity = {shown(given)}: must be the name of a statistic, a ThresholdQoI, a NotchQoI or a LifetimeQoI"
         )
     return given
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_Array = NDArray[np.float64]
-METHODS = ("local", "sobol", "given_data")
-_DEFAULT = {"local": 16, "sobol": 128, "given_data": 1000}
-_REPLICATES = 4
-PARAMETER = "parameter"
 
 
 @checked

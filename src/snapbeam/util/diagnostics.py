@@ -30,6 +30,10 @@ __all__ = [
     "to_json",
 ]
 
+_INTERVAL = 0.2
+_Counts = Callable[[int, int], object]
+_Shares = Callable[[float], object]
+
 
 class DiagnosticWarning(UserWarning):
     """Warning about an input that is valid but probably not intended.
@@ -207,13 +211,7 @@ def _outside() -> int:
     return level
 
 
-# ----------------------------------------------------------------------------------------------------
 # Progress in a script or a notebook: one line that is written over.
-
-
-_INTERVAL = 0.2
-_Counts = Callable[[int, int], object]
-_Shares = Callable[[float], object]
 
 
 class _Line:

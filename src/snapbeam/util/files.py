@@ -32,26 +32,22 @@ __all__ = [
     "set_request",
 ]
 
-
-# ----------------------------------------------------------------------------------------------------
-# Which files that exist may be replaced: in Python every one, on the command line those that snapbeam wrote.
-#
-# Files carry a mark: NetCDF and JSON files the version as an attribute, pictures and animations a line in what they say
-# of themselves.  Text that a person edits, such as a parameter file, carries none and is never replaced unasked.
-
-
 VERSION = "snapbeam_version"
 """Name of the attribute of NetCDF files and of the key of JSON files."""
 MADE_BY = f"made by snapbeam {__version__}"
 """Provenance text in pictures and animations."""
 _MARK = b"made by snapbeam "
 _LOOKED_AT = 1 << 16  # bytes, at each end
-
-
 REQUEST = "request_hash"
 """Name of the attribute of NetCDF files that a command wrote: the hash of its parameters."""
 _HASHED = 64 * 2**20
 """Bytes of an input file up to which its content is part of the request; of larger ones size and time are."""
+
+
+# Which files that exist may be replaced: in Python every one, on the command line those that snapbeam wrote.
+#
+# Files carry a mark: NetCDF and JSON files the version as an attribute, pictures and animations a line in what they say
+# of themselves.  Text that a person edits, such as a parameter file, carries none and is never replaced unasked.
 
 
 @dataclass
@@ -198,9 +194,6 @@ def _attribute(path: Path, name: str) -> object:
 
     with h5py.File(path, "r") as file:
         return file.attrs.get(name)
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 def check_writable(

@@ -116,11 +116,11 @@ def canonical_json(parameters: Any) -> str:
     their values, dataclasses as their fields.
     """
     return json.dumps(
-        _plain(parameters, "parameters"), sort_keys=True, separators=(",", ":"), allow_nan=False
+        _canonical(parameters, "parameters"), sort_keys=True, separators=(",", ":"), allow_nan=False
     )
 
 
-def _plain(value: Any, name: str) -> Any:
+def _canonical(value: Any, name: str) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
     if isinstance(value, enum.Enum):
@@ -129,13 +129,13 @@ def _plain(value: Any, name: str) -> Any:
         for key in value:
             if not isinstance(key, str):
                 raise InputTypeError(f"{name}: key {key!r} must be text")
-        return {key: _plain(item, f"{name}.{key}") for key, item in value.items()}
+        return {key: _canonical(item, f"{name}.{key}") for key, item in value.items()}
     if isinstance(value, (np.ndarray, np.generic)):
         value = value.tolist()
     if value is None or isinstance(value, (str, bool)):
         return value
     if isinstance(value, (list, tuple)):
-        return [_plain(item, f"{name}[{at}]") for at, item in enumerate(value)]
+        return [_canonical(item, f"{name}[{at}]") for at, item in enumerate(value)]
     if isinstance(value, int):
         return value
     if isinstance(value, float):

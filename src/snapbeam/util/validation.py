@@ -47,6 +47,12 @@ __all__ = [
     "within",
 ]
 
+_F = TypeVar("_F", bound=Callable[..., Any])
+_ABSTRACT = {Sequence: "a sequence", Mapping: "a mapping", Iterable: "a sequence", Callable: "callable"}
+_LIBRARIES = {"xr": "xarray", "np": "numpy", "pd": "pandas"}
+_NAMESPACES = ("snapbeam", "snapbeam.dynamics", "snapbeam.model", "snapbeam.uncertainty")
+Kind = TypeVar("Kind")
+
 
 class InputError(ValueError):
     """Invalid parameter; the message names the parameter, its value and the allowed values.
@@ -320,14 +326,7 @@ def instance(name: str, value: Any, kind: type, words: str) -> Any:
     return value
 
 
-# ----------------------------------------------------------------------------------------------------
 # Types of the arguments of public functions, checked against their annotations.
-
-
-_F = TypeVar("_F", bound=Callable[..., Any])
-_ABSTRACT = {Sequence: "a sequence", Mapping: "a mapping", Iterable: "a sequence", Callable: "callable"}
-_LIBRARIES = {"xr": "xarray", "np": "numpy", "pd": "pandas"}
-_NAMESPACES = ("snapbeam", "snapbeam.dynamics", "snapbeam.model", "snapbeam.uncertainty")
 
 
 class _Names(dict[str, Any]):
@@ -452,11 +451,7 @@ def checked(function: _F) -> _F:
     return typing.cast(_F, checked)
 
 
-# ----------------------------------------------------------------------------------------------------
 # Things by name, some of which are made when they are first asked for.
-
-
-Kind = TypeVar("Kind")
 
 
 class NamedTable(dict[str, Kind]):

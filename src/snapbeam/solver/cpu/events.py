@@ -86,13 +86,11 @@ from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["accept_step", "locate_peak_force", "sample_inside_step"]
 
-
-# ----------------------------------------------------------------------------------------------------
-# Instant of the greatest penetration of a contact, or of the greatest force if it depends on the rate too.
-
-
 _PARTS = 24
 """Equal parts of a step, at whose ends the force is evaluated."""
+
+
+# Instant of the greatest penetration of a contact, or of the greatest force if it depends on the rate too.
 
 
 def locate_peak_force(
@@ -216,7 +214,6 @@ def _locate_peak_force(
     return implementation
 
 
-# ----------------------------------------------------------------------------------------------------
 # Samples inside a free step: penetration and centre between its ends.
 
 
@@ -258,7 +255,6 @@ def sample_inside_step(memory, layout, tip, flow, subintervals, subinterval, ste
         sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine
 
 
-# ----------------------------------------------------------------------------------------------------
 # The part of a tick between the onset of a force that begins with a jump and the tick at which its contact begins.
 
 
@@ -307,9 +303,6 @@ def _kick_at_onset(memory, layout, law, p, kinematics, accumulators, outputs):
         )
 
     return implementation
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 _OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)

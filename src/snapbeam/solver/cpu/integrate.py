@@ -252,7 +252,6 @@ def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scr
         accumulators_b.time, accumulators_b.status = now_b.t, _RUNNING
 
 
-# ----------------------------------------------------------------------------------------------------
 # A single run that is recorded: in slices, so that it can be observed, stopped and emptied.
 
 

@@ -54,8 +54,14 @@ from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["accept_step_restitution", "carry"]
 
+_LOCATIONS = 24
+"""Newton steps in which a hit is located, at most."""
+_NOISE = 1e-12
+"""Relative velocities below this multiple of the tip's speed are rounding."""
+_SOON = 0.05
+"""Maximum remaining duration of a chatter that is completed at once, over the shortest period."""
 
-# ----------------------------------------------------------------------------------------------------
+
 # A step in which the tip carries a single mode along, up to the release.
 
 
@@ -295,17 +301,6 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
     return IntegratorState(
         t, now.well_sign, 2.0 * gq + qr, rows, kinematics1, next_control, sample, now.stored_states, status
     ), step
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_LOCATIONS = 24
-"""Newton steps in which a hit is located, at most."""
-_NOISE = 1e-12
-"""Relative velocities below this multiple of the tip's speed are rounding."""
-_SOON = 0.05
-"""Maximum remaining duration of a chatter that is completed at once, over the shortest period."""
 
 
 @inlined

@@ -56,7 +56,7 @@ __all__ = [
     "IntegratorState",
     "KernelInput",
     "Rows",
-    "Run",
+    "RunConstants",
     "Scratch",
     "StepControl",
     "Workspace",
@@ -138,7 +138,7 @@ class StepControl(NamedTuple):
     """Steps since the run began or was stored."""
 
 
-class Run(NamedTuple):
+class RunConstants(NamedTuple):
     """Constants of a run."""
 
     tip: Tip
@@ -226,7 +226,7 @@ def run_of(memory, layout, stages, kernel_input, i):
         fastest = max(fastest, memory[layout.omega + row])
     shortest_subinterval = _TWO_PI / (SUBINTERVALS * fastest)
     step_subintervals = max(4, math.ceil(step_time / shortest_subinterval))
-    run = Run(
+    run = RunConstants(
         tip,
         clock,
         record.phase,

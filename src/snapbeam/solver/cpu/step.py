@@ -167,7 +167,6 @@ def with_velocity_dependent(memory, layout, spare, step):
     )  # fmt: skip
 
 
-# ----------------------------------------------------------------------------------------------------
 # The operations that the step is built from.
 
 
@@ -434,9 +433,6 @@ _STEP = build_step(
     )
 )
 _take_step, _begin_step, _take_stage = _STEP.take_step, _STEP.begin_step, _STEP.take_stage
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 @inlined

@@ -34,6 +34,11 @@ __all__ = [
     "synchroniser",
 ]
 
+SIMULATED = bool(config.ENABLE_CUDASIM)
+"""True if the Numba simulator replaces a device."""
+PARTS = 4
+"""Partial sums that every thread adds up for itself at the end of a sum over the block."""
+
 
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
@@ -136,16 +141,9 @@ def device_structure(ensemble: Ensemble, fewest_threads: int = FEWEST_THREADS) -
     return arranged._replace(values=values)
 
 
-# ----------------------------------------------------------------------------------------------------
 # A block of threads that integrates one trajectory: what it shares, its barrier and its sums.
 #
 # A sum has one order, fixed by the number of threads, and every thread reads the same bits back.
-
-
-SIMULATED = bool(config.ENABLE_CUDASIM)
-"""True if the Numba simulator replaces a device."""
-PARTS = 4
-"""Partial sums that every thread adds up for itself at the end of a sum over the block."""
 
 
 def device(function: Callable[..., Any]) -> Any:

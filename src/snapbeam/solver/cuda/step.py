@@ -44,7 +44,7 @@ class Mode(NamedTuple):
     high: float
 
 
-class State(NamedTuple):
+class BlockState(NamedTuple):
     """Displacement, velocity, and acceleration at the last kick of a thread's mode."""
 
     q: float
@@ -52,7 +52,7 @@ class State(NamedTuple):
     k: float
 
 
-class StepData(NamedTuple):
+class BlockStepData(NamedTuple):
     """All numbers that a step reads."""
 
     block: Any
@@ -140,7 +140,7 @@ def _step(order: int, sum_one: Any, sum_two: Any, sum_three: Any, tension: Any) 
 
     @device
     def begin(data):
-        return State(data.q, data.p, data.k), None
+        return BlockState(data.q, data.p, data.k), None
 
     @device
     def kick_weight(data, stage):
@@ -181,7 +181,7 @@ def _step(order: int, sum_one: Any, sum_two: Any, sum_three: Any, tension: Any) 
         if stage < flows:
             flow, lane = data.block.flows[data.slot * distinct + which[stage]], data.block.lane
             q, p = flow_mode(q, p, flow[0, lane], flow[1, lane], flow[2, lane], flow[3, lane])
-        return State(q, p, k), 0.0
+        return BlockState(q, p, k), 0.0
 
     take = build_step(
         Primitives(
@@ -206,7 +206,9 @@ def _step(order: int, sum_one: Any, sum_two: Any, sum_three: Any, tension: Any) 
         if touching:
             sine, cosine = sincos(phase)
         state, increment = take(
-            StepData(block, flows, gamma, tip, touching, g, mode.contact, slot, length, sine, cosine, q, p, k)
+            BlockStepData(
+                block, flows, gamma, tip, touching, g, mode.contact, slot, length, sine, cosine, q, p, k
+            )
         )
         contact = increment.contact
         return (

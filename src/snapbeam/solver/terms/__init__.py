@@ -8,10 +8,10 @@ from __future__ import annotations
 from typing import Any
 
 from snapbeam.solver.terms.axial_load import AxialLoad
-from snapbeam.solver.terms.base_excitation import BaseExcitation
+from snapbeam.solver.terms.base_excitation import BaseExcitationTerm
 from snapbeam.solver.terms.circuit import Circuit, ResistiveCircuit
-from snapbeam.solver.terms.external_force import ExternalForce
-from snapbeam.solver.terms.local_force import DampedLocalForce, LocalForce
+from snapbeam.solver.terms.external_force import ExternalForceTerm
+from snapbeam.solver.terms.local_force import DampedLocalForceTerm, LocalForceTerm
 from snapbeam.solver.terms.second_well import SecondWell
 
 __all__ = ["TERMS_AFTER_CONTACTS", "TERMS_BEFORE_CONTACTS", "WORKS"]
@@ -20,11 +20,11 @@ __all__ = ["TERMS_AFTER_CONTACTS", "TERMS_BEFORE_CONTACTS", "WORKS"]
 TERMS_BEFORE_CONTACTS: tuple[Any, ...] = (SecondWell,)
 """Terms whose accelerations are added before those of the further contacts: sums keep their order, and so their bits."""
 TERMS_AFTER_CONTACTS: tuple[Any, ...] = (
-    BaseExcitation,
-    ExternalForce,
+    BaseExcitationTerm,
+    ExternalForceTerm,
     AxialLoad,
-    LocalForce,
-    DampedLocalForce,
+    LocalForceTerm,
+    DampedLocalForceTerm,
     Circuit,
     ResistiveCircuit,
 )

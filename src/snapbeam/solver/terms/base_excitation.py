@@ -17,7 +17,7 @@ from snapbeam.solver.simd import WIDTH
 from snapbeam.solver.terms.force_of_time import ForceOfTime, absolute_product
 from snapbeam.solver.terms.interface import TermMemory
 
-__all__ = ["BaseExcitation"]
+__all__ = ["BaseExcitationTerm"]
 
 
 def _acceleration(drive: Any, memory: Any, argument: float) -> float:
@@ -31,7 +31,7 @@ def _acceleration_of_kind(drive, memory, argument):
     return lambda drive, memory, argument: drive.base_sign * own(drive, memory, argument)
 
 
-class BaseExcitation(ForceOfTime):
+class BaseExcitationTerm(ForceOfTime):
     """The base: its acceleration a, m/s^2, and the row b."""
 
     __slots__ = ()

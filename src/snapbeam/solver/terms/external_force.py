@@ -13,7 +13,7 @@ from snapbeam.solver.simd import WIDTH
 from snapbeam.solver.terms.force_of_time import ForceOfTime, absolute_product
 from snapbeam.solver.terms.interface import TermMemory
 
-__all__ = ["ExternalForce"]
+__all__ = ["ExternalForceTerm"]
 
 
 def _force(drive: Any, memory: Any, argument: float, number: int) -> float:
@@ -38,7 +38,7 @@ def _greatest_force_of_kind(drive, memory, number):
     return lambda drive, memory, number: own(drive, memory, 0.0, number)
 
 
-class ExternalForce(ForceOfTime):
+class ExternalForceTerm(ForceOfTime):
     """A force F, N, along the row V^T h."""
 
     __slots__ = ()

@@ -94,7 +94,6 @@ class ExternalWork(NamedTuple):
     """Sum of the absolute values of the works in the kicks."""
 
 
-# ----------------------------------------------------------------------------------------------------
 # How operations are made: text for the terms at hand, compiled into the kernel.
 
 
@@ -149,7 +148,6 @@ def _of_kernels() -> TypeError:
     return TypeError("operations of terms run in compiled code only")
 
 
-# ----------------------------------------------------------------------------------------------------
 # Forces.
 
 
@@ -191,7 +189,6 @@ def add_to_speed_bound(
     raise _of_kernels()
 
 
-# ----------------------------------------------------------------------------------------------------
 # States of terms: first-order equations, whose flow the linear modes drive.
 
 
@@ -272,7 +269,6 @@ def write_loss(
     raise _of_kernels()
 
 
-# ----------------------------------------------------------------------------------------------------
 # Energy and wells.
 
 
@@ -327,7 +323,6 @@ def kinematics_from_barrier(terms, kinematics):
     )
 
 
-# ----------------------------------------------------------------------------------------------------
 # Work.
 
 

@@ -17,7 +17,7 @@ from snapbeam.solver.contact_force import scalar_function
 from snapbeam.solver.simd import WIDTH, broadcast_load, dot, fma, load
 from snapbeam.solver.terms.interface import TermMemory
 
-__all__ = ["DampedLocalForce", "LocalDamping", "LocalForce"]
+__all__ = ["DampedLocalForceTerm", "LocalDamping", "LocalForceTerm"]
 
 
 _ORIGIN, _PLACE, _FORCE, _DAMPING, _WORK = range(5)
@@ -81,7 +81,7 @@ _damping_force, _damping_coefficient = (
 )
 
 
-class LocalForce(NamedTuple):
+class LocalForceTerm(NamedTuple):
     """Places in memory, and the law."""
 
     row: int
@@ -127,7 +127,7 @@ class LocalForce(NamedTuple):
     may_hide_onset = True  # type: ignore[misc]
 
 
-class DampedLocalForce(LocalForce):
+class DampedLocalForceTerm(LocalForceTerm):
     """The same of a law with damping."""
 
     __slots__ = ()

@@ -12,7 +12,7 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import numbered
 from snapbeam.model.system import System
 from snapbeam.solver.statistics import rows_for
-from snapbeam.sweeps.checkpoint.records import Record, TaskLog, refuse_links
+from snapbeam.sweeps.checkpoint.records import TaskLog, TaskRecord, refuse_links
 from snapbeam.sweeps.checkpoint.store import BASE, layers_of, read_description, read_task, reading
 from snapbeam.sweeps.export import to_dataset
 from snapbeam.sweeps.points import points_of, require_memory
@@ -75,7 +75,7 @@ def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
     refuse_links(folder, sweep=False)
     held = read_description(file)
     task_log = TaskLog(folder / "tasks.jsonl")
-    done: dict[str, dict[int, Record]] = {}
+    done: dict[str, dict[int, TaskRecord]] = {}
     for (name, task), record in task_log.records.items():
         if record.state == "done":
             done.setdefault(name, {})[task] = record
@@ -101,7 +101,7 @@ class _Table:
         return ResultTable(self._table.integers[start:stop], self._table.numbers[start:stop])
 
 
-def _work(described: dict[str, Any], name: str, done: dict[int, Record]) -> PointWork:
+def _work(described: dict[str, Any], name: str, done: dict[int, TaskRecord]) -> PointWork:
     """Return the work that a description determines; a finished task must have the same hash."""
     held, chunk = described["parameters"], int(described["points_per_task"])
     strikers = sum(numbered(section)[0] == "contact" for section in held["system"])
@@ -134,7 +134,9 @@ def _work(described: dict[str, Any], name: str, done: dict[int, Record]) -> Poin
     return work
 
 
-def _rows(folder: Path, work: PointWork, stage: Stage, done: dict[int, Record]) -> tuple[ResultTable, int]:
+def _rows(
+    folder: Path, work: PointWork, stage: Stage, done: dict[int, TaskRecord]
+) -> tuple[ResultTable, int]:
     """Return the rows of all points of a stage, and the number of points that are finished."""
     found = work.unfinished(stage.size)
     points = 0

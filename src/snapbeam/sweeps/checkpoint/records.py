@@ -28,8 +28,8 @@ __all__ = [
     "PARTIAL",
     "CheckpointError",
     "CheckpointLock",
-    "Record",
     "TaskLog",
+    "TaskRecord",
     "append_line",
     "durable_write",
     "member",
@@ -37,8 +37,14 @@ __all__ = [
     "refuse_links",
 ]
 
+PARTIAL = ".partial"
+"""Suffix of a file that is being written."""
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+_CHECK_DIGITS = 16
+_LARGEST_LOG = 2**30
+"""Largest task log, bytes: about a million tasks."""
 
-# ----------------------------------------------------------------------------------------------------
+
 # Errors of checkpoints and clusters.
 
 
@@ -56,13 +62,7 @@ class CheckpointError(OSError):
     """
 
 
-# ----------------------------------------------------------------------------------------------------
 # Files of a checkpoint: each is on the disk when the call returns, and only one process writes them.
-
-
-PARTIAL = ".partial"
-"""Suffix of a file that is being written."""
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 
 
 def durable_write(path: Path, data: bytes | memoryview) -> None:
@@ -168,16 +168,16 @@ class CheckpointLock:
         self._handle: int | None = None
 
     def __enter__(self) -> Self:
+        from filelock import lock_descriptor
+
         handle = open_own(self.path, os.O_RDWR)
-        try:
-            _lock(handle)
-        except OSError:
+        if not lock_descriptor(handle, blocking=False):
             holder = _holder(handle)
             os.close(handle)
             raise CheckpointError(
                 f"checkpoint = {str(self.path.parent)!r}: another process is writing it ({holder}); "
                 "wait for it, or stop it"
-            ) from None
+            )
         self._handle = handle
         with suppress(OSError):  # a full disk: the lock holds without its holder's name
             os.ftruncate(handle, 0)
@@ -206,27 +206,8 @@ def _holder(handle: int) -> str:
     return holder or "unknown"
 
 
-def _lock(handle: int) -> None:
-    try:
-        import fcntl
-    except ImportError:
-        import msvcrt
-
-        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
-        return
-    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_CHECK_DIGITS = 16
-_LARGEST_LOG = 2**30
-"""Largest task log, bytes: about a million tasks."""
-
-
 @dataclass(frozen=True, kw_only=True)
-class Record:
+class TaskRecord:
     """Entry of the task log: how one task ended, and what computed it."""
 
     stage: str
@@ -257,7 +238,7 @@ class Record:
         return f"{text}\t{_check(text)}"
 
     @classmethod
-    def from_line(cls, line: str) -> Record | None:
+    def from_line(cls, line: str) -> TaskRecord | None:
         """Return the record of a line; None if the line is torn or altered."""
         text, tab, check = line.rstrip("\n").rpartition("\t")
         if not tab or check != _check(text):
@@ -284,21 +265,21 @@ class TaskLog:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.records: dict[tuple[str, int], Record] = {}
+        self.records: dict[tuple[str, int], TaskRecord] = {}
         self.torn = 0
         if path.exists():
             if path.stat().st_size > _LARGEST_LOG:
                 raise InputError(f"checkpoint = {str(path.parent)!r}: {path.name!r} is larger than 1 GiB")
             with path.open(encoding="utf-8", errors="replace") as stream:
                 for line in stream:
-                    record = Record.from_line(line)
+                    record = TaskRecord.from_line(line)
                     if record is None:
                         self.torn += bool(line.strip())
                     else:
                         self.records[member(record.stage), record.task] = record
 
-    def write(self, record: Record) -> None:
+    def write(self, record: TaskRecord) -> None:
         """Append a record and sync the file."""
-        record = Record(**(asdict(record) | {"created": record.created or created_now()}))
+        record = TaskRecord(**(asdict(record) | {"created": record.created or created_now()}))
         append_line(self.path, record.line())
         self.records[record.stage, record.task] = record

@@ -33,8 +33,8 @@ from snapbeam.sweeps.checkpoint.records import (
     PARTIAL,
     CheckpointError,
     CheckpointLock,
-    Record,
     TaskLog,
+    TaskRecord,
     durable_write,
     member,
     refuse_links,
@@ -81,13 +81,20 @@ __all__ = [
     "snapped",
 ]
 
-
-# ----------------------------------------------------------------------------------------------------
-# The description of a checkpoint: reading it, and comparing it with the requested sweep.
-
-
 FORMAT = {"format": "snapbeam checkpoint", "format_version": 5}
 _KNOWN = {"map.json", "tasks.jsonl", "lock", "runs.zarr"}
+BASE = "base"
+"""Name of the stage that contains all points of a sweep that was not extended."""
+_SAME = 1e-12
+"""Relative difference up to which a requested value is a value of the checkpoint: ranges of different length round
+their values differently."""
+_Index = NDArray[np.int64]
+_DATA = "runs.zarr"
+_TABLES = ("integers", "numbers")
+_NOT_HERE = (errno.EROFS, errno.EACCES, errno.EPERM)
+
+
+# The description of a checkpoint: reading it, and comparing it with the requested sweep.
 
 
 def axes_apart(there: Mapping[str, Any], here: Mapping[str, Any]) -> dict[str, int]:
@@ -244,20 +251,10 @@ def _brief(value: Any) -> str:
     return "nothing" if value is None else f"{value!r}"
 
 
-# ----------------------------------------------------------------------------------------------------
 # Extending a checkpoint: the sweep is requested again with more values of its axes, and only new points are computed.
 #
 # Each extension is a stage of its own, with the points that the sweep before did not have.  No result is written
 # again: an extended checkpoint contains the stages of its earlier sweeps and one more.
-
-
-BASE = "base"
-"""Name of the stage that contains all points of a sweep that was not extended."""
-_SAME = 1e-12
-"""Relative difference up to which a requested value is a value of the checkpoint: ranges of different length round
-their values differently."""
-
-_Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -393,14 +390,6 @@ def snapped(setup: SweepSetup, path: str | os.PathLike[str] | None) -> tuple[Swe
         "values of the checkpoint are used"
     )
     return setup.with_points(Grid(axes, points.units)), words
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_DATA = "runs.zarr"
-_TABLES = ("integers", "numbers")
-_NOT_HERE = (errno.EROFS, errno.EACCES, errno.EPERM)
 
 
 class Checkpoint:
@@ -614,7 +603,7 @@ class Checkpoint:
     def _record(self, stage: Stage, task: int, state: str, content: str, provenance: Provenance) -> None:
         setup = self.work.setup
         self.task_log.write(
-            Record(
+            TaskRecord(
                 stage=stage.name,
                 task=task,
                 state=state,
@@ -662,7 +651,7 @@ class Checkpoint:
         return attrs
 
 
-def _recorded_provenance(record: Record) -> Provenance:
+def _recorded_provenance(record: TaskRecord) -> Provenance:
     return Provenance(**{field.name: getattr(record, field.name) for field in fields(Provenance)})
 
 
@@ -712,11 +701,10 @@ class CheckpointRows:
         return store.work.join(parts)
 
 
-# ----------------------------------------------------------------------------------------------------
 # The Zarr arrays of a checkpoint: one row for each run, one chunk with a check sum for each task.
 
 
-def read_task(folder: Path, stage: Stage, work: PointWork, record: Record) -> ResultTable | None:
+def read_task(folder: Path, stage: Stage, work: PointWork, record: TaskRecord) -> ResultTable | None:
     """Return the results of a finished task; None if they are missing or do not match its record.
 
     The descriptions of the Zarr arrays, which could request any codec and any size, are not used.

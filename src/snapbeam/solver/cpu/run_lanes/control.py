@@ -186,7 +186,6 @@ def load_flows(m, n, shape, lane_settings):
         _prepare_any_length(m, shape, lane_settings, odd)
 
 
-# ----------------------------------------------------------------------------------------------------
 # After a step of every lane: which contacts begin or end in it, and where such steps then end.
 
 
@@ -396,7 +395,6 @@ def detect_deepest_points(m, n, d, dv, turning):
     return found
 
 
-# ----------------------------------------------------------------------------------------------------
 # Steps that are taken: statistics, contacts that begin and end, energy, and where every lane stands then.
 
 

@@ -14,6 +14,8 @@ from snapbeam.solver.splitting import TURNS
 
 __all__ = ["shape_of"]
 
+_named_tuple: Any = namedtuple
+
 
 MOST = 16
 """Modes, at most."""
@@ -87,11 +89,7 @@ RUNS = 16
 """The run of each lane."""
 
 
-# ----------------------------------------------------------------------------------------------------
 # How many modes there are and which of them are coupled, as a type: code is compiled for each.
-
-
-_named_tuple: Any = namedtuple
 
 
 @cache

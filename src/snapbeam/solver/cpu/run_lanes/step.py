@@ -170,11 +170,10 @@ def _tension(modes: Modes) -> list[str]:
     return lines
 
 
-# ----------------------------------------------------------------------------------------------------
 # The operations that the step is built from.  Rows are tuples of registers, one for each mode.
 
 
-class State(NamedTuple):
+class LaneState(NamedTuple):
     """Rows of a step: displacements, velocities, and accelerations at the last kick."""
 
     q: Any
@@ -182,7 +181,7 @@ class State(NamedTuple):
     k: Any
 
 
-class StepData(NamedTuple):
+class LaneStepData(NamedTuple):
     """All numbers that a step of eight runs reads."""
 
     m: Any
@@ -207,7 +206,7 @@ class SineDrive(NamedTuple):
     omega: Any
 
 
-_KNOWN["State"] = State
+_KNOWN["LaneState"] = LaneState
 
 
 @inlined
@@ -239,7 +238,7 @@ def _row(terms: Iterable[str]) -> str:
 
 def _begin(modes: Modes) -> list[str]:
     rows = [_row(modes.row(i, field) for i in modes.each()) for field in (at.Q, at.P, at.K)]
-    return ["def begin(data):", "    m = data.m", f"    return State({', '.join(rows)}), None"]
+    return ["def begin(data):", "    m = data.m", f"    return LaneState({', '.join(rows)}), None"]
 
 
 def _form_products(modes: Modes) -> list[str]:
@@ -267,7 +266,7 @@ def _kick_and_flow(modes: Modes) -> list[str]:
         a = (f"load(m, {modes.place(i, at.FLOW + c * WIDTH)} + flow)" for c in range(4))
         lines += [f"        q{i}, p{i} = flow_mode(q[{i}], p[{i}], {', '.join(a)})"]
     lines += [f"        q, p = {_row(f'q{i}' for i in each)}, {_row(f'p{i}' for i in each)}"]
-    return [*lines, "    return State(q, p, k), splat(0.0)"]
+    return [*lines, "    return LaneState(q, p, k), splat(0.0)"]
 
 
 def _store_end(modes: Modes) -> list[str]:
@@ -304,7 +303,7 @@ def _step_of(shape: Any) -> Any:
         tip = Tip(offset, law, SineDrive(load(m, at.AMPLITUDE), load(m, at.OMEGA)))
         length, sine, cosine = load(m, at.LENGTH), load(m, at.SINE), load(m, at.COSINE)
         state, increment = take(
-            StepData(m, stages, flows, gamma, tip, in_contact, closed, length, sine, cosine)
+            LaneStepData(m, stages, flows, gamma, tip, in_contact, closed, length, sine, cosine)
         )
         store_end(m, state)
         store(m, at.GQ, increment.gq)
@@ -312,9 +311,6 @@ def _step_of(shape: Any) -> Any:
         return increment.contact
 
     return take_step
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 def _signals(modes: Modes) -> list[str]:
@@ -509,7 +505,6 @@ TEXTS = {
 }  # fmt: skip
 
 
-# ----------------------------------------------------------------------------------------------------
 # Functions over modes, each written out for the shape that it is called with.
 
 

@@ -291,7 +291,6 @@ def with_further_contact_energy(memory, others, energy):
     return energy
 
 
-# ----------------------------------------------------------------------------------------------------
 # The tangent flow: a kick by f_j(d_j) along c_j changes by -f_j'(d_j) (c_j . dq) along c_j.
 
 

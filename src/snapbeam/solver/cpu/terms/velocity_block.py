@@ -77,7 +77,6 @@ def numbers_of_block(count: int) -> int:
     return -(-count * (count + _PATH + 1) // WIDTH) * WIDTH
 
 
-# ----------------------------------------------------------------------------------------------------
 # Operations of channels.
 
 
@@ -123,7 +122,6 @@ def damping_forces_of_state(memory: Any, size: int, terms: Any, q: int, v: int, 
     raise TypeError("operations of channels run in compiled code only")
 
 
-# ----------------------------------------------------------------------------------------------------
 # A contact that loses energy: D = max(0, F + C (V - v)) with the striker's velocity V.
 
 
@@ -179,9 +177,6 @@ class ContactDamping(NamedTuple):
     def damping_forces_of_state(memory, size, term, q, v, d):
         """None: in free flight the contact is open."""
         memory[d + term.unknown] = 0.0
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 @inlined
