@@ -17,7 +17,7 @@ from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import split_name
 from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
 from snapbeam.plot.axes import dress, edges_of, is_geometric, positions, symbol_of
-from snapbeam.plot.style import CLASS_COLORS, figure_style, fix_ticks, new_figure, set_title
+from snapbeam.plot.style import CLASS_COLORS, figure_style, fix_ticks, legend_below, new_figure, set_title
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, instance, shown
 
@@ -83,7 +83,7 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
         for values, scale in ((x[kept], ax.set_xscale), (y[kept], ax.set_yscale)):
             if values.size and values.min() > 0.0 and values.max() > _DECADE * values.min():
                 scale("log")
-        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
+        legend_below(ax)
         fix_ticks(ax)
     return ax
 
@@ -241,8 +241,7 @@ def _cells(data: xr.Dataset, ax: Axes, dims: list[str], outcome: str, levels: tu
     dress(ax.yaxis, data, dims[1])
     for at, axis in ((0, ax.set_xlim), (1, ax.set_ylim)):
         axis(edges[at][0], edges[at][-1]) if not is_geometric(edges[at]) else None
-    if handles:
-        ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
+    legend_below(ax, handles)
 
 
 def _draw_measurements(ax: Axes, dims: list[str], measurements: MeasuredPoints) -> None:
@@ -404,7 +403,7 @@ def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
     words = str(data.attrs["quantity"]).replace("omega_1", r"$\omega_1$")
     text = f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}"
     ax.set_xlabel(textwrap.fill(text, 40))
-    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2, columnspacing=0.9)
+    legend_below(ax)
 
 
 def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
@@ -421,7 +420,7 @@ def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
         )  # fmt: skip
     ax.axvline(0.0, color="black", linewidth=0.6)
     ax.set_xlabel(f"Share of the variance: {data.attrs['quantity']}")
-    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
+    legend_below(ax)
 
 
 def _name(data: xr.Dataset, at: int, local: bool) -> str:
