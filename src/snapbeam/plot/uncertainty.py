@@ -11,7 +11,7 @@ from cmcrameri import cm
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
 from matplotlib.lines import Line2D
-from matplotlib.ticker import EngFormatter
+from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import split_name
@@ -80,9 +80,13 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
             if own.any():
                 _reported(dataset, ax, across, up, own, marker, color, f"constraints {word}")
         ax.set(xlabel=_label(dataset, across), ylabel=_label(dataset, up))
-        for values, scale in ((x[kept], ax.set_xscale), (y[kept], ax.set_yscale)):
+        for values, scale, axis in ((x[kept], ax.set_xscale, ax.xaxis), (y[kept], ax.set_yscale, ax.yaxis)):
             if values.size and values.min() > 0.0 and values.max() > _DECADE * values.min():
                 scale("log")
+                if values.max() < _DECADE**3 * values.min():  # numbers of one decade run into one another
+                    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+                    axis.set_major_formatter("{x:g}")
+                    axis.set_minor_formatter(NullFormatter())
         legend_below(ax)
         fix_ticks(ax)
     return ax
