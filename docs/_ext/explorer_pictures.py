@@ -62,7 +62,11 @@ def _seen(browser: Any, url: str) -> Image.Image:
     page.set_default_timeout(10.0 * _WAIT)
     page.goto(url)
     page.wait_for_function(_SHOWN if "tab=" not in url else "() => window.Bokeh && Bokeh.documents[0]")
-    page.wait_for_timeout(_WAIT if "view=" in url else _WAIT / 4)
+    page.wait_for_timeout(_WAIT / 4)
+    finer = page.get_by_role("button", name=re.compile("finer points"))
+    if "view=" in url and finer.is_visible():  # the page asks before a level that takes long
+        finer.click()
+        page.wait_for_timeout(_WAIT)
     picture = Image.open(io.BytesIO(page.screenshot()))
     page.close()
     return picture
