@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import io
+
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
@@ -78,8 +82,10 @@ def test_every_result_opens_with_all_its_figures(kind, tmp_path, monkeypatch):
     for name in figures_of(dataset)[1]:
         page.shown.value = name
         page.draw()
-        (image,) = page.image.data["image"]
+        (url,) = page.image.data["url"]
+        image = plt.imread(io.BytesIO(base64.b64decode(url.partition(",")[2])))
         assert image.shape[1] > 400 and np.unique(image).size > 10, name
+        assert page.plot.aspect_ratio == pytest.approx(image.shape[1] / image.shape[0]), name
     page.kind.value = "svg"
     page.save()
     assert bytes(page.downloads.source.data["bytes"][:5].tolist()) == b"<?xml"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import panel as pn
+from bokeh.models import PrintfTickFormatter
 from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
@@ -43,9 +44,11 @@ from snapbeam.explorer.maps import (
     python_lines,
     run_command,
     sections_of,
+    short_names,
     system_from,
     system_toml,
 )
+from snapbeam.explorer.run_view import across, within
 from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.style import Html, Look, framed_plot, styled
 from snapbeam.model.parameter_axes import CHANGES_UNITS
@@ -209,7 +212,10 @@ class WindowControl:
         self._waiting.end(0)
         self.card.show_windows()
         finest = int(window.stride[window.stride > 0].min()) if (window.stride > 0).any() else 27
-        self.card.tell(f"window: {window.done} of {window.wanted} points; blocks of {finest} cells now")
+        left = _duration((window.wanted - window.done) * window.seconds)
+        self.card.tell(
+            f"window: {window.done} of {window.wanted} points; blocks of {finest} cells now; about {left} left"
+        )
 
     def _ended(self, window: Window, token: Token, words: str) -> None:
         if token is self._token:
@@ -313,7 +319,9 @@ class MapCard:
         show = address.show if address.show in names else names[0]
         if address.show and address.show not in names:
             self._words.append(f"address: this map has no {address.show}")
-        options = {name.replace("_", " "): name for name in dims}
+        full = {name: parameter_of(source.skeleton, name) for name in dims}
+        words = short_names(full.values())
+        options = {words[full[name]]: name for name in dims}
         self.x = pn.widgets.Select(name="Across", options=options, value=x, width=170)
         self.y = pn.widgets.Select(name="Upward", options=options, value=y, width=170)
         self.show = pn.widgets.Select(
@@ -459,9 +467,9 @@ class MapCard:
     def layout(self) -> Any:
         """The card."""
         return pn.Column(
-            pn.FlexBox(self.x, self.y, self.show, margin=0), self.slider_box, self.holder, self.key, self.hover,
-            self.typed, pn.FlexBox(self.auto, self.again, self.stop, self.more, self.layers, align_items="center", margin=0),
-            self.state,
+            pn.FlexBox(self.x, self.y, self.show, margin=0), self.slider_box, self.holder,
+            pn.Row(self.state, self.stop, self.more, sizing_mode="stretch_width", margin=0), self.key, self.hover,
+            self.typed, pn.FlexBox(self.auto, self.again, self.layers, align_items="center", margin=0),
             sizing_mode="stretch_width", css_classes=["card"],
         )  # fmt: skip
 
@@ -773,6 +781,7 @@ class SystemCard:
         self.page = page
         self.system: System
         self.fields: dict[str, Any] = {}
+        self._varied = 0.0
         self._filled: dict[str, Any] = {}
         self.words = Html("", sizing_mode="stretch_width", css_classes=["system-words"])
         self.facts = Html("", sizing_mode="stretch_width", css_classes=["system-facts"])
@@ -782,9 +791,16 @@ class SystemCard:
         back = pn.widgets.Button(name="Back to the map's", width=130)
         back.on_click(lambda _: page.post(self._back))
         save = pn.widgets.Button(name="Save as TOML", width=110)
-        save.on_click(lambda _: page.post(self._save))
+        save.on_click(lambda _: page.post(self.save))
         self.preset = pn.widgets.Select(name="Preset", options=["", *_PRESETS], width=210)
         self.preset.param.watch(lambda event: page.post(lambda: self._chosen(event.new)), "value")
+        self.vary = pn.widgets.Select(name="Vary by a slider", width=210)
+        self.vary.param.watch(lambda _: page.post(self._vary), "value")
+        self.slider = pn.widgets.FloatSlider(
+            visible=False, width=330, format=PrintfTickFormatter(format="%.6g")
+        )
+        self.slider.param.watch(lambda event: page.post(lambda: self._dragged(event.new)), "value")
+        self.slider.param.watch(lambda event: page.post(lambda: self._released(event.new)), "value_throttled")
         laws = {_LAWS.get(kind, kind.replace("_", " ")): kind for kind in _kinds("contact")}
         self.law = pn.widgets.Select(name="Contact law", options=laws, width=160)
         self.law.param.watch(lambda _: page.post(self._law_changed), "value")
@@ -797,6 +813,7 @@ class SystemCard:
     def layout(self) -> Any:
         """The card."""
         return pn.Column(
+            pn.FlexBox(self.vary, self.slider, margin=0, align_items="center"),
             pn.FlexBox(self.preset, pn.Column("Open a TOML file", self.file, margin=0), margin=0),
             self._buttons, self.words, self.facts, self.box,
             sizing_mode="stretch_width", css_classes=["card", "system"],
@@ -831,17 +848,51 @@ class SystemCard:
             if self._law in self.law.options.values():
                 self.law.value = self._law
         self._make_fields(typed)
+        self._vary()
         self._show_facts()
+
+    def _vary(self) -> None:
+        """Let the slider hold the chosen parameter, from half of its value to one and a half."""
+        held, rows = self._held(), parameters()
+        numbers = [name for name in self.fields if isinstance(held.get(name), (int, float)) and held[name]]
+        self.vary.options = {"": ""} | {
+            name.replace("_", " "): name for name in numbers if rows[name].quantity.kind is not bool
+        }
+        name = str(self.vary.value or "")
+        self.slider.visible = bool(name)
+        if name:
+            item, value = rows[name].quantity, held[name]
+            ends = sorted((0.5 * value, 1.5 * value))
+            low, high = max(ends[0], item.low), min(ends[1], item.high)
+            step = 1 if item.kind is int else (high - low) / 500
+            unit = "" if item.unit == "1" else f" ({item.unit})"
+            self._varied = value
+            self.slider.param.update(
+                name=f"{item.long_name}{unit}", start=low, end=max(high, low + step), step=step, value=value
+            )
+
+    def _dragged(self, value: float) -> None:
+        if value != self._varied:
+            self.page.drag({str(self.vary.value): parameters()[self.vary.value].quantity.kind(value)})
+
+    def _released(self, value: float) -> None:
+        self.page.drag({})
+        if value != self._varied:
+            self._use({str(self.vary.value): parameters()[self.vary.value].quantity.kind(value)})
 
     def _edited(self) -> dict[str, Any]:
         return {name: each.value for name, each in self.fields.items() if each.value != self._filled[name]}
 
-    def _make_fields(self, typed: Mapping[str, Any]) -> None:
+    def _held(self) -> dict[str, Any]:
+        """Values of the parameters of the system and of its integration, by dotted name."""
         held = dict(self.system.parameters)
         held |= {
             f"integration.{name}": value for name, value in integration_mapping(self.integration).items()
         }
-        held["integration.cycles"] = self.integration.cycles_or_default
+        return held | {"integration.cycles": self.integration.cycles_or_default}
+
+    def _make_fields(self, typed: Mapping[str, Any]) -> None:
+        held = self._held()
         rows = self._rows()
         if [row.name for row in rows] != list(self.fields):
             self.fields = {row.name: self._field(row) for row in rows}
@@ -870,7 +921,9 @@ class SystemCard:
             return pn.widgets.Select(options=list(row.quantity.choices), **common)
         if row.quantity.kind is bool:
             return pn.widgets.Select(options={"no": False, "yes": True}, **common)
-        return pn.widgets.TextInput(placeholder=row.limits, **common)
+        field = pn.widgets.TextInput(placeholder=row.limits, **common)
+        field.param.watch(lambda _: self.page.post(self.apply), "enter_pressed")
+        return field
 
     def _typed(self, name: str) -> Any:
         """The value in a field; None if it is empty.  Refused (InputError) if it is no number, or out of range."""
@@ -904,7 +957,13 @@ class SystemCard:
     def apply(self) -> None:
         """Apply the values of the fields; invalid ones give a message and change nothing."""
         try:
-            changed = self.changed_fields()
+            self._use(self.changed_fields())
+        except InputError as error:
+            self.refuse(str(error))
+
+    def _use(self, changed: Mapping[str, Any]) -> None:
+        """Compute with some parameters changed."""
+        try:
             card = self.page.card
             assert card.system is not None
             held = sections_of(card.system, card.integration)
@@ -949,7 +1008,8 @@ class SystemCard:
         """Say what cannot be done."""
         self.words.object = Markup('<p class="bad" role="alert">{}</p>').format(words)
 
-    def _save(self) -> None:
+    def save(self) -> None:
+        """Give the parameter file of the system."""
         try:
             text = system_toml(self.system, self.integration)
         except InputError as error:
@@ -1037,9 +1097,9 @@ class TakeCard:
         self.dots = pn.widgets.FileInput(accept=".csv", multiple=False, width=220)
         self.dots.param.watch(lambda event: page.post(lambda: self._dots(event.new)), "value")
         buttons = {
-            "Map": lambda: self._picture("map"), "Run": lambda: self._picture("run"),
+            "Map": self._map_picture, "Run": self._run_picture,
             "MP4": lambda: self._animation(".mp4"), "GIF": lambda: self._animation(".gif"),
-            "Run as NetCDF": self._run_data, "Map as NetCDF": self._map_data, "Window as NetCDF": self._window_data,
+            "Parameter file": lambda: page.system_card().save(), "Run as NetCDF": self._run_data, "Map as NetCDF": self._map_data, "Window as NetCDF": self._window_data,
         }  # fmt: skip
         self.buttons = {name: pn.widgets.Button(name=name, width=145) for name in buttons}
         for name, work in buttons.items():
@@ -1062,7 +1122,7 @@ class TakeCard:
             Html(_HEADING.format(f"Animation of the beam, of at most {_LONGEST:g} of the visible cycles"), margin=0),
             pn.FlexBox(make["MP4"], make["GIF"], self.length, self.slow, margin=0, align_items="center"),
             Html(_HEADING.format("Data"), margin=0),
-            pn.FlexBox(make["Run as NetCDF"], make["Map as NetCDF"], make["Window as NetCDF"], self.link, margin=0),
+            pn.FlexBox(make["Parameter file"], make["Run as NetCDF"], make["Map as NetCDF"], make["Window as NetCDF"], self.link, margin=0),
             Html(_HEADING.format("Measured points to lay over the map (CSV)"), margin=0), self.dots,
             pn.FlexBox(self.words, self.cancel, margin=0), self.text, sizing_mode="stretch_width", css_classes=["card", "take"],
         )  # fmt: skip
@@ -1090,7 +1150,7 @@ class TakeCard:
                     beside, command
                 )
             )
-            text = python_lines(run.system, run.integration)
+            text = python_lines(run.system, run.integration, page.runs[page.which].picture)
             parts.append(Markup('<h2>The same in Python</h2><pre class="python">{}</pre>').format(text))
         window = self._window()
         if window is not None:
@@ -1152,17 +1212,24 @@ class TakeCard:
             self.words.object = _BAD.format("there is no run: click on a point of the map first")
         return run
 
-    def _picture(self, of: str) -> None:
+    def _run_picture(self) -> None:
+        """Give the figure of the view that is seen, of the part of the run that is seen."""
+        from snapbeam.plot.dataset import plot_dataset
+
+        run, view = self._run(), self.page.runs[self.page.which]
+        if run is None:
+            return
+        name, data, options = view.picture, run.dataset, {"window": view.window}
+        if name != "run":
+            data, options = data.isel(time=within(across(run)[0], *view.window)), {}
+        self._make(
+            name, f".{self.kind.value}", lambda path, _: _draw(plot_dataset, data, name, path=path, **options)
+        )
+
+    def _map_picture(self) -> None:
         from snapbeam.plot.map import plot_points, plot_response_map, plot_statistic
-        from snapbeam.plot.run import plot_run
 
         suffix = f".{self.kind.value}"
-        if of == "run":
-            run = self._run()
-            if run is not None:
-                window = self.page.runs[self.page.which].window
-                self._make("run", suffix, lambda path, _: _draw(plot_run, run.dataset, window, path=path))
-            return
         try:
             cut = self._cut()
         except InputError as error:

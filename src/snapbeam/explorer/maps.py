@@ -562,6 +562,15 @@ class Point:
         )
 
 
+def short_names(parameters: Iterable[str]) -> dict[str, str]:
+    """Words for some parameters by their dotted names: without the section, if no other one has the same."""
+    last = {name: name.rpartition(".")[2] for name in parameters}
+    alone = [word for word in last.values() if list(last.values()).count(word) == 1]
+    return {
+        name: (word if word in alone else lookup(name).short).replace("_", " ") for name, word in last.items()
+    }
+
+
 def _brief(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
@@ -724,7 +733,7 @@ class Axis:
 
         attrs = source.skeleton[name].attrs
         text, unit = source.label(name)
-        text = text.replace("omega_1", "ω₁")
+        text = text.replace("omega_1", "ω₁").replace("^2", "²")
         symbol = ""
         if "parameter" in attrs or name in ("frequency_ratio", "velocity_amplitude", "location"):
             symbol = plain_symbol(lookup(str(attrs.get("parameter", name))).quantity.symbol)
@@ -1583,8 +1592,8 @@ def map_command(window: Window, fixed: Mapping[str, Any]) -> str:
     return shlex.join([*parts, "-o", "window.nc", "--plot", "window.png"])
 
 
-def python_lines(system: System, integration: Integration) -> str:
-    """Self-contained Python code that computes a run of a system."""
+def python_lines(system: System, integration: Integration, figure: str = "run") -> str:
+    """Self-contained Python code that computes a run of a system and draws a *figure* of it."""
     run = _integration_section(integration)
     arguments = ", ".join(f"{name}={value!r}" for name, value in run.items())
     sections = plain(system.to_mapping())
@@ -1598,4 +1607,5 @@ def python_lines(system: System, integration: Integration) -> str:
         f"run = sb.simulate(system, sb.Integration({arguments}))\n"
         "print(run.summary)\n"
         'run.save("run.nc")\n'
+        f'run.dataset.snapbeam.plot("{figure}").get_figure(root=True).savefig("{figure}.png")\n'
     )

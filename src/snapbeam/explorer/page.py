@@ -29,7 +29,16 @@ from snapbeam.explorer.jobs import (
     samples_of,
     too_large,
 )
-from snapbeam.explorer.maps import Point, compared, difference, patched, sections_of, system_from, values_of
+from snapbeam.explorer.maps import (
+    Point,
+    compared,
+    difference,
+    patched,
+    sections_of,
+    short_names,
+    system_from,
+    values_of,
+)
 from snapbeam.explorer.maps import chances as chances_of
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
@@ -112,6 +121,8 @@ _PATIENT = 150
 """Milliseconds after which a run that is still computed is said to be."""
 _SENT = 40
 """Milliseconds that what was drawn needs to be on its way to the browser."""
+_DRAGGED = 30
+"""Cycles of the run that is shown while a slider is dragged."""
 _LONGEST = 1.0
 """Seconds for which the rest of a run waits until its first look has been sent."""
 
@@ -141,6 +152,8 @@ class Page(Tab):
         self.runs[0].turned = self.write_address
         self.points: list[Point | None] = [None, None]
         self._tokens: list[Token | None] = [None, None]
+        self._dragged: Mapping[str, Any] = {}
+        self._dragging = False
         self.add_run: Callable[[RunView], None] = lambda view: None
         self.share_height: Callable[[bool], None] = lambda two: None
         self.compare = pn.widgets.Toggle(name="Two points", width=100, align="center")
@@ -230,10 +243,10 @@ class Page(Tab):
         from snapbeam.model.parameters import lookup
 
         self.fields, self.errors = {}, {}
-        for name in dict.fromkeys(names):
+        for name, words in short_names(names).items():
             row = lookup(name)
             unit = "" if row.quantity.unit == "1" else f" ({row.quantity.unit})"
-            field = pn.widgets.TextInput(name=row.short.replace("_", " ") + unit, value="", width=170)
+            field = pn.widgets.TextInput(name=words + unit, value="", width=170)
             field.param.watch(lambda _: self.post(self._ask_typed), "enter_pressed")
             self.fields[name] = field
             self.errors[name] = Html("", width=180, margin=(0, 0, 0, 10), css_classes=["field-error"])
@@ -401,6 +414,37 @@ class Page(Tab):
             self.post(tell)
 
         self.shared.jobs.run(lambda t: conditioned(run, t), done, token)
+
+    def drag(self, changes: Mapping[str, Any]) -> None:
+        """Show the first cycles of the run with some parameters changed; without any, no more of them."""
+        self._dragged = changes
+        if not changes or self._dragging:  # the latest changes follow when the run before is shown
+            return
+        self._dragging, which, (base, how) = True, self.which, self.shown_system()
+        how = how.replace(cycles=min(how.cycles_or_default, _DRAGGED), engine="auto", threads=None)
+
+        def work(token: Token) -> Run:
+            system, short = system_from(patched(sections_of(base, how), changes))
+            return _quick(system, short, token) or sb.simulate(system, short, progress=token.check)
+
+        def done(run: Run | None, error: str) -> None:
+            self.post(lambda: tell(run, error))
+
+        def tell(run: Run | None, error: str) -> None:
+            self._dragging = False
+            if self._dragged is not changes:
+                self.drag(self._dragged)
+            elif run is None:
+                self.runs[which].fail(error)
+            else:
+                values = values_of(self.card.plane.parameters, run.system, run.integration)
+                words = ", ".join(f"{name} = {value:.5g}" for name, value in changes.items())
+                self.runs[which].notes = {}
+                self.runs[which].show(run, f"{words}, the first {run.integration.cycles} cycles", fresh=True)
+                self.card.marks = [(values, "")]
+                self.card._draw_marks()
+
+        self.shared.jobs.run(work, done, Token(RUN_SECONDS))
 
     def use(self, system: System, integration: Integration, given: Collection[str]) -> None:
         """Compute with another system from now on; the point moves to those of the *given* parameters that the map sweeps.

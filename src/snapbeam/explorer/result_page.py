@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import io
 from typing import Any
 
-import numpy as np
 import panel as pn
 from bokeh.events import Tap
 from bokeh.models import ColumnDataSource
@@ -19,6 +20,7 @@ from snapbeam.explorer.maps import ResultSource, sections_of, started
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.style import Html, look_of, sheet, styled
+from snapbeam.model.parameters import parameters
 from snapbeam.plot.dataset import start_of
 from snapbeam.plot.style import save_figure
 
@@ -58,11 +60,13 @@ class ResultPage(Tab):
         save.on_click(lambda _: self.post(self.save))
         self.downloads = Downloads()
         self.words = Html("", sizing_mode="stretch_width", css_classes=["take-words"])
-        self.image = ColumnDataSource({"image": [], "w": [], "h": []}, name="result")
-        self.plot = figure(toolbar_location=None, sizing_mode="stretch_width", tools="", name="result-plot")
+        self.image = ColumnDataSource({"url": [], "w": [], "h": []}, name="result")
+        self.plot = figure(
+            toolbar_location=None, sizing_mode="scale_width", aspect_ratio=1.4, tools="", name="result-plot"
+        )
         self.plot.axis.visible = self.plot.grid.visible = False
         self.plot.min_border = 0
-        self.plot.image_rgba("image", 0, 0, "w", "h", source=self.image)
+        self.plot.image_url("url", 0, 0, "w", "h", anchor="bottom_left", source=self.image)
         self.plot.on_event(Tap, lambda event: self.tapped(event.x, event.y))
         self.axes: Any = None
         self.view = RunView(self.look, "A", self.post, self.later)
@@ -104,10 +108,18 @@ class ResultPage(Tab):
         self.later(self.view.complete, 700)
 
     def _facts(self) -> Markup:
-        """The attributes that a line can hold."""
-        row = Markup('<tr><td class="faint">{}</td><td>{}</td></tr>')
-        held = {name: f"{v:.6g}" if isinstance(v, float) else str(v) for name, v in self.source.attrs.items()}
-        rows = [row.format(name.replace("_", " "), text) for name, text in held.items() if 0 < len(text) < 60]
+        """The title and the parameters among the attributes, with their units."""
+        row = Markup('<tr><td class="faint">{}</td><td>{} {}</td></tr>')
+        known = {each.short: each.quantity.unit for each in parameters().values()}
+        known |= {each.name.replace(".", "_"): each.quantity.unit for each in parameters().values()}
+        held = {name: value for name, value in self.source.attrs.items() if name in known or name == "title"}
+        rows = [
+            row.format(
+                name.replace("_", " "), f"{value:.6g}" if isinstance(value, float) else value,
+                known.get(name, "").removesuffix("1"),
+            )
+            for name, value in held.items() if len(str(value)) < 60
+        ]  # fmt: skip
         return Markup('<table class="facts">{}</table>').format(Markup("").join(rows))
 
     # ------------------------------------------------------------------ figures
@@ -119,16 +131,17 @@ class ResultPage(Tab):
     def draw(self) -> None:
         """Draw the chosen figure."""
 
-        def work(_: Token) -> tuple[Any, Any]:
+        def work(_: Token) -> tuple[bytes, tuple[int, int], Any]:
             from matplotlib.backends.backend_agg import FigureCanvasAgg
 
             with drawing:
                 whole, axes = self._paint()
                 canvas = FigureCanvasAgg(whole)
                 whole.set_dpi(_DOTS)
-                canvas.draw()
+                stream = io.BytesIO()
+                canvas.print_png(stream)
                 _close(whole)
-                return np.asarray(canvas.buffer_rgba())[::-1].copy(), axes
+                return stream.getvalue(), canvas.get_width_height(), axes
 
         def done(found: Any, error: str) -> None:
             self.post(lambda: self._drawn(found, error))
@@ -139,13 +152,12 @@ class ResultPage(Tab):
         if found is None:
             self.words.object = Markup('<p class="bad" role="alert">{}</p>').format(error)
             return
-        pixels, self.axes = found
-        height, width = pixels.shape[:2]
+        picture, (width, height), self.axes = found
         self.plot.x_range.update(start=0, end=width)
         self.plot.y_range.update(start=0, end=height)
-        self.plot.aspect_ratio = width / height
-        image = pixels.view(np.uint32).reshape(height, width)
-        self.image.data = {"image": [image], "w": [width], "h": [height]}
+        self.plot.update(aspect_ratio=width / height, max_width=round(1.2 * width))
+        url = "data:image/png;base64," + base64.b64encode(picture).decode()
+        self.image.data = {"url": [url], "w": [width], "h": [height]}
 
     def save(self) -> None:
         """Give the figure as a file."""
@@ -199,7 +211,15 @@ class ResultPage(Tab):
             return sb.simulate(system, integration, progress=token.check), words
 
         def done(found: tuple[Run, str] | None, error: str) -> None:
-            self.post(lambda: self.view.fail(error or _CLICK) if found is None else self.show(*found))
+            self.post(lambda: tell(found, error))
+
+        def tell(found: tuple[Run, str] | None, error: str) -> None:
+            if error:
+                self.view.fail(error)
+            elif found is None:
+                self.view.forget(_CLICK)
+            else:
+                self.show(*found)
 
         self.shared.jobs.run(work, done, token)
 

@@ -42,6 +42,7 @@ from snapbeam.explorer.style import (
     sheet,
     styled,
 )
+from snapbeam.plot.dataset import figures_of
 from snapbeam.util.si_prefixes import scale_of
 
 if TYPE_CHECKING:
@@ -74,6 +75,8 @@ class RunPanel:
     """
 
     title = ""
+    picture = "run"
+    """The figure of a run that shows the same in a file."""
 
     def __init__(self, look: Look, cursor: Cursor) -> None:
         self.look, self.cursor = look, cursor
@@ -431,6 +434,7 @@ class Energy(RunPanel):
     """Work, what became of it, and whether the books balance."""
 
     title = "Energy"
+    picture = "energies"
 
     def build(self) -> list[Any]:
         """Return the models of this view."""
@@ -597,6 +601,7 @@ class Modal(RunPanel):
     """Amplitudes of the buckling modes."""
 
     title = "Modes"
+    picture = "modal_amplitudes"
 
     def build(self) -> list[Any]:
         """Return the models of this view."""
@@ -672,6 +677,7 @@ class Phase(RunPanel):
     """Displacement against velocity, all of it and once a cycle."""
 
     title = "Phase"
+    picture = "phase_portrait"
 
     def build(self) -> list[Any]:
         """Return the models of this view."""
@@ -762,6 +768,7 @@ class Spectrum(RunPanel):
     """Which frequencies the beam moves at."""
 
     title = "Spectrum"
+    picture = "spectrum"
 
     def build(self) -> list[Any]:
         """Return the models of this view."""
@@ -902,8 +909,9 @@ class WaveformPanel(RunPanel):
         self.low.xaxis.axis_label = label
         shown = []
         struck = "striker_displacement" in data or "midspan_displacement" not in data
-        for name, source in self.sources.items():
+        for (name, source), entry in zip(self.sources.items(), self.top.legend[0].items, strict=False):
             there = name in data and (struck or name != "displacement_at_striker")
+            entry.visible = there
             own = [envelope(x, each, *self.span) for each in _columns_of(data, name).T] if there else []
             source.data = _curve(own)
             shown += [y for _, y in own]
@@ -1006,6 +1014,12 @@ class RunView:
         """The view that is seen."""
         return self.parts[self.tabs.active]
 
+    @property
+    def picture(self) -> str:
+        """The figure of the view that is seen, or the first one where the run has none of it."""
+        name = str(self.active.picture)
+        return name if self.run is not None and name in figures_of(self.run.dataset)[1] else "run"
+
     # ------------------------------------------------------------------ what is shown
 
     def begin(self, words: str) -> None:
@@ -1024,12 +1038,12 @@ class RunView:
         self.tabs.css_classes = ["stale"]
         self._head(_BAD.format("no run"), words)
 
-    def forget(self) -> None:
-        """Show no run; the pictures of the run before are greyed."""
+    def forget(self, words: str = FIRST) -> None:
+        """Show no run, and *words* on how to ask for one; the pictures of the run before are greyed."""
         self.notes = {}
         self._write_notes()
         self.tabs.css_classes = ["stale"] if self.run is not None else []
-        self.head.object = _FAINT.format(FIRST)
+        self.head.object = _FAINT.format(words)
 
     def _head(self, kind: str, words: str, below: str = "") -> None:
         line = Markup("<br>{}").format(below) if below else ""

@@ -16,8 +16,10 @@ from urllib.parse import parse_qsl, quote, urlencode
 
 import panel as pn
 from tornado.httputil import HTTPServerRequest
+from tornado.iostream import StreamClosedError
 from tornado.routing import Router
 from tornado.web import OutputTransform, RequestHandler
+from tornado.websocket import WebSocketClosedError
 
 from snapbeam import InputError, InputTypeError, Integration, System
 from snapbeam.explorer.jobs import BODY, SESSIONS
@@ -178,6 +180,22 @@ class _Headers(OutputTransform):
         return status_code, headers, chunk
 
 
+_LOGGERS = ("asyncio", "bokeh.server.protocol_handler", "bokeh.server.views.ws", "tornado.application")
+
+
+def _lives_on(record: logging.LogRecord) -> bool:
+    """Return False for a message that a tab was closed while something was sent to it or received from it."""
+    error = record.exc_info[1] if record.exc_info else None
+    at = error.__traceback__ if error is not None else None
+    while at is not None and at.tb_next is not None:
+        at = at.tb_next
+    of_session = at is not None and at.tb_frame.f_globals.get("__name__") == "bokeh.server.connection"
+    closed = isinstance(error, (WebSocketClosedError, StreamClosedError)) or (
+        isinstance(error, AssertionError) and of_session  # the session was ended before its last message came
+    )
+    return not closed and "connection was closed" not in str(record.msg)
+
+
 def make_server(
     shared: Shared,
     address: str = "127.0.0.1",
@@ -223,6 +241,8 @@ def make_server(
         )  # fmt: skip
     except OSError as error:
         raise InputError(f"port = {port}: cannot be used, {error.strerror or error}") from None
+    for name in _LOGGERS:
+        logging.getLogger(name).addFilter(_lives_on)  # a filter that it has already is not added again
     application = server._tornado
     application.transforms.append(_Headers)
     server._http.request_callback = Gate(application, shared, hosts, prefix, token)

@@ -198,9 +198,9 @@ def legend(plot: Any, look: Look) -> None:
         item.label_text_color = look.text
         item.label_text_font_size = look.font(11)
         item.border_line_color = None
-        item.padding, item.spacing, item.margin = 3, 8, 4
+        item.padding, item.spacing, item.margin = 3, 5, 4
         item.glyph_height = item.label_height = round(14 * look.scale)
-        item.glyph_width = 34
+        item.glyph_width = 22
         item.click_policy = "hide"
 
 

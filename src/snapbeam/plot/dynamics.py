@@ -13,7 +13,15 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from snapbeam.plot.axes import dress, edges_of, positions
-from snapbeam.plot.style import SERIES_COLORS, axes_or_new, figure_style, fix_ticks, frame, set_title
+from snapbeam.plot.style import (
+    SERIES_COLORS,
+    axes_or_new,
+    figure_style,
+    fix_ticks,
+    frame,
+    legend_below,
+    set_title,
+)
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, checked, choice, instance, shown
 
@@ -102,8 +110,7 @@ def plot_diagram(
             f"{kind} at {'mid-span' if variable.startswith('midspan') else 'the striker'}\nonce a period, {unit}"
         )
         unique = {handle.get_label(): handle for handle in handles}
-        place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
-        ax.legend(handles=list(unique.values()), ncols=4, **place)
+        legend_below(ax, list(unique.values()), 3)
     return ax
 
 
@@ -231,10 +238,7 @@ def _lifetime_cells(
         size = edges[0][column + 1] - left, edges[1][row + 1] - low
         ax.add_patch(Rectangle((left, low), *size, **hatched))
     if endless.any() and legend:
-        ax.legend(
-            handles=[Patch(**hatched, label="snaps on, no end seen")],
-            loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2,
-        )  # fmt: skip
+        legend_below(ax, [Patch(**hatched, label="snaps on, no end seen")])
     dress(ax.xaxis, dataset, dims[0])
     dress(ax.yaxis, dataset, dims[1])
 
@@ -442,9 +446,7 @@ def _undecided_cells(ax: Axes, edges: list[Any], value: Any, error: Any) -> None
             label="sign not decided",
         )  # fmt: skip
         handles += marks
-    figure = ax.get_figure(root=True)
-    assert figure is not None
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    legend_below(ax, handles)
 
 
 @checked
@@ -490,7 +492,7 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
                     )
             ax.set_aspect("equal", adjustable="datalim")
             ax.set(xlabel="Floquet multiplier, real part", ylabel="Floquet multiplier, imaginary part")
-            ax.legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=3)
+            legend_below(ax, columns=3)
     return ax
 
 
@@ -709,9 +711,7 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         unseen = 100 * float(dataset.attrs["unseen_share_95"])
         words = f"Attractors not found: below {unseen:.2g} % of the states (95 %)"
         set_title(ax, f"{ax.get_title('left')}\n{words}".lstrip())
-        figure = ax.get_figure(root=True)
-        assert figure is not None
-        figure.legend(loc="outside lower center", ncols=1)
+        legend_below(ax, columns=1)
     return ax
 
 
@@ -802,8 +802,6 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             for i in range(count + 1)
             if i > 0 or (labels == -1).any()
         ]
-        figure = ax.get_figure(root=True)
-        assert figure is not None
         if (share := float(dataset.attrs.get("sensitive_share", 0.0))) > 0.0:
             label = f"sensitive: {100 * share:.2g} %"
             points = np.argwhere(dataset["sensitive"].values == 1)
@@ -812,7 +810,7 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
                 label=label,
             )  # fmt: skip
             handles.append(dots)
-        figure.legend(handles=handles, loc="outside lower center", ncols=1)
+        legend_below(ax, handles, 1)
     return ax
 
 
@@ -891,8 +889,6 @@ def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             ax.axhline(
                 point, color=_DOWN_STATES, linewidth=0.9, dashes=(4, 2), label=words if i == 0 else None
             )
-        figure = ax.get_figure(root=True)
-        assert figure is not None
         apart = ax.twinx()
         apart.semilogy(
             period,
@@ -904,13 +900,7 @@ def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         apart.set_ylabel("Distance of the two states")
         ax.set_zorder(apart.get_zorder() + 1)
         ax.patch.set_visible(False)
-        handles, labels = (
-            left + right
-            for left, right in zip(
-                ax.get_legend_handles_labels(), apart.get_legend_handles_labels(), strict=True
-            )
-        )
-        figure.legend(handles, labels, loc="outside lower center", ncols=1)
+        legend_below(ax, [line for each in (ax, apart) for line in each.get_legend_handles_labels()[0]], 1)
         ax.set(xlabel="Period of the drive", ylabel=_coordinate(name))
     return ax
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from snapbeam.model.parameters import lookup
-from snapbeam.plot.style import frame
+from snapbeam.plot.style import frame, legend_below
 from snapbeam.util.si_prefixes import prefixed, scale_of
 from snapbeam.util.validation import InputError, checked
 
@@ -124,7 +124,7 @@ def plot_force_displacement(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
         margin = 0.05 * float(np.ptp(place[seen]))
         ax.set_xlim((place[seen].min() - margin) / prefix_w, (place[seen].max() + margin) / prefix_w)
         ax.set_ylim(low / prefix_f, high / prefix_f)
-        ax.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=7.0)
+        legend_below(ax, handles)
     return ax
 
 

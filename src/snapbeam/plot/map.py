@@ -28,6 +28,8 @@ from snapbeam.plot.style import (
     class_cells,
     figure_style,
     fix_ticks,
+    frame,
+    legend_below,
     new_figure,
     set_title,
 )
@@ -134,13 +136,8 @@ def plot_response_map(
         for name in ("frequency_ratio", "location", "velocity_amplitude")
         if name not in (across, upward)
     }
-    with figure_style():
-        own = new_figure("single", 92.0 if legend else 70.0) if ax is None else None
-        if own is not None:
-            ax = own.add_subplot()
-        assert ax is not None
+    with frame(ax, height=92.0 if legend else 70.0) as ax:
         class_cells(ax, edges[0], edges[1], kinds)
-        fix_ticks(ax)
         dress(ax.xaxis, dataset, across)
         dress(ax.yaxis, dataset, upward)
         set_title(ax, subtitle(dataset, (across, upward)))
@@ -152,10 +149,8 @@ def plot_response_map(
             handles.append(draw_quasi_static_line(ax, dataset, across, upward, fixed))
         if measurements is not None:
             handles.append(draw_measurements(ax, measurements, across, upward, fixed))
-        if legend and own is not None:
-            own.legend(handles=handles, loc="outside lower center", ncols=2)
-        elif legend:
-            ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2)
+        if legend:
+            legend_below(ax, handles)
     return ax
 
 
@@ -169,18 +164,12 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
     if overlaid:
         raise InputError("measurements, quasi_static_line: are drawn over two axes; this map has one")
     name = str(dataset["response_class"].squeeze().dims[0])
-    with figure_style():
-        own = new_figure("single", 84.0 if legend else 62.0) if ax is None else None
-        ax = own.add_subplot() if own is not None else ax
-        assert ax is not None
-        fix_ticks(ax)
+    with frame(ax, height=84.0 if legend else 62.0) as ax:
         _draw_line(ax, dataset, name)
         set_title(ax, subtitle(dataset, (name,)))
         handles = class_handles(dataset["response_class"].values, wells_of(dataset.attrs))
-        if legend and own is not None:
-            own.legend(handles=handles, loc="outside lower center", ncols=2)
-        elif legend:
-            ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
+        if legend:
+            legend_below(ax, handles)
     return ax
 
 
@@ -564,12 +553,7 @@ def plot_points(
         raise InputError(f"variable = {shown(name)}: the points have {', '.join(named) or 'no variables'}")
     along = _along(dataset, across, upward)
     of_class = name == "response_class"
-    with figure_style():
-        own = new_figure("single", 92.0 if of_class and legend else 74.0) if ax is None else None
-        if own is not None:
-            ax = own.add_subplot()
-        assert ax is not None
-        fix_ticks(ax)
+    with frame(ax, height=92.0 if of_class and legend else 74.0) as ax:
         at = [_place(axis, dataset, each) for axis, each in zip((ax.xaxis, ax.yaxis), along, strict=True)]
         size = float(np.clip(_AREA / max(at[0].size, 1), _SMALLEST, _LARGEST))
         look: dict[str, Any] = {"s": size, "linewidths": 0.2 if size > 6.0 else 0.0, "edgecolors": "black"}
@@ -582,10 +566,8 @@ def plot_points(
         else:
             _statistic(ax, dataset, name, at, look)
         handles += _over(ax, dataset, along, measurements, quasi_static_line)
-        if legend and handles and own is not None:
-            own.legend(handles=handles, loc="outside lower center", ncols=2)
-        elif legend and handles:
-            ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2)
+        if legend:
+            legend_below(ax, handles)
         set_title(ax, subtitle(dataset, along))
     return ax
 

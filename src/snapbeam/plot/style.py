@@ -413,6 +413,18 @@ _LINE = 2.9  # mm
 _COLORS = {Severity.INFO: "0.35", Severity.WARNING: SHAKER_COLOR, Severity.ERROR: SHAKER_COLOR}
 
 
+def legend_below(ax: Axes, handles: Sequence[Artist] | None = None, columns: int = 2) -> None:
+    """Write a legend below: of the whole figure if no other axes stand in it, else of *ax*; none without entries."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    entries = ax.get_legend_handles_labels()[0] if handles is None else list(handles)
+    places = {each.get_subplotspec() for each in figure.axes if each.get_label() != "<colorbar>"}
+    if entries and len(places) == 1 and figure.get_layout_engine() is not None:
+        figure.legend(handles=entries, loc="outside lower center", ncols=columns)
+    elif entries:
+        ax.legend(handles=entries, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=columns)
+
+
 def _lines(diagnostics: Iterable[Diagnostic], width: float, most: int) -> list[tuple[str, str]]:
     """Wrapped lines and their colours, the gravest diagnostics first, at most so many diagnostics."""
     order = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}

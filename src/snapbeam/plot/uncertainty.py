@@ -11,13 +11,13 @@ from cmcrameri import cm
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
 from matplotlib.lines import Line2D
-from matplotlib.ticker import EngFormatter
+from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import split_name
 from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
 from snapbeam.plot.axes import dress, edges_of, is_geometric, positions, symbol_of
-from snapbeam.plot.style import CLASS_COLORS, figure_style, fix_ticks, new_figure, set_title
+from snapbeam.plot.style import CLASS_COLORS, figure_style, fix_ticks, legend_below, new_figure, set_title
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, instance, shown
 
@@ -75,10 +75,14 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
             if own.any():
                 _reported(dataset, ax, across, up, own, marker, color, f"constraints {word}")
         ax.set(xlabel=_label(dataset, across), ylabel=_label(dataset, up))
-        for values, scale in ((x[kept], ax.set_xscale), (y[kept], ax.set_yscale)):
+        for values, scale, axis in ((x[kept], ax.set_xscale, ax.xaxis), (y[kept], ax.set_yscale, ax.yaxis)):
             if values.size and values.min() > 0.0 and values.max() > _DECADE * values.min():
                 scale("log")
-        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
+                if values.max() < _DECADE**3 * values.min():  # numbers of one decade run into one another
+                    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+                    axis.set_major_formatter("{x:g}")
+                    axis.set_minor_formatter(NullFormatter())
+        legend_below(ax)
         fix_ticks(ax)
     return ax
 
@@ -231,8 +235,7 @@ def _cells(data: xr.Dataset, ax: Axes, dims: list[str], outcome: str, levels: tu
     dress(ax.yaxis, data, dims[1])
     for at, axis in ((0, ax.set_xlim), (1, ax.set_ylim)):
         axis(edges[at][0], edges[at][-1]) if not is_geometric(edges[at]) else None
-    if handles:
-        ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
+    legend_below(ax, handles)
 
 
 def _draw_measurements(ax: Axes, dims: list[str], measurements: MeasuredPoints) -> None:
@@ -384,7 +387,7 @@ def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
     words = str(data.attrs["quantity"]).replace("omega_1", r"$\omega_1$")
     text = f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}"
     ax.set_xlabel(textwrap.fill(text, 40))
-    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2, columnspacing=0.9)
+    legend_below(ax)
 
 
 def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
@@ -401,7 +404,7 @@ def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
         )  # fmt: skip
     ax.axvline(0.0, color="black", linewidth=0.6)
     ax.set_xlabel(f"Share of the variance: {data.attrs['quantity']}")
-    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
+    legend_below(ax)
 
 
 def _name(data: xr.Dataset, at: int, local: bool) -> str:
