@@ -56,8 +56,8 @@ def test_probability(tmp_path) -> None:
         snap = dataset["probability"].sel(outcome="snap").values
     assert snap[0] == 0.0 and 0.0 < snap[1] < 1.0 and snap[2] == 1.0
     assert picture.stat().st_size > 5_000 and "runs at 3 points" in result.output
-    assert re.search(r"velocity_amplitude = \S+: 0 \(0 to 0\.\d+\)", result.output)
-    assert re.search(rf"velocity_amplitude = \S+: {snap[1]:.4g} \(0\.\d+ to 0\.\d+\)", result.output)
+    assert re.search(r"V = \S+: 0 \(0 to 0\.\d+\)", result.output)
+    assert re.search(rf"V = \S+: {snap[1]:.4g} \(0\.\d+ to 0\.\d+\)", result.output)
 
 
 @pytest.mark.slow

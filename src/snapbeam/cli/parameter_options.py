@@ -363,10 +363,11 @@ def configured(
         config = config_of_file(given["from_"], given.get("point"))
     sections: dict[str, dict[str, Any]] = {}
     axes: dict[str, Any] = {}
+    with_striker = any(name.startswith("contact.") and value is not None for name, value in given.items())
     for name, value in given.items():
         if not split_name(name)[1] or value is None:
             continue
-        name = config.of_option(name)
+        name = name if with_striker else config.of_option(name)
         section, field = split_name(name)
         if isinstance(value, str) and _is_axis(name, value):
             axes[name] = value
@@ -542,9 +543,13 @@ def parse_range(name: str, text: str, unit: str = "1") -> tuple[float, float]:
     from snapbeam.model.parameter_axes import parse_axis
     from snapbeam.util.validation import InputError
 
-    if text.count(":") != 1 or "," in text:
-        raise InputError(f"{name} = {text!r}: must be first:last, such as 0:10")
-    first, last = (float(parse_axis(name, part, unit=unit)) for part in text.split(":"))
+    try:
+        if "," in text:
+            raise ValueError
+        first, last = (float(parse_axis(name, part, unit=unit)) for part in text.split(":"))
+    except ValueError:  # an InputError is one
+        of = "" if unit == "1" else f", numbers in {unit}"
+        raise InputError(f"{name} = {text!r}: must be first:last, such as 0:10{of}") from None
     if not first < last:
         raise InputError(f"{name} = {text!r}: first must be less than last")
     return first, last
