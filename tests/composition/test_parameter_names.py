@@ -195,3 +195,12 @@ def test_seeds_are_replicas() -> None:
     )
     with pytest.raises(sb.InputError, match="UniformRange"):
         sb.uncertainty.ParameterUncertainty(of={"base_excitation.seed": sb.uncertainty.Normal(1.0)})
+
+
+def test_a_sweep_in_hz_states_no_single_frequency(harvester) -> None:
+    """The file of values swept up and down has the axis, not the ratio of one run among its fixed parameters."""
+    system = sb.System.load(harvester)
+    found = sb.dynamics.hysteresis(system, "frequency_hz", [30.0, 35.0], sb.Integration(cycles=3))
+    assert found["base_excitation_frequency_hz"].values.tolist() == [30.0, 35.0]
+    assert "base_excitation_frequency_ratio" not in found.attrs
+    assert "base_excitation_acceleration_amplitude" in found.attrs

@@ -65,7 +65,14 @@ def follow(name: str, capsys: pytest.CaptureFixture[str]) -> None:
         "tutorial_beam",
         *(
             pytest.param(each, marks=pytest.mark.slow)
-            for each in ("tutorial_waveform", "howto_harvester", "mems_arch", "mems_switch", "task_arch", "task_harvester")
+            for each in (
+                "tutorial_waveform",
+                "howto_harvester",
+                "mems_arch",
+                "mems_switch",
+                "task_arch",
+                "task_harvester",
+            )
         ),
     ],
 )

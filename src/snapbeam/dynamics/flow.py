@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.model.drive.base import HORIZON, Drive
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameter_axes import ratios_of
-from snapbeam.model.parameters import lookup
+from snapbeam.model.parameters import lookup, ratio_of
 from snapbeam.model.quantity import split_name
 from snapbeam.model.state import FIELDS, OWN_FIELDS, State, amplitude_scale
 from snapbeam.model.system import System
@@ -894,7 +894,8 @@ def fixed_parameters(flow: Flow, *varied: str) -> dict[str, Any]:
         attrs |= {lookup(f"{section}.{name}").short: float(value) for name, value in drive.values().items()}
     if system.striker is not None:
         attrs["location"] = float(system.striker.location)
-    return {name: value for name, value in attrs.items() if name not in varied}
+    shorts = {lookup(ratio_of(system.parameter(name).name)).short for name in varied}
+    return {name: value for name, value in attrs.items() if name not in {*varied, *shorts}}
 
 
 def dimensionless(words: str) -> dict[str, str]:

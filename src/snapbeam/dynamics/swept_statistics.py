@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from snapbeam.dynamics.flow import frequencies_of
 from snapbeam.model.integration import Integration
+from snapbeam.model.parameters import lookup, ratio_of
 from snapbeam.model.quantity import numbered
 from snapbeam.model.system import System
 from snapbeam.simulation.simulate import simulate
@@ -129,7 +130,8 @@ def hysteresis(
             break
     labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
     dims = ("sweep", row.short)
-    attrs = {key: value for key, value in run.dataset.attrs.items() if key not in _OF_ONE_RUN | {row.short}}
+    swept = {row.short, lookup(ratio_of(row.name)).short}
+    attrs = {key: value for key, value in run.dataset.attrs.items() if key not in _OF_ONE_RUN | swept}
     return xr.Dataset(
         {
             key: (dims, table, {"units": rows[key].unit, "long_name": rows[key].long_name})
