@@ -37,10 +37,10 @@ _SECTIONS = {
     "without a type are those of the striker; `location_m` (m) can replace `location`. Several contacts are an array "
     "`[[contact]]`, the drive of each below it as `[contact.drive]`. A `label` replaces the number in the names of their "
     "parameters; see [systems](systems.md#names-of-parameters).",
-    "drive": "The motion of the striker, selected by `type`: {drives}. `frequency_hz` (Hz), `velocity_m_s` (m/s) and "
-    "`displacement_um` (µm) can replace the ratios. A type with samples can have `file` and its [keys](base_and_load.md#records-from-files) instead of them.",
+    "drive": "The motion of the striker, selected by `type`: {drives}. "
+    "[Names in physical units](#names-in-physical-units) can replace the ratios. A type with samples can have `file` and its [keys](base_and_load.md#records-from-files) instead of them.",
     "base_excitation": "The motion of the base, selected by `type` as in `[drive]`; without this section the base is at rest. "
-    "`frequency_hz` (Hz), `velocity_m_s` (m/s) and `amplitude_g` (g) can replace the ratios. A type with samples or a spectrum can have "
+    "[Names in physical units](#names-in-physical-units) can replace the ratios. A type with samples or a spectrum can have "
     "`file` and its [keys](base_and_load.md#records-from-files) instead of them.",
     "axial_load": "The change of the axial load in time, selected by `type`: {loads}; without this section the load is "
     "constant.",
@@ -115,7 +115,27 @@ def parameter_tables() -> str:
         if section in types:
             text += _keys_by_type(types[section], [row[0] for row in rows]) + "\n"
         parts.append(text + _table(header, rows))
-    return "\n".join(parts)
+    return "\n".join([*parts, _physical()])
+
+
+def _physical() -> str:
+    """Return the table of names in physical units, and of the sections that have them."""
+    from snapbeam.model.parameters import PHYSICAL
+    from snapbeam.model.quantity import numbered, split_name
+
+    found: dict[tuple[str, str, str], list[str]] = {}
+    for name, row in PHYSICAL.items():
+        section, field = split_name(name)
+        if numbered(section)[1] == 1:
+            key = field, split_name(row.parameter)[1], row.unit.replace("um", "µm")
+            found.setdefault(key, []).append(section)
+    rows = [(f"`{one}`", f"`{ratio}`", unit, _listed(own)) for (one, ratio, unit), own in found.items()]
+    return (
+        "## Names in physical units\n\n"
+        "Files, options, axes, uncertainties and Python accept these names in place of the ratios, of every contact and force by "
+        "its number or label too (`drive.2.frequency_hz`). The last part alone names the parameter if one part of the system alone "
+        "has it.\n\n" + _table(("name", "in place of", "unit", "sections"), rows)
+    )
 
 
 def _keys_by_type(types: Mapping[str, Any], keys: Sequence[str]) -> str:

@@ -204,3 +204,19 @@ def test_a_sweep_in_hz_states_no_single_frequency(harvester) -> None:
     assert found["base_excitation_frequency_hz"].values.tolist() == [30.0, 35.0]
     assert "base_excitation_frequency_ratio" not in found.attrs
     assert "base_excitation_acceleration_amplitude" in found.attrs
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_a_file_takes_every_ratio_in_its_unit(name: str) -> None:
+    """Each ratio of a file replaced by its value in Hz, m/s, g, um or m is the same system."""
+    config = config_of(name)
+    system = config.system
+    for full in physical_names(system.parameters):
+        section, ratio = split_name(ratio_of(full))
+        given = {key: dict(values) for key, values in config.given.items()}
+        if section not in given or ratio not in given[section]:
+            continue
+        del given[section][ratio]
+        given[section][split_name(full)[1]] = system.get(full)
+        made = config_from_mapping(given).system
+        assert made.get(ratio_of(full)) == pytest.approx(system.get(ratio_of(full)), rel=1e-12), full

@@ -647,14 +647,7 @@ class Config:
             if self._stands_still:
                 sections["drive"] = {"type": "fixed"}
             sections["drive"].setdefault("type", "sine")
-        later = {
-            f"{section}.{name}": sections[section].pop(name)
-            for section in [*sections]
-            for name in [key for key in sections[section] if f"{section}.{key}" in PHYSICAL]
-        }
-        for physical, value in later.items():
-            section, own = split_name(PHYSICAL[physical].parameter)
-            sections[section].setdefault(own, _stand_in(own, value))
+        later = _without_units(sections)
         system = System.from_mapping(sections)
         if later:
             system = system.replace(**{
@@ -781,9 +774,13 @@ class Config:
         sections = {name: self._defaults()[name] | own[name] for name in own}
         sections["model"].setdefault("damping_ratio", DAMPING_RATIO)  # has no effect without motion
         sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
-        return parts_from_mapping(
-            sections | {name: self._with_axes(name) for name in forces if self.section(name)}
-        )
+        sections |= {name: self._with_axes(name) for name in forces if self.section(name)}
+        later = _without_units(sections)
+        parts = parts_from_mapping(sections)
+        places = {name: value for name, value in later.items() if PHYSICAL[name].unit == "m"}
+        if places:  # what acts at rest does not depend on frequencies
+            parts["forces"] = System(**parts).replace(**places).forces
+        return parts
 
     @cached_property
     def integration(self) -> Integration:
@@ -820,9 +817,23 @@ class Config:
         return {section: dict(values) for section, values in self.given.items() if values}
 
 
+def _without_units(sections: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """Take values in physical units out of sections, which get ratios in their place, and return them by dotted name."""
+    found = {}
+    for section, values in sections.items():
+        for full in (f"{section}.{name}" for name in [*values]):
+            if full in PHYSICAL:
+                found[full] = values.pop(split_name(full)[1])
+                ratio = split_name(PHYSICAL[full].parameter)[1]
+                values.setdefault(ratio, _stand_in(ratio, found[full]))
+    return found
+
+
 def _stand_in(name: str, value: Any) -> float:
     """A value that lets the system be made before the physical one is known."""
-    return 1.0 if name == "frequency_ratio" else 0.5 if name == "location" else 0.0
+    if name.endswith("_ratio"):
+        return 2.0 if name in ("high_ratio", "stop_ratio") else 1.0
+    return 0.5 if name == "location" else 0.0
 
 
 def config_from_mapping(
