@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import pytest
 from typer.testing import CliRunner
 
 import snapbeam as sb
 from snapbeam.cli.app import app
+from snapbeam.model.local_force import LOCAL_FORCES
 
 LAW = """
 from dataclasses import dataclass
@@ -51,6 +53,14 @@ damping_ratio = 0.02
 def run(*words: str) -> tuple[int, str]:
     result = CliRunner().invoke(app, list(words))
     return result.exit_code, result.output
+
+
+@pytest.fixture(autouse=True)
+def without_own_laws():
+    """Take the law of the test out of the registry, whose rows other tests compare."""
+    yield
+    LOCAL_FORCES.pop("spring_of_a_test", None)
+    sys.modules.pop("law_of_a_test", None)
 
 
 @pytest.mark.filterwarnings("ignore:the lowest mode about")

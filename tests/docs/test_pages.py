@@ -49,6 +49,8 @@ ELSEWHERE = {
     "howto_harvester.md",
     "mems_arch.md",
     "mems_switch.md",
+    "task_arch.md",
+    "task_harvester.md",
     "tutorial_beam.md",
     "tutorial_sweep.md",
     "tutorial_waveform.md",

@@ -29,7 +29,7 @@ def motion(count=240, noise=0.03, seed=0):
 @pytest.mark.parametrize("at", [75, 128, 170])
 def test_frames_lost_and_shown_twice_are_located(at):
     whole = motion()
-    assert find_order(*whole) == ((), (), ())
+    assert find_order(*whole) == ((), (), (), ())
     for count in (1, 2):
         order = find_order(*(np.delete(one, np.arange(at, at + count)) for one in whole))
         assert order.missing == (at,) and order.many == (count,) and not order.repeated
@@ -51,9 +51,9 @@ def test_every_tenth_frame_lost_and_every_seventh_a_copy():
 
 
 def test_no_frame_of_a_good_recording_is_taken_for_lost():
-    assert all(find_order(*motion(seed=seed)) == ((), (), ()) for seed in range(60))
+    assert all(find_order(*motion(seed=seed)) == ((), (), (), ()) for seed in range(60))
     beam, *_ = motion()
-    assert find_order(beam, np.full(240, np.nan), np.full(240, np.nan)) == ((), (), ())
+    assert find_order(beam, np.full(240, np.nan), np.full(240, np.nan)) == ((), (), (), ())
 
 
 def fast(per_cycle, seed, lost=()):
@@ -69,7 +69,7 @@ def fast(per_cycle, seed, lost=()):
 @pytest.mark.parametrize("per_cycle", [15, 25, 60])
 def test_the_turning_points_of_a_fast_motion_are_no_lost_frames(per_cycle):
     """A cubic over ten frames is too stiff there; a lost frame is found all the same."""
-    assert all(find_order(*fast(per_cycle, seed)) == ((), (), ()) for seed in range(40))
+    assert all(find_order(*fast(per_cycle, seed)) == ((), (), (), ()) for seed in range(40))
     found = [find_order(*fast(per_cycle, seed, [300])).missing for seed in range(40)]
     assert np.mean([any(299 <= at <= 301 for at in places) for places in found]) > 0.9
     assert all(len(places) <= 1 for places in found)

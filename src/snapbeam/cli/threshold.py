@@ -153,7 +153,8 @@ def _curve(curve: xr.Dataset, parameter: str, across: str | None, chosen: dict[s
     first, always = curve["lower_threshold"], curve["upper_threshold"]
     from snapbeam.plot.axes import is_geometric
 
-    word = "snap-through" if wells_of(curve.attrs) == 1 else "interwell response"
+    one = wells_of(curve.attrs) == 1
+    word = "snap-through" if one else "interwell response"
     named = [coordinate_text(curve, name, curve[name].item()) for name in chosen]
     if "modes" in curve.attrs and "modes" not in chosen:
         named.append(coordinate_text(curve, "modes", int(curve.attrs["modes"])))
@@ -177,7 +178,7 @@ def _curve(curve: xr.Dataset, parameter: str, across: str | None, chosen: dict[s
     lines = [line]
     for kind, text in (
         ("no_interwell_in_range", f"no {word} in range: extend the values of {parameter}"),
-        ("undecided", f"undecided: no {word}, but runs failed"),
+        ("undecided", f"undecided: no {'snap-through' if one else 'run is interwell'}, but runs failed"),
         ("not_searched", "not searched: no run has a response class"),
     ):
         count = int((curve["outcome"] == _kinds(curve).index(kind)).sum())
@@ -185,7 +186,9 @@ def _curve(curve: xr.Dataset, parameter: str, across: str | None, chosen: dict[s
             lines.append(f"  {text}, at {count} of {first.size} points")
     open_above = int((first.notnull() & always.isnull()).sum())
     if open_above:
-        lines.append(f"  highest run has no {word}, at {open_above} of {first.size} points")
+        lines.append(
+            f"  highest run {'does not snap through' if one else 'is intrawell'}, at {open_above} of {first.size} points"
+        )
     lower = first.notnull() & (curve["lower_threshold_min"] < first)
     if bool(lower.any()):
         lowest = float(curve["lower_threshold_min"].where(lower).min())

@@ -162,8 +162,8 @@ CASES = (
     Case(ONSET, "under hum of 100 Hz, three tenths of the amplitude, beside a drive of 98 Hz", hum(0.3, 100.0), "right",
          "vibrometer.hum"),
     Case(LINES, "a second motion 2 Hz above the drive, a fifth of it, in a record of 0.8 s", second_motion(0.2, 2.0),
-         "flagged", "vibrometer.second_line"),
+         "flagged", "vibrometer.beat"),
     Case(LINES, "a second motion 8 Hz above the drive, a fiftieth of it", second_motion(0.02, 8.0), "flagged",
-         "vibrometer.second_line"),
+         "vibrometer.beat"),
     Case(ONSET, "a start-up over 100 ms from rest", gentle(0.1), "right", sees="the same"),
 )  # fmt: skip

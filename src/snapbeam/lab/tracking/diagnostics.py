@@ -65,7 +65,7 @@ KINDS = table(
         "camera.rest_moves", WARNING,
         "drift of the beam within the frames given as rest",
         "{told}: all displacements may be shifted by up to {shift_mm:.3g} mm, which is in their standard errors",
-        ("rest_frames",),
+        (),
     ),
     Kind(
         "camera.gamma", WARNING,
@@ -216,7 +216,7 @@ KINDS = table(
         "the striker's rows before and after each frame, against a jump of the drive's phase",
         "the picture shifts by {size:.2f} px at about frame {first:.0f}: the camera was knocked; keep the frames before, or "
         "give a part with a stationary object (fixed_marks, --fixed-mark)",
-        ("fixed_mark",),
+        ("fixed_marks",),
     ),
     Kind(
         "camera.off_its_drive", WARNING,
