@@ -130,7 +130,7 @@ COMMANDS = {
     "threshold": "threshold --parameter {name} --values {axis} -o out.nc",
     "hysteresis": "dynamics hysteresis --parameter {name} --values {axis} -o out.nc",
     "bifurcation": "dynamics bifurcation-diagram --parameter {name} --values {axis} --periods 2 --transient 2 -o out.nc",
-    "exponents": "dynamics lyapunov-spectrum --sweep {name}={axis} --periods 2 --transient 2 -o out.nc",
+    "exponents": "dynamics lyapunov-spectrum --sweep {name}={axis} --periods 20 --transient 2 -o out.nc",
 }
 
 
