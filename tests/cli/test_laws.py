@@ -93,12 +93,15 @@ def test_a_law_of_a_file_in_a_parameter_file(tmp_path, monkeypatch):
         ("broken.py", "ZeroDivisionError"),
         ("empty.py:Magnet", "does not define a class 'Magnet'"),
         ("beam.toml", "existing Python file"),
+        ("json.py", "name of the installed module 'json'"),
+        ("wave.py", "name of the installed module 'wave'"),
     ],
 )
 def test_refused_files(text, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "broken.py").write_text("1 / 0\n", encoding="utf-8")
-    (tmp_path / "empty.py").write_text("", encoding="utf-8")
+    for name in ("empty", "json", "wave"):  # a module that is imported, and one that is not
+        (tmp_path / f"{name}.py").write_text("", encoding="utf-8")
     (tmp_path / "beam.toml").write_text(BEAM, encoding="utf-8")
     code, output = run("equilibria", "--config", "beam.toml", "--law", text)
     assert code == 2 and message in " ".join(output.split())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 import snapbeam as sb
@@ -95,3 +96,22 @@ def test_a_parameter_file_with_units_is_that_in_si():
         sb.InputError, match=r"\[beam\] length = '161 ms': the unit 'ms' does not fit; must be in m"
     ):
         config_from_mapping(plain | {"beam": plain["beam"] | {"length": "161 ms"}}, "x.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("10 um", 1e-5),
+        ("5. um", 5e-6),
+        ("0.7665 um", 7.665e-7),
+        ("1e999999999 um", np.inf),
+        ("1e-999999999 um", 0.0),
+    ],
+)
+def test_the_nearest_number_whatever_the_exponent(text, value):
+    """To the last digit; an exponent beyond all numbers is infinite or zero at once, as without a unit."""
+    assert number_in_unit(text, "m") == value
+
+
+def test_a_product_beyond_all_numbers_is_infinite():
+    assert number_in_unit("1e308 GPa", "Pa") == np.inf

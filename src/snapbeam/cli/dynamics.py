@@ -105,7 +105,7 @@ def _extremes(dataset: xr.Dataset, statistic: str) -> list[str]:
             at = part.isel({name: int(part.values.argmax())})
             where = coordinate_text(dataset, name, at[name].item())
             lines.append(
-                f"{direction}: maximum {part.attrs['long_name']} {value_text(dataset, statistic, at.item())} at {where}"
+                f"{direction}: maximum {part.attrs['long_name']}: {value_text(dataset, statistic, at.item())} at {where}"
             )
     if values.sizes["sweep"] == 2 and values.dtype.kind == "f":
         one, other = (values.isel(sweep=i).values for i in (0, 1))

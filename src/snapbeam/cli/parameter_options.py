@@ -209,7 +209,17 @@ def import_laws(given: Sequence[str] | None) -> None:
         if path.suffix != ".py" or not path.is_file():
             raise InputError(f"{where}: must be an existing Python file, such as mylaw.py or mylaw.py:Magnet")
         module = sys.modules.get(path.stem)
-        if module is None or Path(getattr(module, "__file__", None) or "").resolve() != path.resolve():
+        known = (
+            None
+            if module is not None or not path.stem.isidentifier()
+            else importlib.util.find_spec(path.stem)
+        )
+        origin = getattr(module, "__file__", None) if known is None else known.origin
+        if (module is not None or known is not None) and Path(origin or "").resolve() != path.resolve():
+            raise InputError(
+                f"{where}: has the name of the installed module {path.stem!r}; give the file another name"
+            )
+        if module is None:
             spec = importlib.util.spec_from_file_location(path.stem, path.resolve())
             assert spec is not None and spec.loader is not None
             module = importlib.util.module_from_spec(spec)

@@ -124,7 +124,7 @@ def _checked_error(name: str, error: float) -> float:
 
 
 def converged_modes(system: System, error: float = AUTO_ERROR) -> int:
-    """The least number of modes, 2, 4, 8, ... 64, with which the frequencies about every well have at most a given error.
+    """Smallest number of modes, 2, 4, 8, ... 64, with which the frequencies about every well meet a given error.
 
     Parameters
     ----------

@@ -377,11 +377,11 @@ def plot_run(
     """
     dataset = dataset_of(run, "displacement_at_striker")
     axis_name, label = across(dataset)
-    part = _cut(dataset, axis_name, window)
+    part, period = _cut(dataset, axis_name, window), 1.0
     if _is_of_one_event(dataset):
         part, axis_name = _with_base_acceleration(part), "time"
-        own, unit = scale_of(part["time"].values, "s")
-        part, label = part.assign_coords(time=part["time"] / own), f"Time ({unit})"
+        period, unit = scale_of(part["time"].values, "s")
+        part, label = part.assign_coords(time=part["time"] / period), f"Time ({unit})"
     has_force = "contact_force" in part and bool((part["contact_force"] > 0.0).any())
     rows = 1 + sum(name in part for name in _PANELS)
     if ax is not None:
@@ -399,7 +399,8 @@ def plot_run(
         }
         left = _column(figure, grid, 0, part, part[axis_name].values, scales)
         if "power_load" in part:
-            _mean_power(left[-1], dataset, axis_name, scales["power_load"])
+            row = 1 + [name for name in _PANELS if name in part].index("power_load")
+            _mean_power(left[row], dataset, dataset[axis_name].values / period, scales["power_load"])
         left[-1].set_xlabel(label)
         first, last = float(part[axis_name][0]), float(part[axis_name][-1])
         left[0].set_xlim(_from(first, last), last)
@@ -531,9 +532,9 @@ def _column(
     return axes
 
 
-def _mean_power(ax: Axes, dataset: xr.Dataset, across: str, scale: tuple[float, str]) -> None:
+def _mean_power(ax: Axes, dataset: xr.Dataset, x: np.ndarray, scale: tuple[float, str]) -> None:
     """Draw the mean power over the last quarter of the run, which leaves out the transient before it."""
-    x, time, power = (dataset[name].values for name in (across, "time", "power_load"))
+    time, power = (dataset[name].values for name in ("time", "power_load"))
     late = time >= time[0] + 0.75 * (time[-1] - time[0])
     if late.sum() < 2 or not np.isfinite(power[late]).all():
         return

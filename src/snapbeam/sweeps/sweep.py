@@ -45,7 +45,7 @@ def sweep(
     axes : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
         A mapping from parameters to values defines a grid with one dimension for each parameter.  Names are those of
         :func:`snapbeam.model.parameters`, dotted (``"beam.thickness"``) or short (``"frequency_ratio"``); values
-        increase strictly.  ``"drive.frequency_hz"`` and the other names of ``snapbeam.model.parameter_axes.PHYSICAL``
+        increase strictly.  ``"drive.frequency_hz"`` and the other names of ``snapbeam.model.parameters.PHYSICAL``
         give an axis in Hz, m/s, g, um or m, which becomes one of ratios; if another axis changes the structure, the
         result is a list of points that keep their Hz.  A dataset with one-dimensional variables, or a data frame, defines a list of points along
         the dimension ``point``.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from decimal import Decimal
 from fractions import Fraction
@@ -82,5 +83,7 @@ def number_in_unit(text: str, unit: str) -> float | None:
     if factor is None:
         must = "a number without a unit" if unit == "1" else f"in {unit}"
         raise InputError(f"the unit {found[3]!r} does not fit; must be {must}")
+    if not math.isfinite(value * factor) or value == 0.0:  # exponents that a fraction would write out
+        return value * factor
     exact = Fraction(found[1]) / Fraction(found[2] or 1) * Fraction(repr(factor))
     return float(exact)  # rounded once: 10 um is 1e-5 m to the last digit
