@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 
     from snapbeam.sweeps.measured_points import MeasuredPoints
 
-__all__ = ["class_counts", "score_measurements"]
+__all__ = ["KNOWN_CLASSES", "PSEUDOCOUNT", "class_counts", "score_measurements"]
 
 
-_KINDS = (
+KNOWN_CLASSES = (
     ResponseClass.INTRAWELL,
     ResponseClass.TRANSIENT_1,
     ResponseClass.TRANSIENT_2,
     ResponseClass.CONTINUOUS,
 )
-_PRIOR = 0.5
+PSEUDOCOUNT = 0.5
 """Pseudocount of each class (Jeffreys): a class without runs is unlikely, not impossible."""
 _COORDINATES = ("frequency_ratio", "velocity_amplitude", "location")
 
@@ -101,14 +101,14 @@ def score_measurements(
     integer("samples", samples, 100, 10**7)
     seed = seed_of(rng)
     counts = class_counts(dataset)
-    known = np.isin(measurements.response_class, _KINDS)
+    known = np.isin(measurements.response_class, KNOWN_CLASSES)
     if not known.any():
         raise InputError("measurements: none has a known class")
     at = _nearest(dataset, measurements, known)
     mine = counts[at]
     total = mine.sum(axis=-1)
-    share = (mine + _PRIOR) / (total + _PRIOR * len(_KINDS))[:, None]
-    kind = np.searchsorted(_KINDS, measurements.response_class[known])
+    share = (mine + PSEUDOCOUNT) / (total + PSEUDOCOUNT * len(KNOWN_CLASSES))[:, None]
+    kind = np.searchsorted(KNOWN_CLASSES, measurements.response_class[known])
     rows = np.arange(kind.size)
     _, low, high = interval_of(mine[rows, kind], total, method="jeffreys")
     generator = np.random.Generator(np.random.Philox(key=[seed, 0]))
@@ -128,7 +128,7 @@ def score_measurements(
             "probability_low": ("measurement", low, labels | {"long_name": "its lower limit"}),
             "probability_high": ("measurement", high, labels | {"long_name": "its upper limit"}),
             "most_likely": (
-                "measurement", np.array(_KINDS, dtype=np.int8)[best], labels | {"long_name": "most likely class"} | flags
+                "measurement", np.array(KNOWN_CLASSES, dtype=np.int8)[best], labels | {"long_name": "most likely class"} | flags
             ),
             "best": ("measurement", share[rows, best], labels | {"long_name": "probability of the most likely class"}),
         },

@@ -25,10 +25,10 @@ from snapbeam.simulation.simulate import simulate
 from snapbeam.simulation.tolerance import perturbation_growth
 from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.uncertainty.distributions import Distribution, Empirical, ParameterUncertainty
+from snapbeam.uncertainty.measured_classes import KNOWN_CLASSES, PSEUDOCOUNT
 from snapbeam.uncertainty.measurements import Measurements
 from snapbeam.uncertainty.monte_carlo import reached, trials_of
 from snapbeam.util.diagnostics import DiagnosticWarning, counting
-from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -68,13 +68,6 @@ _STEP = 2e-5
 """Relative step of the logarithms by which runs are compared: beyond what steps in time make of them."""
 _BESIDE = {"damping_ratio": "model.damping_ratio", "contact_stiffness": "contact.stiffness"}
 """Parameters in addition to the beam that a waveform determines."""
-_KINDS = (
-    ResponseClass.INTRAWELL,
-    ResponseClass.TRANSIENT_1,
-    ResponseClass.TRANSIENT_2,
-    ResponseClass.CONTINUOUS,
-)
-_PRIOR = 0.5
 
 
 # The frequencies that a beam would show, beside those that were measured.
@@ -705,7 +698,7 @@ def class_likelihood(
     shared = sorted(set(posterior.parameters) & set(uncertainty.of))
     if shared:
         raise InputError(f"uncertainty: contains {', '.join(shared)}, which the posterior has")
-    known = np.isin(measurements.response_class, _KINDS)
+    known = np.isin(measurements.response_class, KNOWN_CLASSES)
     if not known.any():
         raise InputError("measurements: none has a known class")
     trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint)
@@ -727,4 +720,4 @@ def class_likelihood(
     mine = (found["response_class"] == measurements.response_class[known][dot]) & reached(found)
     hits = mine.reshape(samples, count, runs).sum(axis=-1)
     total = reached(found).reshape(samples, count, runs).sum(axis=-1)
-    return np.asarray(np.log((hits + _PRIOR) / (total + _PRIOR * len(_KINDS))).sum(axis=-1))
+    return np.asarray(np.log((hits + PSEUDOCOUNT) / (total + PSEUDOCOUNT * len(KNOWN_CLASSES))).sum(axis=-1))
