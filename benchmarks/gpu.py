@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import platform
 import sys
 import time
@@ -163,9 +164,18 @@ def conformance(smoke: bool) -> dict[str, Any]:
 
 
 def throughput(smoke: bool, facts: dict[str, Any]) -> dict[str, Any]:
-    """Runs of 200 cycles over the plane of Fig. 6, for several shares of the registers."""
+    """Runs of 200 cycles over the plane of Fig. 6: all cores of the host, then shares of the registers."""
     runs, cycles, modes = (2, 1, 1) if smoke else (16_384, 200, 32)
     rows, slowest = [], 3.0 if smoke else 0.1
+    hosts = []
+    for early in (False,) if smoke else (False, True):
+        host = ensemble_of(modes, *sample(max(1, runs // 8), slowest), cycles, early_termination=early)
+        cpu_engine.run_ensemble(ensemble_of(modes, [4.0], [0.1], 1, early_termination=early))
+        seconds, found = timed(lambda host=host: cpu_engine.run_ensemble(host))
+        hosts.append(
+            {"early_termination": early, "cores": os.cpu_count(), "runs": host.size, "seconds": seconds,
+             "ms_per_run": 1e3 * seconds / host.size, "steps_per_second": float(found["steps"].sum()) / seconds}
+        )  # fmt: skip
     for early in (False,) if smoke else (False, True):
         for warps in (None,) if smoke else (8, 12, 16):
             ensemble = ensemble_of(modes, *sample(runs, slowest), cycles, early_termination=early)
@@ -176,11 +186,12 @@ def throughput(smoke: bool, facts: dict[str, Any]) -> dict[str, Any]:
             row = {
                 "early_termination": early, "warps": warps, "compile_s": compiling, "seconds": seconds,
                 "ms_per_run": 1e3 * seconds / runs, "steps_per_second": steps / seconds, "flops": rate,
+                "host_over_device": hosts[early]["ms_per_run"] * runs / (1e3 * seconds),
             }  # fmt: skip
             if "fp64_limit_flops" in facts:
                 row["share_of_fp64_limit"] = rate / facts["fp64_limit_flops"]
             rows.append(row)
-    return {"runs": runs, "cycles": cycles, "modes": modes, "rows": rows}
+    return {"runs": runs, "cycles": cycles, "modes": modes, "host": hosts, "rows": rows}
 
 
 def scaling(smoke: bool) -> dict[str, Any]:
