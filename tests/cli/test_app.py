@@ -181,6 +181,16 @@ def test_simulate(cli, tmp_path):
     assert "contact_force" in cli("info", "run.nc").stdout
 
 
+def test_a_threshold_and_options_of_other_figures(cli):
+    """A file of a threshold has response classes too, but its figure is not that of a map."""
+    args = ("threshold", "--modes", "1", "--cycles", "8", "--frequency-ratio", "1:2:2", "-o", "border.nc")
+    assert cli(*args).exit_code == 0
+    assert cli("plot", "border.nc", "-o", "border.png").exit_code == 0
+    for option, value in (("--window", "0:2"), ("--quasi-static-line", None)):
+        refused = cli("plot", "border.nc", "-o", "b.png", option, *([] if value is None else [value]))
+        assert refused.exit_code == 2 and "leave" in refused.output
+
+
 def test_frequencies(cli):
     lines = cli("frequencies", "--count", "3").stdout.splitlines()
     assert lines[0].startswith("P = 37.19 N, P_cr = 24.37 N: buckled by b = 335 µm")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -57,6 +57,7 @@ def plot(
         open_result,
         read_overlay,
     )
+    from snapbeam.plot.dataset import figures_of
     from snapbeam.util.validation import InputError
 
     check_pictures(("output", output))
@@ -67,22 +68,27 @@ def plot(
         "location": location,
     }
     dataset = _sliced(dataset, wanted, at or [])
-    if variable not in (None, "response_class") and (measurements is not None or quasi_static_line):
-        raise InputError(
-            f"variable = {variable!r}: measured responses and the quasi-static line are drawn over response classes; "
-            "leave them out"
-        )
-    if "time" in dataset.dims:
-        options = {} if variable not in (None, "run") else {"window": opt.parse_window(window)}
-        draw(dataset, output, variable, **options)
-    elif "response_class" not in dataset or variable not in (None, "response_class"):
-        draw(dataset, output, variable)
-    else:
+    kind, figures = figures_of(dataset)
+    figure = next(iter(figures), None) if variable is None else variable
+    options: dict[str, Any] = {}
+    if measurements is not None or quasi_static_line:
+        if figure != "response_class":
+            raise InputError(
+                "measurements and quasi_static_line are drawn over the response classes of a map, not over "
+                f"{figure!r} (file: {kind}); leave them out"
+            )
         attrs = dataset.attrs
         overlay = read_overlay(
             measurements, attrs.get("reference_frequency"), attrs.get("beam_buckling_level")
         )
-        draw(dataset, output, measurements=overlay, quasi_static_line=quasi_static_line)
+        options = {"measurements": overlay, "quasi_static_line": quasi_static_line}
+    if window is not None:
+        if figure != "run":
+            raise InputError(
+                f"window = {window!r}: belongs to the figure 'run' of a run, not to {figure!r} (file: {kind}); leave it out"
+            )
+        options = {"window": opt.parse_window(window)}
+    draw(dataset, output, variable, **options)
     add_json(files=[output])
     out().print(f"Written: {file_line(output)}")
 
