@@ -33,5 +33,5 @@ def test_branches_units_and_snaps() -> None:
     assert len(stable) == 2
     drawn = np.concatenate([line.get_ydata() for line in stable])
     assert np.isfinite(drawn).all()
-    with pytest.raises(InputError, match="must be a result of force_displacement"):
+    with pytest.raises(InputError, match="no force-displacement curve among"):
         sb.plot.plot_force_displacement(xr.Dataset({"force": 0.0}))

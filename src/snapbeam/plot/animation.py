@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from snapbeam.model.boundary_conditions import BoundaryConditions, modes_between
 from snapbeam.model.parameters import lookup
 from snapbeam.model.reduced_model import displacement_along
+from snapbeam.plot.run import across, cut, hardest_impact
 from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, caption, figure_style, fix_ticks, new_figure
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.util.files import MADE_BY, atomic_path, check_writable
@@ -191,30 +192,20 @@ def _write_gif(pictures: Iterator[NDArray[np.uint8]], path: Path, rate: float) -
     ]
     if not images:
         raise InputError("frames: must hold at least one figure")
-    images[0].save(
-        path,
-        save_all=True,
-        append_images=images[1:],
-        duration=1000.0 / rate,
-        loop=0,
-        optimize=True,
-        comment=MADE_BY.encode(),
-    )
+    look: dict[str, Any] = {
+        "duration": 1000.0 / rate,
+        "loop": 0,
+        "optimize": True,
+        "comment": MADE_BY.encode(),
+    }
+    images[0].save(path, save_all=True, append_images=images[1:], **look)
 
 
 def _span(dataset: xr.Dataset, window: tuple[float, float] | None) -> tuple[float, float]:
-    time = dataset["time"].values
-    if window is None:
-        return float(time[0]), float(time[-1])
-    if "cycle" not in dataset.variables:
+    if window is not None and "cycle" not in dataset.variables:
         raise InputError(f"window = {window}: this run has no cycles of excitation")
-    cycle = dataset["cycle"].values
-    inside = (cycle >= window[0]) & (cycle <= window[1])
-    if inside.sum() < 2:
-        raise InputError(
-            f"window = {window}: must hold at least two samples of a run of {cycle[-1]:g} cycles"
-        )
-    return float(time[inside][0]), float(time[inside][-1])
+    time = cut(dataset, "cycle", window)["time"].values
+    return float(time[0]), float(time[-1])
 
 
 def _hardest_impact(
@@ -226,10 +217,7 @@ def _hardest_impact(
     force = np.where((time >= start) & (time <= stop), dataset["contact_force"].values, 0.0)
     if not (force > 0.0).any():
         return None
-    peak = int(np.argmax(force))
-    apart = np.flatnonzero(~(force > 0.0))
-    first = apart[apart < peak][-1] if (apart < peak).any() else 0
-    last = apart[apart > peak][0] if (apart > peak).any() else force.size - 1
+    first, last = hardest_impact(force)
     margin = 0.5 * (time[last] - time[first])
     return max(float(time[first] - margin), start), min(float(time[last] + margin), stop)
 
@@ -241,7 +229,8 @@ class _Scene:
         self.fps = fps
         self.time = dataset["time"].values
         inside = (self.time >= times[0]) & (self.time <= times[-1])
-        self.across = dataset["cycle"].values if "cycle" in dataset.variables else self.time
+        name, self.label = across(dataset)
+        self.across = dataset[name].values
         self.shape = _BeamShape(dataset) if "modal_amplitude" in dataset else None
         self.beam = dataset["displacement_at_striker"].values
         self.shaker = dataset["striker_displacement"].values if "striker_displacement" in dataset else None
@@ -281,7 +270,7 @@ class _Scene:
         (self.dot,) = ax.plot([], [], "o", color=BEAM_COLOR, markersize=3)
         low, high = ax.get_ylim()
         ax.set(xlim=(x[0], x[-1]), ylim=(low, high + 0.15 * (high - low)), ylabel="Displacement $w/b$")
-        ax.set_xlabel(r"Cycles of excitation $\tau$" if self.across is not self.time else "Time (s)")
+        ax.set_xlabel(self.label)
         ax.legend(loc="upper right", ncols=2)
         fix_ticks(ax)
 

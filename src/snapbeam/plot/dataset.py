@@ -115,11 +115,7 @@ def _named(function: Callable[..., Axes], name: str) -> _Draws:
 
 
 def _run(dataset: xr.Dataset) -> dict[str, _Draws]:
-    figures: dict[str, _Draws] = {}
-    for name, (function, needed) in _RUN.items():
-        if needed in dataset:
-            figures[name] = function
-    return figures
+    return {name: function for name, (function, needed) in _RUN.items() if needed in dataset}
 
 
 def _map(dataset: xr.Dataset) -> dict[str, _Draws]:
@@ -133,9 +129,7 @@ def _map(dataset: xr.Dataset) -> dict[str, _Draws]:
 
 
 def _swept(dataset: xr.Dataset) -> dict[str, _Draws]:
-    figures = _map(dataset)
-    del figures["response_class"]
-    return figures
+    return {name: function for name, function in _map(dataset).items() if name != "response_class"}
 
 
 def _lifetimes(dataset: xr.Dataset) -> dict[str, _Draws]:

@@ -15,9 +15,9 @@ from matplotlib.patches import Patch, Rectangle
 from snapbeam.plot.axes import dress, edges_of, positions
 from snapbeam.plot.style import (
     SERIES_COLORS,
-    axes_or_new,
-    figure_style,
-    fix_ticks,
+    color_bar,
+    color_of,
+    contains,
     frame,
     legend_below,
     set_title,
@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 
-_UP, _DOWN, _LINE = "#16245E", "#B03A27", "#000000"
+_BLUE, _RED, _, _GRAY, _BLACK = SERIES_COLORS
 _STARTS = "#8A8A8A"
 MAX_CURVES = 5
 """The most points of a map that :func:`plot_survival` draws."""
@@ -96,8 +96,7 @@ def plot_diagram(
     with frame(ax, first, "double", 66.0) as ax:
         handles: list[Line2D] = []
         if dataset is not None:
-            if variable not in dataset:
-                raise InputError(f"no {variable} among {list(map(str, dataset.variables))}")
+            contains(dataset, variable, variable)
             handles += _points(dataset, ax, along, variable)
             dress(ax.xaxis, dataset, along)
         for branch in branches:
@@ -118,7 +117,7 @@ def _points(dataset: xr.Dataset, ax: Axes, along: str, variable: str) -> list[Li
     """Draw the points, those swept down smaller and over those swept up, so that both are seen where they agree."""
     handles = []
     looks = {
-        "up": (_UP, "swept up", 2.0), "down": (_DOWN, "swept down", 1.0)
+        "up": (_BLUE, "swept up", 2.0), "down": (_RED, "swept down", 1.0)
     }  # fmt: skip
     sweeps = [str(name) for name in dataset["sweep"].values]
     for name in sorted(sweeps, key=list(looks).index if set(sweeps) <= set(looks) else str):
@@ -138,13 +137,13 @@ def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
     # up to the stable orbits beside them, so that no gap is left
     beside = ~stable | np.append(~stable[1:], False) | np.append(False, ~stable[:-1])
     for y in returns:
-        ax.plot(x, np.where(stable, y, np.nan), color=_LINE, linewidth=1.1)
-        ax.plot(x, np.where(beside, y, np.nan), color=_LINE, linewidth=0.9, dashes=(3, 2))
+        ax.plot(x, np.where(stable, y, np.nan), color=_BLACK, linewidth=1.1)
+        ax.plot(x, np.where(beside, y, np.nan), color=_BLACK, linewidth=0.9, dashes=(3, 2))
     looks: tuple[tuple[bool, dict[str, Any]], ...] = (
         (bool(stable.any()), {"linewidth": 1.1, "label": "stable orbit"}),
         (not stable.all(), {"linewidth": 0.9, "dashes": (3, 2), "label": "unstable orbit"}),
     )
-    handles = [Line2D([], [], color=_LINE, **look) for drawn, look in looks if drawn]
+    handles = [Line2D([], [], color=_BLACK, **look) for drawn, look in looks if drawn]
     for kind, value, after in zip(
         branch["special_point_kind"].values,
         branch["special_point_value"].values,
@@ -153,21 +152,15 @@ def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
     ):
         at = int(after)
         near = returns[:, at : at + 2].mean(axis=1)
-        mark: dict[str, Any] = {
-            "marker": _SPECIAL_POINTS[str(kind)],
-            "linestyle": "",
-            "color": _LINE,
-            "markersize": 3.5,
-        }
-        handles += ax.plot(np.full(near.size, value), near, markerfacecolor="white", label=str(kind), **mark)
+        handles += ax.plot(
+            np.full(near.size, value), near, _SPECIAL_POINTS[str(kind)], color=_BLACK, markersize=3.5,
+            markerfacecolor="white", label=str(kind),
+        )  # fmt: skip
     return handles
 
 
 # ----------------------------------------------------------------------------------------------------
 # Lifetimes over one parameter or two, and survival curves.
-
-
-_UP_LIFETIMES = "#16245E"
 
 
 @checked
@@ -197,8 +190,7 @@ def plot_lifetimes(
     ... )
     >>> ax = sb.plot.plot_lifetimes(lifetimes)
     """
-    if "lifetime" not in dataset:
-        raise InputError(f"no lifetimes among {list(map(str, dataset.variables))}")
+    contains(dataset, "lifetimes", "lifetime")
     dims = [str(name) for name in dataset["lifetime"].dims]
     if not 1 <= len(dims) <= 2 or "point" in dims:
         raise InputError(f"lifetime over {dims}: is drawn over one or two parameters")
@@ -207,8 +199,8 @@ def plot_lifetimes(
             x, _ = positions(dataset, dims[0])
             low, high = dataset["lifetime_low"].values, dataset["lifetime_high"].values
             top = np.where(np.isfinite(high), high, np.nan)
-            ax.fill_between(x, low, top, color=_UP_LIFETIMES, alpha=0.25, linewidth=0.0, label="interval")
-            ax.plot(x, dataset["lifetime"].values, color=_UP_LIFETIMES, label="lifetime")
+            ax.fill_between(x, low, top, color=_BLUE, alpha=0.25, linewidth=0.0, label="interval")
+            ax.plot(x, dataset["lifetime"].values, color=_BLUE, label="lifetime")
             ax.set_yscale("log")
             ax.set_ylabel("Lifetime of snapping (cycles)")
             ax.legend(loc="best")
@@ -228,9 +220,7 @@ def _lifetime_cells(
         low, high = (float(np.quantile(known, share)) for share in (0.02, 0.98))
         norm = LogNorm(*((max(low, 1.0), max(high, low) * 1.001) if limits is None else limits))
         cells = ax.pcolormesh(*edges, values, cmap=cm.batlow, norm=norm, rasterized=True)
-        figure = ax.get_figure()
-        assert figure is not None
-        figure.colorbar(cells, ax=ax, label="Lifetime of snapping (cycles)", extend="both")
+        color_bar(cells, ax, "Lifetime of snapping (cycles)", extend="both")
     endless = np.isnan(values) & (dataset["runs_snapping"].values.T > 0)
     hatched: dict[str, Any] = {"facecolor": "white", "edgecolor": "0.4", "hatch": "//////", "linewidth": 0.0}
     for row, column in np.argwhere(endless):
@@ -302,12 +292,8 @@ def plot_survival(
                 ax.plot(
                     t, begun * np.exp(-(t - delay[i]) / tau[i]), color=color, dashes=(4, 2), linewidth=0.7
                 )
-        ax.set(
-            xlabel="Cycles",
-            ylabel="Fraction of runs still snapping",
-            yscale="log",
-            ylim=(0.6 / rows.shape[1], 1.3),
-        )
+        ax.set(xlabel="Cycles", ylabel="Fraction of runs still snapping", yscale="log")
+        ax.set_ylim(0.6 / rows.shape[1], 1.3)
         ax.set_xlim(left=0.0)
         if not np.isfinite(rows).any():
             ax.text(0.5, 0.5, "no run snaps through", transform=ax.transAxes, ha="center")
@@ -327,11 +313,6 @@ def plot_survival(
 # State space: Lyapunov exponents, Poincare sections, basins, edge states.
 
 
-_UP_STATES, _DOWN_STATES = "#16245E", "#B03A27"
-_UNDECIDED = "#858585"
-
-
-_SETTLED, _CHAOS = "#16245E", "#B03A27"
 _PER = {"second": r"s$^{-1}$", "period": "per period of the excitation"}
 
 
@@ -360,8 +341,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> ax = sb.plot.plot_exponents(sb.dynamics.lyapunov_spectrum(system, periods=40, transient=20))
     """
-    if "exponent" not in dataset:
-        raise InputError(f"no exponents among {list(map(str, dataset.variables))}")
+    contains(dataset, "exponents", "exponent")
     unit = _PER[choice("per", per, tuple(_PER))]
     of_map = str(dataset["exponent"].attrs.get("units", "1/s")) == "1"
     factor: Any = 1.0
@@ -387,9 +367,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
             most = float(np.nanmax(np.abs(value.values))) or 1.0
             edges = [edges_of(dataset, name) for name in dims]
             cells = ax.pcolormesh(*edges, value.values.T, cmap=cm.vik, vmin=-most, vmax=most, rasterized=True)
-            figure = ax.get_figure()
-            assert figure is not None
-            figure.colorbar(cells, ax=ax, label=f"Largest Lyapunov exponent ({unit})")
+            color_bar(cells, ax, f"Largest Lyapunov exponent ({unit})")
             _undecided_cells(ax, edges, value.values.T, error.values.T)
             dress(ax.xaxis, dataset, dims[0])
             dress(ax.yaxis, dataset, dims[1])
@@ -404,8 +382,8 @@ def _running(running: xr.DataArray, ax: Axes) -> None:
     shown = min(running.sizes["exponent_number"], 10)
     values = running.transpose("period", ..., "exponent_number").values
     for number in range(shown):
-        color = cm.batlow(0.85 * number / max(shown - 1, 1))
-        ax.plot(period, values[:, 0, number], color=color, label=rf"$\lambda_{{{number + 1}}}$")
+        label = rf"$\lambda_{{{number + 1}}}$"
+        ax.plot(period, values[:, 0, number], color=color_of(number, shown), label=label)
     ax.legend(loc="best", ncols=2)
 
 
@@ -417,8 +395,8 @@ def _exponent_line(dataset: xr.Dataset, ax: Axes, name: str, value: Any, error: 
     ax.plot(x, value, color="0.45", linewidth=0.6)
     settled, chaotic = value + 2 * error < 0.0, value - 2 * error > 0.0
     for which, mark, color, words in (
-        (settled, "o", _SETTLED, "negative: periodic"),
-        (chaotic, "^", _CHAOS, "positive: chaotic"),
+        (settled, "o", _BLUE, "negative: periodic"),
+        (chaotic, "^", _RED, "positive: chaotic"),
         (np.isfinite(value) & ~settled & ~chaotic, "x", "0.3", "sign not decided"),
     ):
         if which.any():
@@ -472,8 +450,7 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=200)
     >>> ax = sb.plot.plot_multipliers(orbit.to_dataset())
     """
-    if not {"multiplier_real", "multiplier_imag"} <= set(map(str, dataset.variables)):
-        raise InputError(f"no multipliers among {list(map(str, dataset.variables))}")
+    contains(dataset, "multipliers", "multiplier_real", "multiplier_imag")
     values = dataset["multiplier_real"].values + 1j * dataset["multiplier_imag"].values
     with frame(ax, dataset, height=84.0) as ax:
         if "orbit" in dataset.dims:
@@ -483,8 +460,8 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             ax.plot(np.cos(angle), np.sin(angle), color="0.5", linewidth=0.7, label="unit circle")
             outside = np.abs(values) > 1.0
             for which, mark, color, words in (
-                (~outside, "o", _SETTLED, "inside: decays"),
-                (outside, "^", _CHAOS, "outside: grows"),
+                (~outside, "o", _BLUE, "inside: decays"),
+                (outside, "^", _RED, "outside: grows"),
             ):
                 if which.any():
                     ax.plot(
@@ -537,9 +514,8 @@ def plot_backbone(
         labels = [words[curve.attrs["well"]] for curve in curves]
     if len(labels) != len(curves) or not all(isinstance(label, str) for label in labels):
         raise InputError(f"labels = {shown(list(labels))}: must be one text for each of {len(curves)} curves")
-    with figure_style():
-        one_model = len({curve.attrs["modes"] for curve in curves}) == 1
-        ax = axes_or_new(ax, curves[0] if one_model else None, height=70.0)
+    one_model = len({curve.attrs["modes"] for curve in curves}) == 1
+    with frame(ax, curves[0] if one_model else None, height=70.0) as ax:
         unstable = False
         for number, (curve, label) in enumerate(zip(curves, labels, strict=True)):
             frequency = curve["frequency_ratio"].values
@@ -560,7 +536,6 @@ def plot_backbone(
             ax.plot([], [], color="0.3", dashes=(3, 1.5), label="unstable")
         if len(curves) > 1 or unstable:
             ax.legend()
-        fix_ticks(ax)
     return ax
 
 
@@ -652,9 +627,9 @@ def _multipliers_along(dataset: xr.Dataset, ax: Axes, sizes: Any) -> None:
     )
     shown = min(sizes.shape[1], 6)
     for number in range(shown):
-        color = cm.batlow(0.85 * number / max(shown - 1, 1))
-        ax.plot(dataset[along].values, sizes[:, number], color=color, label=f"multiplier {number + 1}")
-    ax.axhline(1.0, color=_CHAOS, linewidth=0.8, dashes=(4, 2), label="limit of stability")
+        label = f"multiplier {number + 1}"
+        ax.plot(dataset[along].values, sizes[:, number], color=color_of(number, shown), label=label)
+    ax.axhline(1.0, color=_RED, linewidth=0.8, dashes=(4, 2), label="limit of stability")
     for value, kind in zip(
         dataset["special_point_value"].values, dataset["special_point_kind"].values, strict=True
     ):
@@ -729,22 +704,12 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
     >>> ax = sb.plot.plot_section(sb.dynamics.poincare_section(system, "impact", 20, transient=20))
     """
     y = x.replace("displacement", "velocity")
-    if x not in dataset or y not in dataset:
-        raise InputError(f"no {x} and {y} among {list(map(str, dataset.variables))}")
+    contains(dataset, f"{x} and {y}", x, y)
     with frame(ax, dataset) as ax:
-        ax.plot(
-            dataset[x].values,
-            dataset[y].values,
-            ".",
-            color=_UP_STATES,
-            markersize=2.0,
-            markeredgewidth=0.0,
-            rasterized=True,
-        )
-        for limits, name in (
-            ("xlim", x),
-            ("ylim", y),
-        ):  # a point that repeats is not magnified to its rounding errors
+        look: dict[str, Any] = {"color": _BLUE, "markersize": 2.0, "markeredgewidth": 0.0, "rasterized": True}
+        ax.plot(dataset[x].values, dataset[y].values, ".", **look)
+        # a point that repeats is not magnified to its rounding errors
+        for limits, name in (("xlim", x), ("ylim", y)):
             values = dataset[name].values
             middle, least = 0.5 * (values.min() + values.max()), 1e-3 * np.abs(values).max()
             if 0.0 < least > np.ptp(values):
@@ -771,12 +736,11 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     >>> grid = {"amplitude[1]": [-1.2, 0.0, 1.2], "velocity[1]": [-0.5, 0.5]}
     >>> ax = sb.plot.plot_basins(sb.dynamics.basins_of_attraction(found, grid))
     """
-    if "basin" not in dataset:
-        raise InputError(f"no basins among {list(map(str, dataset.variables))}")
+    contains(dataset, "basins", "basin")
     names = [str(name) for name in dataset["basin"].dims]
     labels = dataset["basin"].values
     count = int(dataset["basin"].attrs["flag_values"].max()) + 1
-    colors = [_UNDECIDED, *_attractor_colors(count)]
+    colors = [_GRAY, *_attractor_colors(count)]
     meanings = [each.replace("_", " ") for each in str(dataset["basin"].attrs["flag_meanings"]).split()]
     for i, points in enumerate(dataset["attractor_points"].values):
         share = 100.0 * float((labels == i).mean())
@@ -793,12 +757,7 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             axis.set_label_text(_coordinate(name))
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
         handles: list[Any] = [
-            Patch(
-                facecolor=colors[i],
-                edgecolor="black",
-                linewidth=0.4,
-                label=meanings[i],
-            )
+            Patch(facecolor=colors[i], edgecolor="black", linewidth=0.4, label=meanings[i])
             for i in range(count + 1)
             if i > 0 or (labels == -1).any()
         ]
@@ -837,12 +796,11 @@ def plot_manifold(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
     >>> ax = sb.plot.plot_manifold(sb.dynamics.invariant_manifold(saddle, max_arclength=1.0))
     """
-    if "age" not in dataset or "saddle" not in dataset:
-        raise InputError(f"no manifold among {list(map(str, dataset.variables))}")
+    contains(dataset, "manifold", "age", "saddle")
     names = [str(name) for name in dataset["coordinate"].values]
     at = (0, next((i for i, name in enumerate(names) if name.startswith("velocity")), 1 % len(names)))
     stability, new = str(dataset.attrs["stability"]), ax is None
-    line, color = ("-", _CHAOS) if stability == "unstable" else ("--", cm.batlow(0.15))
+    line, color = ("-", _RED) if stability == "unstable" else ("--", cm.batlow(0.15))
     with frame(ax, dataset, height=84.0) as ax:
         for side in np.unique(dataset["side"].values):
             points = dataset["state"].values[dataset["side"].values == side]
@@ -860,8 +818,7 @@ def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
 
     The right axis, which is logarithmic, has the distance between the two states of different outcome.
     """
-    if "orbit_state" not in dataset or "state" not in dataset:
-        raise InputError(f"no edge state among {list(map(str, dataset.variables))}")
+    contains(dataset, "edge state", "orbit_state", "state")
     name = str(dataset["coordinate"].values[0])
     values = dataset["state"].values[:, 0]
     with frame(ax, dataset) as ax:
@@ -873,29 +830,18 @@ def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
                     va="bottom", fontsize=6, color="0.4",
                 )  # fmt: skip
         period = np.arange(1, values.size + 1)
-        ax.plot(
-            period,
-            values,
-            ".-",
-            color=_UP_STATES,
-            linewidth=0.7,
-            markersize=3.5,
-            label="between the two outcomes",
-        )
+        look: dict[str, Any] = {"color": _BLUE, "linewidth": 0.7, "markersize": 3.5}
+        ax.plot(period, values, ".-", label="between the two outcomes", **look)
         points = dataset["orbit_state"].values[:, 0]
         out = int((np.hypot(dataset["multiplier_real"], dataset["multiplier_imag"]) > 1.0).sum())
         for i, point in enumerate(points):
             words = f"orbit of period {points.size}, {out} multiplier{'s' if out != 1 else ''} outside"
-            ax.axhline(
-                point, color=_DOWN_STATES, linewidth=0.9, dashes=(4, 2), label=words if i == 0 else None
-            )
-        apart = ax.twinx()
+            label = words if i == 0 else None
+            ax.axhline(point, color=_RED, linewidth=0.9, dashes=(4, 2), label=label)
+        apart, distance = ax.twinx(), dataset["distance"].values
+        distance = np.where(distance > 0.0, distance, np.nan)
         apart.semilogy(
-            period,
-            np.where(dataset["distance"].values > 0.0, dataset["distance"].values, np.nan),
-            color=_STARTS,
-            linewidth=0.7,
-            label="distance of the two states (right)",
+            period, distance, color=_STARTS, linewidth=0.7, label="distance of the two states (right)"
         )
         apart.set_ylabel("Distance of the two states")
         ax.set_zorder(apart.get_zorder() + 1)

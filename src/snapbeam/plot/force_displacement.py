@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from snapbeam.model.parameters import lookup
-from snapbeam.plot.style import frame, legend_below
+from snapbeam.plot.style import contains, frame, legend_below
 from snapbeam.util.si_prefixes import prefixed, scale_of
-from snapbeam.util.validation import InputError, checked
+from snapbeam.util.validation import checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,10 +21,10 @@ __all__ = ["plot_equilibrium_branches", "plot_force_displacement"]
 
 
 _STABLE, _HELD, _UNSTABLE = "#16245E", "#B03A27", "#9A9A9A"
-_STYLES: dict[str, tuple[str, Any, float]] = {
-    "stable": (_STABLE, "-", 1.6),
-    "stable under displacement control only": (_HELD, "--", 1.2),
-    "unstable": (_UNSTABLE, ":", 0.9),
+_STYLES: dict[str, dict[str, Any]] = {
+    "stable": {"color": _STABLE, "linestyle": "-", "linewidth": 1.6},
+    "stable under displacement control only": {"color": _HELD, "linestyle": "--", "linewidth": 1.2},
+    "unstable": {"color": _UNSTABLE, "linestyle": ":", "linewidth": 0.9},
 }
 _MARKERS = {"limit": ("o", "limit point"), "bifurcation": ("D", "bifurcation point")}
 
@@ -54,10 +54,8 @@ def plot_force_displacement(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
     >>> arch = sb.ReducedModel.from_beam(beam, modes=4, imperfection=sb.Imperfection(midspan_amplitude=6e-6))
     >>> ax = sb.plot.plot_force_displacement(sb.force_displacement(arch, 0.5))
     """
-    if not {"force", "displacement", "unstable_directions", "critical_force"} <= set(dataset.variables):
-        raise InputError(
-            f"dataset with {', '.join(map(str, dataset.variables))}: must be a result of force_displacement"
-        )
+    needed = ("force", "displacement", "unstable_directions", "critical_force")
+    contains(dataset, "force-displacement curve", *needed)
     place, force = dataset["displacement"].values, dataset["force"].values
     held = dataset["unstable_directions_at_fixed_displacement"].values == 0
     low, high = _force_range(dataset)
@@ -65,55 +63,23 @@ def plot_force_displacement(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
     prefix_w, unit_w = scale_of(place[seen], "m")
     prefix_f, unit_f = scale_of([low, high], "N")
     kind = np.where(dataset["unstable_directions"].values == 0, 0, np.where(held, 1, 2))
-    names = list(_STYLES)
-    drawn = set()
+    names = np.array(list(_STYLES))
+    handles = []
     with frame(ax, height=84.0) as ax:
         secondary = np.flatnonzero(dataset["branch_kind"].values == "secondary")
         # the two halves of a secondary branch differ in a mode that does not move at the force
         for number in np.setdiff1d(np.arange(dataset.sizes["branch_number"]), secondary[1::2]):
-            index = np.flatnonzero(dataset["branch"].values == number)
-            # a line of one kind ends where the next one begins
-            cuts = np.flatnonzero(np.diff(kind[index])) + 1
-            for part in np.split(np.arange(index.size), cuts):
-                if not part.size:
-                    continue
-                name = names[kind[index[part[0]]]]
-                color, line, width = _STYLES[name]
-                points = index[part[0] : min(part[-1] + 2, index.size)]
-                order = 3 - kind[index[part[0]]]
-                ax.plot(
-                    place[points] / prefix_w,
-                    force[points] / prefix_f,
-                    line,
-                    color=color,
-                    linewidth=width,
-                    zorder=order,
-                )
-                drawn.add(name)
-        handles = [
-            Line2D(
-                [],
-                [],
-                color=_STYLES[name][0],
-                linestyle=_STYLES[name][1],
-                linewidth=_STYLES[name][2],
-                label=name,
-            )
-            for name in names
-            if name in drawn
-        ]
+            own = dataset["branch"].values == number
+            handles += _pieces(ax, place[own] / prefix_w, force[own] / prefix_f, names[kind[own]])
         handles += _critical(dataset, ax, prefix_w, prefix_f)
         for name, words in (("snap_through", "snap-through"), ("snap_back", "snap-back")):
             value = float(dataset[f"{name}_force"])
             if np.isfinite(value):
-                ax.plot(
-                    float(dataset[f"{name}_displacement"]) / prefix_w, value / prefix_f,
-                    "^" if value > 0.0 else "v", color="#000000", markersize=6.0, zorder=6,
-                )  # fmt: skip
-                right = float(dataset[f"{name}_displacement"]) > place[seen].mean()
+                there = float(dataset[f"{name}_displacement"])
+                at, right = (there / prefix_w, value / prefix_f), there > place[seen].mean()
+                ax.plot(*at, "^" if value > 0.0 else "v", color="#000000", markersize=6.0, zorder=6)
                 ax.annotate(
-                    f"{words} {prefixed(value, 'N')}",
-                    (float(dataset[f"{name}_displacement"]) / prefix_w, value / prefix_f),
+                    f"{words} {prefixed(value, 'N')}", at,
                     xytext=(6.0 if right else -6.0, 9.0 if value > 0.0 else -15.0), textcoords="offset points",
                     ha="right" if right else "left", fontsize=7.0,
                     bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}, zorder=7,
@@ -124,8 +90,25 @@ def plot_force_displacement(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
         margin = 0.05 * float(np.ptp(place[seen]))
         ax.set_xlim((place[seen].min() - margin) / prefix_w, (place[seen].max() + margin) / prefix_w)
         ax.set_ylim(low / prefix_f, high / prefix_f)
-        legend_below(ax, handles)
+        legend_below(ax, _in_order(handles))
     return ax
+
+
+def _pieces(ax: Axes, x: np.ndarray, y: np.ndarray, names: np.ndarray) -> list[Line2D]:
+    """Draw a branch; a line of one kind of stability ends where the next one begins."""
+    lines: list[Line2D] = []
+    for part in np.split(np.arange(x.size), np.flatnonzero(names[1:] != names[:-1]) + 1):
+        if part.size:
+            points, name = slice(part[0], part[-1] + 2), str(names[part[0]])
+            order = 3 - list(_STYLES).index(name)
+            lines += ax.plot(x[points], y[points], label=name, zorder=order, **_STYLES[name])
+    return lines
+
+
+def _in_order(handles: list[Line2D]) -> list[Line2D]:
+    """One legend entry of each label, those of stability first."""
+    unique = {str(each.get_label()): each for each in reversed(handles)}
+    return [unique.pop(name) for name in _STYLES if name in unique] + list(unique.values())[::-1]
 
 
 def _force_range(dataset: xr.Dataset) -> tuple[float, float]:
@@ -152,25 +135,14 @@ def _critical(dataset: xr.Dataset, ax: Axes, prefix_w: float, prefix_f: float) -
         at = np.column_stack(
             (dataset["critical_displacement"].values[chosen], dataset["critical_force"].values[chosen])
         )
-        near = np.array(
-            [
-                bool(stable.any())
-                and float(np.hypot((place[stable] - w) / spans[0], (force[stable] - f) / spans[1]).min())
-                < 0.02
-                for w, f in at
-            ],
-            dtype=bool,
-        )
+        apart = np.hypot(
+            (place[stable] - at[:, :1]) / spans[0], (force[stable] - at[:, 1:]) / spans[1]
+        ).min(axis=1, initial=np.inf)  # fmt: skip
+        near = apart < 0.02
         if near.any():
-            ax.plot(
+            handles += ax.plot(
                 at[near, 0] / prefix_w, at[near, 1] / prefix_f, marker, color="#000000", markerfacecolor="white",
-                markersize=4.0, markeredgewidth=0.9, zorder=5,
-            )  # fmt: skip
-            handles.append(
-                Line2D(
-                    [], [], linestyle="", marker=marker, color="#000000", markerfacecolor="white", markersize=4.0,
-                    label=label,
-                )
+                markersize=4.0, markeredgewidth=0.9, zorder=5, label=label,
             )  # fmt: skip
     return handles
 
@@ -198,29 +170,19 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
     >>> found = sb.model.equilibrium_branches(sb.System(plate, forces=[electrode]), "force.voltage", (0.0, 8.0))
     >>> ax = sb.plot.plot_equilibrium_branches(found)
     """
-    if not {"midspan_displacement", "unstable_directions", "critical_value"} <= set(dataset.variables):
-        raise InputError(
-            f"dataset with {', '.join(map(str, dataset.variables))}: must be a result of equilibrium_branches"
-        )
+    needed = ("midspan_displacement", "unstable_directions", "critical_value")
+    contains(dataset, "equilibrium branches", *needed)
     row = lookup(dataset.attrs["parameter"])
     value, place = dataset[row.short].values, dataset["midspan_displacement"].values
-    stable = dataset["unstable_directions"].values == 0
+    names = np.where(dataset["unstable_directions"].values == 0, "stable", "unstable")
     prefix, unit = scale_of(place, "m")
     size, axis = _short_axis(value, row.quantity.unit)
     label = dataclasses.replace(row, quantity=dataclasses.replace(row.quantity, unit=axis)).label
+    handles: list[Line2D] = []
     with frame(ax, height=70.0) as ax:
         for number in np.unique(dataset["branch"].values):
-            index = np.flatnonzero(dataset["branch"].values == number)
-            for part in np.split(np.arange(index.size), np.flatnonzero(np.diff(stable[index])) + 1):
-                # a line of one kind ends where the next one begins
-                points = index[part[0] : min(part[-1] + 2, index.size)]
-                color, line, width = _STYLES["stable" if stable[points[0]] else "unstable"]
-                ax.plot(value[points] / size, place[points] / prefix, line, color=color, linewidth=width)
-        handles = [
-            Line2D([], [], color=_STYLES[name][0], linestyle=_STYLES[name][1], label=name)
-            for name in ("stable", "unstable")
-            if (stable if name == "stable" else ~stable).any()
-        ]
+            own = dataset["branch"].values == number
+            handles += _pieces(ax, value[own] / size, place[own] / prefix, names[own])
         for kind, (marker, words) in _MARKERS.items():
             at = dataset["critical_kind"].values == kind
             if at.any():
@@ -230,7 +192,7 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
                 )  # fmt: skip
         ax.set_xlabel(label)
         ax.set_ylabel(f"Displacement of the centre ({unit})")
-        ax.legend(handles=handles, loc="best")
+        ax.legend(handles=_in_order(handles), loc="best")
     return ax
 
 

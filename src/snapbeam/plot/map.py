@@ -26,18 +26,16 @@ from snapbeam.plot.style import (
     base_and_load,
     beam_text,
     class_cells,
-    figure_style,
-    fix_ticks,
+    color_bar,
     frame,
     legend_below,
-    new_figure,
     set_title,
 )
 from snapbeam.solver.statistics import STATISTICS
 from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.util.si_prefixes import prefixed, scale_of
 from snapbeam.util.status_codes import ResponseClass, wells_of
-from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, instance, shown
+from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -113,21 +111,13 @@ def plot_response_map(
     >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_response_map(dataset)
     """
-    from snapbeam.util.datasets import xr
-
-    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    over: dict[str, Any] = {"measurements": measurements, "quasi_static_line": quasi_static_line}
     if "response_class" in dataset and dataset["response_class"].dims == ("point",):
-        return plot_points(
-            dataset,
-            "response_class",
-            ax,
-            measurements=measurements,
-            quasi_static_line=quasi_static_line,
-            legend=legend,
-        )
+        return plot_points(dataset, "response_class", ax, legend=legend, **over)
     if measurements is None and not quasi_static_line:  # which are drawn over ratios
         dataset = in_units(dataset)
-    if "response_class" in dataset and _is_line(dataset):
+    response = dataset["response_class"].squeeze() if "response_class" in dataset else dataset
+    if "response_class" in dataset and response.ndim == 1 and "point" not in response.dims:
         return _line(dataset, ax, measurements is not None or quasi_static_line, legend)
     across, upward, kinds = _two_axes(dataset)
     edges = tuple(edges_of(dataset, name) for name in (across, upward))
@@ -154,11 +144,6 @@ def plot_response_map(
     return ax
 
 
-def _is_line(dataset: xr.Dataset) -> bool:
-    response = dataset["response_class"].squeeze()
-    return response.ndim == 1 and "point" not in response.dims
-
-
 def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) -> Axes:
     """A map over one axis."""
     if overlaid:
@@ -167,9 +152,8 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
     with frame(ax, height=84.0 if legend else 62.0) as ax:
         _draw_line(ax, dataset, name)
         set_title(ax, subtitle(dataset, (name,)))
-        handles = class_handles(dataset["response_class"].values, wells_of(dataset.attrs))
         if legend:
-            legend_below(ax, handles)
+            legend_below(ax, class_handles(dataset["response_class"].values, wells_of(dataset.attrs)))
     return ax
 
 
@@ -193,9 +177,6 @@ def _draw_line(ax: Axes, dataset: xr.Dataset, name: str) -> None:
 
 
 def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
-    from snapbeam.util.datasets import xr
-
-    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "response_class" not in dataset:
         raise InputError(
             f"dataset: is not a map; it has no variable 'response_class' among {list(map(str, dataset.variables))}"
@@ -208,9 +189,14 @@ def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
             f"a map is drawn over two axes of more than one point; this one has {sizes}: select one point of the "
             "others, as with dataset.isel(location=0)"
         )
-    upward = next((name for name in UPWARD if name in named), named[1])
-    across = named[0] if named[1] == upward else named[1]
+    across, upward = _in_order(named)
     return across, upward, response.transpose(upward, across).values
+
+
+def _in_order(dims: list[str]) -> tuple[str, str]:
+    """The names of two axes: the one that is drawn across, then the one that is drawn upward."""
+    upward = next((name for name in UPWARD if name in dims), dims[1])
+    return dims[0] if dims[1] == upward else dims[1], upward
 
 
 def _scalar(dataset: xr.Dataset, name: str) -> float | None:
@@ -299,6 +285,12 @@ def draw_quasi_static_line(
     return ax.plot(*line, color="black", linewidth=0.9, dashes=(4, 2), label=label)[0]
 
 
+def quasi_static_along(dataset: xr.Dataset, along: str, x: _Array) -> _Array:
+    """V_QS1 of one mode (Eq. 21) along ``location`` or ``frequency_ratio``, the other of them fixed."""
+    place, ratio = (x if along == name else float(dataset[name]) for name in ("location", "frequency_ratio"))
+    return np.asarray(quasi_static_threshold(place, ratio))
+
+
 def _given(fixed: dict[str, float | None], name: str) -> float:
     value = fixed[name]
     if value is None:
@@ -325,12 +317,8 @@ def draw_measurements(
         )
     colors = [CLASS_COLORS[ResponseClass(int(kind))] for kind in measurements.response_class[keep]]
     where = getattr(measurements, across)[keep], getattr(measurements, upward)[keep]
-    outside = (
-        (where[0] < ax.get_xlim()[0])
-        | (where[0] > ax.get_xlim()[1])
-        | (where[1] < ax.get_ylim()[0])
-        | (where[1] > ax.get_ylim()[1])
-    )
+    ends = zip(where, (ax.get_xlim(), ax.get_ylim()), strict=True)
+    outside = np.any([(at < low) | (at > high) for at, (low, high) in ends], axis=0)
     if outside.any():
         warnings.warn(
             f"{int(outside.sum())} of {len(measurements)} measured points lie outside the map", stacklevel=3
@@ -385,10 +373,7 @@ def plot_statistic(
     >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_statistic(dataset, "peak_force")
     """
-    from snapbeam.util.datasets import xr
-
-    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
-    if instance("name", name, str, "text") not in dataset:
+    if name not in dataset:
         raise InputError(f"variable = {shown(name)}: the map has {', '.join(map(str, dataset.data_vars))}")
     if dataset[name].dims == ("point",):
         return plot_points(dataset, name, ax)
@@ -407,23 +392,18 @@ def plot_statistic(
     data = values.copy(data=scaled.reshape(values.shape))
     if log is None:
         log = wants_powers(scaled)
-    with figure_style():
-        if ax is None:
-            ax = new_figure("single", 74.0).add_subplot()
-        fix_ticks(ax)
-        if dims[:1] == ["sweep"]:
-            _swept(ax, dataset, data, dims[1])
-            ax.set_ylabel(label)
-            ax.set_yscale("log" if log else "linear")
-        elif len(dims) == 1:
-            points, _ = positions(dataset, dims[0])
-            ax.plot(points, data.values, ".-", color=BEAM_COLOR, markersize=3)
-            dress(ax.xaxis, dataset, dims[0])
+    with frame(ax, height=74.0) as ax:
+        if dims[:1] == ["sweep"] or len(dims) == 1:
+            if len(dims) > 1:
+                _swept(ax, dataset, data, dims[1])
+            else:
+                points, _ = positions(dataset, dims[0])
+                ax.plot(points, data.values, ".-", color=BEAM_COLOR, markersize=3)
+            dress(ax.xaxis, dataset, dims[-1])
             ax.set_ylabel(label)
             ax.set_yscale("log" if log else "linear")
         else:
-            upward = next((each for each in UPWARD if each in dims), dims[1])
-            across = dims[0] if dims[1] == upward else dims[1]
+            across, upward = _in_order(dims)
             field = np.ma.masked_invalid(data.transpose(upward, across).values)
             positive = scaled[scaled > 0.0]
             norm = LogNorm(positive.min(), positive.max()) if log else Normalize()
@@ -432,7 +412,7 @@ def plot_statistic(
                 edges_of(dataset, across), edges_of(dataset, upward), field, cmap=crameri.batlow, norm=norm,
                 rasterized=field.size > 20_000,
             )  # fmt: skip
-            ax.figure.colorbar(mesh, ax=ax, label=label, pad=0.02).ax.tick_params(labelsize=7)
+            color_bar(mesh, ax, label, pad=0.02)
             dress(ax.xaxis, dataset, across)
             dress(ax.yaxis, dataset, upward)
         set_title(ax, subtitle(dataset, (*dims,)))
@@ -446,7 +426,6 @@ def _swept(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, name: str) -> None
     for row, kind in zip(data.values, dataset["sweep"].values, strict=True):
         look, color, face = looks[str(kind)]
         ax.plot(points, row, look, color=color, markerfacecolor=face, markersize=3.5, label=f"swept {kind}")
-    dress(ax.xaxis, dataset, name)
     ax.legend(loc="best")
 
 
@@ -545,10 +524,7 @@ def plot_points(
     >>> dataset = sb.sweep(system, points, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_points(dataset, "peak_force")
     """
-    from snapbeam.util.datasets import xr
-
-    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
-    if instance("name", name, str, "text") not in dataset.data_vars or dataset[name].dims != ("point",):
+    if name not in dataset.data_vars or dataset[name].dims != ("point",):
         named = [str(key) for key, item in dataset.data_vars.items() if item.dims == ("point",)]
         raise InputError(f"variable = {shown(name)}: the points have {', '.join(named) or 'no variables'}")
     along = _along(dataset, across, upward)
@@ -573,14 +549,10 @@ def plot_points(
 
 
 def _over(
-    ax: Axes,
-    dataset: xr.Dataset,
-    along: tuple[str, str],
-    measurements: MeasuredPoints | None,
-    quasi_static_line: bool,
+    ax: Axes, dataset: xr.Dataset, along: tuple[str, str], measurements: MeasuredPoints | None, line: bool
 ) -> list[Any]:
     """Draw what lies over the points; what a legend needs for it."""
-    if measurements is None and not quasi_static_line:
+    if measurements is None and not line:
         return []
     if along not in _PAPER:
         raise InputError(
@@ -591,7 +563,7 @@ def _over(
     for name in {name for pair in _PAPER for name in pair} - set(along):
         values = np.unique(dataset[name].values) if name in dataset.coords else np.empty(0)
         fixed[name] = float(values[0]) if values.size == 1 else None
-    handles: list[Any] = [draw_quasi_static_line(ax, dataset, *along, fixed)] if quasi_static_line else []
+    handles: list[Any] = [draw_quasi_static_line(ax, dataset, *along, fixed)] if line else []
     return handles if measurements is None else [*handles, draw_measurements(ax, measurements, *along, fixed)]
 
 
@@ -647,9 +619,6 @@ def _statistic(
     norm = LogNorm() if log else Normalize()
     drawn = ax.scatter(at[0][good], at[1][good], c=values[good], cmap=crameri.batlow, norm=norm, **look)
     if not good.all():
-        ax.scatter(
-            at[0][~good],
-            at[1][~good],
-            **look | {"facecolors": "none", "linewidths": 0.4, "edgecolors": "0.5"},
-        )
-    ax.figure.colorbar(drawn, ax=ax, label=label, pad=0.02).ax.tick_params(labelsize=7)
+        hollow = look | {"facecolors": "none", "linewidths": 0.4, "edgecolors": "0.5"}
+        ax.scatter(at[0][~good], at[1][~good], **hollow)
+    color_bar(drawn, ax, label, pad=0.02)

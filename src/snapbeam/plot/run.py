@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import cmcrameri.cm as crameri
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -17,6 +16,7 @@ from snapbeam.plot.style import (
     CENTER_COLOR,
     SHAKER_COLOR,
     caption,
+    color_of,
     figure_style,
     fix_ticks,
     frame,
@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "across",
+    "cut",
     "dataset_of",
+    "hardest_impact",
     "plot_energies",
     "plot_modal_amplitudes",
     "plot_phase_portrait",
@@ -66,14 +68,6 @@ def across(dataset: xr.Dataset) -> tuple[str, str]:
     return "time", "Time (s)"
 
 
-def _axes(ax: Axes | None, dataset: xr.Dataset) -> Axes:
-    if ax is None:
-        ax = new_figure("single", 66.0).add_subplot()
-        set_title(ax, caption(dataset, 2))
-    fix_ticks(ax)
-    return ax
-
-
 @checked
 def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, modes: int = 5) -> Axes:
     """Draw the amplitudes of the first *modes* buckling modes, over that of the well.
@@ -104,17 +98,10 @@ def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, mode
     name, label = across(dataset)
     alpha = dataset["modal_amplitude"].values
     well = _well_amplitude(dataset)
-    with figure_style():
-        ax = _axes(ax, dataset)
+    with frame(ax, dataset, height=66.0) as ax:
         for i in range(count):
-            color = crameri.batlow(0.85 * i / max(count - 1, 1))
-            ax.plot(
-                dataset[name],
-                alpha[:, i] / (well or 1.0),
-                color=color,
-                label=rf"$\alpha_{{{i + 1}}}$",
-                zorder=-i,
-            )
+            look: dict[str, Any] = {"color": color_of(i, count), "zorder": -i}
+            ax.plot(dataset[name], alpha[:, i] / (well or 1.0), label=rf"$\alpha_{{{i + 1}}}$", **look)
         unit = r"$\alpha_i\,/\,|\alpha_1|$ in the well" if well else r"$\alpha_i$ (m$^{1/2}$)"
         ax.set(xlabel=label, ylabel=f"Modal amplitude {unit}")
         ax.margins(x=0.0)
@@ -131,11 +118,11 @@ def _well_amplitude(dataset: xr.Dataset) -> float | None:
     return None
 
 
-def _legend(ax: Axes, entries: int) -> None:
-    """A legend in a row above the curves, where it crosses none."""
+def _legend(ax: Axes, columns: int, room: float = 0.16) -> None:
+    """A legend above the curves, where it crosses none, in a share of the height."""
     low, high = ax.get_ylim()
-    ax.set_ylim(low, high + 0.16 * (high - low))
-    ax.legend(loc="upper left", ncols=entries, columnspacing=1.0, handlelength=1.2)
+    ax.set_ylim(low, high + room * (high - low))
+    ax.legend(loc="upper left", ncols=columns)
 
 
 @checked
@@ -165,15 +152,12 @@ def plot_energies(run: Run | xr.Dataset, ax: Axes | None = None) -> Axes:
     name, label = across(dataset)
     found = [(key, words, color) for key, words, color in _ENERGIES if key in dataset]
     factor, unit = scale_of(np.concatenate([dataset[key].values for key, _, _ in found]), "J")
-    with figure_style():
-        ax = _axes(ax, dataset)
+    with frame(ax, dataset, height=66.0) as ax:
         for key, words, color in found:
             ax.plot(dataset[name], dataset[key] / factor, color=color, label=words)
         ax.set(xlabel=label, ylabel=f"Energy ({unit})")
         ax.margins(x=0.0)
-        low, high = ax.get_ylim()
-        ax.set_ylim(low, high + 0.24 * (high - low))
-        ax.legend(loc="upper left", ncols=2)
+        _legend(ax, 2, 0.24)
     return ax
 
 
@@ -235,8 +219,7 @@ def plot_spectrum(
     spectrum = 2.0 * np.abs(np.fft.rfft((y - y.mean()) * weight)) / weight.sum()
     frequency = np.fft.rfftfreq(even.size, float(even[1] - even[0]))
     unit = dataset[variable].attrs.get("units", "1")
-    with figure_style():
-        ax = _axes(ax, dataset)
+    with frame(ax, dataset, height=66.0) as ax:
         ax.plot(frequency[1:], spectrum[1:], color=BEAM_COLOR, linewidth=0.6)
         top = 12.0 if name == "cycle" else float(frequency[-1])
         shown = spectrum[1:][frequency[1:] <= top]
@@ -302,8 +285,7 @@ def plot_phase_portrait(
     names = names if at_midspan else ("displacement_at_striker", "velocity_at_striker")
     dataset = dataset_of(run, *names)
     w, v = (dataset[name].values for name in names)
-    with figure_style():
-        ax = _axes(ax, dataset)
+    with frame(ax, dataset, height=66.0) as ax:
         ax.plot(w, v, color="0.6", linewidth=0.4, rasterized=w.size > 20_000)
         if strobe and "cycle" in dataset.variables:
             cycle = dataset["cycle"].values
@@ -377,7 +359,7 @@ def plot_run(
     """
     dataset = dataset_of(run, "displacement_at_striker")
     axis_name, label = across(dataset)
-    part, period = _cut(dataset, axis_name, window), 1.0
+    part, period = cut(dataset, axis_name, window), 1.0
     if _is_of_one_event(dataset):
         part, axis_name = _with_base_acceleration(part), "time"
         period, unit = scale_of(part["time"].values, "s")
@@ -385,7 +367,13 @@ def plot_run(
     has_force = "contact_force" in part and bool((part["contact_force"] > 0.0).any())
     rows = 1 + sum(name in part for name in _PANELS)
     if ax is not None:
-        return _alone(ax, part, part[axis_name].values, label)
+        with frame(ax) as ax:
+            x = part[axis_name].values
+            _displacements(ax, part, x)
+            ax.axhline(0.0, color="0.6", linewidth=0.5, zorder=0)
+            ax.set(xlabel=label, ylabel="Displacement $w/b$", xlim=(_from(x[0], x[-1]), x[-1]))
+            _legend(ax, 3, 0.15)
+        return ax
     with figure_style():
         figure = new_figure("double", 35.0 + 28.0 * rows)
         grid = figure.add_gridspec(
@@ -408,15 +396,10 @@ def plot_run(
         if axis_name == "time" and "length_scale" in dataset.attrs:
             size, unit = scale_of([float(dataset.attrs["length_scale"])], "m")
             metres = float(dataset.attrs["length_scale"]) / size
-            beside = left[0].secondary_yaxis(
-                "right",
-                functions=(lambda w: np.multiply(w, metres), lambda w: np.divide(w, metres)),
-            )
+            turned = (lambda w: np.multiply(w, metres), lambda w: np.divide(w, metres))
+            beside = left[0].secondary_yaxis("right", functions=turned)
             beside.set_ylabel(f"Displacement ({unit})")
-        handles, labels = left[0].get_legend_handles_labels()
-        figure.legend(
-            handles, labels, loc="outside lower left", ncols=3,
-        )  # fmt: skip
+        figure.legend(*left[0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
         set_title(left[0], caption(dataset, 2))
         figure.align_ylabels(left)
         if has_force:
@@ -454,18 +437,9 @@ def _curves(part: xr.Dataset) -> list[tuple[str, str, str]]:
     return [each for each in _CURVES if each[0] in part and (struck or each[0] != "displacement_at_striker")]
 
 
-def _alone(ax: Axes, part: xr.Dataset, x: np.ndarray, label: str) -> Axes:
-    """Draw the displacements on the given axes."""
-    with figure_style():
-        for name, words, color in _curves(part):
-            ax.plot(x, part[name].values, color=color, label=words, rasterized=x.size > _MANY)
-        ax.axhline(0.0, color="0.6", linewidth=0.5, zorder=0)
-        ax.set(xlabel=label, ylabel="Displacement $w/b$", xlim=(_from(x[0], x[-1]), x[-1]))
-        low, high = ax.get_ylim()
-        ax.set_ylim(low, high + 0.15 * (high - low))
-        ax.legend(loc="upper left", ncols=3)
-        fix_ticks(ax)
-    return ax
+def _displacements(ax: Axes, part: xr.Dataset, x: np.ndarray) -> None:
+    for name, words, color in _curves(part):
+        ax.plot(x, part[name].values, color=color, label=words, rasterized=x.size > _MANY)
 
 
 def _from(first: float, last: float) -> float:
@@ -473,7 +447,8 @@ def _from(first: float, last: float) -> float:
     return first if first > 0.0 else first - 0.01 * (last - first)
 
 
-def _cut(dataset: xr.Dataset, across: str, window: tuple[float, float] | None) -> xr.Dataset:
+def cut(dataset: xr.Dataset, across: str, window: tuple[float, float] | None) -> xr.Dataset:
+    """The samples of a run within a window."""
     if window is None:
         return dataset
     first, last = interval("window", window)
@@ -487,15 +462,9 @@ def _cut(dataset: xr.Dataset, across: str, window: tuple[float, float] | None) -
 
 
 def _column(
-    figure: Figure,
-    grid: GridSpec,
-    at: int,
-    part: xr.Dataset,
-    x: np.ndarray,
-    scales: dict[str, tuple[float, str]],
-) -> list[Axes]:
-    rows = grid.nrows
-    axes: list[Axes] = []
+    figure: Figure, grid: GridSpec, at: int, part: xr.Dataset, x: np.ndarray, scales: dict[str, tuple[float, str]]
+) -> list[Axes]:  # fmt: skip
+    rows, axes = grid.nrows, list[Axes]()
     for row in range(rows):
         axes.append(figure.add_subplot(grid[row, at], sharex=axes[0] if axes else None))
         fix_ticks(axes[-1])
@@ -574,15 +543,18 @@ def _envelope(ax: Axes, x: np.ndarray, y: np.ndarray, color: str, label: str | N
     ax.fill_between(at, np.append(low, low[-1]), np.append(high, high[-1]), alpha=0.35, **look)
 
 
-def _hardest_impact(part: xr.Dataset) -> tuple[xr.Dataset, np.ndarray, float]:
-    """Return the samples near the maximum force: the contact, and a margin of 0.6 of its length on either side."""
-    force, time = part["contact_force"].values, part["time"].values
+def hardest_impact(force: np.ndarray) -> tuple[int, int]:
+    """The samples without contact before and after the maximum force, or the first and last one."""
     peak = int(np.nanargmax(force))
     apart = np.flatnonzero(~(force > 0.0))
-    before = apart[apart < peak]
-    after = apart[apart > peak]
-    start = int(before[-1]) if before.size else 0
-    stop = int(after[0]) if after.size else len(force) - 1
+    before, after = apart[apart < peak], apart[apart > peak]
+    return int(before[-1]) if before.size else 0, int(after[0]) if after.size else len(force) - 1
+
+
+def _hardest_impact(part: xr.Dataset) -> tuple[xr.Dataset, np.ndarray, float]:
+    """Return the samples near the maximum force: the contact, and a margin of 0.6 of its length on either side."""
+    time = part["time"].values
+    start, stop = hardest_impact(part["contact_force"].values)
     margin = 0.6 * (time[stop] - time[start])
     inside = (time >= time[start] - margin) & (time <= time[stop] + margin)
     near = part.isel(time=inside)

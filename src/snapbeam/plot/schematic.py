@@ -19,6 +19,7 @@ from snapbeam.model.quantity import numbered
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
 from snapbeam.plot.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, figure_style, new_figure
+from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.validation import InputError, checked, instance
 
 __all__ = ["FRAME", "draw_surroundings", "draw_tips", "motion_of", "plot_system"]
@@ -40,8 +41,7 @@ def draw_tips(ax: Axes, system: System, tips: list[tuple[int, Any]]) -> None:
     lead = tips[0][1]
     times = np.linspace(0.0, _CYCLES * float(lead.cycle(_columns(lead), scale)[0]), 1601)
     for (number, drive), line in zip(tips, _LINES, strict=False):
-        columns = _columns(drive)
-        moved = motion_of(drive, columns, scale, times, float(columns.get("phase", np.zeros(1))[0]))
+        moved = motion_of(drive, scale, times)
         ax.plot(times / times[-1] * _CYCLES, moved / scale.length, label=f"striker {number}", **line)
     ax.set_xlabel("Cycles of the drive")
     ax.set_ylabel("Tips / $b$")
@@ -53,10 +53,12 @@ def _columns(drive: Any) -> dict[str, _Array]:
     return {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
 
 
-def motion_of(drive: Any, columns: dict[str, _Array], scale: Any, times: _Array, phase: float) -> _Array:
+def motion_of(drive: Any, scale: Any, times: _Array) -> _Array:
     """Displacement of a tip from its mid-position at instants, m, or the change of a load, N."""
+    columns = _columns(drive)
     found = drive.numbers(columns, scale)
     if drive.harmonic:
+        phase = float(columns.get("phase", np.zeros(1))[0])
         return np.asarray(found["amplitude"][0] * np.sin(found["omega"][0] * times + phase))
     numbers = drive.numbers_type()(*(float(found[name][0]) for name in drive.number_names))
     samples = drive.samples()
@@ -113,7 +115,7 @@ def _layers(ax: Axes, piezo: PiezoelectricHarvester, x: _Array, w: _Array, sign:
         ax.add_patch(Polygon(outline, closed=True, facecolor=_COLOR, alpha=0.75, edgecolor="none", zorder=4))
     at = 0.5 * (piezo.patch_start + piezo.patch_end) * wide
     there = float(np.interp(at, x, w))
-    _resistor(ax, at, there + sign * (0.03 + _LAYER), sign, f"{_ohms(piezo.resistance)}")
+    _resistor(ax, at, there + sign * (0.03 + _LAYER), sign, prefixed(piezo.resistance, r"$\Omega$"))
 
 
 def _coil(ax: Axes, coil: ElectromagneticHarvester, x: _Array, w: _Array, sign: float, wide: float) -> None:
@@ -129,7 +131,7 @@ def _coil(ax: Axes, coil: ElectromagneticHarvester, x: _Array, w: _Array, sign: 
         for turn in range(4):
             y = there + sign * (0.22 + 0.1 * turn)
             ax.plot(at + side * 0.19, y, marker="o", markersize=2.2, color=_COLOR, zorder=4)
-    _resistor(ax, at, there + sign * 0.6, sign, f"{_ohms(coil.resistance)}", apart=0.19)
+    _resistor(ax, at, there + sign * 0.6, sign, prefixed(coil.resistance, r"$\Omega$"), apart=0.19)
 
 
 def _resistor(ax: Axes, at: float, edge: float, sign: float, words: str, apart: float = 0.14) -> None:
@@ -137,24 +139,11 @@ def _resistor(ax: Axes, at: float, edge: float, sign: float, words: str, apart: 
     share = np.linspace(0.0, 1.0, 9)
     swing = np.array([0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0, 0.0, 0.0])
     for side in (-1.0, 1.0):
-        ax.plot(
-            [at + side * apart, at + side * apart, at + side * 0.32],
-            [edge, top, top],
-            color=_COLOR,
-            linewidth=0.7,
-        )
+        wire = [at + side * apart, at + side * apart, at + side * 0.32, at + side * 0.32]
+        ax.plot(wire, [edge, top, top, top + 0.28 * sign], color=_COLOR, linewidth=0.7)
     ax.plot(at - 0.32 + 0.64 * share, top + 0.28 * sign + 0.06 * swing, color=_COLOR, linewidth=0.9)
-    for side in (-1.0, 1.0):
-        ax.plot([at + side * 0.32] * 2, [top, top + 0.28 * sign], color=_COLOR, linewidth=0.7)
     # over the resistor, clear of the shape of the other well
     ax.text(at, top + 0.58 * sign, words, ha="center", va="center", color=_COLOR)
-
-
-def _ohms(value: float) -> str:
-    for size, prefix in ((1e6, "M"), (1e3, "k"), (1.0, "")):
-        if value >= size:
-            return rf"{value / size:.3g} {prefix}$\Omega$"
-    return rf"{value:.3g} $\Omega$"
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -166,6 +155,9 @@ _RADIUS = 0.10
 """Radius of the tip, in units of the picture: b upwards, L/7 sideways."""
 _WIDE = 7.0
 """Length of the beam in those units."""
+_MOTIONS = {
+    "drive": "Tip / $b$", "base_excitation": "Base $y/b$", "axial_load": "$P(t) - P$ (N)", "force": "$F(t)$ (N)",
+}  # fmt: skip
 _LAWS = {
     "elastic_plastic": "elastic-plastic",
     "hertz": "Hertz",
@@ -316,14 +308,8 @@ def _draw_imperfection(ax: Axes, system: System, imperfection: Imperfection, res
     if imperfection.point_load != 0.0:
         push = 1.0 if imperfection.point_load > 0.0 else -1.0
         at = imperfection.point_location * _WIDE
-        ax.text(
-            at,
-            float(np.interp(at, x, w)) - 0.7 * push,
-            "$F$",
-            ha="center",
-            va="center",
-            color=_LOAD_COLOR,
-        )
+        height = float(np.interp(at, x, w)) - 0.7 * push
+        ax.text(at, height, "$F$", ha="center", va="center", color=_LOAD_COLOR)
 
 
 def _draw_striker(ax: Axes, system: System, striker: Striker, contact: ContactLaw, number: int) -> None:
@@ -365,22 +351,15 @@ def _draw_striker(ax: Axes, system: System, striker: Striker, contact: ContactLa
 
 
 def _caption(
-    ax: Axes,
-    at: float,
-    sign: float,
-    contact: ContactLaw,
-    striker: Striker,
-    gap: float,
-    number: int,
-    first: Striker | None,
-) -> None:
+    ax: Axes, at: float, sign: float, contact: ContactLaw, striker: Striker, gap: float, number: int, first: Striker | None
+) -> None:  # fmt: skip
     """Write the contact law, gap and mass next to the striker, clear of the beam."""
     law = _LAWS.get(contact.name, contact.name)
     lines = [f"striker {number}: {law}" if number else f"contact: {law}"]
     if gap != 0.0:
         lines.append(f"gap {gap:.3g} $b$" if gap > 0.0 else f"preload {-gap:.3g} $b$")
     if striker.mass is not None:
-        lines.append(r"$m_\mathrm{s}$ = " + _grams(striker.mass))
+        lines.append(r"$m_\mathrm{s}$ = " + prefixed(1e3 * striker.mass, "g"))
     lines = [", ".join(lines)] if number else lines
     right = at < 0.6 * _WIDE
     x, side = (at + 0.75, "left") if right else (at - 0.75, "right")
@@ -389,10 +368,6 @@ def _caption(
     for i, line in enumerate(lines):
         y = -sign * (1.35 + 0.42 * i)
         ax.text(x, y, line, ha=side, va="center", color=SHAKER_COLOR)
-
-
-def _grams(mass: float) -> str:
-    return f"{1e3 * mass:.3g} g" if mass < 1.0 else f"{mass:.3g} kg"
 
 
 def _rod(ax: Axes, x: float, one: float, other: float) -> None:
@@ -435,28 +410,16 @@ def _damper(ax: Axes, x: float, one: float, other: float) -> None:
 def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
     """Draw the motion of the tip without contact, the base motion, or the change of the axial load."""
     scale = system.scale
-    columns = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
-    period = float(drive.cycle(columns, scale)[0])
+    period = float(drive.cycle(_columns(drive), scale)[0])
     cycles = np.linspace(0.0, 2.0 if isinstance(drive, ConstantVelocity) else _CYCLES, 1601)
-    phase = float(columns.get("phase", np.zeros(1))[0])
-    moved = motion_of(drive, columns, scale, cycles * period, phase)
+    moved = motion_of(drive, scale, cycles * period)
     section = numbered(section)[0]
     per = 1.0 if section in ("axial_load", "force") else scale.length
-    down = (
-        section == "base_excitation"
-        and system.base_excitation is not None
-        and system.base_excitation.direction == "down"
-    )
+    base = system.base_excitation if section == "base_excitation" else None
+    down = base is not None and base.direction == "down"
     color = SHAKER_COLOR if section == "drive" else _LOAD_COLOR
     ax.plot(cycles, (-moved if down else moved) / per, color=color)
     ax.set_xlabel("Cycles")
-    ax.set_ylabel(
-        {
-            "drive": "Tip / $b$",
-            "base_excitation": "Base $y/b$",
-            "axial_load": r"$P(t) - P$ (N)",
-            "force": "$F(t)$ (N)",
-        }[section]
-    )
+    ax.set_ylabel(_MOTIONS[section])
     ax.set_xlim(0.0, cycles[-1])
     ax.set_title(drive.name.replace("_", " "), loc="left")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
+from cmcrameri import cm
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -206,27 +207,38 @@ def new_figure(width: str = "single", height: float = 75.0) -> Figure:
         return plt.figure(figsize=(millimetres / 25.4, tall / 25.4))
 
 
-def axes_or_new(
-    ax: Axes | None, dataset: xr.Dataset | None = None, width: str = "single", height: float = 72.0
-) -> Axes:
-    """The axes that were given, or those of a new figure whose title states the fixed parameters of the dataset."""
-    if ax is not None:
-        return ax
-    ax = new_figure(width, height).add_subplot()
-    if dataset is not None:
-        set_title(ax, caption(dataset, 2))
-    return ax
-
-
 @contextmanager
 def frame(
     ax: Axes | None, dataset: xr.Dataset | None = None, width: str = "single", height: float = 72.0
 ) -> Iterator[Axes]:
-    """Axes to draw on in the style of this package, as :func:`axes_or_new` gives them, with its ticks in the end."""
+    """Axes to draw on in the style of this package, with its ticks in the end.
+
+    They are those that were given, or of a new figure whose title states the fixed parameters of the dataset.
+    """
     with figure_style():
-        ax = axes_or_new(ax, dataset, width, height)
+        if ax is None:
+            ax = new_figure(width, height).add_subplot()
+            if dataset is not None:
+                set_title(ax, caption(dataset, 2))
         yield ax
         fix_ticks(ax)
+
+
+def contains(dataset: xr.Dataset, words: str, *names: str) -> None:
+    """Raise an InputError unless a dataset has the variables of a kind of result."""
+    if not set(names) <= set(map(str, dataset.variables)):
+        raise InputError(f"no {words} among {list(map(str, dataset.variables))}")
+
+
+def color_of(number: int, count: int, last: float = 0.85) -> Any:
+    """Colour of one of several curves in an order, such as those of modes."""
+    return cm.batlow(last * number / max(count - 1, 1))
+
+
+def color_bar(mesh: Any, ax: Axes, label: str, **options: Any) -> None:
+    """Draw the colour bar of cells or dots beside their axes."""
+    bar = ax.figure.colorbar(mesh, ax=ax, label=label, **options)
+    bar.ax.tick_params(labelsize=_RC["ytick.labelsize"], width=_RC["ytick.major.width"])
 
 
 def set_title(ax: Axes, text: str) -> None:

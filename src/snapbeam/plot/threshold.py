@@ -9,10 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
+from snapbeam.model.quasi_static import quasi_static_objection
 from snapbeam.plot.axes import dress, edges_of, positions, symbol_of
-from snapbeam.plot.style import figure_style, fix_ticks, new_figure, set_title
-from snapbeam.util.validation import InputError, checked, instance
+from snapbeam.plot.map import plot_response_map, quasi_static_along
+from snapbeam.plot.style import contains, frame, set_title
+from snapbeam.util.validation import InputError, checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -64,15 +65,9 @@ def plot_threshold(
     ... )
     >>> ax = sb.plot.plot_threshold(dataset)
     """
-    from snapbeam.util.datasets import xr
-
-    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
-    if not set(_NEEDED) <= set(dataset.variables):
-        raise InputError(f"no threshold curve among {list(map(str, dataset.variables))}")
+    contains(dataset, "threshold curve", *_NEEDED)
     dims = [str(name) for name in dataset["lower_threshold"].squeeze().dims]
     if not dims:  # one threshold: the classes along its parameter
-        from snapbeam.plot.map import plot_response_map
-
         ax = plot_response_map(dataset, ax, legend=legend)
         for name in ("lower_threshold", "upper_threshold"):
             if np.isfinite(float(dataset[name])):
@@ -93,21 +88,18 @@ def plot_threshold(
     curves = [curve.squeeze() for curve in curves]
     if len(curves) > len(_STYLES):
         raise InputError(f"dataset: has {len(curves)} curves; at most {len(_STYLES)} can be told apart")
-    with figure_style():
-        if ax is None:
-            ax = new_figure("single", 70.0).add_subplot()
+    with frame(ax, height=70.0) as ax:
         for curve, (color, dashes) in zip(curves, _STYLES, strict=False):
             _draw_curve(ax, curve, x, (color, dashes), _label(dataset, curve, others, raised))
         known = raised == "velocity_amplitude" and along in ("frequency_ratio", "location")
         quasi_static = quasi_static and known and quasi_static_objection(dataset.attrs) is None
         if quasi_static:
-            static = _quasi_static(dataset, along, x)
+            static = quasi_static_along(dataset, along, x)
             (line,) = ax.plot(x, static, color="black", linewidth=0.8, dashes=(4, 2))
         amplitude = dataset[raised].values
         upper = dataset["upper_threshold_max"].where(dataset["lower_threshold"].notnull(), -np.inf)
         closed = bool(upper.notnull().all()) and bool(np.isfinite(upper).any())
         top = min(amplitude[-1], 1.4 * float(upper.max())) if closed else amplitude[-1]
-        fix_ticks(ax)
         dress(ax.xaxis, dataset, along)
         dress(ax.yaxis, dataset, raised)
         low = amplitude[0] if ax.get_yscale() == "log" else min(0.0, amplitude[0])
@@ -118,10 +110,8 @@ def plot_threshold(
         marks = _mark_no_threshold(ax, curves, x, edges)
         if "cycles" in dataset.attrs:
             step = float(np.max(np.diff(amplitude)))
-            words = (
-                f"{int(dataset.attrs['cycles'])} cycles, steps of {step:.2g} in {symbol_of(dataset, raised)}"
-            )
-            set_title(ax, words)
+            cycles = int(dataset.attrs["cycles"])
+            set_title(ax, f"{cycles} cycles, steps of {step:.2g} in {symbol_of(dataset, raised)}")
         if legend:
             handles, _ = ax.get_legend_handles_labels()
             first, always = dataset["lower_threshold"], dataset["upper_threshold"]
@@ -190,9 +180,3 @@ def _label(dataset: xr.Dataset, curve: xr.Dataset, others: list[str], raised: st
         return f"{symbol_of(dataset, others[0])} = {text}"
     modes = dataset.attrs.get("modes")
     return f"lowest interwell {symbol_of(dataset, raised)}" if modes is None else f"$N$ = {int(modes)}"
-
-
-def _quasi_static(dataset: xr.Dataset, along: str, x: np.ndarray) -> np.ndarray:
-    if along == "location":
-        return np.asarray(quasi_static_threshold(x, float(dataset["frequency_ratio"])))
-    return np.asarray(quasi_static_threshold(float(dataset["location"]), x))

@@ -15,11 +15,20 @@ from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import split_name
-from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
+from snapbeam.model.quasi_static import quasi_static_objection
 from snapbeam.plot.axes import dress, edges_of, is_geometric, positions, symbol_of
-from snapbeam.plot.style import CLASS_COLORS, figure_style, fix_ticks, legend_below, new_figure, set_title
+from snapbeam.plot.map import quasi_static_along
+from snapbeam.plot.style import (
+    CLASS_COLORS,
+    SERIES_COLORS,
+    color_bar,
+    contains,
+    frame,
+    legend_below,
+    set_title,
+)
 from snapbeam.util.status_codes import ResponseClass
-from snapbeam.util.validation import InputError, instance, shown
+from snapbeam.util.validation import InputError, checked, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,13 +38,16 @@ if TYPE_CHECKING:
 __all__ = ["plot_designs", "plot_probability", "plot_quantiles", "plot_tornado"]
 
 
-_TRIED, _BROKEN = "#4C97C8", "0.8"
+_BLUE, _RED, _SKY = SERIES_COLORS[:3]
+_TRIED = "#4C97C8"
+_BARS: dict[str, Any] = {"ecolor": "black", "elinewidth": 0.8, "capsize": 2.0}
 _STATES = (("violated", "X", "#B03A27"), ("undecided", "D", "#C3DD8A"), ("satisfied", "o", "#16245E"))
 _OBJECTIVE = "tried_objective_"
 _DECADE = 10.0
 """Ratio of the maximum to the minimum above which an axis is logarithmic."""
 
 
+@checked
 def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None = None) -> Axes:
     """Draw the result of :func:`snapbeam.uncertainty.optimize_design`: the first objective over the second, or a variable.
 
@@ -49,9 +61,6 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
         A variable, such as ``"location"``; the second objective by default, or the first variable if there is one objective.
     ax : matplotlib.axes.Axes, optional
     """
-    from snapbeam.util.datasets import xr
-
-    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "constraints_satisfied" not in dataset or "tried" not in dataset.dims:
         raise InputError(f"no designs among {list(map(str, dataset.variables))}")
     names = [str(name) for name in dataset.data_vars]
@@ -64,16 +73,19 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     else:
         raise InputError(f"over = {shown(over)}: must be one of {', '.join(variables)}")
     up = f"objective_{objectives[0]}"
-    with figure_style():
-        if ax is None:
-            ax = new_figure("single", 74.0).add_subplot()
+    with frame(ax, height=74.0) as ax:
         x, y = dataset[f"tried_{across}"].values, dataset[f"tried_{up}"].values
         kept = (dataset["violation"].values == 0.0) & np.isfinite(y)
         ax.scatter(x[kept], y[kept], s=4, color=_TRIED, linewidths=0.0, label="tried, constraints satisfied")
         for code, (word, marker, color) in enumerate(_STATES):
             own = dataset["constraints_satisfied"].values == code
             if own.any():
-                _reported(dataset, ax, across, up, own, marker, color, f"constraints {word}")
+                bars = [_errors(dataset, name, own) for name in (across, up)]
+                ax.errorbar(
+                    dataset[across].values[own], dataset[up].values[own], xerr=bars[0], yerr=bars[1], fmt=marker,
+                    color=color, markersize=5, markeredgecolor="black", markeredgewidth=0.5, zorder=3,
+                    label=f"constraints {word}", **_BARS,
+                )  # fmt: skip
         ax.set(xlabel=_label(dataset, across), ylabel=_label(dataset, up))
         for values, scale, axis in ((x[kept], ax.set_xscale, ax.xaxis), (y[kept], ax.set_yscale, ax.yaxis)):
             if values.size and values.min() > 0.0 and values.max() > _DECADE * values.min():
@@ -83,19 +95,7 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
                     axis.set_major_formatter("{x:g}")
                     axis.set_minor_formatter(NullFormatter())
         legend_below(ax)
-        fix_ticks(ax)
     return ax
-
-
-def _reported(
-    dataset: xr.Dataset, ax: Axes, across: str, up: str, own: np.ndarray, marker: str, color: str, label: str
-) -> None:
-    x, y = dataset[across].values[own], dataset[up].values[own]
-    bars = [_errors(dataset, name, own) for name in (across, up)]
-    ax.errorbar(
-        x, y, xerr=bars[0], yerr=bars[1], fmt=marker, color=color, markersize=5, markeredgecolor="black",
-        markeredgewidth=0.5, ecolor="black", elinewidth=0.8, capsize=2.0, label=label, zorder=3,
-    )  # fmt: skip
 
 
 def _errors(dataset: xr.Dataset, name: str, own: np.ndarray) -> np.ndarray | None:
@@ -123,10 +123,10 @@ _WORDS = {
     "first_well": "P(ends in the first well)",
     "other_well": "P(ends in the other well)",
 }
-_LINES = (("#B03A27", "-"), ("#16245E", "--"), ("#4C97C8", "-."), ("#000000", ":"))
 _DASHES: dict[float, Any] = {0.05: ":", 0.5: "-", 0.95: "--"}
 
 
+@checked
 def plot_probability(
     dataset: xr.Dataset,
     outcome: str = "snap",
@@ -152,11 +152,7 @@ def plot_probability(
     levels : tuple of float
         Probabilities, increasing, each in (0, 1).
     """
-    from snapbeam.util.datasets import xr
-
-    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
-    if "probability" not in dataset or "outcome" not in dataset["probability"].dims:
-        raise InputError(f"no probabilities among {list(map(str, dataset.variables))}")
+    contains(dataset, "probabilities", "probability", "outcome")
     known = [str(name) for name in dataset["outcome"].values]
     if outcome not in known:
         raise InputError(f"outcome = {shown(outcome)}: must be one of {', '.join(known)}")
@@ -165,16 +161,20 @@ def plot_probability(
     data = data.squeeze()
     if not 1 <= len(dims) <= 2 or "point" in dims:
         raise InputError(f"probability over {dims}: is drawn over one or two parameters")
-    with figure_style():
-        if ax is None:
-            ax = new_figure("single", 72.0).add_subplot()
+    with frame(ax) as ax:
         if len(dims) == 1:
             _line(data, ax, dims[0], outcome, levels)
         else:
             _cells(data, ax, dims, outcome, levels)
         if measurements is not None and len(dims) == 2:
-            _draw_measurements(ax, dims, measurements)
-        fix_ticks(ax)
+            for kind in ResponseClass:
+                own = measurements.response_class == kind
+                if own.any():
+                    x, y = (getattr(measurements, name)[own] for name in dims)
+                    ax.scatter(
+                        x, y, s=12, color=CLASS_COLORS[kind],
+                        edgecolors="black", linewidths=0.5, zorder=3, label=kind.label,
+                    )  # fmt: skip
     return ax
 
 
@@ -184,15 +184,8 @@ def _line(data: xr.Dataset, ax: Axes, name: str, outcome: str, levels: tuple[flo
     for level in levels:
         ax.axhline(level, color="0.75", linewidth=0.6, zorder=0)
     share = 100.0 * float(data.attrs.get("confidence", 0.95))
-    ax.fill_between(x, low, high, color="#16245E", alpha=0.25, linewidth=0.0, label=f"{share:g} % interval")
-    ax.plot(
-        x,
-        data["probability"].values,
-        color="#16245E",
-        marker="o",
-        markersize=2.2,
-        label="fraction of the runs",
-    )
+    ax.fill_between(x, low, high, color=_BLUE, alpha=0.25, linewidth=0.0, label=f"{share:g} % interval")
+    ax.plot(x, data["probability"].values, "o-", color=_BLUE, markersize=2.2, label="fraction of the runs")
     ax.set(ylim=(-0.02, 1.02), ylabel=_WORDS.get(outcome, outcome))
     ax.legend(loc="best")
     dress(ax.xaxis, data, name)
@@ -205,10 +198,7 @@ def _cells(data: xr.Dataset, ax: Axes, dims: list[str], outcome: str, levels: tu
     cells = ax.pcolormesh(
         *edges, values, cmap=colors, norm=BoundaryNorm(np.linspace(0.0, 1.0, 11), 10), rasterized=True
     )
-    figure = ax.get_figure()
-    assert figure is not None
-    bar = figure.colorbar(cells, ax=ax, label=_WORDS.get(outcome, outcome), ticks=np.linspace(0.0, 1.0, 6))
-    bar.ax.tick_params(labelsize=7, width=0.6)
+    color_bar(cells, ax, _WORDS.get(outcome, outcome), ticks=np.linspace(0.0, 1.0, 6))
     x, y = (positions(data, name)[0] for name in dims)
     drawn = [level for level in levels if np.nanmin(values) < level < np.nanmax(values)]
     handles: list[Any] = []
@@ -221,31 +211,13 @@ def _cells(data: xr.Dataset, ax: Axes, dims: list[str], outcome: str, levels: tu
             handles.append(Line2D([], [], color="#B03A27", linestyle=style, label=f"P = {level:g}"))
     wide = np.argwhere(~data["reached"].transpose(dims[1], dims[0]).values)
     if wide.size:
-        marks = ax.scatter(
-            x[wide[:, 1]],
-            y[wide[:, 0]],
-            marker="x",
-            s=8,
-            color="0.35",
-            linewidths=0.6,
-            label="wider than asked",
-        )
-        handles.append(marks)
+        look: dict[str, Any] = {"marker": "x", "s": 8, "color": "0.35", "linewidths": 0.6}
+        handles.append(ax.scatter(x[wide[:, 1]], y[wide[:, 0]], label="wider than asked", **look))
     dress(ax.xaxis, data, dims[0])
     dress(ax.yaxis, data, dims[1])
     for at, axis in ((0, ax.set_xlim), (1, ax.set_ylim)):
         axis(edges[at][0], edges[at][-1]) if not is_geometric(edges[at]) else None
     legend_below(ax, handles)
-
-
-def _draw_measurements(ax: Axes, dims: list[str], measurements: MeasuredPoints) -> None:
-    for kind in ResponseClass:
-        own = measurements.response_class == kind
-        if own.any():
-            ax.scatter(
-                getattr(measurements, dims[0])[own], getattr(measurements, dims[1])[own], s=12, color=CLASS_COLORS[kind],
-                edgecolors="black", linewidths=0.5, zorder=3, label=kind.label,
-            )  # fmt: skip
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -261,6 +233,7 @@ _STYLES = (
 )
 
 
+@checked
 def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static: bool = False) -> Axes:
     """Draw the result of :func:`snapbeam.uncertainty.quantile_threshold` over one parameter.
 
@@ -274,11 +247,7 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
     quasi_static : bool
         Whether to draw V_QS1 (Eq. 21) too, over frequency ratio or location.
     """
-    from snapbeam.util.datasets import xr
-
-    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
-    if "threshold" not in dataset or "quantile" not in dataset["threshold"].dims:
-        raise InputError(f"no quantile thresholds among {list(map(str, dataset.variables))}")
+    contains(dataset, "quantile thresholds", "threshold", "quantile")
     data = dataset.squeeze([name for name in dataset["is_monotonic"].dims if dataset.sizes[name] == 1])
     dims = [str(name) for name in data["is_monotonic"].dims]
     if len(dims) != 1 or "point" in dims:
@@ -288,33 +257,30 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
             f"dataset: has {data.sizes['quantile']} lines; at most {len(_STYLES)} can be told apart"
         )
     along, raised = dims[0], str(data.attrs["parameter"])
+    if quasi_static and (objection := quasi_static_objection(data.attrs)) is not None:
+        raise InputError(f"quasi_static with {objection}; leave quasi_static out")
+    if quasi_static and along not in ("location", "frequency_ratio"):
+        raise InputError(f"quasi_static over {along}: is known over location and frequency_ratio")
     bottom, top = (float(each) for each in data.attrs["bounds"])
     x, _ = positions(data, along)
-    with figure_style():
-        if ax is None:
-            ax = new_figure("single", 70.0).add_subplot()
+    with frame(ax, height=70.0) as ax:
         for level, (color, dashes) in zip(data["quantile"].values, _STYLES, strict=False):
             one = data.sel(quantile=level)
             low, high = (np.clip(one[f"threshold_{end}"].values, bottom, top) for end in ("low", "high"))
             ax.fill_between(x, low, high, color=color, alpha=0.22, linewidth=0.0)
-            ax.plot(
-                x,
-                one["threshold"].values,
-                linestyle=dashes,
-                color=color,
-                linewidth=1.1,
-                label=f"P = {level:g}",
-            )
+            look: dict[str, Any] = {"linestyle": dashes, "color": color, "linewidth": 1.1}
+            ax.plot(x, one["threshold"].values, label=f"P = {level:g}", **look)
         if quasi_static:
-            _quasi_static(data, ax, along, x)
+            line = quasi_static_along(data, along, x)
+            ax.plot(
+                x, line, color="black", linewidth=0.8, dashes=(4, 2), label=r"quasi-static, $V_\mathrm{QS1}$"
+            )
         falls = ~data["is_monotonic"].values
         if falls.any():
             middle = data["threshold"].sel(quantile=0.5, method="nearest").values
             ax.plot(x[falls], middle[falls], "x", color="black", markersize=4, label="not monotone")
-        fix_ticks(ax)
         dress(ax.xaxis, data, along)
-        symbol = symbol_of(data, raised)
-        ax.set(xlim=x[[0, -1]], ylabel=f"Threshold of {symbol}")
+        ax.set(xlim=x[[0, -1]], ylabel=f"Threshold of {symbol_of(data, raised)}")
         reach = np.nanmax(np.where(np.isfinite(data["threshold_high"]), data["threshold_high"], np.nan))
         ax.set_ylim(min(0.0, bottom), min(top, 1.08 * float(reach)) if np.isfinite(reach) else top)
         share = 100.0 * float(data.attrs.get("confidence", 0.95))
@@ -323,24 +289,11 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
     return ax
 
 
-def _quasi_static(data: xr.Dataset, ax: Axes, along: str, x: np.ndarray) -> None:
-    if (objection := quasi_static_objection(data.attrs)) is not None:
-        raise InputError(f"quasi_static with {objection}; leave quasi_static out")
-    if along not in ("location", "frequency_ratio"):
-        raise InputError(f"quasi_static over {along}: is known over location and frequency_ratio")
-    place = x if along == "location" else float(data["location"])
-    ratio = x if along == "frequency_ratio" else float(data["frequency_ratio"])
-    line = quasi_static_threshold(place, ratio)
-    ax.plot(x, line, color="black", linewidth=0.8, dashes=(4, 2), label=r"quasi-static, $V_\mathrm{QS1}$")
-
-
 # ----------------------------------------------------------------------------------------------------
 # Tornado pictures: how far an answer moves with each parameter, the most telling on top.
 
 
-_UP, _DOWN, _TOTAL = "#B03A27", "#16245E", "#70BBF0"
-
-
+@checked
 def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Draw the result of :func:`snapbeam.uncertainty.sensitivity`: a bar for each parameter, with intervals.
 
@@ -348,18 +301,13 @@ def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     much that is in the unit of the parameter is next to its name.  Of indices, the first order and, if there is
     one, the total.
     """
-    from snapbeam.util.datasets import xr
-
-    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "parameter" not in dataset.dims or not {"effect", "first_order"} & set(map(str, dataset.variables)):
         raise InputError(f"no sensitivities among {list(map(str, dataset.variables))}")
     local = "effect" in dataset
     weight = np.abs(dataset["effect" if local else "first_order"].values)
     data = dataset.isel(parameter=np.argsort(weight, kind="stable"))
     place = np.arange(data.sizes["parameter"])
-    with figure_style():
-        if ax is None:
-            ax = new_figure("single", 28.0 + 10.0 * place.size).add_subplot()
+    with frame(ax, height=28.0 + 10.0 * place.size) as ax:
         if local:
             _bars(data, ax, place)
         else:
@@ -368,20 +316,17 @@ def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         ax.tick_params(axis="y", length=0)
         for side in ("top", "right", "left"):
             ax.spines[side].set_visible(False)
-        fix_ticks(ax)
     return ax
 
 
 def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
     middle = float(data.attrs["quantity_mean"])
     half, low, high = (data[f"effect{end}"].values for end in ("", "_low", "_high"))
-    for sign, color, label in ((-1.0, _DOWN, "parameter lower"), (1.0, _UP, "parameter higher")):
+    for sign, color, label in ((-1.0, _BLUE, "parameter lower"), (1.0, _RED, "parameter higher")):
         ax.barh(place, sign * half, left=middle, height=0.62, color=color, label=label)
         error = np.stack([half - low, high - half])[:: int(sign)]
         interval = f"{100.0 * float(data.attrs['confidence']):g} % interval" if sign > 0.0 else None
-        ax.errorbar(
-            middle + sign * half, place, xerr=error, fmt="none", ecolor="black", elinewidth=0.8, capsize=2.0, label=interval
-        )  # fmt: skip
+        ax.errorbar(middle + sign * half, place, xerr=error, fmt="none", label=interval, **_BARS)
     ax.axvline(middle, color="black", linewidth=0.6)
     unit = str(data.attrs["quantity_units"])
     words = str(data.attrs["quantity"]).replace("omega_1", r"$\omega_1$")
@@ -393,15 +338,12 @@ def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
 def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
     both = "total_order" in data
     height = 0.36 if both else 0.62
-    kinds = [("first_order", _DOWN, "first order", 0.19 if both else 0.0)]
-    kinds += [("total_order", _TOTAL, "total", -0.19)] if both else []
+    kinds = [("first_order", _BLUE, "first order", 0.19 if both else 0.0)]
+    kinds += [("total_order", _SKY, "total", -0.19)] if both else []
     for name, color, label, shift in kinds:
         value, low, high = (data[f"{name}{end}"].values for end in ("", "_low", "_high"))
         ax.barh(place + shift, value, height=height, color=color, label=label)
-        ax.errorbar(
-            value, place + shift, xerr=np.stack([value - low, high - value]), fmt="none", ecolor="black",
-            elinewidth=0.8, capsize=2.0,
-        )  # fmt: skip
+        ax.errorbar(value, place + shift, xerr=np.stack([value - low, high - value]), fmt="none", **_BARS)
     ax.axvline(0.0, color="black", linewidth=0.6)
     ax.set_xlabel(f"Share of the variance: {data.attrs['quantity']}")
     legend_below(ax)
