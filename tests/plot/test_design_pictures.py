@@ -41,7 +41,7 @@ def probabilities():
 def test_probabilities_over_two_parameters(probabilities) -> None:
     ax = plot_probability(probabilities)
     words = [text.get_text() for text in ax.figure.legends[0].get_texts()]
-    assert words == ["P = 0.05", "P = 0.5", "P = 0.95", "wider than asked"]
+    assert words == ["P = 0.05", "P = 0.5", "P = 0.95", "interval wider than requested"]
     assert "V" in ax.get_ylabel()
     cells = ax.collections[0].get_array().reshape(8, 9)
     np.testing.assert_array_equal(cells, probabilities["probability"].sel(outcome="snap").T)
@@ -114,7 +114,7 @@ def test_designs() -> None:
     )  # fmt: skip
     ax = plot_designs(dataset)
     words = [text.get_text() for text in ax.figure.legends[0].get_texts()]
-    assert words == ["tried, constraints satisfied", "constraints satisfied"]
+    assert words == ["candidates that satisfy the constraints", "reported design, constraints satisfied"]
     assert ax.collections[0].get_offsets().shape == (int((goal >= 0.4).sum()), 2)
     with pytest.raises(InputError, match="must be one of location"):
         plot_designs(dataset, "gap")

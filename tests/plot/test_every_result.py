@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import subprocess
 import sys
@@ -12,7 +13,8 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.model.parameter_file import Config
-from snapbeam.plot.dynamics import plot_attractors, plot_exponents, plot_multipliers
+from snapbeam.plot.dataset import _KINDS
+from snapbeam.plot.dynamics import plot_attractors, plot_diagram, plot_exponents, plot_multipliers
 from snapbeam.util.datasets import xr
 
 SMALL = Config().system.replace(**{"model.modes": 1})
@@ -138,6 +140,112 @@ def test_attractors_state_what_may_be_unseen() -> None:
         "0: period 1 in the upper well, 70.0 % of the states",
         "1: period 1 in the lower well, 30.0 % of the states",
     ]
+
+
+RESULTS = {
+    "sweep": "map", "read_checkpoint": "map", "threshold": "threshold", "force_displacement": "force-displacement curve",
+    "perturbation_growth": "growth of a perturbation", "backbone_curve": "backbone curve",
+    "basins_of_attraction": "basins of attraction", "bifurcation_curve": "bifurcation curve",
+    "bifurcation_diagram": "bifurcation diagram", "homoclinic_points": "homoclinic points",
+    "hysteresis": "statistics swept up and down", "invariant_manifold": "manifold",
+    "largest_lyapunov": "Lyapunov exponents", "lyapunov_spectrum": "Lyapunov exponents", "lifetime_map": "lifetimes",
+    "poincare_section": "section", "gradient": "gradient", "optimize_design": "designs",
+    "probability_map": "probability map", "quantile_threshold": "quantiles of a threshold",
+    "score_measurements": "measured classes", "sensitivity": "sensitivities",
+    "equilibrium_branches": "equilibrium branches",
+}  # fmt: skip
+"""Public functions that return a dataset, and the kind of figure that it has."""
+
+
+def public(kind) -> dict[str, object]:
+    spaces = (sb, sb.dynamics, sb.uncertainty, sb.model)
+    found = {name: getattr(space, name) for space in spaces for name in dir(space) if name[0] != "_"}
+    return {name: each for name, each in found.items() if kind(each)}
+
+
+def test_every_dataset_that_an_analysis_returns_has_a_kind_of_figure() -> None:
+    """A new function that returns a dataset fails here until its result draws itself."""
+    functions = public(inspect.isfunction)
+    returned = {
+        name
+        for name, each in functions.items()
+        if "Dataset" in str(inspect.signature(each).return_annotation)
+    }
+    assert returned == set(RESULTS)
+    assert set(RESULTS.values()) <= {kind.words for kind in _KINDS}
+
+
+def test_every_class_of_results_has_plot() -> None:
+    classes = public(inspect.isclass)
+    results = {name for name, each in classes.items() if hasattr(each, "to_dataset")} | {"Run", "System"}
+    assert results >= {"Attractors", "Branch", "EdgeState", "PeriodicOrbit", "Posterior"}
+    assert [name for name in sorted(results) if not callable(getattr(classes[name], "plot", None))] == []
+
+
+def test_posterior_and_gradient_state_units_and_intervals() -> None:
+    draw = np.random.default_rng(1).normal(size=(4000, 2))
+    values = np.column_stack([3.4e-4 * (1.0 + 0.02 * draw[:, 0]), 4e8 * (1.0 + 0.1 * draw[:, 1])])
+    names = ("beam.buckling_level", "contact.stiffness")
+    ax = sb.uncertainty.Posterior(names, values, np.full(4000, 1 / 4000)).plot()
+    labels = [text.get_text().split("\n") for text in ax.get_yticklabels()]
+    assert labels[0][0] == "buckling level" and labels[0][1].endswith("µm")
+    wide = ax.collections[0].get_segments()
+    np.testing.assert_allclose(
+        [np.ptp(line[:, 0]) for line in wide], [2 * 1.96 * 2, 2 * 1.96 * 10], rtol=0.06
+    )
+    table = xr.Dataset(
+        {"elasticity": ("parameter", [0.4, -2.0]), "relative_error": ("parameter", [0.1, 0.01])},
+        {"parameter": list(names)}, {"quantity": "peak_force"},
+    )  # fmt: skip
+    bars = table.snapbeam.plot().patches
+    assert [bar.get_width() for bar in bars] == [0.4, -2.0], "the most telling parameter on top"
+
+
+def test_scores_are_in_the_colours_of_the_measured_classes() -> None:
+    kinds = np.array([0, 3, 3], dtype=np.int8)
+    names = ("probability", "probability_low", "probability_high")
+    columns = dict(zip(names, ([0.9, 0.2, 0.6], [0.8, 0.1, 0.5], [1.0, 0.3, 0.7]), strict=True))
+    table = xr.Dataset(
+        {name: ("measurement", values) for name, values in columns.items()}
+        | {"response_class": ("measurement", kinds), "most_likely": ("measurement", kinds)},
+        attrs={"agree": 2, "agree_expected": 1.7},
+    )
+    ax = table.snapbeam.plot()
+    assert [text.get_text() for text in ax.figure.legends[0].get_texts()] == [
+        "measured: intrawell", "measured: continuous interwell",
+    ]  # fmt: skip
+    np.testing.assert_allclose(ax.containers[1].lines[0].get_ydata(), [0.2, 0.6])
+
+
+def test_homoclinic_points_and_growth_draw_themselves() -> None:
+    points = xr.Dataset(
+        {
+            "state": (("point", "coordinate"), [[0.1, 0.2], [0.3, 0.4]]),
+            "stable_arclength": ("point", [1.0, 2.0]),
+        },
+        {"coordinate": ["amplitude[1]", "velocity[1]"]},
+    )
+    assert points.snapbeam.plot().lines[0].get_label() == "homoclinic points, 2"
+    growth = sb.perturbation_growth(SMALL, sb.Integration(cycles=3))
+    assert growth.snapbeam.plot().get_yscale() == "log"
+
+
+def test_the_gap_between_two_groups_of_curves_is_closed() -> None:
+    """A broken axis where no curve is: both groups keep one scale, and no tick is in the gap."""
+    value, low = np.linspace(0.1, 0.3, 5), np.linspace(-1.0, -0.5, 5)
+    table = xr.Dataset(
+        {"midspan_displacement": (("sweep", "velocity_amplitude", "period"), np.stack([low, np.ones(5)])[..., None])},
+        {"sweep": ["up", "down"], "velocity_amplitude": value}, {"parameter": "velocity_amplitude"},
+    )  # fmt: skip
+    ax = plot_diagram(table)
+    at = ax.transAxes.inverted().transform(
+        ax.transData.transform([(0.2, y) for y in (-1.0, -0.75, -0.5, 1.0)])
+    )[:, 1]
+    assert at[2] - at[1] == pytest.approx(at[1] - at[0])
+    assert at[3] - at[2] < 0.4 and at[2] - at[0] > 0.5
+    assert all(y < -0.4 or y > 0.9 for y in ax.get_yticks())
+    joined = plot_diagram(table.isel(sweep=[0]))
+    assert joined.get_yscale() == "linear"
 
 
 def test_objects_draw_themselves() -> None:

@@ -18,15 +18,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "AXIS_LABELS",
-    "axis_label",
-    "dress",
-    "edges_of",
-    "in_units",
-    "is_geometric",
-    "positions",
-    "symbol_of",
-]
+    "AXIS_LABELS", "axis_label", "dress", "edges_of", "in_units", "is_geometric", "positions", "symbol_of",
+]  # fmt: skip
 
 
 _Array = NDArray[np.float64]

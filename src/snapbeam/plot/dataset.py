@@ -3,37 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from snapbeam.model.parameters import lookup
-from snapbeam.plot.dynamics import (
-    MAX_CURVES,
-    plot_attractors,
-    plot_backbone,
-    plot_basins,
-    plot_bifurcation_curve,
-    plot_diagram,
-    plot_edge,
-    plot_exponents,
-    plot_lifetimes,
-    plot_manifold,
-    plot_multipliers,
-    plot_section,
-    plot_survival,
-)
-from snapbeam.plot.force_displacement import plot_equilibrium_branches, plot_force_displacement
+from snapbeam.plot import dynamics, force_displacement, run, uncertainty
 from snapbeam.plot.map import plot_response_map, plot_statistic
-from snapbeam.plot.run import (
-    plot_energies,
-    plot_modal_amplitudes,
-    plot_phase_portrait,
-    plot_run,
-    plot_spectrum,
-)
 from snapbeam.plot.threshold import plot_threshold
-from snapbeam.plot.uncertainty import plot_designs, plot_probability, plot_quantiles, plot_tornado
 from snapbeam.util.validation import InputError, checked, instance, shown
 
 if TYPE_CHECKING:
@@ -45,11 +23,11 @@ __all__ = ["Start", "figures_of", "plot_dataset", "start_of"]
 
 _Draws = Callable[..., "Axes"]
 _RUN: dict[str, tuple[_Draws, str]] = {
-    "run": (plot_run, "displacement_at_striker"),
-    "modal_amplitudes": (plot_modal_amplitudes, "modal_amplitude"),
-    "energies": (plot_energies, "energy_beam"),
-    "spectrum": (plot_spectrum, "midspan_displacement"),
-    "phase_portrait": (plot_phase_portrait, "midspan_velocity"),
+    "run": (run.plot_run, "displacement_at_striker"),
+    "modal_amplitudes": (run.plot_modal_amplitudes, "modal_amplitude"),
+    "energies": (run.plot_energies, "energy_beam"),
+    "spectrum": (run.plot_spectrum, "midspan_displacement"),
+    "phase_portrait": (run.plot_phase_portrait, "midspan_velocity"),
 }
 """The function that draws each figure of a run, and a variable that it needs."""
 
@@ -107,11 +85,7 @@ def _basin_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Star
 
 
 def _branch(dataset: xr.Dataset, ax: Axes | None = None, **options: Any) -> Axes:
-    return plot_diagram(None, ax, branches=[dataset], **options)
-
-
-def _named(function: Callable[..., Axes], name: str) -> _Draws:
-    return lambda dataset, ax=None, **options: function(dataset, name, ax, **options)
+    return dynamics.plot_diagram(None, ax, branches=[dataset], **options)
 
 
 def _run(dataset: xr.Dataset) -> dict[str, _Draws]:
@@ -125,7 +99,9 @@ def _map(dataset: xr.Dataset) -> dict[str, _Draws]:
         for name, item in dataset.data_vars.items()
         if item.dtype.kind in "biuf" and set(item.dims) == over and name != "response_class"
     ]
-    return {"response_class": plot_response_map} | {name: _named(plot_statistic, name) for name in others}
+    return {"response_class": plot_response_map} | {
+        name: partial(plot_statistic, name=name) for name in others
+    }
 
 
 def _swept(dataset: xr.Dataset) -> dict[str, _Draws]:
@@ -133,75 +109,78 @@ def _swept(dataset: xr.Dataset) -> dict[str, _Draws]:
 
 
 def _lifetimes(dataset: xr.Dataset) -> dict[str, _Draws]:
-    figures: dict[str, _Draws] = {"lifetime": plot_lifetimes} if dataset["lifetime"].ndim else {}
-    return figures | ({"survival": plot_survival} if dataset["lifetime"].size <= MAX_CURVES else {})
+    figures: dict[str, _Draws] = {"lifetime": dynamics.plot_lifetimes} if dataset["lifetime"].ndim else {}
+    return figures | (
+        {"survival": dynamics.plot_survival} if dataset["lifetime"].size <= dynamics.MAX_CURVES else {}
+    )
 
 
 def _section(dataset: xr.Dataset) -> dict[str, _Draws]:
     pairs = ("midspan_displacement", "displacement_at_striker")
-    return {
-        name: lambda data, ax=None, x=name: plot_section(data, ax, x=x) for name in pairs if name in dataset
-    }
+    return {name: partial(dynamics.plot_section, x=name) for name in pairs if name in dataset}
 
 
 def _designs(dataset: xr.Dataset) -> dict[str, _Draws]:
-    def function(name: str | None) -> _Draws:
-        return lambda data, ax=None: plot_designs(data, name, ax)
-
     tried = [str(name).removeprefix("tried_") for name in dataset.data_vars if str(name).startswith("tried_")]
     over = [name for name in tried if not name.startswith("objective_")]
-    return {"objectives": function(None)} | {name: function(name) for name in over}
+    return {"objectives": uncertainty.plot_designs} | {
+        name: partial(uncertainty.plot_designs, over=name) for name in over
+    }
 
 
 def _diagram(dataset: xr.Dataset) -> dict[str, _Draws]:
-    def function(name: str) -> _Draws:
-        return lambda data, ax=None, **options: plot_diagram(data, ax, variable=name, **options)
-
     names = [str(name) for name, item in dataset.data_vars.items() if {"sweep", "period"} <= set(item.dims)]
-    return {name: function(name) for name in sorted(names, key=lambda each: each != "midspan_displacement")}
+    names.sort(key=lambda each: each != "midspan_displacement")
+    return {name: partial(dynamics.plot_diagram, variable=name) for name in names}
 
 
 _KINDS = (
     _Kind("run", {"displacement_at_striker"}, {"time"}, _run),
     _Kind("threshold", {"lower_threshold"}, set(), lambda _: {"threshold": plot_threshold}),
-    _Kind("quantiles of a threshold", {"threshold"}, {"quantile"}, lambda _: {"threshold": plot_quantiles}),
+    _Kind("quantiles of a threshold", {"threshold"}, {"quantile"}, lambda _: {"threshold": uncertainty.plot_quantiles}),
     _Kind(
         "probability map", {"probability"}, {"outcome"},
-        lambda ds: {str(name): _named(plot_probability, str(name)) for name in ds["outcome"].values},
+        lambda ds: {str(name): partial(uncertainty.plot_probability, outcome=str(name)) for name in ds["outcome"].values},
     ),
-    _Kind("sensitivities", {"effect"}, {"parameter"}, lambda _: {"effect": plot_tornado}),
-    _Kind("sensitivity indices", {"first_order"}, {"parameter"}, lambda _: {"first_order": plot_tornado}),
+    _Kind("sensitivities", {"effect"}, {"parameter"}, lambda _: {"effect": uncertainty.plot_tornado}),
+    _Kind("sensitivity indices", {"first_order"}, {"parameter"}, lambda _: {"first_order": uncertainty.plot_tornado}),
+    _Kind("gradient", {"elasticity"}, {"parameter"}, lambda _: {"elasticity": uncertainty.plot_gradient}),
+    _Kind("posterior", {"weight"}, {"sample"}, lambda _: {"weight": uncertainty.plot_posterior}),
+    _Kind("measured classes", {"most_likely"}, {"measurement"}, lambda _: {"probability": uncertainty.plot_scores}),
+    _Kind("growth of a perturbation", {"separation"}, {"time"}, lambda _: {"separation": run.plot_perturbation}),
+    _Kind("estimated density", {"psd_low", "psd"}, {"frequency"}, lambda _: {"psd": run.plot_spectrum}),
+    _Kind("homoclinic points", {"stable_arclength"}, {"point"}, lambda _: {"state": dynamics.plot_homoclinic}),
     _Kind("designs", {"constraints_satisfied"}, {"tried"}, _designs),
     _Kind("lifetimes", {"lifetime", "last_snap"}, set(), _lifetimes),
-    _Kind("edge state", {"orbit_state", "distance"}, set(), lambda _: {"state": plot_edge}),
+    _Kind("edge state", {"orbit_state", "distance"}, set(), lambda _: {"state": dynamics.plot_edge}),
     _Kind(
         "branch of orbits", {"multiplier_real", "stable"}, {"orbit"},
-        lambda _: {"midspan_displacement": _branch, "multipliers": plot_multipliers}, _branch_start,
+        lambda _: {"midspan_displacement": _branch, "multipliers": dynamics.plot_multipliers}, _branch_start,
     ),
     _Kind(
         "bifurcation curve", {"special_point_kind", "multiplier_real"}, {"point"},
-        lambda ds: {str(list(ds.attrs["parameters"])[1]): plot_bifurcation_curve},
+        lambda ds: {str(list(ds.attrs["parameters"])[1]): dynamics.plot_bifurcation_curve},
     ),
     _Kind(
-        "periodic orbit", {"multiplier_real", "state"}, set(), lambda _: {"multipliers": plot_multipliers}, _orbit_start
+        "periodic orbit", {"multiplier_real", "state"}, set(), lambda _: {"multipliers": dynamics.plot_multipliers}, _orbit_start
     ),
     _Kind(
-        "backbone curve", {"participation", "initial_amplitude"}, {"point"}, lambda _: {"frequency_ratio": plot_backbone}
+        "backbone curve", {"participation", "initial_amplitude"}, {"point"}, lambda _: {"frequency_ratio": dynamics.plot_backbone}
     ),
-    _Kind("manifold", {"saddle", "age"}, {"point"}, lambda _: {"state": plot_manifold}),
-    _Kind("attractors", {"points", "share"}, {"attractor"}, lambda _: {"points": plot_attractors}),
-    _Kind("Lyapunov exponents", {"exponent"}, set(), lambda _: {"exponent": plot_exponents}),
-    _Kind("basins of attraction", {"basin"}, set(), lambda _: {"basin": plot_basins}, _basin_start),
+    _Kind("manifold", {"saddle", "age"}, {"point"}, lambda _: {"state": dynamics.plot_manifold}),
+    _Kind("attractors", {"points", "share"}, {"attractor"}, lambda _: {"points": dynamics.plot_attractors}),
+    _Kind("Lyapunov exponents", {"exponent"}, set(), lambda _: {"exponent": dynamics.plot_exponents}),
+    _Kind("basins of attraction", {"basin"}, set(), lambda _: {"basin": dynamics.plot_basins}, _basin_start),
     _Kind("bifurcation diagram", set(), {"sweep", "period"}, _diagram),
     _Kind("section", {"drive_phase"}, {"point"}, _section),
     _Kind("statistics swept up and down", {"response_class"}, {"sweep"}, _swept),
     _Kind(
         "force-displacement curve", {"snap_through_force"}, {"branch_number"},
-        lambda _: {"force": plot_force_displacement},
+        lambda _: {"force": force_displacement.plot_force_displacement},
     ),
     _Kind(
         "equilibrium branches", {"critical_value", "natural_frequency"}, {"critical_point"},
-        lambda _: {"midspan_displacement": plot_equilibrium_branches},
+        lambda _: {"midspan_displacement": force_displacement.plot_equilibrium_branches},
     ),
     _Kind("map", {"response_class"}, set(), _map),
 )  # fmt: skip
@@ -253,10 +232,6 @@ def plot_dataset(
         Where to draw; a new figure by default.
     **options
         Options of the function that draws, such as ``quasi_static_line`` of :func:`plot_response_map`.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Examples
     --------

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
+from matplotlib.ticker import MaxNLocator
 
 from snapbeam.plot.axes import dress, edges_of, positions
 from snapbeam.plot.style import (
@@ -18,10 +19,11 @@ from snapbeam.plot.style import (
     color_bar,
     color_of,
     contains,
+    extend_title,
     frame,
     legend_below,
-    set_title,
 )
+from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, checked, choice, instance, shown
 
@@ -29,25 +31,17 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "MAX_CURVES",
-    "plot_attractors",
-    "plot_backbone",
-    "plot_basins",
-    "plot_diagram",
-    "plot_edge",
-    "plot_exponents",
-    "plot_lifetimes",
-    "plot_manifold",
-    "plot_multipliers",
-    "plot_section",
-    "plot_survival",
-]
+    "MAX_CURVES", "plot_attractors", "plot_backbone", "plot_basins", "plot_diagram", "plot_edge", "plot_exponents",
+    "plot_homoclinic", "plot_lifetimes", "plot_manifold", "plot_multipliers", "plot_section", "plot_survival",
+]  # fmt: skip
 
 
 _BLUE, _RED, _, _GRAY, _BLACK = SERIES_COLORS
 _STARTS = "#8A8A8A"
 MAX_CURVES = 5
 """The most points of a map that :func:`plot_survival` draws."""
+_STABILITY: dict[bool, tuple[Any, str]] = {True: ("-", "stable"), False: ("--", "unstable")}
+"""Line of a motion by its stability, and its name."""
 _SPECIAL_POINTS = {"fold": "s", "flip": "D", "Neimark-Sacker": "o", "branch point": "^", "grazing": "x"}
 
 
@@ -93,7 +87,8 @@ def plot_diagram(
         needed = {"sweep", "period"} if name == "dataset" else {"orbit"}
         if each is not None and not needed <= set(getattr(each, "dims", ())):
             raise InputError(f"{name}: must have the dimensions {', '.join(sorted(needed))}")
-    with frame(ax, first, "double", 66.0) as ax:
+    new = ax is None
+    with frame(ax, first, "double", 80.0) as ax:
         handles: list[Line2D] = []
         if dataset is not None:
             contains(dataset, variable, variable)
@@ -110,7 +105,32 @@ def plot_diagram(
         )
         unique = {handle.get_label(): handle for handle in handles}
         legend_below(ax, list(unique.values()), 3)
+        if new:
+            _close_gap(ax)
     return ax
+
+
+def _close_gap(ax: Axes) -> None:
+    """Break the vertical axis where no curve is over more than a third of its range."""
+    drawn = np.concatenate([np.ravel(line.get_ydata()) for line in ax.lines])
+    y = np.unique(drawn[np.isfinite(drawn)])
+    if y.size < 2 or (widest := float(np.diff(y).max())) < 0.34 * np.ptp(y):
+        return
+    at, pad = int(np.argmax(np.diff(y))), 0.05 * (np.ptp(y) - widest) + 0.02 * widest
+    low, high = y[at] + pad, y[at + 1] - pad
+    scale = (np.ptp(y) - widest) * 0.06 / (high - low)
+    known = np.array([y[0] - 1e3, low, high, y[-1] + 1e3])
+    drawn_at = np.cumsum(np.append(known[0], np.diff(known) * [1.0, scale, 1.0]))
+    functions = (lambda w: np.interp(w, known, drawn_at), lambda w: np.interp(w, drawn_at, known))
+    ax.set_yscale("function", functions=functions)
+    ticks = MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(0.0, np.ptp(y) - widest + 4.0 * pad)
+    step = ticks[1] - ticks[0]
+    places = step * np.arange(np.ceil((y[0] - pad) / step), (y[-1] + pad) / step + 1e-9)
+    ax.set_yticks([place for place in places if not low < place < high])
+    ax.set_ylim(y[0] - pad, y[-1] + pad)
+    ax.axhspan(low, high, color="0.92", linewidth=0.0, zorder=0)
+    ax.annotate("axis broken", (0.995, 0.5 * (low + high)), xycoords=("axes fraction", "data"), ha="right",
+                va="center", fontsize=6, color="0.3")  # fmt: skip
 
 
 def _points(dataset: xr.Dataset, ax: Axes, along: str, variable: str) -> list[Line2D]:
@@ -139,11 +159,8 @@ def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
     for y in returns:
         ax.plot(x, np.where(stable, y, np.nan), color=_BLACK, linewidth=1.1)
         ax.plot(x, np.where(beside, y, np.nan), color=_BLACK, linewidth=0.9, dashes=(3, 2))
-    looks: tuple[tuple[bool, dict[str, Any]], ...] = (
-        (bool(stable.any()), {"linewidth": 1.1, "label": "stable orbit"}),
-        (not stable.all(), {"linewidth": 0.9, "dashes": (3, 2), "label": "unstable orbit"}),
-    )
-    handles = [Line2D([], [], color=_BLACK, **look) for drawn, look in looks if drawn]
+    drawn = [(line, name) for kind, (line, name) in _STABILITY.items() if (stable == kind).any()]
+    handles = [Line2D([], [], color=_BLACK, linestyle=line, label=f"{name} orbit") for line, name in drawn]
     for kind, value, after in zip(
         branch["special_point_kind"].values,
         branch["special_point_value"].values,
@@ -480,7 +497,7 @@ def plot_backbone(
     *,
     labels: Sequence[str] | None = None,
 ) -> Axes:
-    """Draw backbone curves: the amplitude of the centre over the frequency; unstable motions are dashed.
+    """Draw backbone curves: the amplitude at mid-span over the frequency; unstable motions are dashed.
 
     Earlier curves are wider, so that each is seen where they agree.
 
@@ -515,27 +532,31 @@ def plot_backbone(
     if len(labels) != len(curves) or not all(isinstance(label, str) for label in labels):
         raise InputError(f"labels = {shown(list(labels))}: must be one text for each of {len(curves)} curves")
     one_model = len({curve.attrs["modes"] for curve in curves}) == 1
-    with frame(ax, curves[0] if one_model else None, height=70.0) as ax:
-        unstable = False
+    with frame(ax, curves[0] if one_model else None, height=84.0) as ax:
+        handles: list[Line2D] = []
+        kinds = set[bool]()
         for number, (curve, label) in enumerate(zip(curves, labels, strict=True)):
             frequency = curve["frequency_ratio"].values
             height = 0.5 * (curve["max_midspan"] - curve["min_midspan"]).values
             stable = curve["stable"].values
-            color = SERIES_COLORS[number % len(SERIES_COLORS)]
-            wide = 1.0 + 1.2 * (len(curves) - 1 - number)
-            for which, dashes, name in ((stable, (), label), (~stable, (3, 1.5), "")):
+            look: dict[str, Any] = {
+                "color": SERIES_COLORS[number % len(SERIES_COLORS)],
+                "linewidth": 1.2 + 0.7 * (len(curves) - 1 - number),
+            }
+            for kind in (True, False):
                 # a segment is drawn as its first point is
-                segments = which | np.append(False, which[:-1])
+                segments = (stable == kind) | np.append(False, (stable == kind)[:-1])
                 x, y = (np.where(segments, each, np.nan) for each in (frequency, height))
-                if which.any():
-                    ax.plot(x, y, dashes=dashes, color=color, label=name, linewidth=wide)
-            unstable |= not stable.all()
-        ax.set(xlabel=r"Frequency $\Omega$ of free vibration", ylabel="Amplitude at mid-span $w/b$")
+                if (stable == kind).any():
+                    ax.plot(x, y, _STABILITY[kind][0], **look)
+                    kinds.add(kind)
+            handles.append(Line2D([], [], label=label, **look))
+        unit = f" (1: {prefixed(curves[0].attrs['reference_frequency'], 'Hz')})" if one_model else ""
+        ax.set(xlabel=rf"Frequency $\Omega$ of free vibration{unit}", ylabel="Amplitude at mid-span $w/b$")
         ax.set_ylim(bottom=0.0)
-        if unstable:
-            ax.plot([], [], color="0.3", dashes=(3, 1.5), label="unstable")
-        if len(curves) > 1 or unstable:
-            ax.legend()
+        for line, name in (_STABILITY[kind] for kind in sorted(kinds, reverse=True)):
+            handles.append(Line2D([], [], color="0.3", linestyle=line, label=f"{name} motion"))
+        legend_below(ax, handles)
     return ax
 
 
@@ -639,7 +660,7 @@ def _multipliers_along(dataset: xr.Dataset, ax: Axes, sizes: Any) -> None:
             textcoords="offset points", rotation=90, va="top", fontsize=6,
         )  # fmt: skip
     ax.set(yscale="log", ylabel="Absolute value of the Floquet multipliers")
-    ax.legend(loc="best", ncols=2)
+    legend_below(ax)
     dress(ax.xaxis, dataset.swap_dims(orbit=along).drop_duplicates(along), along)
 
 
@@ -684,8 +705,7 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         ax.set(xlabel=_coordinate(names[pair[0]]), ylabel=_coordinate(names[pair[1]]))
         ax.margins(0.08)
         unseen = 100 * float(dataset.attrs["unseen_share_95"])
-        words = f"Attractors not found: below {unseen:.2g} % of the states (95 %)"
-        set_title(ax, f"{ax.get_title('left')}\n{words}".lstrip())
+        extend_title(ax, f"Attractors not found: below {unseen:.2g} % of the states (95 %)")
         legend_below(ax, columns=1)
     return ax
 
@@ -714,8 +734,8 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
             middle, least = 0.5 * (values.min() + values.max()), 1e-3 * np.abs(values).max()
             if 0.0 < least > np.ptp(values):
                 ax.set(**{limits: (middle - 10.0 * least, middle + 10.0 * least)})
-        where = "Centre" if x.startswith("midspan") else "Contact point's"
-        ax.set(xlabel=f"{where} displacement, over $b$", ylabel=rf"{where} velocity, over $b\,\omega_1$")
+        where = "at mid-span" if x.startswith("midspan") else "at the striker"
+        ax.set(xlabel=f"Displacement {where} $w/b$", ylabel=rf"Velocity {where} $\dot w\,/\,b\omega_1$")
     return ax
 
 
@@ -813,6 +833,27 @@ def plot_manifold(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     return ax
 
 
+@checked
+def plot_homoclinic(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw homoclinic points, the result of :func:`snapbeam.dynamics.homoclinic_points`, over manifolds too."""
+    contains(dataset, "homoclinic points", "state", "stable_arclength")
+    names, new = [str(name) for name in dataset["coordinate"].values], ax is None
+    with frame(ax, dataset) as ax:
+        label = f"homoclinic points, {dataset.sizes['point']}"
+        ax.plot(
+            *dataset["state"].values.T,
+            "o",
+            color=_BLACK,
+            markerfacecolor="white",
+            markersize=4.0,
+            label=label,
+        )
+        if new:
+            ax.set(xlabel=_coordinate(names[0]), ylabel=_coordinate(names[1]))
+        ax.legend(loc="best")
+    return ax
+
+
 def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Draw an edge state: the first coordinate once a period, and the unstable orbit that it settles on.
 
@@ -825,9 +866,10 @@ def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         for at, words in ((-1.0, "well"), (0.0, "straight")):
             if name == "amplitude[1]" and values.min() - 0.3 < at < values.max() + 0.3:
                 ax.axhline(at, color="0.75", linewidth=0.5, zorder=0)
+                above = at < values.mean()
                 ax.annotate(
-                    words, (0.0, at), (2.0, 1.0), xycoords=("axes fraction", "data"), textcoords="offset points",
-                    va="bottom", fontsize=6, color="0.4",
+                    words, (0.0, at), (2.0, 1.0 if above else -1.0), xycoords=("axes fraction", "data"),
+                    textcoords="offset points", va="bottom" if above else "top", fontsize=6, color="0.4",
                 )  # fmt: skip
         period = np.arange(1, values.size + 1)
         look: dict[str, Any] = {"color": _BLUE, "linewidth": 0.7, "markersize": 3.5}

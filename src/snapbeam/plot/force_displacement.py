@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from snapbeam.model.parameters import lookup
-from snapbeam.plot.style import contains, frame, legend_below
+from snapbeam.plot.style import SERIES_COLORS, contains, frame, legend_below
 from snapbeam.util.si_prefixes import prefixed, scale_of
 from snapbeam.util.validation import checked
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 __all__ = ["plot_equilibrium_branches", "plot_force_displacement"]
 
 
-_STABLE, _HELD, _UNSTABLE = "#16245E", "#B03A27", "#9A9A9A"
+_STABLE, _HELD, _UNSTABLE = *SERIES_COLORS[:2], SERIES_COLORS[3]
 _STYLES: dict[str, dict[str, Any]] = {
     "stable": {"color": _STABLE, "linestyle": "-", "linewidth": 1.6},
-    "stable under displacement control only": {"color": _HELD, "linestyle": "--", "linewidth": 1.2},
-    "unstable": {"color": _UNSTABLE, "linestyle": ":", "linewidth": 0.9},
+    "stable under displacement control only": {"color": _HELD, "linestyle": "-.", "linewidth": 1.2},
+    "unstable": {"color": _UNSTABLE, "linestyle": "--", "linewidth": 0.9},
 }
 _MARKERS = {"limit": ("o", "limit point"), "bifurcation": ("D", "bifurcation point")}
 
@@ -42,10 +42,6 @@ def plot_force_displacement(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
         Of :func:`snapbeam.force_displacement`.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Examples
     --------
@@ -65,7 +61,7 @@ def plot_force_displacement(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
     kind = np.where(dataset["unstable_directions"].values == 0, 0, np.where(held, 1, 2))
     names = np.array(list(_STYLES))
     handles = []
-    with frame(ax, height=84.0) as ax:
+    with frame(ax, dataset, height=84.0) as ax:
         secondary = np.flatnonzero(dataset["branch_kind"].values == "secondary")
         # the two halves of a secondary branch differ in a mode that does not move at the force
         for number in np.setdiff1d(np.arange(dataset.sizes["branch_number"]), secondary[1::2]):
@@ -158,10 +154,6 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
 
-    Returns
-    -------
-    matplotlib.axes.Axes
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -179,7 +171,7 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
     size, axis = _short_axis(value, row.quantity.unit)
     label = dataclasses.replace(row, quantity=dataclasses.replace(row.quantity, unit=axis)).label
     handles: list[Line2D] = []
-    with frame(ax, height=70.0) as ax:
+    with frame(ax, dataset, height=70.0) as ax:
         for number in np.unique(dataset["branch"].values):
             own = dataset["branch"].values == number
             handles += _pieces(ax, value[own] / size, place[own] / prefix, names[own])
@@ -191,7 +183,7 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
                     marker, markerfacecolor="white", markeredgecolor="#000000", markersize=4.5, linestyle="", label=words,
                 )  # fmt: skip
         ax.set_xlabel(label)
-        ax.set_ylabel(f"Displacement of the centre ({unit})")
+        ax.set_ylabel(f"Displacement at mid-span ({unit})")
         ax.legend(handles=_in_order(handles), loc="best")
     return ax
 

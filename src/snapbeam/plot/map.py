@@ -15,25 +15,24 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from snapbeam.model.parameters import PHYSICAL, lookup
 from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
 from snapbeam.plot.agreement import draw_agreement
-from snapbeam.plot.axes import axis_label, dress, edges_of, in_units, positions, symbol_of
+from snapbeam.plot.axes import axis_label, dress, edges_of, in_units, positions
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CLASS_COLORS,
     SHAKER_COLOR,
-    base_and_load,
-    beam_text,
+    caption,
     class_cells,
     color_bar,
+    fixed_value,
     frame,
     legend_below,
     set_title,
 )
 from snapbeam.solver.statistics import STATISTICS
 from snapbeam.sweeps.measured_points import MeasuredPoints
-from snapbeam.util.si_prefixes import prefixed, scale_of
+from snapbeam.util.si_prefixes import scale_of
 from snapbeam.util.status_codes import ResponseClass, wells_of
 from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, shown
 
@@ -41,17 +40,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "UPWARD",
-    "class_handles",
-    "draw_measurements",
-    "draw_quasi_static_line",
-    "plot_points",
-    "plot_response_map",
-    "plot_statistic",
-    "scaled_values",
-    "subtitle",
-    "wants_powers",
-]
+    "UPWARD", "class_handles", "draw_measurements", "draw_quasi_static_line", "plot_points", "plot_response_map",
+    "plot_statistic", "scaled_values", "wants_powers",
+]  # fmt: skip
 
 
 _Array = NDArray[np.float64]
@@ -96,10 +87,6 @@ def plot_response_map(
     legend : bool
         Whether to draw a legend below the map: response classes and their fractions of the runs.
 
-    Returns
-    -------
-    matplotlib.axes.Axes
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -122,7 +109,7 @@ def plot_response_map(
     across, upward, kinds = _two_axes(dataset)
     edges = tuple(edges_of(dataset, name) for name in (across, upward))
     fixed = {
-        name: _scalar(dataset, name)
+        name: fixed_value(dataset, name)
         for name in ("frequency_ratio", "location", "velocity_amplitude")
         if name not in (across, upward)
     }
@@ -130,7 +117,7 @@ def plot_response_map(
         class_cells(ax, edges[0], edges[1], kinds)
         dress(ax.xaxis, dataset, across)
         dress(ax.yaxis, dataset, upward)
-        set_title(ax, subtitle(dataset, (across, upward)))
+        set_title(ax, caption(dataset, 2, (across, upward)))
         handles = class_handles(kinds, wells_of(dataset.attrs))
         if "class_fraction" in dataset:
             handles.append(draw_agreement(ax, dataset, (across, upward), edges))
@@ -151,7 +138,7 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
     name = str(dataset["response_class"].squeeze().dims[0])
     with frame(ax, height=84.0 if legend else 62.0) as ax:
         _draw_line(ax, dataset, name)
-        set_title(ax, subtitle(dataset, (name,)))
+        set_title(ax, caption(dataset, 2, (name,)))
         if legend:
             legend_below(ax, class_handles(dataset["response_class"].values, wells_of(dataset.attrs)))
     return ax
@@ -197,31 +184,6 @@ def _in_order(dims: list[str]) -> tuple[str, str]:
     """The names of two axes: the one that is drawn across, then the one that is drawn upward."""
     upward = next((name for name in UPWARD if name in dims), dims[1])
     return dims[0] if dims[1] == upward else dims[1], upward
-
-
-def _scalar(dataset: xr.Dataset, name: str) -> float | None:
-    return float(dataset[name].squeeze()) if name in dataset.coords and dataset[name].size == 1 else None
-
-
-def subtitle(dataset: xr.Dataset, axes: tuple[str, ...]) -> str:
-    """The beam, and what holds for the whole map: modes, cycles and the paper's coordinates that are no axes."""
-    parts = []
-    if "modes" in dataset.attrs:
-        parts.append(f"$N$ = {int(dataset.attrs['modes'])}")
-    if "cycles" in dataset.attrs:
-        parts.append(f"{int(dataset.attrs['cycles'])} cycles")
-    for name in ("frequency_ratio", "velocity_amplitude", "location"):
-        value = _scalar(dataset, name)
-        if name not in axes and value is not None:
-            parts.append(f"{symbol_of(dataset, name)} = {value:.4g}")
-    for row in map(lookup, PHYSICAL):
-        value = _scalar(dataset, row.short)
-        if row.short not in axes and value is not None:
-            unit = row.quantity.unit
-            parts.append(f"{value:.4g} µm" if unit == "um" else prefixed(value, unit, 4))
-    parts += base_and_load(dataset)
-    beam = "" if any(name.startswith("beam") for name in axes) else beam_text(dataset.attrs)
-    return "\n".join(line for line in (beam, ", ".join(parts)) if line)
 
 
 def class_handles(kinds: NDArray[np.int8] | None = None, wells: int = 2) -> list[Patch | Line2D]:
@@ -281,7 +243,12 @@ def draw_quasi_static_line(
     else:
         line = x, quasi_static_threshold(_given(fixed, "location"), x)
     ax.plot(*line, color="white", linewidth=1.8)
-    label = r"quasi-static, $V_\mathrm{QS1}$"
+    inside = [
+        (min(lim) < at) & (at < max(lim))
+        for at, lim in zip(line, (ax.get_xlim(), ax.get_ylim()), strict=True)
+    ]
+    where = "" if np.logical_and(*inside).any() else ": outside the map"
+    label = rf"quasi-static, $V_\mathrm{{QS1}}${where}"
     return ax.plot(*line, color="black", linewidth=0.9, dashes=(4, 2), label=label)[0]
 
 
@@ -358,10 +325,6 @@ def plot_statistic(
     log : bool, optional
         Whether colours, or the axis, go by powers of ten; by default where the values span more than two of them.
 
-    Returns
-    -------
-    matplotlib.axes.Axes
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -415,7 +378,7 @@ def plot_statistic(
             color_bar(mesh, ax, label, pad=0.02)
             dress(ax.xaxis, dataset, across)
             dress(ax.yaxis, dataset, upward)
-        set_title(ax, subtitle(dataset, (*dims,)))
+        set_title(ax, caption(dataset, 2, dims))
     return ax
 
 
@@ -503,10 +466,6 @@ def plot_points(
     legend : bool
         Whether to draw a legend below: response classes and their fractions of the points.
 
-    Returns
-    -------
-    matplotlib.axes.Axes
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -544,7 +503,7 @@ def plot_points(
         handles += _over(ax, dataset, along, measurements, quasi_static_line)
         if legend:
             legend_below(ax, handles)
-        set_title(ax, subtitle(dataset, along))
+        set_title(ax, caption(dataset, 2, along))
     return ax
 
 

@@ -17,6 +17,7 @@ from snapbeam.plot.style import (
     SHAKER_COLOR,
     caption,
     color_of,
+    contains,
     figure_style,
     fix_ticks,
     frame,
@@ -32,16 +33,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "across",
-    "cut",
-    "dataset_of",
-    "hardest_impact",
-    "plot_energies",
-    "plot_modal_amplitudes",
-    "plot_phase_portrait",
-    "plot_run",
-    "plot_spectrum",
-]
+    "across", "cut", "dataset_of", "hardest_impact", "plot_energies", "plot_modal_amplitudes", "plot_perturbation",
+    "plot_phase_portrait", "plot_run", "plot_spectrum",
+]  # fmt: skip
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -78,10 +72,6 @@ def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, mode
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
     modes : int
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Examples
     --------
@@ -129,15 +119,6 @@ def _legend(ax: Axes, columns: int, room: float = 0.16) -> None:
 def plot_energies(run: Run | xr.Dataset, ax: Axes | None = None) -> Axes:
     """Draw the energy of the beam and the contact, the dissipated energy and the striker's work.
 
-    Parameters
-    ----------
-    run : Run or xarray.Dataset
-    ax : matplotlib.axes.Axes, optional
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -176,7 +157,6 @@ def plot_spectrum(
     run : Run or xarray.Dataset
         Of a run; or the power spectral density that ``estimated_psd`` of a recorded acceleration or a random vibration
         returns: it is drawn with its interval, over the density that it was drawn from.
-    ax : matplotlib.axes.Axes, optional
     variable : str
         A variable over time, by name.
     window : pair of float, optional
@@ -230,6 +210,22 @@ def plot_spectrum(
     return ax
 
 
+@checked
+def plot_perturbation(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the growth of a small perturbation of a run, the result of :func:`snapbeam.perturbation_growth`."""
+    contains(dataset, "perturbation", "separation")
+    name, label = across(dataset)
+    with frame(ax, dataset) as ax:
+        ax.plot(
+            dataset[name].values,
+            np.where(dataset["separation"] > 0.0, dataset["separation"], np.nan),
+            color=BEAM_COLOR,
+        )
+        ax.set(yscale="log", xlabel=label, ylabel="Maximum change of the displacement $w/b$")
+        ax.margins(x=0.0)
+    return ax
+
+
 def _plot_density(dataset: xr.Dataset, ax: Axes | None) -> Axes:
     """Draw an estimated power spectral density with its interval, on logarithmic axes."""
     data = dataset.sel(frequency=dataset["frequency"] > 0.0)
@@ -246,7 +242,7 @@ def _plot_density(dataset: xr.Dataset, ax: Axes | None) -> Axes:
             target = data["psd_target"].values[inside]
             ax.plot(f[inside], target, "--", color=SHAKER_COLOR, linewidth=1.2, label="given density")
         ax.set(xscale="log", yscale="log", xlabel="Frequency (Hz)", ylabel="Acceleration PSD (g$^2$/Hz)")
-        ax.set_title(f"{data.attrs['rms_g']:.3g} g root mean square")
+        set_title(ax, f"{data.attrs['rms_g']:.3g} g root mean square")
         ax.legend()
     return ax
 
@@ -260,15 +256,10 @@ def plot_phase_portrait(
     Parameters
     ----------
     run : Run or xarray.Dataset
-    ax : matplotlib.axes.Axes, optional
     of : {"midspan", "striker"}
         The point of the beam: mid-span, or the location of the striker.
     strobe : bool
         Whether to mark whole cycles.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Examples
     --------
@@ -370,7 +361,6 @@ def plot_run(
         with frame(ax) as ax:
             x = part[axis_name].values
             _displacements(ax, part, x)
-            ax.axhline(0.0, color="0.6", linewidth=0.5, zorder=0)
             ax.set(xlabel=label, ylabel="Displacement $w/b$", xlim=(_from(x[0], x[-1]), x[-1]))
             _legend(ax, 3, 0.15)
         return ax
@@ -440,6 +430,13 @@ def _curves(part: xr.Dataset) -> list[tuple[str, str, str]]:
 def _displacements(ax: Axes, part: xr.Dataset, x: np.ndarray) -> None:
     for name, words, color in _curves(part):
         ax.plot(x, part[name].values, color=color, label=words, rasterized=x.size > _MANY)
+    _straight(ax)
+
+
+def _straight(ax: Axes) -> None:
+    """A line where the beam is straight, if the motion passes it."""
+    if ax.get_ylim()[0] < 0.0 < ax.get_ylim()[1]:
+        ax.axhline(0.0, color="0.6", linewidth=0.5, zorder=0)
 
 
 def _from(first: float, last: float) -> float:
@@ -480,7 +477,7 @@ def _column(
         else:
             axes[0].plot(x, part[name].values, color=color, label=label, rasterized=pixels)
     if at == 0:
-        axes[0].axhline(0.0, color="0.6", linewidth=0.5, zorder=0)
+        _straight(axes[0])
     for row, name in enumerate((each for each in _PANELS if each in part), 1):
         factor, unit = scales[name]
         values = part[name].values / factor

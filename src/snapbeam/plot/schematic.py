@@ -18,7 +18,14 @@ from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.quantity import numbered
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
-from snapbeam.plot.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, figure_style, new_figure
+from snapbeam.plot.style import (
+    BEAM_COLOR,
+    CENTER_COLOR,
+    SERIES_COLORS,
+    SHAKER_COLOR,
+    figure_style,
+    new_figure,
+)
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.validation import InputError, checked, instance
 
@@ -44,7 +51,7 @@ def draw_tips(ax: Axes, system: System, tips: list[tuple[int, Any]]) -> None:
         moved = motion_of(drive, scale, times)
         ax.plot(times / times[-1] * _CYCLES, moved / scale.length, label=f"striker {number}", **line)
     ax.set_xlabel("Cycles of the drive")
-    ax.set_ylabel("Tips / $b$")
+    ax.set_ylabel(_MOTIONS["drive"][1])
     ax.set_xlim(0.0, _CYCLES)
     ax.legend(ncols=2, loc="lower center", bbox_to_anchor=(0.45, 1.0), frameon=False, columnspacing=1.0)
 
@@ -73,7 +80,7 @@ FRAME = 2.3
 """Distance of the base's bar from the straight beam, b."""
 _LAYER = 0.09
 """Thickness of a layer in the picture, b."""
-_COLOR = CENTER_COLOR
+_COLOR = SERIES_COLORS[0]
 
 
 def draw_surroundings(ax: Axes, system: System, x: _Array, w: _Array, sign: float, wide: float) -> None:
@@ -156,8 +163,12 @@ _RADIUS = 0.10
 _WIDE = 7.0
 """Length of the beam in those units."""
 _MOTIONS = {
-    "drive": "Tip / $b$", "base_excitation": "Base $y/b$", "axial_load": "$P(t) - P$ (N)", "force": "$F(t)$ (N)",
-}  # fmt: skip
+    "drive": ("Drive", "Tip displacement $/\\,b$"),
+    "base_excitation": ("Base", "Base displacement $y/b$"),
+    "axial_load": ("Axial load", "Change $P(t) - P$ (N)"),
+    "force": ("Force", "Force $F(t)$ (N)"),
+}
+"""Title of the motion in the schematic, and label of its axis."""
 _LAWS = {
     "elastic_plastic": "elastic-plastic",
     "hertz": "Hertz",
@@ -168,7 +179,7 @@ _LAWS = {
     "restitution": "restitution",
 }
 _CYCLES = 8.0
-_LOAD_COLOR = CENTER_COLOR
+_LOAD_COLOR = _COLOR
 
 
 @checked
@@ -308,8 +319,8 @@ def _draw_imperfection(ax: Axes, system: System, imperfection: Imperfection, res
     if imperfection.point_load != 0.0:
         push = 1.0 if imperfection.point_load > 0.0 else -1.0
         at = imperfection.point_location * _WIDE
-        height = float(np.interp(at, x, w)) - 0.7 * push
-        ax.text(at, height, "$F$", ha="center", va="center", color=_LOAD_COLOR)
+        height = float(np.interp(at, x, w)) - 0.35 * push
+        ax.text(at + 0.12, height, "$F$", ha="left", va="center", color=_LOAD_COLOR)
 
 
 def _draw_striker(ax: Axes, system: System, striker: Striker, contact: ContactLaw, number: int) -> None:
@@ -420,6 +431,7 @@ def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
     color = SHAKER_COLOR if section == "drive" else _LOAD_COLOR
     ax.plot(cycles, (-moved if down else moved) / per, color=color)
     ax.set_xlabel("Cycles")
-    ax.set_ylabel(_MOTIONS[section])
+    words, label = _MOTIONS[section]
+    ax.set_ylabel(label)
     ax.set_xlim(0.0, cycles[-1])
-    ax.set_title(drive.name.replace("_", " "), loc="left")
+    ax.set_title(f"{words}: {drive.name.replace('_', ' ')}", loc="left")

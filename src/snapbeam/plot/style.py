@@ -21,6 +21,7 @@ from matplotlib.legend import Legend
 from matplotlib.ticker import AutoLocator
 from numpy.typing import ArrayLike, NDArray
 
+from snapbeam.model.parameters import PHYSICAL, lookup
 from snapbeam.util.diagnostics import Diagnostic, Severity
 from snapbeam.util.files import MADE_BY, atomic_path, check_writable
 from snapbeam.util.si_prefixes import prefixed
@@ -31,30 +32,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "BEAM_COLOR",
-    "CENTER_COLOR",
-    "CLASS_COLORS",
-    "COLUMN_WIDTHS",
-    "FIGURE_SUFFIXES",
-    "SERIES_COLORS",
-    "SHAKER_COLOR",
-    "base_and_load",
-    "beam_text",
-    "caption",
-    "cell_edges",
-    "class_cells",
-    "diagnostics_height",
-    "draw_diagnostics",
-    "figure_legend",
-    "figure_style",
-    "fix_ticks",
-    "frame",
-    "new_figure",
-    "panel_letters",
-    "plot_style",
-    "save_figure",
-    "set_title",
-]
+    "BEAM_COLOR", "CENTER_COLOR", "CLASS_COLORS", "COLUMN_WIDTHS", "FIGURE_SUFFIXES", "SERIES_COLORS",
+    "SHAKER_COLOR", "base_and_load", "beam_text", "caption", "cell_edges", "class_cells", "color_bar", "color_of",
+    "contains", "diagnostics_height", "draw_diagnostics", "extend_title", "figure_legend", "figure_style",
+    "fix_ticks", "fixed_value", "frame", "new_figure", "panel_letters", "plot_style", "save_figure", "set_title",
+]  # fmt: skip
 
 
 COLUMN_WIDTHS = {"single": 90.0, "double": 190.0}
@@ -198,30 +180,34 @@ def new_figure(width: str = "single", height: float = 75.0) -> Figure:
     import matplotlib.pyplot as plt
 
     millimetres = COLUMN_WIDTHS[choice("width", width, tuple(COLUMN_WIDTHS))]
-    tall = (
-        within("height", height, 0.0, 1e4, closed="right", unit="mm")
-        * COLUMN_WIDTHS["single"]
-        / _STYLES["elsevier"][0][0]
-    )
+    tall = within("height", height, 0.0, 1e4, closed="right", unit="mm")
+    tall *= COLUMN_WIDTHS["single"] / _STYLES["elsevier"][0][0]
     with figure_style():
         return plt.figure(figsize=(millimetres / 25.4, tall / 25.4))
 
 
 @contextmanager
 def frame(
-    ax: Axes | None, dataset: xr.Dataset | None = None, width: str = "single", height: float = 72.0
-) -> Iterator[Axes]:
+    ax: Axes | None, dataset: xr.Dataset | None = None, width: str = "single", height: float = 72.0,
+    axes: Sequence[str] = (),
+) -> Iterator[Axes]:  # fmt: skip
     """Axes to draw on in the style of this package, with its ticks in the end.
 
-    They are those that were given, or of a new figure whose title states the fixed parameters of the dataset.
+    They are those that were given, or of a new figure whose title states the fixed parameters of the dataset: all but
+    those along *axes*.
     """
     with figure_style():
         if ax is None:
             ax = new_figure(width, height).add_subplot()
             if dataset is not None:
-                set_title(ax, caption(dataset, 2))
+                set_title(ax, caption(dataset, 2, axes))
         yield ax
         fix_ticks(ax)
+
+
+def extend_title(ax: Axes, words: str) -> None:
+    """Write a further line below the fixed parameters in the title."""
+    set_title(ax, f"{ax.get_title('left')}\n{words}".strip())
 
 
 def contains(dataset: xr.Dataset, words: str, *names: str) -> None:
@@ -300,36 +286,45 @@ def beam_text(attrs: Any) -> str:
     return ", ".join(words)
 
 
-def caption(dataset: xr.Dataset, lines: int = 1) -> str:
-    """Beam, modes, drive and class of a run or a map from its attributes, in one or two lines."""
+def caption(dataset: xr.Dataset, lines: int = 1, axes: Sequence[str] = ()) -> str:
+    """Beam, modes, cycles of a map, fixed parameters and class of a run, in one or two lines.
+
+    *axes* are the parameters along the axes, which are not fixed.
+    """
     attrs = dataset.attrs
-    what, how = [beam_text(attrs)], []
-    if "modes" in attrs:
-        what.append(f"$N$ = {int(attrs['modes'])}")
-    if "frequency_ratio" in attrs and "frequency_ratio" not in dataset.dims:
-        text = rf"$\Omega$ = {attrs['frequency_ratio']:.4g}"
-        if "reference_frequency" in attrs:
-            text += f" ({prefixed(attrs['frequency_ratio'] * attrs['reference_frequency'], 'Hz')})"
-        how.append(text)
-    if "velocity_amplitude" in attrs and "velocity_amplitude" not in dataset.dims:
-        text = f"$V$ = {attrs['velocity_amplitude']:.4g}"
-        if {"reference_frequency", "length_scale"} <= set(attrs):
-            speed = (
-                attrs["velocity_amplitude"]
-                * 2.0
-                * np.pi
-                * attrs["reference_frequency"]
-                * attrs["length_scale"]
-            )
-            text += f" ({prefixed(speed, 'm/s')})"
-        how.append(text)
-    if "location" in attrs and "location" not in dataset.dims:
-        how.append(rf"$x_\mathrm{{s}}$ = {attrs['location']:.3g}")
-    how += base_and_load(dataset)
-    parts = [", ".join(part for part in each if part) for each in (what, how)]
+    frequency, length = (attrs.get(name, np.nan) for name in ("reference_frequency", "length_scale"))
+    parts = ["" if any(name.startswith("beam") for name in axes) else beam_text(attrs)]
+    how = [f"$N$ = {int(attrs['modes'])}"] if "modes" in attrs and "modes" not in axes else []
+    how += [f"{int(attrs['cycles'])} cycles"] if "response_class" in dataset and "cycles" in attrs else []
+    for name, symbol, scale, unit in (
+        ("frequency_ratio", r"\Omega", frequency, "Hz"),
+        ("velocity_amplitude", "V", 2.0 * np.pi * frequency * length, "m/s"),
+        ("location", r"x_\mathrm{s}", np.nan, ""),
+    ):
+        if (value := fixed_value(dataset, name, axes)) is not None:
+            physical = f" ({prefixed(value * scale, unit)})" if np.isfinite(scale) else ""
+            how.append(f"${symbol}$ = {value:.4g}{physical}")
+    for name, each in PHYSICAL.items():
+        row, ratio = lookup(name), lookup(each.parameter).short
+        named = ratio in ("frequency_ratio", "velocity_amplitude") or name.startswith("base_excitation")
+        if (
+            row.short in dataset.coords
+            and not named
+            and (value := fixed_value(dataset, row.short, axes)) is not None
+        ):
+            unit = row.quantity.unit
+            how.append(f"{value:.4g} µm" if unit == "um" else prefixed(value, unit, 4))
+    parts.append(", ".join(how + base_and_load(dataset)))
     text = ("\n" if lines > 1 else ", ").join(part for part in parts if part)
     kind = attrs.get("response_class")
     return f"{text}: {kind}" if isinstance(kind, str) and text else text
+
+
+def fixed_value(dataset: xr.Dataset, name: str, axes: Sequence[str] = ()) -> float | None:
+    """Value of a parameter that is the same in the whole dataset; None if it differs or is not known."""
+    if name in dataset.coords:
+        return float(dataset[name].squeeze()) if dataset[name].size == 1 and name not in axes else None
+    return None if name in axes or name not in dataset.attrs else float(dataset.attrs[name])
 
 
 _GRAVITY = 9.80665
@@ -337,17 +332,13 @@ _GRAVITY = 9.80665
 
 def base_and_load(dataset: xr.Dataset) -> list[str]:
     """The base excitation in Hz and g, and the load resistance of a harvester."""
-    attrs, words, given = dataset.attrs, [], {}
-    for name in (
-        "base_excitation_frequency_ratio", "base_excitation_acceleration_amplitude", "harvester_resistance",
-    ):  # fmt: skip
-        if name in dataset.coords and dataset[name].size == 1:
-            given[name] = float(dataset[name].squeeze())
-        elif name in attrs and name not in dataset.dims:
-            given[name] = attrs[name]
+    attrs, words = dataset.attrs, []
     omega = 2.0 * np.pi * attrs.get("reference_frequency", np.nan)
     unit = omega**2 * attrs.get("length_scale", np.nan)
-    for name, value in given.items():
+    names = ("frequency_ratio", "acceleration_amplitude")
+    for name in (*(f"base_excitation_{each}" for each in names), "harvester_resistance"):
+        if (value := fixed_value(dataset, name)) is None:
+            continue
         if name.endswith("resistance"):
             words.append(f"$R$ = {prefixed(value, 'Ω')}")
         elif name.endswith("ratio") and np.isfinite(omega):
@@ -368,17 +359,9 @@ def panel_letters(axes: Iterable[Axes], first: str = "A", *, offset: float = -16
     """Write a bold capital next to the upper left corner of each of *axes*, *offset* points to its right."""
     for at, ax in enumerate(axes):
         ax.annotate(
-            chr(ord(first) + at),
-            (0.0, 1.0),
-            (offset, 3.0),
-            xycoords="axes fraction",
-            textcoords="offset points",
-            fontsize=9,
-            fontweight="bold",
-            ha="right",
-            va="bottom",
-            annotation_clip=False,
-        )
+            chr(ord(first) + at), (0.0, 1.0), (offset, 3.0), xycoords="axes fraction", textcoords="offset points",
+            fontsize=9, fontweight="bold", ha="right", va="bottom", annotation_clip=False,
+        )  # fmt: skip
 
 
 def cell_edges(points: ArrayLike, low: float = -np.inf, high: float = np.inf) -> _Array:

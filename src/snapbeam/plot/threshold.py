@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from snapbeam.model.quasi_static import quasi_static_objection
 from snapbeam.plot.axes import dress, edges_of, positions, symbol_of
 from snapbeam.plot.map import plot_response_map, quasi_static_along
-from snapbeam.plot.style import contains, frame, set_title
+from snapbeam.plot.style import contains, extend_title, frame
 from snapbeam.util.validation import InputError, checked
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def plot_threshold(
     curves = [curve.squeeze() for curve in curves]
     if len(curves) > len(_STYLES):
         raise InputError(f"dataset: has {len(curves)} curves; at most {len(_STYLES)} can be told apart")
-    with frame(ax, height=70.0) as ax:
+    with frame(ax, dataset, height=76.0) as ax:
         for curve, (color, dashes) in zip(curves, _STYLES, strict=False):
             _draw_curve(ax, curve, x, (color, dashes), _label(dataset, curve, others, raised))
         known = raised == "velocity_amplitude" and along in ("frequency_ratio", "location")
@@ -111,7 +111,7 @@ def plot_threshold(
         if "cycles" in dataset.attrs:
             step = float(np.max(np.diff(amplitude)))
             cycles = int(dataset.attrs["cycles"])
-            set_title(ax, f"{cycles} cycles, steps of {step:.2g} in {symbol_of(dataset, raised)}")
+            extend_title(ax, f"{cycles} cycles, steps of {step:.2g} in {symbol_of(dataset, raised)}")
         if legend:
             handles, _ = ax.get_legend_handles_labels()
             first, always = dataset["lower_threshold"], dataset["upper_threshold"]

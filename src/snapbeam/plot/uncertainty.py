@@ -11,7 +11,7 @@ from cmcrameri import cm
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
 from matplotlib.lines import Line2D
-from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import split_name
@@ -23,10 +23,11 @@ from snapbeam.plot.style import (
     SERIES_COLORS,
     color_bar,
     contains,
+    extend_title,
     frame,
     legend_below,
-    set_title,
 )
+from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, checked, shown
 
@@ -35,7 +36,10 @@ if TYPE_CHECKING:
 
     from snapbeam.sweeps.measured_points import MeasuredPoints
 
-__all__ = ["plot_designs", "plot_probability", "plot_quantiles", "plot_tornado"]
+__all__ = [
+    "plot_designs", "plot_gradient", "plot_posterior", "plot_probability", "plot_quantiles", "plot_scores",
+    "plot_tornado",
+]  # fmt: skip
 
 
 _BLUE, _RED, _SKY = SERIES_COLORS[:3]
@@ -59,7 +63,6 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     dataset : xarray.Dataset
     over : str, optional
         A variable, such as ``"location"``; the second objective by default, or the first variable if there is one objective.
-    ax : matplotlib.axes.Axes, optional
     """
     if "constraints_satisfied" not in dataset or "tried" not in dataset.dims:
         raise InputError(f"no designs among {list(map(str, dataset.variables))}")
@@ -73,10 +76,17 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     else:
         raise InputError(f"over = {shown(over)}: must be one of {', '.join(variables)}")
     up = f"objective_{objectives[0]}"
-    with frame(ax, height=74.0) as ax:
+    with frame(ax, dataset, height=84.0) as ax:
         x, y = dataset[f"tried_{across}"].values, dataset[f"tried_{up}"].values
         kept = (dataset["violation"].values == 0.0) & np.isfinite(y)
-        ax.scatter(x[kept], y[kept], s=4, color=_TRIED, linewidths=0.0, label="tried, constraints satisfied")
+        ax.scatter(
+            x[kept],
+            y[kept],
+            s=4,
+            color=_TRIED,
+            linewidths=0.0,
+            label="candidates that satisfy the constraints",
+        )
         for code, (word, marker, color) in enumerate(_STATES):
             own = dataset["constraints_satisfied"].values == code
             if own.any():
@@ -84,7 +94,7 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
                 ax.errorbar(
                     dataset[across].values[own], dataset[up].values[own], xerr=bars[0], yerr=bars[1], fmt=marker,
                     color=color, markersize=5, markeredgecolor="black", markeredgewidth=0.5, zorder=3,
-                    label=f"constraints {word}", **_BARS,
+                    label=f"reported design, constraints {word}", **_BARS,
                 )  # fmt: skip
         ax.set(xlabel=_label(dataset, across), ylabel=_label(dataset, up))
         for values, scale, axis in ((x[kept], ax.set_xscale, ax.xaxis), (y[kept], ax.set_yscale, ax.yaxis)):
@@ -118,10 +128,10 @@ def _label(dataset: xr.Dataset, name: str) -> str:
 
 _LEVELS = (0.05, 0.5, 0.95)
 _WORDS = {
-    "snap": "P(snap-through)",
-    "continuous": "P(continuous snap-through)",
-    "first_well": "P(ends in the first well)",
-    "other_well": "P(ends in the other well)",
+    "snap": "Probability of snap-through",
+    "continuous": "Probability of continuous snap-through",
+    "first_well": "Probability of ending in the first well",
+    "other_well": "Probability of ending in the other well",
 }
 _DASHES: dict[float, Any] = {0.05: ":", 0.5: "-", 0.95: "--"}
 
@@ -146,7 +156,6 @@ def plot_probability(
     dataset : xarray.Dataset
         Of :func:`snapbeam.uncertainty.probability_map` over one or two parameters.
     outcome : str
-    ax : matplotlib.axes.Axes, optional
     measurements : MeasuredPoints, optional
         Measured responses to lay over it, in the colours of their classes.
     levels : tuple of float
@@ -161,7 +170,7 @@ def plot_probability(
     data = data.squeeze()
     if not 1 <= len(dims) <= 2 or "point" in dims:
         raise InputError(f"probability over {dims}: is drawn over one or two parameters")
-    with frame(ax) as ax:
+    with frame(ax, dataset, height=80.0) as ax:
         if len(dims) == 1:
             _line(data, ax, dims[0], outcome, levels)
         else:
@@ -212,7 +221,9 @@ def _cells(data: xr.Dataset, ax: Axes, dims: list[str], outcome: str, levels: tu
     wide = np.argwhere(~data["reached"].transpose(dims[1], dims[0]).values)
     if wide.size:
         look: dict[str, Any] = {"marker": "x", "s": 8, "color": "0.35", "linewidths": 0.6}
-        handles.append(ax.scatter(x[wide[:, 1]], y[wide[:, 0]], label="wider than asked", **look))
+        handles.append(
+            ax.scatter(x[wide[:, 1]], y[wide[:, 0]], label="interval wider than requested", **look)
+        )
     dress(ax.xaxis, data, dims[0])
     dress(ax.yaxis, data, dims[1])
     for at, axis in ((0, ax.set_xlim), (1, ax.set_ylim)):
@@ -243,7 +254,6 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
     Parameters
     ----------
     dataset : xarray.Dataset
-    ax : matplotlib.axes.Axes, optional
     quasi_static : bool
         Whether to draw V_QS1 (Eq. 21) too, over frequency ratio or location.
     """
@@ -263,7 +273,7 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
         raise InputError(f"quasi_static over {along}: is known over location and frequency_ratio")
     bottom, top = (float(each) for each in data.attrs["bounds"])
     x, _ = positions(data, along)
-    with frame(ax, height=70.0) as ax:
+    with frame(ax, dataset, height=76.0, axes=(raised,)) as ax:
         for level, (color, dashes) in zip(data["quantile"].values, _STYLES, strict=False):
             one = data.sel(quantile=level)
             low, high = (np.clip(one[f"threshold_{end}"].values, bottom, top) for end in ("low", "high"))
@@ -284,7 +294,7 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
         reach = np.nanmax(np.where(np.isfinite(data["threshold_high"]), data["threshold_high"], np.nan))
         ax.set_ylim(min(0.0, bottom), min(top, 1.08 * float(reach)) if np.isfinite(reach) else top)
         share = 100.0 * float(data.attrs.get("confidence", 0.95))
-        set_title(ax, f"{int(data['runs'].max())} runs a point, {share:g} % bands")
+        extend_title(ax, f"{int(data['runs'].max())} runs a point, {share:g} % bands")
         ax.legend(loc="best")
     return ax
 
@@ -306,23 +316,19 @@ def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     local = "effect" in dataset
     weight = np.abs(dataset["effect" if local else "first_order"].values)
     data = dataset.isel(parameter=np.argsort(weight, kind="stable"))
-    place = np.arange(data.sizes["parameter"])
-    with frame(ax, height=28.0 + 10.0 * place.size) as ax:
-        if local:
-            _bars(data, ax, place)
-        else:
-            _indices(data, ax, place)
-        ax.set_yticks(place, [_name(data, i, local) for i in range(place.size)])
-        ax.tick_params(axis="y", length=0)
-        for side in ("top", "right", "left"):
-            ax.spines[side].set_visible(False)
+    count = data.sizes["parameter"]
+    with frame(ax, dataset, height=28.0 + 10.0 * count) as ax:
+        (_bars if local else _indices)(data, ax, _rows(ax, [_name(data, i) for i in range(count)]))
     return ax
 
 
 def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
     middle = float(data.attrs["quantity_mean"])
     half, low, high = (data[f"effect{end}"].values for end in ("", "_low", "_high"))
-    for sign, color, label in ((-1.0, _BLUE, "parameter lower"), (1.0, _RED, "parameter higher")):
+    for sign, color, label in (
+        (-1.0, _BLUE, "one standard deviation lower"),
+        (1.0, _RED, "one standard deviation higher"),
+    ):
         ax.barh(place, sign * half, left=middle, height=0.62, color=color, label=label)
         error = np.stack([half - low, high - half])[:: int(sign)]
         interval = f"{100.0 * float(data.attrs['confidence']):g} % interval" if sign > 0.0 else None
@@ -349,18 +355,104 @@ def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
     legend_below(ax)
 
 
-def _name(data: xr.Dataset, at: int, local: bool) -> str:
+def _name(data: xr.Dataset, at: int) -> str:
     """Label of a bar: the parameter and, for a local analysis, its step with unit."""
     name = str(data["parameter"].values[at])
-    row = lookup(name)
+    step = "step" in data and _with_unit(float(data["step"][at]), lookup(name).quantity.unit, 2)
+    return f"{_words(name)}\n± {step}" if step else _words(name)
+
+
+def _words(name: str) -> str:
     section, text = split_name(name)
-    text = text.replace("_", " ")
-    if section == "contact" and row.kinds:
-        text = f"contact {text}"
-    if not local:
-        return text
-    step = float(data["step"][at])
-    if row.quantity.unit == "1":
-        return f"{text}\n± {step:.2g}"
-    unit = re.sub(r"\^([\d.]+)", r"$^{\1}$", row.quantity.unit)
-    return f"{text}\n± {EngFormatter(unit, places=1)(step)}"
+    return f"{'contact ' if section == 'contact' and lookup(name).kinds else ''}{text.replace('_', ' ')}"
+
+
+def _with_unit(value: float, unit: str, digits: int) -> str:
+    unit = re.sub(r"\^([\d.]+)", r"$^{\1}$", unit)
+    return f"{value:.{digits}g}" if unit == "1" else prefixed(value, unit, digits)
+
+
+# ----------------------------------------------------------------------------------------------------
+# Gradients, posteriors and measured classes: a row or a point for each, with its interval.
+
+
+@checked
+def plot_gradient(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the elasticities of a quantity, the result of :func:`snapbeam.uncertainty.gradient`, with their errors."""
+    contains(dataset, "gradient", "elasticity", "relative_error")
+    data = dataset.isel(parameter=np.argsort(np.abs(dataset["elasticity"].values), kind="stable"))
+    with frame(ax, dataset, height=24.0 + 9.0 * data.sizes["parameter"]) as ax:
+        value, place = (
+            data["elasticity"].values,
+            _rows(ax, [_name(data, i) for i in range(data.sizes["parameter"])]),
+        )
+        error = np.nan_to_num(np.abs(value) * data["relative_error"].values)
+        ax.barh(place, value, xerr=error, height=0.62, color=_BLUE, error_kw=_BARS)
+        ax.axvline(0.0, color="black", linewidth=0.6)
+        words = str(data.attrs["quantity"]).replace("_", " ")
+        ax.set_xlabel(f"Change in % for 1 % of the parameter:\n{words[:1].upper()}{words[1:]}")
+    return ax
+
+
+@checked
+def plot_posterior(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the marginal intervals of a posterior, over the median of each parameter, and state the medians."""
+    contains(dataset, "posterior", "weight")
+    names = [str(name) for name in dataset.data_vars if name != "weight"]
+    weight = dataset["weight"].values
+    labels, ends = [], []
+    for name in names:
+        order = np.argsort(dataset[name].values)
+        share = np.cumsum(weight[order]) - 0.5 * weight[order]
+        found = np.interp((0.025, 0.25, 0.5, 0.75, 0.975), share, dataset[name].values[order])
+        row = lookup(str(dataset[name].attrs["parameter"]))
+        labels.append(f"{_words(row.name)}\n{_with_unit(found[2], row.quantity.unit, 4)}")
+        ends.append(100.0 * (found / found[2] - 1.0))
+    with frame(ax, dataset, height=28.0 + 9.0 * len(names)) as ax:
+        place, at = _rows(ax, labels), np.array(ends)
+        ax.hlines(place, at[:, 0], at[:, 4], color=_BLUE, linewidth=1.0, label="95 % interval")
+        ax.hlines(place, at[:, 1], at[:, 3], color=_BLUE, linewidth=4.0, label="50 % interval")
+        ax.axvline(0.0, color="black", linewidth=0.6)
+        ax.set_xlabel("Difference from the median (%)")
+        legend_below(ax)
+    return ax
+
+
+@checked
+def plot_scores(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the probability of each measured class, the result of :func:`snapbeam.uncertainty.score_measurements`."""
+    contains(dataset, "measured classes", "most_likely", "probability_low")
+    order = np.argsort(dataset["probability"].values, kind="stable")
+    data = dataset.isel(measurement=order)
+    x, middle = np.arange(1, order.size + 1), data["probability"].values
+    bars = np.clip([middle - data["probability_low"], data["probability_high"] - middle], 0.0, None)
+    with frame(ax, dataset) as ax:
+        for kind in ResponseClass:
+            own = data["response_class"].values == kind
+            if own.any():
+                ax.errorbar(
+                    x[own], middle[own], yerr=bars[:, own], fmt="o", color=CLASS_COLORS[kind], markersize=4,
+                    markeredgecolor="black", markeredgewidth=0.5, label=f"measured: {kind.label}", **_BARS,
+                )  # fmt: skip
+        extend_title(
+            ax,
+            f"{data.attrs['agree']} of {order.size} most likely, {data.attrs['agree_expected']:.3g} expected",
+        )
+        ax.set(
+            xlabel="Measurement, by probability",
+            ylabel="Probability of the measured class",
+            ylim=(-0.02, 1.02),
+        )
+        legend_below(ax)
+    return ax
+
+
+def _rows(ax: Axes, labels: list[str]) -> np.ndarray:
+    """Name the rows of a picture, from the bottom, and take away the frame beside them; returns their places."""
+    place = np.arange(len(labels))
+    ax.set_yticks(place, labels)
+    ax.set_ylim(-0.6, len(labels) - 0.4)
+    ax.tick_params(axis="y", length=0)
+    for side in ("top", "right", "left"):
+        ax.spines[side].set_visible(False)
+    return place

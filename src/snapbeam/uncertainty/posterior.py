@@ -29,6 +29,7 @@ from snapbeam.uncertainty.measured_classes import KNOWN_CLASSES, PSEUDOCOUNT
 from snapbeam.uncertainty.measurements import Measurements
 from snapbeam.uncertainty.monte_carlo import reached, trials_of
 from snapbeam.util.diagnostics import DiagnosticWarning, counting
+from snapbeam.util.display import plotter
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -398,6 +399,10 @@ class Posterior:
             ranks = stats.rankdata(even.values, axis=0) / (len(even.values) + 1.0)
             matrix[:count, :count] = np.corrcoef(special.ndtri(ranks).T)
         return ParameterUncertainty(of=of | beside, correlation=matrix, **more)
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the marginal interval of each parameter, over its median; returns the axes."""
+        return plotter("plot_dataset")(self.to_dataset(), None, ax)
 
     def to_dataset(self) -> xr.Dataset:
         """Samples and weights, labelled."""
