@@ -164,6 +164,49 @@ def draw_potential(images: Path) -> None:
     save(drawn(figure), images / "potential_energy.png")
 
 
+def draw_systems(images: Path) -> None:
+    """Draw the schematics of the pages on strikers, beams, harvesters and systems."""
+    import snapbeam as sb
+    from snapbeam import paper
+
+    level, hertz = paper.BEAM.buckling_level, paper.CONTACT
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=8)
+    shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    burst = sb.Burst(
+        frequency_ratio=1.2, velocity_amplitude=0.2, duration_cycles=5, ramp_up_cycles=2, ramp_down_cycles=1, retraction=0.4
+    )  # fmt: skip
+    body = sb.Striker(
+        drive=burst, mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7, gap=0.1 * level
+    )
+    sphere = sb.Striker(
+        drive=sb.ConstantVelocity(speed=0.4), mass=2e-3, gap=0.5 * level, side="above", location=0.5
+    )
+    several = [
+        sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.18) + burst, location=0.3),
+        sb.Striker(drive=sb.Sine(frequency_ratio=0.9, velocity_amplitude=0.12), side="above", location=0.7, gap=0.3 * level),
+    ]  # fmt: skip
+    side_load = sb.Imperfection(midspan_amplitude=1.5e-5, point_load=-0.02, point_location=0.3)
+    wells = sb.ReducedModel.from_beam(paper.BEAM, modes=8, imperfection=side_load)
+    base = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25))
+    stop = sb.Striker(drive=sb.FixedStop(), gap=0.15 * level)
+    noise = sb.BandLimitedNoise(low_ratio=0.3, high_ratio=1.5, velocity_rms=0.15, seed=1)
+    shaking = sb.Striker(drive=noise, gap=-0.1 * level, location=0.7)
+    piezo = sb.PiezoelectricHarvester(moment_per_volt=4e-3, capacitance=60e-9, resistance=2e4, patch_end=0.25)
+    coil = sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resistance=10.0, location=0.7)
+    load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))
+    for name, system in {
+        "body": sb.System(model, contacts=[sb.Contact(sb.HuntCrossley(4e8, 2.0), body)]),
+        "sphere": sb.System(model, contacts=[sb.Contact(hertz, sphere)]),
+        "several": sb.System(model, contacts=[sb.Contact(hertz, several[0]), sb.Contact(sb.PowerLaw(1e6, 1.4), several[1])]),
+        "wells": sb.System(wells, contacts=[sb.Contact(hertz, shaker)]),
+        "base": sb.System(model, contacts=[sb.Contact(hertz, stop)], harvesters=[piezo], base_excitation=base),
+        "coil": sb.System(model, contacts=[sb.Contact(hertz, shaker)], harvesters=[coil], axial_load=load),
+        "stop": sb.System(model, contacts=[sb.Contact(sb.KelvinVoigt(linear_stiffness=1e6, linear_damping=2.0), shaking)]),
+    }.items():  # fmt: skip
+        save(drawn(system.plot()), images / f"system_{name}.png")
+        plt.close("all")
+
+
 def draw_examples(images: Path) -> None:
     """Run each example and save the figures that it leaves open, in their order."""
     for name in EXAMPLES:
@@ -194,6 +237,7 @@ def main(names: list[str]) -> None:
             os.chdir(DOCS)
     if not names:
         draw_potential(images)
+        draw_systems(images)
         draw_examples(images)
 
 
