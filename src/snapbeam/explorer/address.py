@@ -18,10 +18,12 @@ from snapbeam.explorer.jobs import ADDRESS
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import split_name
 
-__all__ = ["Address", "number"]
+__all__ = ["Address", "number", "typed"]
 
 
 _KEYS = ("x", "y", "show", "cut", "at", "b", "view", "set", "theme", "type", "tab", "card")
+_NAMES = ("x", "y", "show", "tab", "card")
+_WORDS = {"theme": ("default", "dark"), "type": ("large",)}
 _MOST = 64
 _NAME = r"[a-z]\w*(\.[1-9]\d*)?(\.\w+)?"
 
@@ -83,10 +85,8 @@ class Address:
 
     def write(self) -> str:
         """The part of the address after the question mark."""
-        parts = {"x": self.x, "y": self.y, "show": self.show, "tab": self.tab, "card": self.card}
-        parts["cut"] = _pairs_text(self.cut)
-        parts["at"] = _pairs_text(self.at)
-        parts["b"] = _pairs_text(self.b)
+        parts = {name: getattr(self, name) for name in _NAMES}
+        parts |= {name: _pairs_text(getattr(self, name)) for name in ("cut", "at", "b")}
         parts["set"] = ",".join(f"{name}:{_written(value)}" for name, value in self.changes.items())
         if self.view is not None:
             parts["view"] = ",".join(repr(float(value)) for value in self.view)
@@ -98,18 +98,14 @@ class Address:
 
 
 def _with(found: Address, name: str, text: str) -> Address:
-    if name in ("x", "y", "show", "tab", "card"):
+    if name in _NAMES:
         if not text.isidentifier() or len(text) > _MOST:
             raise InputError("must be a name")
         return replace(found, **{name: text})  # type: ignore[arg-type]
-    if name == "theme":
-        if text not in ("default", "dark"):
-            raise InputError("must be default or dark")
-        return replace(found, theme=text)
-    if name == "type":
-        if text != "large":
-            raise InputError("must be large")
-        return replace(found, type=text)
+    if name in _WORDS:
+        if text not in _WORDS[name]:
+            raise InputError(f"must be {' or '.join(_WORDS[name])}")
+        return replace(found, **{name: text})  # type: ignore[arg-type]
     if name == "view":
         view = tuple(number("view", part) for part in text.split(","))
         if len(view) != 4 or not (view[0] < view[1] and view[2] < view[3]):
@@ -149,29 +145,27 @@ def _changes(text: str) -> dict[str, Any]:
 
 
 def _pairs(text: str) -> dict[str, Any]:
-    pairs: dict[str, Any] = {}
-    for part in text.split(","):
-        name, colon, value = part.partition(":")
-        if not colon:
-            raise InputError("must be name:value,name:value")
-        row = lookup(name)
-        if row.quantity.kind in (str, bool):
-            pairs[row.name] = row.quantity.check(name, value if row.quantity.kind is str else value == "True")
-        else:
-            found = number(name, value)
-            pairs[row.name] = row.quantity.check(
-                name, int(found) if row.quantity.kind is int and found == int(found) else found
-            )
-        if len(pairs) > _MOST:
-            raise InputError(f"at most {_MOST} of them")
-    return pairs
+    parts = [part.partition(":") for part in text.split(",")]
+    if not all(colon for _, colon, _ in parts):
+        raise InputError("must be name:value,name:value")
+    if len(parts) > _MOST:
+        raise InputError(f"at most {_MOST} of them")
+    return {lookup(name).name: typed(name, value) for name, _, value in parts}
 
 
 def _pairs_text(pairs: Mapping[str, Any]) -> str:
-    return ",".join(
-        f"{name}:{value!r}" if isinstance(value, (int, float)) else f"{name}:{value}"
-        for name, value in pairs.items()
-    )
+    return ",".join(f"{name}:{value}" for name, value in pairs.items())
+
+
+def typed(name: str, text: str) -> Any:
+    """The value of a parameter that was typed; refused (InputError) if it has none such."""
+    item, value = lookup(name).quantity, text.strip()
+    if item.kind is bool:
+        return item.check(name, {"True": True, "False": False}.get(value, value))
+    if item.kind is str:
+        return item.check(name, value)
+    found = number(name, value)
+    return item.check(name, int(found) if item.kind is int and found == int(found) else found)
 
 
 def number(name: str, text: str) -> float:

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import tempfile
 import time
+import wave
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 import panel as pn
 from bokeh.models import PrintfTickFormatter
 from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
-from snapbeam import InputError, Integration, ResponseClass, RunStatus, System, write_netcdf
-from snapbeam.explorer.address import Address, number
+from snapbeam import STATISTICS, InputError, Integration, ResponseClass, RunStatus, System, write_netcdf
+from snapbeam.explorer import maps
+from snapbeam.explorer.address import Address, typed
 from snapbeam.explorer.jobs import (
     UPLOAD,
     WINDOW_SECONDS,
@@ -27,34 +31,27 @@ from snapbeam.explorer.jobs import (
     too_large,
 )
 from snapbeam.explorer.map_view import MapView
-from snapbeam.explorer.maps import (
-    NOT_COMPUTED,
-    Plane,
-    Point,
-    Scatter,
-    Window,
-    compute,
-    drawn_shares,
-    integration_mapping,
-    known_cells,
-    map_command,
-    parameter_of,
-    patched,
-    planned,
-    python_lines,
-    run_command,
-    sections_of,
-    short_names,
-    system_from,
-    system_toml,
-)
 from snapbeam.explorer.run_view import across, within
 from snapbeam.explorer.shared import Shared
-from snapbeam.explorer.style import Html, Look, framed_plot, styled
+from snapbeam.explorer.style import (
+    BUSY,
+    HEADING,
+    NOTE,
+    REFUSED,
+    Html,
+    Later,
+    Look,
+    Post,
+    button,
+    framed_plot,
+    styled,
+)
 from snapbeam.model.parameter_axes import CHANGES_UNITS
 from snapbeam.model.parameter_file import Config, config_from_mapping
 from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, parameters
-from snapbeam.plot.style import CLASS_COLORS
+from snapbeam.plot.dataset import plot_dataset
+from snapbeam.plot.map import plot_points, plot_response_map, plot_statistic
+from snapbeam.plot.style import CLASS_COLORS, save_figure
 from snapbeam.util.input_files import parsed_toml
 
 if TYPE_CHECKING:
@@ -63,12 +60,7 @@ if TYPE_CHECKING:
     from snapbeam import Run
     from snapbeam.explorer.page import Page
 
-__all__ = ["MapCard", "SystemCard", "TakeCard", "WindowControl", "window_dataset"]
-
-
-_HEADING = Markup("<h2>{}</h2>")
-_NOTE = Markup('<p class="note">{}</p>')
-_BAD = Markup('<p class="bad">{}</p>')
+__all__ = ["MapCard", "SystemCard", "TakeCard", "WindowControl", "draw", "window_dataset", "write_sound"]
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -149,21 +141,23 @@ class WindowControl:
         self.cancel("")
         self.card.own.add(key)
         try:
-            system, integration = Point(self.card.plane.fixed_values()).system(
+            system, integration = maps.Point(self.card.plane.fixed_values()).system(
                 self.card.system, self.card.integration
             )
         except InputError as error:
             self.card.tell(str(error))
             return
         log = (self.card.plane.x.log, self.card.plane.y.log)
-        made = planned(
+        made = maps.planned(
             system, integration, self.card.plane.names, bounds, log, self.card.view.pixels, key=key
         )
         window = self.card.shared.window(made)
         if window is made:
             others = [each for each in self.card.windows() if each is not made]
             strides = [each.stride.copy() for each in others]
-            made.known = known_cells(made, self.card.shown_plane, list(zip(others, strides, strict=True)))
+            made.known = maps.known_cells(
+                made, self.card.shown_plane, list(zip(others, strides, strict=True))
+            )
         if window.finished or not window.wanted:  # by this page before, or by another
             self.card.show_windows()
             self.card.tell("" if window.finished or not force else "the map is as fine as the screen shows")
@@ -173,7 +167,9 @@ class WindowControl:
         self.card.tell("computing this view")
         self._waiting.begin(0, self._still)
         self.card.shared.jobs.window(
-            lambda _: compute(window, self.card.shared.jobs, token, lambda w: self._grew(w, token), seconds),
+            lambda _: maps.compute(
+                window, self.card.shared.jobs, token, lambda w: self._grew(w, token), seconds
+            ),
             lambda _, words: self.card.post(lambda: self._ended(window, token, words)),
             token,
         )
@@ -181,14 +177,11 @@ class WindowControl:
     def _bounds(self) -> tuple[float, float, float, float] | None:
         """Visible ranges of the axes, clipped to the allowed parameter values."""
         left, right, low, high = self.card.view.view
+        plane = self.card.plane
         found: list[float] = []
-        for (a, b), name, axis in (
-            ((left, right), self.card.plane.names[0], self.card.plane.x),
-            ((low, high), self.card.plane.names[1], self.card.plane.y),
-        ):
+        for a, b, name, axis in zip((left, low), (right, high), plane.names, (plane.x, plane.y), strict=True):
             item = lookup(name).quantity
-            least = max(a, item.low) if np.isfinite(item.low) else a
-            most = min(b, item.high) if np.isfinite(item.high) else b
+            least, most = max(a, item.low), min(b, item.high)
             if axis.log:
                 least = max(least, 1e-3 * float(axis.at[0]))
             if not least < most:
@@ -196,7 +189,7 @@ class WindowControl:
             found += [least, most]
         return found[0], found[1], found[2], found[3]
 
-    def _grew(self, window: Window, token: Token) -> None:
+    def _grew(self, window: maps.Window, token: Token) -> None:
         now = time.monotonic()
         if now - self._pushed > _PUSH and not token.cancelled:
             self._pushed = now
@@ -206,7 +199,7 @@ class WindowControl:
         if self._token is not None:
             self.card.tell(f"computing this view, {seconds:.0f} s" + (f"; {why}" if why else ""))
 
-    def _draw_growing(self, window: Window, token: Token) -> None:
+    def _draw_growing(self, window: maps.Window, token: Token) -> None:
         if token is not self._token:
             return
         self._waiting.end(0)
@@ -217,7 +210,7 @@ class WindowControl:
             f"window: {window.done} of {window.wanted} points; blocks of {finest} cells now; about {left} left"
         )
 
-    def _ended(self, window: Window, token: Token, words: str) -> None:
+    def _ended(self, window: maps.Window, token: Token, words: str) -> None:
         if token is self._token:
             self._waiting.end(0)
             self.card.stop.visible = False
@@ -272,27 +265,19 @@ class MapCard:
         ``post(work)`` does something on the page's own thread, ``later(work, milliseconds)`` does it later.
     """
 
-    def __init__(
-        self,
-        look: Look,
-        shared: Shared,
-        address: Address,
-        post: Callable[[Callable[[], None]], None],
-        later: Callable[[Callable[[], None], int], Any],
-    ) -> None:
+    def __init__(self, look: Look, shared: Shared, address: Address, post: Post, later: Later) -> None:
         self.look, self.shared, self.post, self.later = look, shared, post, later
         self.source = shared.source
         self.system, self.integration = shared.system, shared.integration
         self.changed = False
         self.dots: Any = None
         self.marks: list[tuple[dict[str, Any], str]] = []
-        self.asked: Callable[[Point], None] = lambda _: None
+        self.asked: Callable[[maps.Point], None] = lambda _: None
         self.moved: Callable[[], None] = lambda: None
         self.cut_moved: Callable[[dict[str, Any]], None] = lambda _: None
         self.own: set[Any] = set()
         """Keys of the windows that this page requested; those of other tabs are not drawn over its map."""
-        self._drawn: list[tuple[Window, NDArray[np.int8]]] = []
-        self._picked: tuple[float, float] | None = None
+        self._drawn: list[tuple[maps.Window, NDArray[np.int8]]] = []
         self._words = list(address.words)
         self._restoring = False
         self._make_controls(address)
@@ -319,8 +304,8 @@ class MapCard:
         show = address.show if address.show in names else names[0]
         if address.show and address.show not in names:
             self._words.append(f"address: this map has no {address.show}")
-        full = {name: parameter_of(source.skeleton, name) for name in dims}
-        words = short_names(full.values())
+        full = {name: maps.parameter_of(source.skeleton, name) for name in dims}
+        words = maps.short_names(full.values())
         options = {words[full[name]]: name for name in dims}
         self.x = pn.widgets.Select(name="Across", options=options, value=x, width=170)
         self.y = pn.widgets.Select(name="Upward", options=options, value=y, width=170)
@@ -330,11 +315,23 @@ class MapCard:
         grid = [name for name in dims if not source.is_list and source.skeleton[name].size > 1]
         self.sliders = {name: self._slider(name, address) for name in grid}
         self.auto = pn.widgets.Checkbox(name="compute the view automatically", value=True, align="center")
-        self.stop = pn.widgets.Button(
-            name="Stop", button_type="warning", width=70, visible=False, align="center"
+        hidden: dict[str, Any] = {"visible": False, "align": "center"}
+        self.stop = button(
+            "Stop",
+            self.post,
+            lambda: self.control.cancel("stopped"),
+            button_type="warning",
+            width=70,
+            **hidden,
         )
-        self.more = pn.widgets.Button(name="Finer", button_type="primary", visible=False, align="center")
-        self.again = pn.widgets.Button(name="Compute view", button_type="default", width=110, align="center")
+        self.more = button("Finer", self.post, lambda: self.control.more(), button_type="primary", **hidden)
+        self.again = button(
+            "Compute view",
+            self.post,
+            lambda: self.control.compute_view(force=True),
+            width=110,
+            align="center",
+        )
         self.layers = pn.widgets.CheckButtonGroup(
             options={
                 "interwell threshold": "threshold", "quasi-static threshold": "quasi",
@@ -350,9 +347,6 @@ class MapCard:
             widget.param.watch(self._axes_changed, "value")
         self.show.param.watch(lambda _: self.post(self.redraw), "value")
         self.layers.param.watch(lambda _: self.post(self.redraw), "value")
-        self.stop.on_click(lambda _: self.post(lambda: self.control.cancel("stopped")))
-        self.more.on_click(lambda _: self.post(self.control.more))
-        self.again.on_click(lambda _: self.post(lambda: self.control.compute_view(force=True)))
         for slider in self.sliders.values():
             slider.param.watch(lambda _: None if self._restoring else self.post(self._cut_changed), "value")
         self.auto.visible = self.again.visible = not source.is_list
@@ -377,7 +371,7 @@ class MapCard:
 
     def _place(self, name: str, address: Address) -> int | None:
         """Which point of an axis that is not shown an address describes; None if it does not, or is of another map."""
-        full, points = parameter_of(self.source.skeleton, name), self.source.coordinate(name)
+        full, points = maps.parameter_of(self.source.skeleton, name), self.source.coordinate(name)
         wanted = address.cut.get(full, address.at.get(full))
         if wanted is None or points.dtype.kind not in "iuf":
             found = np.flatnonzero(points == wanted)
@@ -388,7 +382,8 @@ class MapCard:
         """The values of the axes that have a slider and are not shown, by dotted name."""
         skeleton, held = self.source.skeleton, self._fixed()
         return {
-            parameter_of(skeleton, name): self.source.coordinate(name)[at].item() for name, at in held.items()
+            maps.parameter_of(skeleton, name): self.source.coordinate(name)[at].item()
+            for name, at in held.items()
         }
 
     def restore(self, address: Address) -> None:
@@ -405,12 +400,15 @@ class MapCard:
             self.rebuild(address.view)
             return
         self.plane = replace(self.plane, fixed=self.plane.fixed | self._fixed())
-        if address.view is None:
-            self.view.view = (*self.plane.x.span, *self.plane.y.span)
-        elif len(address.view) == 4:
-            self.view.view = (address.view[0], address.view[1], address.view[2], address.view[3])
+        self._see(address.view)
         self.redraw()
         self.control.view_moved()
+
+    def _see(self, view: tuple[float, ...] | None) -> None:
+        """Show a part of the map; all of it if there is none, or not on its logarithmic axes."""
+        if view is None or (self.plane.x.log and view[0] <= 0) or (self.plane.y.log and view[2] <= 0):
+            view = (*self.plane.x.span, *self.plane.y.span)
+        self.view.view = (view[0], view[1], view[2], view[3])
 
     def _axes_changed(self, event: Any) -> None:
         if self._restoring:
@@ -440,18 +438,13 @@ class MapCard:
         """Make the figure again, for other axes."""
         self.control.cancel("")
         self.plane = (
-            Scatter.of(self.source, self.x.value, self.y.value)
+            maps.Scatter.of(self.source, self.x.value, self.y.value)
             if self.source.is_list
-            else Plane.of(self.source, self.x.value, self.y.value, self._fixed())
+            else maps.Plane.of(self.source, self.x.value, self.y.value, self._fixed())
         )
         self.view = MapView(self.look, self.plane.x, self.plane.y, _HEIGHT)
-        if (
-            view is not None
-            and len(view) == 4
-            and not ((self.plane.x.log and view[0] <= 0) or (self.plane.y.log and view[2] <= 0))
-        ):
-            self.view.view = (view[0], view[1], view[2], view[3])
-        self.view.on_tap(self._tapped)
+        self._see(view)
+        self.view.on_tap(lambda x, y: self.asked(self.point(x, y)))
         self.view.on_hover(self._hovered)
         self.view.on_view(self.control.view_moved)
         for edge in ("inner_width", "inner_height"):
@@ -480,7 +473,7 @@ class MapCard:
         fixed = tuple(sorted(self.plane.fixed_values().items()))
         return self.system.hash, self.integration, self.plane.names, fixed
 
-    def windows(self) -> list[Window]:
+    def windows(self) -> list[maps.Window]:
         """Windows over this section that the page requested, the widest first."""
         if self.system is None or self.source.is_list:
             return []
@@ -549,14 +542,13 @@ class MapCard:
         if shown and self.show.value != "response_class" and not self.source.skeleton.data_vars:
             known = [w.values[self.show.value][w.stride > 0] for w in shown if self.show.value in w.values]
             self.view.limits = _span(np.concatenate(known)) if known else (0.0, 1.0)
-            self.view.mapper.update(
-                low=self.view.limits[0], high=max(self.view.limits[1], self.view.limits[0] + 1e-300)
-            )
+            low, high = self.view.limits
+            self.view.mapper.update(low=low, high=max(high, low + 1e-300))
         self._drawn = self.view.show_windows(shown, self.show.value, self.shown_plane)
         self._legend()
 
     @property
-    def shown_plane(self) -> Plane | None:
+    def shown_plane(self) -> maps.Plane | None:
         """The cut through the map; None if it has no numbers, or those of another system."""
         held = bool(self.source.skeleton.data_vars) and not self.changed and not self.source.is_list
         return self.plane if held else None
@@ -565,7 +557,6 @@ class MapCard:
         return (0.0, 1.0) if values is None or name == "response_class" else _span(values)
 
     def _fixed_short(self) -> dict[str, Any]:
-
         return {lookup(name).short: value for name, value in self.plane.fixed_values().items()}
 
     def _draw_dots(self, wanted: bool, words: list[str]) -> None:
@@ -618,7 +609,7 @@ class MapCard:
             inside = (x >= left) & (x <= right) & (y >= low) & (y <= high)
             found, counts = np.unique(np.zeros(0) if kinds is None else kinds[inside], return_counts=True)
             return dict(zip(found.tolist(), (counts / max(counts.sum(), 1)).tolist(), strict=True))
-        return drawn_shares(self.plane, kinds, self._drawn, (left, right, low, high), self.view.pixels)
+        return maps.drawn_shares(self.plane, kinds, self._drawn, (left, right, low, high), self.view.pixels)
 
     def say(self, words: str) -> None:
         """Add a line to what is wrong."""
@@ -635,11 +626,7 @@ class MapCard:
 
     # ------------------------------------------------------------------ points
 
-    def _tapped(self, x: float, y: float) -> None:
-        self._picked = (x, y)
-        self.asked(self.point(x, y))
-
-    def point(self, x: float, y: float) -> Point:
+    def point(self, x: float, y: float) -> maps.Point:
         """The point that is shown at a place: that of the finest window drawn over it, or the map's."""
         for window, stride in reversed(self._drawn):
             at = window.computed_at(x, y, stride) if window.covers(x, y) else None
@@ -648,17 +635,17 @@ class MapCard:
                     zip(window.names, (window.x[at[1]].item(), window.y[at[0]].item()), strict=True)
                 )
                 held = {name: found[at].item() for name, found in window.values.items()}
-                return Point(values | self.plane.fixed_values(), held)
+                return maps.Point(values | self.plane.fixed_values(), held)
         return self.plane.at(*self.plane.index(x, y))
 
-    def expected(self, point: Point) -> dict[str, Any]:
+    def expected(self, point: maps.Point) -> dict[str, Any]:
         """Results of the map at a point; empty if the point is not on the map, or the system has changed."""
         if point.expected or self.changed or not self.source.skeleton.data_vars:
             return point.expected
         place = self.plane.find(point.values)
         return {} if place is None else self.source.point(self.plane.indexers(*place))
 
-    def step(self, values: dict[str, Any], across: int, upward: int) -> Point | None:
+    def step(self, values: dict[str, Any], across: int, upward: int) -> maps.Point | None:
         """The neighbour of a point, *across* and *upward* points on."""
         place = self.plane.place(values)
         if place is None:
@@ -675,7 +662,7 @@ class MapCard:
             return self.plane.at(*beside)
         return self.point(float(self.plane.x.at[beside[1]]), float(self.plane.y.at[beside[0]]))
 
-    def select(self, point: Point | None) -> None:
+    def select(self, point: maps.Point | None) -> None:
         """Let the readout show a point whenever the pointer is not over the map."""
         self._selected = Markup("&nbsp;")
         if point is not None:
@@ -691,7 +678,7 @@ class MapCard:
         point = self.point(x, y)
         self.hover.object = self._readout(point, self._held(point, x, y))
 
-    def _held(self, point: Point, x: float, y: float) -> dict[str, Any]:
+    def _held(self, point: maps.Point, x: float, y: float) -> dict[str, Any]:
         """The class, the shown variable and two more of the cell at a location."""
         held = point.expected
         if held or self.changed:
@@ -710,10 +697,10 @@ class MapCard:
                 found[each] = values[place].item()
         return found
 
-    def _readout(self, point: Point, held: dict[str, Any]) -> Markup:
+    def _readout(self, point: maps.Point, held: dict[str, Any]) -> Markup:
         parts = [point.words()]
         if held.get("status") == RunStatus.NOT_RUN:
-            parts.append(NOT_COMPUTED)
+            parts.append(maps.NOT_COMPUTED)
             held = {}
         if "response_class" in held:
             parts.append(Markup("<b>{}</b>").format(ResponseClass(int(held["response_class"])).label))
@@ -747,12 +734,7 @@ _SECTIONS = {
 }  # fmt: skip
 _ALWAYS = ("beam", "model", "integration")
 """Sections of which all parameters have a field; of contact and drive if there is a striker, else those that are set."""
-_INTEGRATION = (
-    "integration.cycles",
-    "integration.accuracy",
-    "integration.step",
-    "integration.early_termination",
-)
+_INTEGRATION = tuple(f"integration.{name}" for name in ("cycles", "accuracy", "step", "early_termination"))
 _LAWS = {
     "elastic_plastic": "elastic-plastic", "hertz": "Hertz", "hunt_crossley": "Hunt and Crossley", "kelvin_voigt": "Kelvin and Voigt", "layer": "elastic layer",
     "power": "power law", "restitution": "coefficient of restitution",
@@ -786,19 +768,15 @@ class SystemCard:
         self.words = Html("", sizing_mode="stretch_width", css_classes=["system-words"])
         self.facts = Html("", sizing_mode="stretch_width", css_classes=["system-facts"])
         self.box = pn.Column(sizing_mode="stretch_width", margin=0)
-        apply = pn.widgets.Button(name="Use this system", button_type="primary", width=130)
-        apply.on_click(lambda _: page.post(self.apply))
-        back = pn.widgets.Button(name="Back to the map's", width=130)
-        back.on_click(lambda _: page.post(self._back))
-        save = pn.widgets.Button(name="Save as TOML", width=110)
-        save.on_click(lambda _: page.post(self.save))
+        apply = button("Use this system", page.post, self.apply, button_type="primary", width=130)
+        back = button("Back to the map's", page.post, self._back, width=130)
+        save = button("Save as TOML", page.post, self.save, width=110)
         self.preset = pn.widgets.Select(name="Preset", options=["", *_PRESETS], width=210)
         self.preset.param.watch(lambda event: page.post(lambda: self._chosen(event.new)), "value")
         self.vary = pn.widgets.Select(name="Vary by a slider", width=210)
         self.vary.param.watch(lambda _: page.post(self._vary), "value")
-        self.slider = pn.widgets.FloatSlider(
-            visible=False, width=330, format=PrintfTickFormatter(format="%.6g")
-        )
+        digits = PrintfTickFormatter(format="%.6g")
+        self.slider = pn.widgets.FloatSlider(visible=False, width=330, format=digits)
         self.slider.param.watch(lambda event: page.post(lambda: self._dragged(event.new)), "value")
         self.slider.param.watch(lambda event: page.post(lambda: self._released(event.new)), "value_throttled")
         laws = {_LAWS.get(kind, kind.replace("_", " ")): kind for kind in _kinds("contact")}
@@ -825,18 +803,17 @@ class SystemCard:
         held = self.system.parameters
         kinds = {"contact": self.law.value, "drive": str(held.get("drive.type", "sine"))}
         whole = (*_ALWAYS, *(kinds if self.system.contacts else ()))
+
+        def shown(row: Parameter) -> bool:
+            if row.section in whole:
+                return not row.kinds or kinds.get(row.section) in row.kinds
+            return row.name in held
+
+        rows = [row for row in parameters().values() if _group(row) in _SECTIONS and shown(row)]
         return [
-            row
-            for row in parameters().values()
-            if row.quantity.kind in (float, int, str, bool)
-            and (row.section != "integration" or row.name in _INTEGRATION)
-            and _group(row) in _SECTIONS
-            and (
-                not row.kinds or kinds.get(row.section) in row.kinds
-                if row.section in whole
-                else row.name in held
-            )
-        ]
+            row for row in rows
+            if row.quantity.kind in (float, int, str, bool) and (row.section != "integration" or row.name in _INTEGRATION)
+        ]  # fmt: skip
 
     def fill(self, keep: bool = False) -> None:
         """Let the fields show the system at the point that is shown; *keep* what was typed and is not used yet."""
@@ -885,11 +862,8 @@ class SystemCard:
 
     def _held(self) -> dict[str, Any]:
         """Values of the parameters of the system and of its integration, by dotted name."""
-        held = dict(self.system.parameters)
-        held |= {
-            f"integration.{name}": value for name, value in integration_mapping(self.integration).items()
-        }
-        return held | {"integration.cycles": self.integration.cycles_or_default}
+        how = maps.integration_mapping(self.integration) | {"cycles": self.integration.cycles_or_default}
+        return dict(self.system.parameters) | {f"integration.{name}": value for name, value in how.items()}
 
     def _make_fields(self, typed: Mapping[str, Any]) -> None:
         held = self._held()
@@ -902,7 +876,7 @@ class SystemCard:
                 if section == "contact" and self.system.contacts:
                     fields = [self.law, *fields]
                 if fields:
-                    parts += [Html(_HEADING.format(title), margin=0), pn.FlexBox(*fields, margin=0)]
+                    parts += [Html(HEADING.format(title), margin=0), pn.FlexBox(*fields, margin=0)]
             for part in parts:
                 styled(part, self.page.look)
             self.box.objects = parts
@@ -927,14 +901,8 @@ class SystemCard:
 
     def _typed(self, name: str) -> Any:
         """The value in a field; None if it is empty.  Refused (InputError) if it is no number, or out of range."""
-        row, value = parameters()[name], self.fields[name].value
-        if isinstance(value, str) and not row.quantity.choices:
-            if not value.strip():
-                return None
-            value = number(name, value)
-            if row.quantity.kind is int and value == int(value):
-                value = int(value)
-        return row.quantity.check(name, value)
+        value = str(self.fields[name].value)
+        return typed(name, value) if value.strip() else None
 
     def changed_fields(self) -> dict[str, Any]:
         """Parameters whose fields were changed, by dotted name; of another contact law all, None for those of the old one.
@@ -966,8 +934,8 @@ class SystemCard:
         try:
             card = self.page.card
             assert card.system is not None
-            held = sections_of(card.system, card.integration)
-            self.page.use(*system_from(patched(held, changed)), changed)
+            held = maps.sections_of(card.system, card.integration)
+            self.page.use(*maps.system_from(maps.patched(held, changed)), changed)
         except InputError as error:
             self.refuse(str(error))
 
@@ -1006,12 +974,12 @@ class SystemCard:
 
     def refuse(self, words: str) -> None:
         """Say what cannot be done."""
-        self.words.object = Markup('<p class="bad" role="alert">{}</p>').format(words)
+        self.words.object = REFUSED.format(words)
 
     def save(self) -> None:
         """Give the parameter file of the system."""
         try:
-            text = system_toml(self.system, self.integration)
+            text = maps.system_toml(self.system, self.integration)
         except InputError as error:
             self.refuse(str(error))
             return
@@ -1019,24 +987,20 @@ class SystemCard:
 
     def _show_facts(self) -> None:
         model = self.system.model
+        frequencies = ", ".join(f"{value:.4g}" for value in model.natural_frequencies[:4])
         facts = [
             ("f₁", f"{model.reference_frequency:.6g} Hz"),
-            (
-                "natural frequencies",
-                ", ".join(f"{value:.4g}" for value in model.natural_frequencies[:4]) + " Hz",
-            ),
+            ("natural frequencies", f"{frequencies} Hz"),
             ("barrier", f"{1e6 * (model.saddle_energy - model.well_energy):.4g} µJ"),
         ]
         beam = model.beam
         if beam is not None:
-            facts += [
-                ("b/r", f"{beam.buckling_level / beam.radius_of_gyration:.4g}"),
-                ("P/P_cr", f"{beam.axial_load / beam.critical_load:.5g}"),
-            ]
+            facts.append(("b/r", f"{beam.buckling_level / beam.radius_of_gyration:.4g}"))
+            facts.append(("P/P_cr", f"{beam.axial_load / beam.critical_load:.5g}"))
         cell = Markup('<td><span class="faint">{}</span> <b>{}</b></td>')
         cells = Markup("").join(cell.format(name, value) for name, value in facts)
         found = [each.message for each in self.system.diagnostics()]
-        doubts = Markup("").join(_BAD.format(each) for each in found)
+        doubts = Markup("").join(REFUSED.format(each) for each in found)
         self.facts.object = Markup('<table class="facts"><tr>{}</tr></table>{}').format(cells, doubts)
 
 
@@ -1062,7 +1026,7 @@ def _text(value: Any) -> str:
 
 
 _EXPORT_SECONDS = 300.0
-_LONGEST = 5.0
+_LONGEST = 20.0
 """Cycles of an animation, if more are seen."""
 _PROGRESS = 0.3
 """Seconds between two reports of the progress of an animation."""
@@ -1088,28 +1052,26 @@ class TakeCard:
         self.words = Html("", sizing_mode="stretch_width", css_classes=["take-words"])
         self.text = Html("", sizing_mode="stretch_width", css_classes=["take-text"])
         self.kind = pn.widgets.RadioButtonGroup(options=["png", "pdf", "svg"], value="png")
-        self.slow = pn.widgets.FloatInput(
-            name="slow motion at the hardest impact (s)", value=2.0, start=0.0, end=30.0, width=260
-        )
-        self.length = pn.widgets.FloatInput(
-            name="length of the animation (s)", value=4.0, start=1.0, end=60.0, width=210
-        )
+        slow, length = "slow motion at the hardest impact (s)", "length of the animation (s)"
+        self.slow = pn.widgets.FloatInput(name=slow, value=2.0, start=0.0, end=30.0, width=260)
+        self.length = pn.widgets.FloatInput(name=length, value=4.0, start=1.0, end=60.0, width=210)
         self.dots = pn.widgets.FileInput(accept=".csv", multiple=False, width=220)
         self.dots.param.watch(lambda event: page.post(lambda: self._dots(event.new)), "value")
         buttons = {
             "Map": self._map_picture, "Run": self._run_picture,
-            "MP4": lambda: self._animation(".mp4"), "GIF": lambda: self._animation(".gif"),
-            "Parameter file": lambda: page.system_card().save(), "Run as NetCDF": self._run_data, "Map as NetCDF": self._map_data, "Window as NetCDF": self._window_data,
+            "MP4": lambda: self._animation(".mp4"), "GIF": lambda: self._animation(".gif"), "WAV": self._sound,
+            "Parameter file": lambda: page.system_card().save(),
+            "Run as NetCDF": lambda: self._make("run", ".nc", self._run().save),
+            "Map as NetCDF": self._map_data, "Window as NetCDF": self._window_data,
         }  # fmt: skip
-        self.buttons = {name: pn.widgets.Button(name=name, width=145) for name in buttons}
-        for name, work in buttons.items():
-            self.buttons[name].on_click(_posted(page, work))
+        self.buttons = {
+            name: button(name, page.post, partial(self._tried, work), width=145)
+            for name, work in buttons.items()
+        }
         self.link = pn.widgets.Button(name="Copy the link", width=145)
         self.link.js_on_click(args={"button": self.link}, code=_COPY)
-        self.cancel = pn.widgets.Button(
-            name="Cancel the animation", button_type="warning", width=180, visible=False
-        )
-        self.cancel.on_click(_posted(page, self._cancelled))
+        stop: dict[str, Any] = {"button_type": "warning", "width": 180, "visible": False}
+        self.cancel = button("Cancel the animation", page.post, self._cancelled, **stop)
         self._animating: Token | None = None
 
     @property
@@ -1117,13 +1079,13 @@ class TakeCard:
         """The card."""
         make = self.buttons
         return pn.Column(
-            Html(_HEADING.format("Pictures in the style of the journal"), margin=0),
+            Html(HEADING.format("Figures in the style of the journal, of what is in view"), margin=0),
             pn.FlexBox(make["Map"], make["Run"], self.kind, margin=0, align_items="center"),
-            Html(_HEADING.format(f"Animation of the beam, of at most {_LONGEST:g} of the visible cycles"), margin=0),
-            pn.FlexBox(make["MP4"], make["GIF"], self.length, self.slow, margin=0, align_items="center"),
-            Html(_HEADING.format("Data"), margin=0),
+            Html(HEADING.format(f"Animation of at most {_LONGEST:g} of the visible cycles, and their sound"), margin=0),
+            pn.FlexBox(make["MP4"], make["GIF"], self.length, self.slow, make["WAV"], margin=0, align_items="center"),
+            Html(HEADING.format("Data"), margin=0),
             pn.FlexBox(make["Parameter file"], make["Run as NetCDF"], make["Map as NetCDF"], make["Window as NetCDF"], self.link, margin=0),
-            Html(_HEADING.format("Measured points to lay over the map (CSV)"), margin=0), self.dots,
+            Html(HEADING.format("Measured points to lay over the map (CSV)"), margin=0), self.dots,
             pn.FlexBox(self.words, self.cancel, margin=0), self.text, sizing_mode="stretch_width", css_classes=["card", "take"],
         )  # fmt: skip
 
@@ -1132,133 +1094,116 @@ class TakeCard:
     def refresh(self) -> None:
         """Write the command and the lines of what is shown."""
         page = self.page
-        run, point = page.runs[page.which].run, page.points[page.which]
-        parts = []
+        run, point, card = page.runs[page.which].run, page.points[page.which], page.card
+        part, texts = Markup('<h2>{}</h2><pre class="{}">{}</pre>'), []
+        beside = " (with the system saved as system.toml beside it)"
         if run is not None and point is not None:
             file = page.shared.file.name if page.shared.file is not None else ""
-            on_map = bool(file) and not page.card.changed and page.card.plane.find(point.values) is not None
-            skeleton = page.shared.source.skeleton
-            over = {
-                name: value
-                for name, value in point.values.items()
-                if page.card.source.is_list or lookup(name).short in skeleton.dims
-            }
-            command = run_command(over if on_map else point.values, file, on_map)
-            beside = "" if on_map else " (with the system saved as system.toml beside it)"
-            parts.append(
-                Markup('<h2>The command that makes this run{}</h2><pre class="command">{}</pre>').format(
-                    beside, command
-                )
+            on_map = bool(file) and not card.changed and card.plane.find(point.values) is not None
+            values, dims = dict(point.values), page.shared.source.skeleton.dims
+            if on_map and not card.source.is_list:
+                values = {name: value for name, value in values.items() if lookup(name).short in dims}
+            command, title = maps.run_command(values, file, on_map), "The command that makes this run"
+            texts.append(part.format(title + ("" if on_map else beside), "command", command))
+            lines = maps.python_lines(run.system, run.integration, page.runs[page.which].picture)
+            texts.append(part.format("The same in Python", "python", lines))
+        if card.windows():
+            command = maps.map_command(card.windows()[-1], card.plane.fixed_values())
+            texts.append(
+                part.format(f"The command that makes the finest window{beside}", "map-command", command)
             )
-            text = python_lines(run.system, run.integration, page.runs[page.which].picture)
-            parts.append(Markup('<h2>The same in Python</h2><pre class="python">{}</pre>').format(text))
-        window = self._window()
-        if window is not None:
-            command = map_command(window, page.card.plane.fixed_values())
-            parts.append(
-                Markup(
-                    "<h2>The command that makes the finest window (with the system saved as system.toml beside it)</h2>"
-                    '<pre class="map-command">{}</pre>'
-                ).format(command)
-            )
-        self.text.object = Markup("").join(parts) or _NOTE.format("Click on a point of the map first.")
-
-    def _window(self) -> Any:
-        windows = self.page.card.windows()
-        return windows[-1] if windows else None
+        self.text.object = Markup("").join(texts) or NOTE.format("Click on a point of the map first.")
 
     def refuse(self, words: str) -> None:
         """Say what cannot be done."""
-        self.words.object = Markup('<p class="bad" role="alert">{}</p>').format(words)
+        self.words.object = REFUSED.format(words)
 
     # ------------------------------------------------------------------ files
 
-    def _make(self, name: str, suffix: str, write: Callable[[Any, Token], object]) -> None:
-        """Make a file in the background and send it to the browser."""
-        token = Token(_EXPORT_SECONDS)
-        work, done = self._job(name, suffix, write, token)
-        self.page.shared.jobs.export(work, done, token)
+    def _tried(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except InputError as error:
+            self.refuse(str(error))
 
-    def _job(
-        self, name: str, suffix: str, write: Callable[[Any, Token], object], token: Token
-    ) -> tuple[Any, Any]:
-        """Function that makes a file, and function that offers it for download."""
-        page = self.page
-        self.words.object = Markup('<p class="busy">making {}{}</p>').format(name, suffix)
+    def _make(
+        self, name: str, suffix: str, write: Callable[[Any], object], token: Token | None = None
+    ) -> None:
+        """Make a file in the background and send it to the browser."""
+        page, token = self.page, token or Token(_EXPORT_SECONDS)
+        self.words.object = BUSY.format(f"making {name}{suffix}")
 
         def done(content: bytes | None, error: str) -> None:
             def tell() -> None:
                 if token is self._animating:
                     self._animating, self.cancel.visible = None, False
                 if content is None:
-                    self.words.object = _BAD.format(error)
+                    self.refuse(error)
                 else:
-                    self.words.object = _NOTE.format(f"{name}{suffix}, {len(content) / 1e3:.0f} kB")
+                    self.words.object = NOTE.format(f"{name}{suffix}, {len(content) / 1e3:.0f} kB")
                     page.downloads.give(f"{name}{suffix}", content)
 
             page.post(tell)
 
-        return lambda t: file_bytes(suffix, lambda path: write(path, t)), done
+        page.shared.jobs.export(lambda _: file_bytes(suffix, write), done, token)
 
     def _cancelled(self) -> None:
         if self._animating is not None:
             self._animating.cancel()
         self._animating, self.cancel.visible = None, False
-        self.words.object = _NOTE.format("the animation was cancelled")
+        self.words.object = NOTE.format("the animation was cancelled")
 
-    def _run(self) -> Run | None:
+    def _run(self) -> Run:
+        """The run that is shown; refused (InputError) if there is none."""
         run = self.page.runs[self.page.which].run
         if run is None:
-            self.words.object = _BAD.format("there is no run: click on a point of the map first")
+            raise InputError("there is no run: click on a point of the map first")
         return run
 
     def _run_picture(self) -> None:
         """Give the figure of the view that is seen, of the part of the run that is seen."""
-        from snapbeam.plot.dataset import plot_dataset
-
         run, view = self._run(), self.page.runs[self.page.which]
-        if run is None:
-            return
         name, data, options = view.picture, run.dataset, {"window": view.window}
         if name != "run":
             data, options = data.isel(time=within(across(run)[0], *view.window)), {}
-        self._make(
-            name, f".{self.kind.value}", lambda path, _: _draw(plot_dataset, data, name, path=path, **options)
-        )
+        self._make(name, f".{self.kind.value}", partial(draw, partial(plot_dataset, data, name, **options)))
 
     def _map_picture(self) -> None:
-        from snapbeam.plot.map import plot_points, plot_response_map, plot_statistic
-
-        suffix = f".{self.kind.value}"
-        try:
-            cut = self._cut()
-        except InputError as error:
-            self.refuse(str(error))
-            return
-        quasi = "quasi" in self.page.card.layers.value
-        dots = self.page.card.dots if "dots" in self.page.card.layers.value else None
-        name = self.page.card.show.value
-        label = name if name != "response_class" else "map"
-        painter: Callable[..., Any] = plot_statistic
-        options: dict[str, Any] = {"name": name}
-        overlay = {"quasi_static_line": quasi, "measurements": dots}
-        plane = self.page.card.plane
-        if self.page.card.source.is_list:
-            painter = plot_points
-            options |= {"across": str(plane.x.name), "upward": str(plane.y.name)} | overlay
-        elif name == "response_class":
-            painter, options = plot_response_map, overlay
-        self._make(label, suffix, lambda path, _: _draw(painter, cut, path=path, **options))
-
-    def _cut(self) -> xr.Dataset:
-        """The map over the two axes that are shown; of a system without a map, its finest window."""
+        """Give the figure of the part of the map that is seen, or of the finest window that holds all of it."""
         card = self.page.card
-        source = card.source
-        if not source.skeleton.data_vars or card.changed:
-            window = self._window()
-            if window is None or not window.values:
-                raise InputError("there is no map yet")
-            return window_dataset(window)
+        left, right, low, high = view = card.view.view
+        cut, name, plane = self._cut(view), card.show.value, card.plane
+        overlay = {
+            "quasi_static_line": "quasi" in card.layers.value, "measurements": card.dots if "dots" in card.layers.value else None
+        }  # fmt: skip
+        painter: Callable[..., Any] = partial(plot_statistic, cut, name=name)
+        if card.source.is_list:
+            painter = partial(
+                plot_points, cut, name=name, across=str(plane.x.name), upward=str(plane.y.name), **overlay
+            )
+        elif name == "response_class":
+            painter = partial(plot_response_map, cut, **overlay)
+
+        def zoomed() -> Any:
+            axes = painter()
+            if not card.view.is_whole:
+                axes.set(xlim=(left, right), ylim=(low, high))
+            return axes
+
+        label = name if name != "response_class" else "map"
+        self._make(label, f".{self.kind.value}", partial(draw, zoomed))
+
+    def _cut(self, view: tuple[float, float, float, float]) -> xr.Dataset:
+        """The map over the two axes that are shown, or the finest window drawn over all of a *view*."""
+        card, source = self.page.card, self.page.card.source
+        held = card.shown_plane is not None or source.is_list
+        for window, stride in reversed(card._drawn):
+            left, right, low, high = window.bounds
+            covers = left <= view[0] and view[1] <= right and low <= view[2] and view[3] <= high
+            if not held or (covers and (stride > 0).all()):
+                return window_dataset(window, blocks=True)
+        if not held:
+            raise InputError("there is no map yet")
         cut = source.skeleton.drop_vars(list(source.skeleton.data_vars)).isel(card.plane.fixed)
         for name in dict.fromkeys(("response_class", card.show.value)):
             values = source.values(name)
@@ -1266,12 +1211,13 @@ class TakeCard:
                 cut[name] = values.isel(card.plane.fixed)
         return cut
 
-    def _animation(self, suffix: str) -> None:
-        run = self._run()
-        if run is None:
-            return
+    def _seen(self) -> tuple[float, float]:
+        """The visible cycles, at most so many as an animation may have."""
         first, last = self.page.runs[self.page.which].window
-        window = (first, min(last, first + _LONGEST))
+        return first, min(last, first + _LONGEST)
+
+    def _animation(self, suffix: str) -> None:
+        run, window = self._run(), self._seen()
         length, slow = float(self.length.value), float(self.slow.value)
         if self._animating is not None:
             self._animating.cancel()
@@ -1292,42 +1238,39 @@ class TakeCard:
             finally:
                 drawing.acquire()
 
-        def write(path: Any, _: Token) -> None:
+        def write(path: Any) -> None:
             from snapbeam.plot.animation import animate_run
 
             with drawing:
                 animate_run(run.dataset, path, window, duration=length, slow_motion=slow, progress=progress)
 
-        work, done = self._job("run", suffix, write, token)
-        self.page.shared.jobs.animation(work, done, token)
+        self._make("run", suffix, write, token)
 
     def _report(self, words: str, token: Token) -> None:
         if token is self._animating:
-            self.words.object = Markup('<p class="busy">{}</p>').format(words)
+            self.words.object = BUSY.format(words)
 
-    def _run_data(self) -> None:
-        run = self._run()
-        if run is not None:
-            self._make("run", ".nc", lambda path, _: run.save(path))
+    def _sound(self) -> None:
+        """Give the velocity of mid-span, as long as it lasts, as sound."""
+        data, (low, high) = self._run().dataset, self.page.runs[self.page.which].window
+        part = data.isel(time=within(across(self._run())[0], low, high))
+        self._make(
+            "velocity",
+            ".wav",
+            lambda path: write_sound(part["time"].values, part["midspan_velocity"].values, path),
+        )
 
     def _map_data(self) -> None:
         source = self.page.card.source
         if not source.skeleton.data_vars:
-            self.words.object = _BAD.format("there is no map: take the window")
-            return
-
-        def write(path: Any, _: Token) -> None:
-            write_netcdf(source.whole(), path)
-
-        self._make("map", ".nc", write)
+            raise InputError("there is no map: take the window")
+        self._make("map", ".nc", lambda path: write_netcdf(source.whole(), path))
 
     def _window_data(self) -> None:
-        window = self._window()
-        if window is None or not window.values:
-            self.words.object = _BAD.format("no window was computed")
-            return
-        dataset = window_dataset(window)
-        self._make("window", ".nc", lambda path, _: write_netcdf(dataset, path))
+        windows = self.page.card.windows()
+        if not windows or not windows[-1].values:
+            raise InputError("no window was computed")
+        self._make("window", ".nc", partial(write_netcdf, window_dataset(windows[-1])))
 
     def _dots(self, content: bytes | None) -> None:
         if not content:
@@ -1338,18 +1281,28 @@ class TakeCard:
         page, attrs = self.page, self.page.card.source.attrs
 
         def done(dots: Any, error: str) -> None:
-            def tell() -> None:
-                if dots is None:
-                    self.refuse(error)
-                    return
-                page.card.dots = dots
-                self.words.object = _NOTE.format(f"{len(dots)} measured points")
-                page.card.layers.value = list(dict.fromkeys([*page.card.layers.value, "dots"]))
-                page.card.redraw()
+            page.post(lambda: self.refuse(error) if dots is None else tell(dots))
 
-            page.post(tell)
+        def tell(dots: Any) -> None:
+            page.card.dots = dots
+            self.words.object = NOTE.format(f"{len(dots)} measured points")
+            page.card.layers.value = list(dict.fromkeys([*page.card.layers.value, "dots"]))
+            page.card.redraw()
 
         page.shared.jobs.run(lambda _: _uploaded_points(content, attrs), done, Token())
+
+
+_RATE = 44_100
+
+
+def write_sound(time: NDArray[np.float64], velocity: NDArray[np.float64], path: Path) -> None:
+    """Write a velocity as sound of 44.1 kHz and 16 bits, its maximum the loudest."""
+    even = np.arange(time[0], time[-1], 1.0 / _RATE)
+    series = np.interp(even, time, velocity)
+    loudest = float(np.abs(series).max(initial=0.0)) or 1.0
+    with wave.open(str(path), "wb") as file:
+        file.setparams((1, 2, _RATE, even.size, "NONE", ""))
+        file.writeframes(np.round(32767.0 / loudest * series).astype("<i2").tobytes())
 
 
 def _uploaded_config(content: bytes) -> Config:
@@ -1372,47 +1325,36 @@ def _uploaded_points(content: bytes, attrs: dict[str, Any]) -> Any:
         )
 
 
-def _posted(page: Page, work: Callable[[], None]) -> Callable[[Any], None]:
-    return lambda _: page.post(work)
-
-
-def _draw(painter: Callable[..., Any], *given: Any, path: Any, **options: Any) -> None:
-    """Write the figure that a function draws; one thread at a time may draw."""
-    import matplotlib.pyplot as plt
-
-    from snapbeam.plot.style import save_figure
-
+def draw(painter: Callable[[], Any], path: Any) -> None:
+    """Write the figure of the axes that a function draws; one thread at a time may draw."""
     with drawing:
-        figure = painter(*given, **options).get_figure(root=True)
+        figure = painter().get_figure(root=True)
         try:
             save_figure(figure, path)
         finally:
             plt.close(figure)
 
 
-def window_dataset(window: Any) -> xr.Dataset:
-    """A window as a labelled map; cells that no run was made of are unknown, with ``computed`` = 0."""
-    import numpy as np
+def window_dataset(window: maps.Window, *, blocks: bool = False) -> xr.Dataset:
+    """A window as a labelled map, with ``computed`` = 0 where no run was made.
 
-    from snapbeam import STATISTICS
-    from snapbeam.explorer.maps import axes_dataset
-
-    dataset = axes_dataset(
-        window.system, {window.names[1]: window.y, window.names[0]: window.x}, window.integration
-    )
-    dims = tuple(lookup(name).short for name in (window.names[1], window.names[0]))
+    Such cells are unknown or, with *blocks*, hold what the run of their block gave.
+    """
+    axes = dict(zip(window.names[::-1], (window.y, window.x), strict=True))
+    dataset = maps.axes_dataset(window.system, axes, window.integration)
+    dims = tuple(lookup(name).short for name in axes)
     own = window.own()
     for name, values in window.values.items():
         row = STATISTICS[name]
         held = values.astype(np.float64) if values.dtype.kind == "f" else values.copy()
-        held[~own] = np.nan if held.dtype.kind == "f" else -1 if name == "response_class" else 0
-        if name == "status":
-            held[~own] = 5
+        unknown = (
+            np.nan
+            if held.dtype.kind == "f"
+            else {"response_class": -1, "status": RunStatus.NOT_RUN}.get(name, 0)
+        )
+        held[window.stride == 0 if blocks else ~own] = unknown
         dataset[name] = (dims, held, {"units": row.unit, "long_name": row.long_name})
-    dataset["computed"] = (
-        dims,
-        own.astype(np.int8),
-        {"units": "1", "long_name": "whether the point was run"},
-    )
+    labels = {"units": "1", "long_name": "whether the point was run"}
+    dataset["computed"] = (dims, own.astype(np.int8), labels)
     dataset.attrs["title"] = "window of a map of the response of a struck bistable beam"
     return dataset

@@ -7,6 +7,7 @@ progress; a window's next batch waits while a run, which a person waits for, is 
 from __future__ import annotations
 
 import logging
+import mimetypes
 import tempfile
 import threading
 import time
@@ -85,11 +86,9 @@ class Token:
 class Jobs:
     """Threads that the pages of one server share."""
 
-    def __init__(self, runs: int = 2, windows: int = 8) -> None:
-        self._runs = ThreadPoolExecutor(runs, "snapbeam-run")
-        self._windows = ThreadPoolExecutor(windows, "snapbeam-window")
-        self._exports = ThreadPoolExecutor(1, "snapbeam-export")
-        self._animations = ThreadPoolExecutor(1, "snapbeam-animation")
+    def __init__(self) -> None:
+        sizes = {"run": 2, "window": 8, "export": 3}  # a picture need not wait for an animation
+        self._pools = {name: ThreadPoolExecutor(size, f"snapbeam-{name}") for name, size in sizes.items()}
         self._waiting = 0
         self._free = threading.Condition()
         self._turns = threading.Condition()
@@ -108,19 +107,15 @@ class Jobs:
                     self._waiting -= 1
                     self._free.notify_all()
 
-        self._runs.submit(guarded)
+        self._pools["run"].submit(guarded)
 
     def window(self, work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:
         """Do *work* when nothing more urgent is to be done."""
-        self._windows.submit(_guarded, work, done, token)
+        self._pools["window"].submit(_guarded, work, done, token)
 
     def export(self, work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:
-        """Make a file, one at a time."""
-        self._exports.submit(_guarded, work, done, token)
-
-    def animation(self, work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:
-        """Make an animation, one at a time; other files do not wait for it."""
-        self._animations.submit(_guarded, work, done, token)
+        """Make a file."""
+        self._pools["export"].submit(_guarded, work, done, token)
 
     def give_way(self, token: Token) -> None:
         """Wait while a run is computed."""
@@ -154,10 +149,8 @@ class Jobs:
 
     def close(self) -> None:
         """Take no more work, and drop what has not begun."""
-        self._runs.shutdown(wait=False, cancel_futures=True)
-        self._windows.shutdown(wait=False, cancel_futures=True)
-        self._exports.shutdown(wait=False, cancel_futures=True)
-        self._animations.shutdown(wait=False, cancel_futures=True)
+        for pool in self._pools.values():
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _guarded(work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:
@@ -377,27 +370,22 @@ class Tab:
 
     def post(self, work: Callable[[], None]) -> None:
         """Do something on the page's own thread, unless the page is closed."""
-        if self.closed or self.doc is None:
-            return
-
-        def guarded() -> None:
-            if not self.closed:
-                with self._together():
-                    work()
-
-        with suppress(Exception):  # the page was closed between the two lines
-            self.doc.add_next_tick_callback(guarded)
+        if not self.closed and self.doc is not None:
+            with suppress(Exception):  # the page was closed between the two lines
+                self.doc.add_next_tick_callback(self._on_page(work))
 
     def later(self, work: Callable[[], None], milliseconds: int) -> None:
         """Do something a little later."""
+        if not self.closed and self.doc is not None:
+            self.doc.add_timeout_callback(self._on_page(work), milliseconds)
 
+    def _on_page(self, work: Callable[[], None]) -> Callable[[], None]:
         def guarded() -> None:
             if not self.closed:
                 with self._together():
                     work()
 
-        if not self.closed and self.doc is not None:
-            self.doc.add_timeout_callback(guarded, milliseconds)
+        return guarded
 
     def _together(self) -> AbstractContextManager[None]:
         """Context that sends all changes to the browser at once."""
@@ -422,10 +410,6 @@ link.click();
 link.remove();
 setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 """
-_KINDS = {
-    ".png": "image/png", ".pdf": "application/pdf", ".svg": "image/svg+xml", ".mp4": "video/mp4",
-    ".gif": "image/gif", ".nc": "application/x-netcdf", ".toml": "application/toml", ".py": "text/x-python",
-}  # fmt: skip
 
 
 class Downloads:
@@ -437,7 +421,7 @@ class Downloads:
 
     def give(self, name: str, content: bytes) -> None:
         """Hand a file to the browser; on the page's own thread."""
-        self.source.tags = [name, _KINDS.get(Path(name).suffix, "application/octet-stream")]
+        self.source.tags = [name, mimetypes.guess_type(name)[0] or "application/octet-stream"]
         self.source.data = {"bytes": np.frombuffer(content, dtype=np.uint8).copy()}
 
 

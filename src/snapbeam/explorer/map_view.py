@@ -6,18 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from bokeh.models import (
-    BoxAnnotation,
-    ColorBar,
-    ColumnDataSource,
-    CustomJS,
-    FixedTicker,
-    LinearAxis,
-    LinearColorMapper,
-    LogAxis,
-    LogScale,
-    Range1d,
-)
+from bokeh import models
 from numpy.typing import NDArray
 
 from snapbeam import ResponseClass
@@ -38,6 +27,7 @@ if (now - (probe.tags[0] || 0) < %d) { return; }
 probe.tags = [now];
 probe.data = {x: [cb_obj.x], y: [cb_obj.y]};
 """
+_IMAGE = ("image", "x", "y", "dw", "dh")
 _QUASI_STATIC = {"frequency_ratio", "velocity_amplitude", "location"}
 
 
@@ -59,85 +49,54 @@ class MapView:
         self.plot = figure(
             look, name="map", height=height, used=390,
             x_axis_type="log" if x.log else "linear", y_axis_type="log" if y.log else "linear",
-            x_range=Range1d(*x.span, bounds=None), y_range=Range1d(*y.span, bounds=None),
+            x_range=models.Range1d(*x.span, bounds=None), y_range=models.Range1d(*y.span, bounds=None),
             x_axis_label=x.label, y_axis_label=y.label, title="", tools="pan,box_zoom,wheel_zoom,reset",
             active_scroll="wheel_zoom", active_drag="box_zoom",
         )  # fmt: skip
         self.plot.grid.visible = False
         for axis, bokeh_axis in ((x, self.plot.xaxis), (y, self.plot.yaxis)):
             if axis.words is not None:
-                bokeh_axis.ticker = FixedTicker(ticks=axis.at.tolist())
+                bokeh_axis.ticker = models.FixedTicker(ticks=axis.at.tolist())
                 bokeh_axis.major_label_overrides = dict(zip(axis.at.tolist(), axis.words, strict=True))
-        self.base = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []}, name="map-base")
-        self.whole = self.plot.image_rgba("image", "x", "y", "dw", "dh", source=self.base)
-        self.tiles = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []}, name="map-windows")
-        self.plot.image_rgba("image", "x", "y", "dw", "dh", source=self.tiles)
+        self.base = models.ColumnDataSource({name: [] for name in _IMAGE}, name="map-base")
+        self.whole = self.plot.image_rgba(*_IMAGE, source=self.base)
+        self.tiles = models.ColumnDataSource({name: [] for name in _IMAGE}, name="map-windows")
+        self.plot.image_rgba(*_IMAGE, source=self.tiles)
         self.frames = columns(left=[], right=[], bottom=[], top=[])
-        self.plot.quad(
-            "left",
-            "right",
-            "bottom",
-            "top",
-            source=self.frames,
-            fill_color=None,
-            line_color="#ffffff",
-            line_width=1.0,
-            line_dash="dotted",
-        )
-        self.curve = columns(x=[], y=[])
-        for color, width in (("#ffffff", 3.0), ("#000000", 1.4)):
-            dash = "solid" if color == "#ffffff" else "dashed"
-            self.plot.line("x", "y", source=self.curve, line_color=color, line_width=width, line_dash=dash)
-        self.threshold = columns(x=[], y=[])
-        for color, width in (("#ffffff", 3.6), ("#000000", 1.8)):
-            self.plot.line("x", "y", source=self.threshold, line_color=color, line_width=width)
-        self.dots = ColumnDataSource({"x": [], "y": [], "color": []})
-        self.plot.scatter(
-            "x", "y", color="color", source=self.dots, size=8, line_color="#ffffff", line_width=1.2
-        )
-        self.list = ColumnDataSource({"x": [], "y": [], "color": []}, name="map-list")
-        self.plot.scatter(
-            "x", "y", color="color", source=self.list, size=9, line_color=look.text, line_width=0.5
-        )
-        self.mark = ColumnDataSource({"x": [], "y": [], "text": []}, name="map-mark")
-        for size, color, width in ((17, "#000000", 3.6), (17, "#ffffff", 1.6)):
+        dotted = {"line_color": "#ffffff", "line_width": 1.0, "line_dash": "dotted"}
+        self.plot.quad("left", "right", "bottom", "top", source=self.frames, fill_color=None, **dotted)
+        self.curve, self.threshold = columns(x=[], y=[]), columns(x=[], y=[])
+        for source, width, dash in ((self.curve, 1.4, "dashed"), (self.threshold, 1.8, "solid")):
+            self.plot.line("x", "y", source=source, line_color="#ffffff", line_width=2.0 * width)
+            self.plot.line("x", "y", source=source, line_color="#000000", line_width=width, line_dash=dash)
+        self.dots = models.ColumnDataSource({"x": [], "y": [], "color": []})
+        self.list = models.ColumnDataSource({"x": [], "y": [], "color": []}, name="map-list")
+        for source, size, color, width in ((self.dots, 8, "#ffffff", 1.2), (self.list, 9, look.text, 0.5)):
             self.plot.scatter(
-                "x",
-                "y",
-                source=self.mark,
-                size=size,
-                marker="circle_cross",
-                fill_color=None,
-                line_color=color,
-                line_width=width,
+                "x", "y", color="color", source=source, size=size, line_color=color, line_width=width
             )
+        self.mark = models.ColumnDataSource({"x": [], "y": [], "text": []}, name="map-mark")
+        for color, width in (("#000000", 3.6), ("#ffffff", 1.6)):
+            ring = {"size": 17, "marker": "circle_cross", "fill_color": None}
+            self.plot.scatter("x", "y", source=self.mark, line_color=color, line_width=width, **ring)
         self.plot.text(
-            "x",
-            "y",
-            "text",
-            source=self.mark,
-            x_offset=10,
-            y_offset=-6,
-            text_color="#ffffff",
-            text_outline_color="#000000",
-            text_font_style="bold",
-            text_font_size=look.font(14),
-        )
-        self.box = BoxAnnotation(fill_alpha=0.0, line_color=look.accent, line_width=2, visible=False)
-        self.plot.add_layout(self.box)
-        self.mapper = LinearColorMapper(
+            "x", "y", "text", source=self.mark, x_offset=10, y_offset=-6, text_color="#ffffff",
+            text_outline_color="#000000", text_font_style="bold", text_font_size=look.font(14),
+        )  # fmt: skip
+        self.mapper = models.LinearColorMapper(
             palette=[f"#{r:02x}{g:02x}{b:02x}" for r, g, b, _ in sequential()], low=0.0, high=1.0
         )
-        self.bar = ColorBar(
+        self.bar = models.ColorBar(
             color_mapper=self.mapper, visible=False, width=10, padding=4, label_standoff=5,
             background_fill_color=look.card, major_label_text_color=look.text, bar_line_color=look.faint,
         )  # fmt: skip
         self.plot.add_layout(self.bar, "right")
-        self.probe = ColumnDataSource({"x": [], "y": []}, name="map-probe", tags=[0])
-        self.plot.js_on_event("mousemove", CustomJS(args={"probe": self.probe}, code=_HOVER % _THROTTLE))
+        self.probe = models.ColumnDataSource({"x": [], "y": []}, name="map-probe", tags=[0])
         self.plot.js_on_event(
-            "mouseleave", CustomJS(args={"probe": self.probe}, code="probe.data = {x: [], y: []};")
+            "mousemove", models.CustomJS(args={"probe": self.probe}, code=_HOVER % _THROTTLE)
         )
+        left = models.CustomJS(args={"probe": self.probe}, code="probe.data = {x: [], y: []};")
+        self.plot.js_on_event("mouseleave", left)
         self.physical: dict[str, Any] = {}
         """Axes in physical units opposite to those of the ratios, with what a ratio of 1 is, by "x" and "y"."""
 
@@ -151,21 +110,21 @@ class MapView:
             factor, label = units[name]
             own = getattr(self.plot, f"{name}_range")
             if name not in self.physical:
-                other = Range1d(own.start * factor, own.end * factor)
+                other = models.Range1d(own.start * factor, own.end * factor)
                 getattr(self.plot, f"extra_{name}_ranges")["unit"] = other
-                kind = LogAxis if axis.log else LinearAxis
+                kind = models.LogAxis if axis.log else models.LinearAxis
                 made = kind(**{f"{name}_range_name": "unit"})
                 if axis.log:
-                    getattr(self.plot, f"extra_{name}_scales")["unit"] = LogScale()
+                    getattr(self.plot, f"extra_{name}_scales")["unit"] = models.LogScale()
                 style_axis(made, self.look)
                 getattr(self.plot, place).insert(0, made)  # nearer than a colour bar
                 self.physical[name] = made
-                scaled = ColumnDataSource({"factor": [factor]}, name=f"map-unit-{name}")
+                scaled = models.ColumnDataSource({"factor": [factor]}, name=f"map-unit-{name}")
                 made.tags = [scaled]
                 code = (
                     "const f = scaled.data.factor[0]; other.setv({start: own.start * f, end: own.end * f});"
                 )
-                follow = CustomJS(args={"own": own, "other": other, "scaled": scaled}, code=code)
+                follow = models.CustomJS(args={"own": own, "other": other, "scaled": scaled}, code=code)
                 own.js_on_change("start", follow)
                 own.js_on_change("end", follow)
                 other.js_on_change("start", follow)
@@ -220,31 +179,26 @@ class MapView:
     def is_whole(self) -> bool:
         """True if the complete map is visible."""
         left, right, low, high = self.view
-        return bool(
-            left <= self.x.span[0]
-            and right >= self.x.span[1]
-            and low <= self.y.span[0]
-            and high >= self.y.span[1]
-        )
+        (first, last), (bottom, top) = self.x.span, self.y.span
+        return left <= first and right >= last and low <= bottom and high >= top
 
     # ------------------------------------------------------------------ what is shown
 
     def show(self, name: str, values: NDArray[Any] | None, limits: tuple[float, float], title: str) -> None:
         """Show a variable, an array of shape (y, x)."""
-        self.limits = limits
-        is_class = name == "response_class"
-        self.bar.update(visible=not is_class, title=None)
-        if not is_class:
-            self.mapper.update(low=limits[0], high=limits[1] if limits[1] > limits[0] else limits[0] + 1.0)
-        self.plot.title.text = title
+        self._scale(name, limits, title)
         seen = None if values is None else picture(values, self.x, self.y, self.view, self.pixels)
-        if seen is None:
-            self.base.data = {"image": [], "x": [], "y": [], "dw": [], "dh": []}
-            return
-        self.base.data = {
-            "image": [colors_of(name, seen.values, limits)],
-            "x": [seen.x], "y": [seen.y], "dw": [seen.width], "dh": [seen.height],
-        }  # fmt: skip
+        columns = (
+            []
+            if seen is None
+            else [colors_of(name, seen.values, limits), seen.x, seen.y, seen.width, seen.height]
+        )
+        self.base.data = {each: columns[at : at + 1] for at, each in enumerate(_IMAGE)}
+
+    def _scale(self, name: str, limits: tuple[float, float], title: str) -> None:
+        """Take the limits of the colours of a variable, and its title."""
+        self.limits, self.bar.visible, self.plot.title.text = limits, name != "response_class", title
+        self.mapper.update(low=limits[0], high=limits[1] if limits[1] > limits[0] else limits[0] + 1.0)
 
     def fade(self, old: bool) -> None:
         """Show the map pale, if it is of another system than what is computed."""
@@ -257,9 +211,7 @@ class MapView:
 
         *plane* is the cut through the map; None if it has no numbers, or those of another system.
         """
-        data: dict[str, list[Any]] = {"image": [], "x": [], "y": [], "dw": [], "dh": []}
-        borders: dict[str, list[float]] = {"left": [], "right": [], "bottom": [], "top": []}
-        drawn = []
+        images, borders, drawn = [], [], []
         known = [window for window in windows if name in window.values]
         for window, stride in zip(known, visible_strides(known, plane), strict=True):
             if not stride.any():
@@ -269,12 +221,11 @@ class MapView:
             drawn.append((window, stride))
             image[stride == 0] = 0
             left, right, low, high = window.bounds
-            for key, value in zip(data, (image, left, low, right - left, high - low), strict=True):
-                data[key].append(value)
-            for key, side in zip(borders, (left, right, low, high), strict=True):
-                borders[key].append(side)
-        self.tiles.data = data
-        self.frames.data = borders
+            images.append((image, left, low, right - left, high - low))
+            borders.append(window.bounds)
+        self.tiles.data = {key: [each[at] for each in images] for at, key in enumerate(_IMAGE)}
+        sides = ("left", "right", "bottom", "top")
+        self.frames.data = {key: [each[at] for each in borders] for at, key in enumerate(sides)}
         return drawn
 
     def show_list(
@@ -287,11 +238,8 @@ class MapView:
         title: str,
     ) -> None:
         """Show a list of points as dots in the colours of a variable; those without a number are clear."""
-        self.limits = limits
-        self.plot.title.text = title
+        self._scale(name, limits, title)
         packed = colors_of(name, values[None, :], limits)[0].view(np.uint8).reshape(-1, 4)
-        self.bar.update(visible=name != "response_class")
-        self.mapper.update(low=limits[0], high=limits[1] if limits[1] > limits[0] else limits[0] + 1.0)
         self.list.data = {
             "x": x,
             "y": y,

@@ -10,7 +10,7 @@ import shlex
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -429,21 +429,15 @@ def default_axes(system: System) -> dict[str, Any]:
 
 def axes_dataset(system: System, axes: Mapping[str, Any], integration: Integration) -> xr.Dataset:
     """Coordinates and attributes of a sweep that is not computed."""
-    import json
-
-    from snapbeam.model.parameters import lookup
     from snapbeam.util.datasets import xr
 
     coords: dict[str, Any] = {}
-    for name, values in axes.items():
-        row = lookup(name)
+    shared = ("drive.frequency_ratio", "drive.velocity_amplitude", "contact.location")
+    values = {name: system.parameters[name] for name in shared if name in system.parameters} | dict(axes)
+    for name in [*axes, *(name for name in values if name not in axes)]:
+        row, dims = lookup(name), (lookup(name).short,) if name in axes else ()
         labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
-        coords[row.short] = ((row.short,), np.asarray(values), labels)
-    for name in ("drive.frequency_ratio", "drive.velocity_amplitude", "contact.location"):
-        row = lookup(name)
-        if row.short not in coords and name in system.parameters:
-            labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
-            coords[row.short] = ((), system.parameters[name], labels)
+        coords.setdefault(row.short, (dims, np.asarray(values[name]), labels))
     attrs = {
         "modes": system.model.modes,
         "cycles": integration.cycles_or_default,
@@ -457,10 +451,7 @@ def axes_dataset(system: System, axes: Mapping[str, Any], integration: Integrati
 
 def integration_mapping(integration: Integration) -> dict[str, Any]:
     """An integration as plain values, without what does not change a number."""
-    import dataclasses
-
-    found = dataclasses.asdict(integration)
-    return {name: value for name, value in found.items() if name != "threads"}
+    return {name: value for name, value in asdict(integration).items() if name != "threads"}
 
 
 def plain(value: Any) -> Any:
@@ -729,8 +720,6 @@ class Axis:
     @staticmethod
     def words_of(source: Source, name: str) -> str:
         """Axis label: long name, symbol and unit."""
-        from snapbeam.model.parameters import lookup
-
         attrs = source.skeleton[name].attrs
         text, unit = source.label(name)
         text = text.replace("omega_1", "ω₁").replace("^2", "²")
@@ -1144,6 +1133,15 @@ class Window:
         return int(self.x.size * self.y.size)
 
     @property
+    def edges(self) -> tuple[_Array, _Array]:
+        """Scaled borders of the cells across and upward."""
+        (left, right), (low, high) = (
+            _scaled(self.bounds[:2], self.log[0]),
+            _scaled(self.bounds[2:], self.log[1]),
+        )
+        return np.linspace(left, right, self.x.size + 1), np.linspace(low, high, self.y.size + 1)
+
+    @property
     def wanted(self) -> int:
         """Cells that are finer than other data at the same location."""
         return int(self.refines(1).sum())
@@ -1157,14 +1155,11 @@ class Window:
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
         """Row and column of the cell at a place."""
-        place = []
-        for value, (low, high), log, size in (
-            (y, self.bounds[2:], self.log[1], self.y.size),
-            (x, self.bounds[:2], self.log[0], self.x.size),
-        ):
-            share = np.log(value / low) / np.log(high / low) if log else (value - low) / (high - low)
-            place.append(int(np.clip(share * size, 0, size - 1)))
-        return place[0], place[1]
+        row, column = (
+            int(np.clip(np.searchsorted(edges, _scaled(value, log), side="right") - 1, 0, edges.size - 2))
+            for edges, value, log in zip(self.edges[::-1], (y, x), self.log[::-1], strict=True)
+        )
+        return row, column
 
     def computed_at(
         self, x: float, y: float, stride_of: NDArray[np.int8] | None = None
@@ -1185,8 +1180,7 @@ class Window:
         rows, columns = np.indices(self.stride.shape)
         stride = np.maximum(self.stride.astype(np.int64), 1)
         middle = [at // stride * stride + stride // 2 for at in (rows, columns)]
-        found: NDArray[np.bool_] = (self.stride > 0) & (middle[0] == rows) & (middle[1] == columns)
-        return found
+        return (self.stride > 0) & (middle[0] == rows) & (middle[1] == columns)
 
     def covers(self, x: float, y: float) -> bool:
         """Return whether a point is inside the window."""
@@ -1227,47 +1221,34 @@ def known_cells(
     others : list of (Window, array of shape (ny, nx))
         Windows and the strides of their blocks, in the order in which they are drawn.
     """
-    shape = window.stride.shape
-    units = [
-        (_scaled(high, log) - _scaled(low, log)) / size
-        for (low, high), log, size in zip(
-            (window.bounds[:2], window.bounds[2:]), window.log, (window.x.size, window.y.size), strict=True
-        )
-    ]
-    wide, tall = np.full(shape, np.inf), np.full(shape, np.inf)
+    centers = [_scaled(each, log) for each, log in zip((window.x, window.y), window.log, strict=True)]
+    units = [np.ptp(edges) / (edges.size - 1) for edges in window.edges]
+    below = (np.full(window.stride.shape, np.inf), np.full(window.stride.shape, np.inf))
+    grids = [(other.edges, stride.astype(np.float64)) for other, stride in others]
     if plane is not None:
-        sides = []
-        for axis, centers, log, unit in zip(
-            (plane.x, plane.y), (window.x, window.y), window.log, units, strict=True
-        ):
-            edges = _scaled(axis.edges, log)
-            at = np.searchsorted(edges, _scaled(centers, log), side="right") - 1
-            inside = (at >= 0) & (at < edges.size - 1)
-            widths = np.diff(edges)[np.clip(at, 0, edges.size - 2)] / unit
-            sides.append(np.where(inside, widths, np.inf))
-        both = np.isfinite(sides[0])[None, :] & np.isfinite(sides[1])[:, None]
-        wide = np.where(both, sides[0][None, :], np.inf)
-        tall = np.where(both, sides[1][:, None], np.inf)
-    for other, stride in others:
-        index, ratio = [], []
-        for low, high, log, centers, size, unit in (
-            (*other.bounds[:2], window.log[0], window.x, other.x.size, units[0]),
-            (*other.bounds[2:], window.log[1], window.y, other.y.size, units[1]),
-        ):
-            first, last = _scaled(low, log), _scaled(high, log)
-            index.append(np.floor((_scaled(centers, log) - first) / (last - first) * size).astype(np.int64))
-            ratio.append(float((last - first) / size / unit))
-        columns = np.flatnonzero((index[0] >= 0) & (index[0] < other.x.size))
-        rows = np.flatnonzero((index[1] >= 0) & (index[1] < other.y.size))
-        if not columns.size or not rows.size:
-            continue
-        part = np.ix_(rows, columns)
-        found = stride[np.ix_(index[1][rows], index[0][columns])].astype(np.float64)
-        sides = [found * each for each in ratio]
-        better = (found > 0) & _finer((sides[0], sides[1]), (wide[part], tall[part]))
-        wide[part] = np.where(better, sides[0], wide[part])
-        tall[part] = np.where(better, sides[1], tall[part])
-    return wide, tall
+        ones = np.ones((plane.y.edges.size - 1, plane.x.edges.size - 1))
+        grids.insert(0, (_edges_of(plane, window.log), ones))
+    for edges, stride in grids:
+        (columns, across), (rows, upward) = map(_inside, edges, centers)
+        widths = [np.diff(each) / unit for each, unit in zip(edges, units, strict=True)]
+        part, found = np.ix_(rows, columns), stride[np.ix_(upward, across)]
+        sides = (found * widths[0][across], found * widths[1][upward, None])
+        better = (found > 0) & _finer(sides, (below[0][part], below[1][part]))
+        for held, side in zip(below, sides, strict=True):
+            held[part] = np.where(better, side, held[part])
+    return below
+
+
+def _edges_of(plane: Plane, log: tuple[bool, bool]) -> tuple[_Array, _Array]:
+    """Scaled borders of the cells of a map across and upward."""
+    return _scaled(plane.x.edges, log[0]), _scaled(plane.y.edges, log[1])
+
+
+def _inside(edges: _Array, places: _Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Which of some places lie between the first and the last of *edges*, and in which cells."""
+    at = np.searchsorted(edges, places, side="right") - 1
+    inside = np.flatnonzero((at >= 0) & (at < edges.size - 1))
+    return inside, at[inside]
 
 
 def visible_strides(windows: list[Window], plane: Plane | None) -> list[NDArray[np.int8]]:
@@ -1290,39 +1271,26 @@ def drawn_shares(
     pixels: tuple[int, int],
 ) -> dict[int, float]:
     """Share that each class has of the area of a view with a map (*kinds*, of shape (y, x), or None) and windows over it."""
-    none = np.iinfo(np.int16).min
-    where: list[NDArray[np.int64]] = []
-    cells: list[list[NDArray[np.int64]]] = []
-    areas: list[_Array] = []
-    for side, axis in enumerate((plane.x, plane.y)):
-        first, last = _scaled(view[2 * side : 2 * side + 2], axis.log)
-        own = _scaled(axis.edges, axis.log)
-        spans = [_scaled(window.bounds[2 * side : 2 * side + 2], axis.log) for window, _ in drawn]
-        sizes = [(window.x, window.y)[side].size for window, _ in drawn]
-        parts = [np.linspace(a, b, size + 1) for (a, b), size in zip(spans, sizes, strict=True)]
-        edges = np.unique(np.clip(np.concatenate([own, *parts, [first, last]]), first, last))
+    none, log = np.iinfo(np.int16).min, (plane.x.log, plane.y.log)
+    own = _edges_of(plane, log)
+    borders: list[_Array] = []
+    for side in (0, 1):
+        first, last = _scaled(view[2 * side : 2 * side + 2], log[side])
+        parts = [window.edges[side] for window, _ in drawn]
+        edges = np.unique(np.clip(np.concatenate([own[side], *parts, [first, last]]), first, last))
         if edges.size > 2 * pixels[side]:  # more of them than the screen shows
             edges = np.linspace(first, last, pixels[side] + 1)
-        middles = 0.5 * (edges[1:] + edges[:-1])
-        areas.append(np.diff(edges))
-        where.append(np.searchsorted(own, middles, side="right").astype(np.int64) - 1)
-        cells.append([
-            np.floor((middles - a) / (b - a) * size).astype(np.int64)
-            for (a, b), size in zip(spans, sizes, strict=True)
-        ])  # fmt: skip
-    shown = np.full((where[1].size, where[0].size), none, dtype=np.int16)
-    pictures: list[tuple[NDArray[Any], NDArray[Any], NDArray[np.int64], NDArray[np.int64]]] = []
+        borders.append(edges)
+    middles = [0.5 * (edges[1:] + edges[:-1]) for edges in borders]
+    shown = np.full((middles[1].size, middles[0].size), none, dtype=np.int16)
+    pictures = [(window.edges, window.values["response_class"], stride) for window, stride in drawn]
     if kinds is not None:
-        pictures.append((kinds, np.ones_like(kinds), where[0], where[1]))
-    for at, (window, stride) in enumerate(drawn):
-        pictures.append((window.values["response_class"], stride, cells[0][at], cells[1][at]))
-    for values, stride, columns, rows in pictures:
-        height, width = stride.shape
-        across = np.flatnonzero((columns >= 0) & (columns < width))
-        upward = np.flatnonzero((rows >= 0) & (rows < height))
-        part, there = np.ix_(upward, across), np.ix_(rows[upward], columns[across])
+        pictures.insert(0, (own, kinds, np.ones(kinds.shape, dtype=np.int8)))
+    for cells, values, stride in pictures:
+        (across, columns), (upward, rows) = map(_inside, cells, middles)
+        part, there = np.ix_(upward, across), np.ix_(rows, columns)
         shown[part] = np.where(stride[there] > 0, values[there], shown[part])
-    area = np.outer(areas[1], areas[0])
+    area = np.outer(np.diff(borders[1]), np.diff(borders[0]))
     whole = float(area[shown != none].sum())
     return {int(kind): float(area[shown == kind].sum()) / whole for kind in np.unique(shown) if kind != none}
 
@@ -1463,8 +1431,6 @@ def _structure_order(
 
 
 def _is_run(name: str) -> bool:
-    from snapbeam.model.parameters import lookup
-
     return lookup(name).is_run
 
 
@@ -1472,12 +1438,10 @@ def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) 
     """Statistics of some cells, by name."""
     from snapbeam.util.datasets import xr
 
-    rows = np.array([item[2] for item in points])
-    columns = np.array([item[3] for item in points])
-    table = xr.Dataset({
-        window.names[0]: ("point", window.x[columns]),
-        window.names[1]: ("point", window.y[rows]),
-    })  # fmt: skip
+    rows, columns = np.array(points)[:, 2:].T
+    table = xr.Dataset(
+        {window.names[0]: ("point", window.x[columns]), window.names[1]: ("point", window.y[rows])}
+    )
     spare = max(1, (os.cpu_count() or 2) - 1)  # a run that is clicked on needs a core
     found = sweep(window.system, table, window.integration.replace(threads=spare), progress=token.check)
     return {str(name): item.values for name, item in found.data_vars.items() if item.dims == ("point",)}

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam import InputError, Integration, Run, RunStatus, System
-from snapbeam.explorer.address import Address, number
+from snapbeam.explorer import maps
+from snapbeam.explorer.address import Address, typed
 from snapbeam.explorer.cards import MapCard, SystemCard, TakeCard
 from snapbeam.explorer.jobs import (
     ADDRESS,
@@ -26,24 +27,15 @@ from snapbeam.explorer.jobs import (
     Token,
     Waiting,
     check_run,
+    conditioned,
     samples_of,
     too_large,
-)
-from snapbeam.explorer.maps import (
-    Point,
-    compared,
-    difference,
-    patched,
-    sections_of,
-    short_names,
-    system_from,
-    values_of,
 )
 from snapbeam.explorer.maps import chances as chances_of
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
-from snapbeam.explorer.style import Html, Look, framed, look_of, styled
-from snapbeam.model.parameters import PHYSICAL
+from snapbeam.explorer.style import WRONG, Html, Look, framed, look_of, styled
+from snapbeam.model.parameters import PHYSICAL, lookup
 
 __all__ = ["Answer", "Page", "answer"]
 
@@ -69,7 +61,7 @@ class Answer:
 
 
 def answer(
-    card: MapCard, point: Point, base: Any, how: Any, token: Token, look: Callable[[Run], None]
+    card: MapCard, point: maps.Point, base: Any, how: Any, token: Token, look: Callable[[Run], None]
 ) -> Answer:
     """Compute a point of a card's map; *look* is given the run at a few instants before it is recorded whole."""
     system, integration = point.system(base, how.replace(engine="auto", threads=None))
@@ -84,7 +76,7 @@ def answer(
     try:
         held = card.expected(point)
         chances = chances_of(source.layers, held)
-        same, words = compared(held, run.summary, str(source.attrs.get("engine", "cpu")))
+        same, words = maps.compared(held, run.summary, str(source.attrs.get("engine", "cpu")))
     except InputError as error:  # the run stands, although its map cannot be read any more
         same, words = False, str(error)
     if times is not None:
@@ -150,12 +142,11 @@ class Page(Tab):
         self.waiting = Waiting(shared.compiling, self.later)
         self.runs = [RunView(self.look, "A", self.post, self.later)]
         self.runs[0].turned = self.write_address
-        self.points: list[Point | None] = [None, None]
+        self.points: list[maps.Point | None] = [None, None]
         self._tokens: list[Token | None] = [None, None]
         self._dragged: Mapping[str, Any] = {}
         self._dragging = False
-        self.add_run: Callable[[RunView], None] = lambda view: None
-        self.share_height: Callable[[bool], None] = lambda two: None
+        self.runs_box: Any = None
         self.compare = pn.widgets.Toggle(name="Two points", width=100, align="center")
         self.target = pn.widgets.RadioButtonGroup(
             options=["A", "B"], value="A", visible=False, align="center"
@@ -210,14 +201,13 @@ class Page(Tab):
 
     def system_card(self) -> SystemCard:
         """The card of the system, made when it is first needed."""
-        if self._system is None:
-            self._system = SystemCard(self)
+        self._system = self._system or SystemCard(self)
         return self._system
 
     def shown_system(self) -> tuple[System, Integration]:
         """The system and the integration at the point that is shown; without a point, on the cut."""
         assert self.card.system is not None
-        point = self.points[self.which] or Point(self.card.plane.fixed_values())
+        point = self.points[self.which] or maps.Point(self.card.plane.fixed_values())
         try:
             return point.system(self.card.system, self.card.integration)
         except InputError:  # a point that the system cannot have
@@ -240,10 +230,8 @@ class Page(Tab):
 
     def _make_fields(self) -> None:
         names = self.card.plane.parameters
-        from snapbeam.model.parameters import lookup
-
         self.fields, self.errors = {}, {}
-        for name, words in short_names(names).items():
+        for name, words in maps.short_names(names).items():
             row = lookup(name)
             unit = "" if row.quantity.unit == "1" else f" ({row.quantity.unit})"
             field = pn.widgets.TextInput(name=words + unit, value="", width=170)
@@ -271,7 +259,7 @@ class Page(Tab):
             values = {name: at[name] for name in at if name in names} if names <= at.keys() else {}
             point = self.points[which]
             if values and (again or point is None or point.values != values):
-                self.ask(Point(values), which)
+                self.ask(maps.Point(values), which)
             elif not values and point is not None:
                 self._forget(which)
         self.target.value = "B" if address.b else "A"
@@ -318,10 +306,8 @@ class Page(Tab):
                 elif source.version != self._version:
                     self._version = source.version
                     self.card.redraw()
-                    attrs = source.attrs
-                    self.card.tell(
-                        f"checkpoint: {attrs.get('points_done')} of {attrs.get('points_total')} points"
-                    )
+                    done, whole = (source.attrs.get(f"points_{name}") for name in ("done", "total"))
+                    self.card.tell(f"checkpoint: {done} of {whole} points")
 
             self.post(tell)
 
@@ -334,7 +320,7 @@ class Page(Tab):
         """Number of the requested run of the two."""
         return 1 if self.compare.value and self.target.value == "B" else 0
 
-    def ask(self, point: Point, which: int | None = None) -> None:
+    def ask(self, point: maps.Point, which: int | None = None) -> None:
         """Compute the run of a point; earlier requests are cancelled."""
         which = self.which if which is None else which
         view, words = self.runs[which], point.words()
@@ -371,21 +357,21 @@ class Page(Tab):
         """Let the point that the fields hold follow the sliders."""
         point = self.points[self.which]
         if point is not None and point.values | cut != point.values:
-            self.ask(Point(point.values | cut))
+            self.ask(maps.Point(point.values | cut))
 
-    def _first(self, which: int, point: Point, token: Token, run: Run) -> None:
+    def _first(self, which: int, point: maps.Point, token: Token, run: Run) -> None:
         """Show a first look, asked on a thread of the server, and wait until it is on its way to the browser."""
         sent = threading.Event()
         self.post(lambda: self._look(which, point, token, run, sent))
         sent.wait(_LONGEST)  # Python does one thing at a time
 
-    def _look(self, which: int, point: Point, token: Token, run: Run, sent: threading.Event) -> None:
+    def _look(self, which: int, point: maps.Point, token: Token, run: Run, sent: threading.Event) -> None:
         if not token.cancelled and self.points[which] is point:
             self.waiting.end(which)
             self.runs[which].show(run, point.words(), fresh=True)
         self.later(sent.set, _SENT)
 
-    def _done(self, which: int, point: Point, token: Token, found: Answer | None, error: str) -> None:
+    def _done(self, which: int, point: maps.Point, token: Token, found: Answer | None, error: str) -> None:
         if token.cancelled or self.points[which] is not point:
             return
         self.waiting.end(which)
@@ -403,9 +389,7 @@ class Page(Tab):
             self._take.refresh()
         self._condition(which, point, run, token)
 
-    def _condition(self, which: int, point: Point, run: Run, token: Token) -> None:
-        from snapbeam.explorer.jobs import conditioned
-
+    def _condition(self, which: int, point: maps.Point, run: Run, token: Token) -> None:
         def done(words: str | None, error: str) -> None:
             def tell() -> None:
                 if not token.cancelled and self.points[which] is point:
@@ -424,7 +408,7 @@ class Page(Tab):
         how = how.replace(cycles=min(how.cycles_or_default, _DRAGGED), engine="auto", threads=None)
 
         def work(token: Token) -> Run:
-            system, short = system_from(patched(sections_of(base, how), changes))
+            system, short = maps.system_from(maps.patched(maps.sections_of(base, how), changes))
             return _quick(system, short, token) or sb.simulate(system, short, progress=token.check)
 
         def done(run: Run | None, error: str) -> None:
@@ -437,7 +421,7 @@ class Page(Tab):
             elif run is None:
                 self.runs[which].fail(error)
             else:
-                values = values_of(self.card.plane.parameters, run.system, run.integration)
+                values = maps.values_of(self.card.plane.parameters, run.system, run.integration)
                 words = ", ".join(f"{name} = {value:.5g}" for name, value in changes.items())
                 self.runs[which].notes = {}
                 self.runs[which].show(run, f"{words}, the first {run.integration.cycles} cycles", fresh=True)
@@ -455,21 +439,19 @@ class Page(Tab):
             If a page may not ask for it.
         """
         assert self.shared.system is not None
-        swept = {
-            name: PHYSICAL[name].parameter if name in PHYSICAL else name
-            for name in self.card.plane.parameters
-        }
-        before = sections_of(self.shared.system, self.shared.integration)
-        found = difference(before, sections_of(system, integration))
+        names = self.card.plane.parameters
+        swept = {name: PHYSICAL[name].parameter if name in PHYSICAL else name for name in names}
+        before = maps.sections_of(self.shared.system, self.shared.integration)
+        found = maps.difference(before, maps.sections_of(system, integration))
         self._adopt({name: value for name, value in found.items() if name not in swept.values()})
-        held, own = self.points[self.which], values_of(swept, system, integration)
+        held, own = self.points[self.which], maps.values_of(swept, system, integration)
         moved = {name: value for name, value in own.items() if swept[name] in given}
         if moved:
-            self.points[self.which] = Point({**own, **(held.values if held else {}), **moved})
+            self.points[self.which] = maps.Point({**own, **(held.values if held else {}), **moved})
         for which in sorted({0, 1}, key=lambda each: each == self.which):
             point = self.points[which]
             if point is not None:
-                self.ask(Point(point.values), which)
+                self.ask(maps.Point(point.values), which)
         self.write_address()
 
     def _adopt(self, changes: Mapping[str, Any]) -> None:
@@ -478,7 +460,9 @@ class Page(Tab):
             return
         system, integration = self.shared.system, self.shared.integration
         if changes:
-            system, integration = system_from(patched(sections_of(system, integration), changes))
+            system, integration = maps.system_from(
+                maps.patched(maps.sections_of(system, integration), changes)
+            )
         self.changes = dict(changes)
         self.card.use(system, integration, bool(changes))
         names = ", ".join(f"{name} = {_brief(value)}" for name, value in list(changes.items())[:6])
@@ -501,11 +485,12 @@ class Page(Tab):
         if self.compare.value and len(self.runs) == 1:
             self.runs.append(RunView(self.look, "B", self.post, self.later))
             self.runs[1].tabs.active = self.runs[0].tabs.active
-            self.add_run(self.runs[1])
+            styled(self.runs[1].layout, self.look)
+            self.runs_box.append(self.runs[1].layout)
             self.later(self.runs[1].complete, _AFTER)
         if len(self.runs) > 1:
             self.runs[1].layout.visible = self.compare.value
-            self.share_height(self.compare.value)
+            self.runs_box.css_classes = ["right", "two"] if self.compare.value else ["right"]
         if self.compare.value:
             self.target.value = "B"
         self._mark()
@@ -521,7 +506,7 @@ class Page(Tab):
         if point is not None:
             self._fill_fields(point)
 
-    def _fill_fields(self, point: Point) -> None:
+    def _fill_fields(self, point: maps.Point) -> None:
         if set(point.values) - set(self.fields):
             self._make_fields()
         for name, value in point.values.items():
@@ -532,26 +517,17 @@ class Page(Tab):
             self._system.fill(keep=True)
 
     def _ask_typed(self) -> None:
-        from snapbeam.model.parameters import lookup
-
         values: dict[str, Any] = {}
         for name, field in self.fields.items():
-            row = lookup(name)
-            item, text = row.quantity, str(field.value_input or field.value).strip()
             self.errors[name].object = ""
             try:
-                value: Any = text if item.kind in (str, bool) else number(row.short, text)
-                if item.kind is int and isinstance(value, float) and value == int(value):
-                    value = int(value)
-                if item.kind is bool:
-                    value = {"True": True, "False": False}.get(text, text)
-                values[name] = item.check(row.short, value)
+                values[name] = typed(lookup(name).short, str(field.value_input or field.value))
             except InputError as error:
-                self.errors[name].object = Markup('<span class="bad" role="alert">{}</span>').format(error)
+                self.errors[name].object = WRONG.format(error)
         if len(values) < len(self.fields):
             self.runs[self.which].fail("correct the marked field")
             return
-        self.ask(Point(values))
+        self.ask(maps.Point(values))
 
     def _key(self, key: str) -> None:
         point = self.points[self.which]
@@ -581,10 +557,8 @@ class Page(Tab):
         if len(search) > ADDRESS:
             self.card.tell("the system is too long for an address: save it as TOML to open it again")
         elif search and search != self._written:
-            self.bar.data = {
-                "search": [search],
-                "step": [self.bar.data["step"][0] + 1 if self._written else 0],
-            }
+            step = self.bar.data["step"][0] + 1 if self._written else 0
+            self.bar.data = {"search": [search], "step": [step]}
             self._written = search
 
     def _search(self) -> str:

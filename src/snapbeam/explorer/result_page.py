@@ -6,23 +6,25 @@ import base64
 import io
 from typing import Any
 
+import matplotlib.pyplot as plt
 import panel as pn
 from bokeh.events import Tap
 from bokeh.models import ColumnDataSource
 from bokeh.plotting import figure
 from markupsafe import Markup
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import snapbeam as sb
 from snapbeam import Run
 from snapbeam.explorer.address import Address
+from snapbeam.explorer.cards import draw
 from snapbeam.explorer.jobs import RUN_SECONDS, Downloads, Tab, Token, check_run, drawing, file_bytes
 from snapbeam.explorer.maps import ResultSource, sections_of, started
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
-from snapbeam.explorer.style import Html, look_of, sheet, styled
+from snapbeam.explorer.style import NOTE, REFUSED, Html, button, look_of, sheet, styled
 from snapbeam.model.parameters import parameters
 from snapbeam.plot.dataset import start_of
-from snapbeam.plot.style import save_figure
 
 __all__ = ["ResultPage"]
 
@@ -56,8 +58,7 @@ class ResultPage(Tab):
         )  # fmt: skip
         self.shown.param.watch(lambda _: self.post(self.draw), "value")
         self.kind = pn.widgets.RadioButtonGroup(options=["png", "pdf", "svg"], value="png")
-        save = pn.widgets.Button(width=100, label="Save figure")
-        save.on_click(lambda _: self.post(self.save))
+        save = button("Save figure", self.post, self.save, width=100)
         self.downloads = Downloads()
         self.words = Html("", sizing_mode="stretch_width", css_classes=["take-words"])
         self.image = ColumnDataSource({"url": [], "w": [], "h": []}, name="result")
@@ -102,7 +103,7 @@ class ResultPage(Tab):
         self.view.stand()
         self.draw()
         if self.source.run is not None:
-            self.show(self.source.run, "the run of the file")
+            self.view.show(self.source.run, "the run of the file", fresh=True)
         elif start_of(self.source.skeleton) is not None:
             self.ask(None)
         self.later(self.view.complete, 700)
@@ -125,32 +126,26 @@ class ResultPage(Tab):
     # ------------------------------------------------------------------ figures
 
     def _paint(self) -> Any:
-        drawn = self.source.figures[self.shown.value](self.source.skeleton, ax=None)
-        return drawn.get_figure(root=True), drawn
+        return self.source.figures[self.shown.value](self.source.skeleton, ax=None)
 
     def draw(self) -> None:
         """Draw the chosen figure."""
 
         def work(_: Token) -> tuple[bytes, tuple[int, int], Any]:
-            from matplotlib.backends.backend_agg import FigureCanvasAgg
-
             with drawing:
-                whole, axes = self._paint()
-                canvas = FigureCanvasAgg(whole)
-                whole.set_dpi(_DOTS)
+                axes = self._paint()
+                canvas = FigureCanvasAgg(axes.get_figure(root=True))
+                canvas.figure.set_dpi(_DOTS)
                 stream = io.BytesIO()
                 canvas.print_png(stream)
-                _close(whole)
+                plt.close(canvas.figure)
                 return stream.getvalue(), canvas.get_width_height(), axes
 
-        def done(found: Any, error: str) -> None:
-            self.post(lambda: self._drawn(found, error))
-
-        self.shared.jobs.export(work, done, Token())
+        self.shared.jobs.export(work, lambda *found: self.post(lambda: self._drawn(*found)), Token())
 
     def _drawn(self, found: Any, error: str) -> None:
         if found is None:
-            self.words.object = Markup('<p class="bad" role="alert">{}</p>').format(error)
+            self.words.object = REFUSED.format(error)
             return
         picture, (width, height), self.axes = found
         self.plot.x_range.update(start=0, end=width)
@@ -163,21 +158,15 @@ class ResultPage(Tab):
         """Give the figure as a file."""
         suffix, name = f".{self.kind.value}", str(self.shown.value)
 
-        def write(path: Any) -> None:
-            with drawing:
-                whole, _ = self._paint()
-                save_figure(whole, path)
-                _close(whole)
+        def saved(content: bytes | None, error: str) -> None:
+            if content is not None:
+                self.downloads.give(f"{name}{suffix}", content)
+            self.words.object = NOTE.format(error or f"{name}{suffix}")
 
-        def done(content: bytes | None, error: str) -> None:
-            self.post(lambda: self._saved(content, f"{name}{suffix}", error))
+        def work(_: Token) -> bytes:
+            return file_bytes(suffix, lambda path: draw(self._paint, path))
 
-        self.shared.jobs.export(lambda _: file_bytes(suffix, write), done, Token())
-
-    def _saved(self, content: bytes | None, name: str, error: str) -> None:
-        if content is not None:
-            self.downloads.give(name, content)
-        self.words.object = Markup('<p class="note">{}</p>').format(error or name)
+        self.shared.jobs.export(work, lambda *found: self.post(lambda: saved(*found)), Token())
 
     # ------------------------------------------------------------------ runs
 
@@ -219,22 +208,12 @@ class ResultPage(Tab):
             elif found is None:
                 self.view.forget(_CLICK)
             else:
-                self.show(*found)
+                self.view.show(*found, fresh=True)
 
         self.shared.jobs.run(work, done, token)
-
-    def show(self, run: Run, words: str) -> None:
-        """Show a run."""
-        self.view.show(run, words, fresh=True)
 
     def close(self) -> None:
         """The tab is closed: compute nothing for it any more."""
         super().close()
         if self._token is not None:
             self._token.cancel()
-
-
-def _close(whole: Any) -> None:
-    import matplotlib.pyplot as plt
-
-    plt.close(whole)

@@ -8,29 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import panel as pn
-from bokeh.models import (
-    ColumnDataSource,
-    CustomJS,
-    DataTable,
-    Label,
-    LegendItem,
-    NumberFormatter,
-    Range1d,
-    Select,
-    Slider,
-    Span,
-    TableColumn,
-    Toggle,
-)
+from bokeh import models
 from bokeh.transform import linear_cmap
 from markupsafe import Markup
 from numpy.typing import NDArray
 
 from snapbeam import STATISTICS, ResponseClass, RunStatus
 from snapbeam.explorer.style import (
+    BUSY,
+    FAINT,
     Cursor,
     Html,
+    Later,
     Look,
+    Post,
     blend,
     class_chip,
     columns,
@@ -41,7 +32,7 @@ from snapbeam.explorer.style import (
     legend,
     sheet,
     styled,
-)
+)  # fmt: skip
 from snapbeam.plot.dataset import figures_of
 from snapbeam.util.si_prefixes import scale_of
 
@@ -52,7 +43,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BeamPanel", "Energy", "Impacts", "Modal", "Numbers", "Phase", "RunPanel", "RunView", "Spectrum",
-    "WaveformPanel", "across", "amplitude_spectrum", "envelope", "round_trip", "within",
+    "WaveformPanel", "across", "amplitude_spectrum", "envelope", "within",
 ]  # fmt: skip
 
 
@@ -100,6 +91,17 @@ class RunPanel:
     def show(self, run: Run, low: float, high: float) -> None:
         """Show a run from *low* to *high*, in cycles or seconds."""
         raise NotImplementedError
+
+    def over_time(self, **options: Any) -> Any:
+        """A figure over the common range of time, with the cursor."""
+        tools: dict[str, Any] = {
+            "tools": "xpan,xbox_zoom,xwheel_zoom,reset",
+            "active_drag": "xbox_zoom",
+            "active_scroll": "xwheel_zoom",
+        }
+        plot = figure(self.look, x_range=self.cursor.range, **tools, **options)
+        self.cursor.attach(plot)
+        return plot
 
     def named(self, name: str) -> str:
         """The name of something in this view, another one in each of two runs."""
@@ -221,84 +223,59 @@ class BeamPanel(RunPanel):
         self.fresh = True
         self.count = 0
         empty: list[float] = []
-        self.frames = ColumnDataSource({"t": empty, "force": empty}, name=self.named("frames"))
-        self.rods = ColumnDataSource({"tip": empty, "force": empty}, name=self.named("rods"))
-        self.amplitudes = ColumnDataSource({"q": empty})
-        self.modes, self.shapes = ColumnDataSource({"phi": empty}), ColumnDataSource({"x": empty})
-        self.meta = ColumnDataSource({"modes": [0]}, name=self.named("beam-meta"))
-        beam = ColumnDataSource(
+        self.frames = models.ColumnDataSource({"t": empty, "force": empty}, name=self.named("frames"))
+        self.rods = models.ColumnDataSource({"tip": empty, "force": empty}, name=self.named("rods"))
+        self.amplitudes = models.ColumnDataSource({"q": empty})
+        self.modes, self.shapes = (
+            models.ColumnDataSource({"phi": empty}),
+            models.ColumnDataSource({"x": empty}),
+        )
+        self.meta = models.ColumnDataSource({"modes": [0]}, name=self.named("beam-meta"))
+        beam = models.ColumnDataSource(
             {"x": empty, "top": empty, "low": empty}, syncable=False, name=self.named("beam")
         )
-        striker = ColumnDataSource({"x": empty, "y": empty, "color": empty}, syncable=False)
+        striker = models.ColumnDataSource({"x": empty, "y": empty, "color": empty}, syncable=False)
         self.plot = figure(
             look, name=self.named("beam-plot"), height=330, used=330, title=" ",
             x_axis_label="position (mm)", y_axis_label="displacement (mm)",
-            x_range=Range1d(0.0, 1.0), y_range=Range1d(-1.0, 1.0), tools="pan,wheel_zoom,reset",
+            x_range=models.Range1d(0.0, 1.0), y_range=models.Range1d(-1.0, 1.0), tools="pan,wheel_zoom,reset",
         )  # fmt: skip
         self.plot.patches("x", "y", source=striker, fill_color="color", line_color=None)
         self.plot.varea("x", "low", "top", source=beam, fill_color=look.beam)
         for edge in ("top", "low"):
             self.plot.line("x", edge, source=beam, line_color=look.beam, line_width=2.5)
-        self.supports = ColumnDataSource(
+        self.supports = models.ColumnDataSource(
             {"left": empty, "right": empty, "low": empty, "top": empty}, name=self.named("supports")
         )
         self.plot.quad(
             "left", "right", "low", "top", source=self.supports, fill_color=look.grid, line_color=look.faint,
             hatch_pattern="/", hatch_color=look.faint,
         )  # fmt: skip
-        words = Label(
-            x=10,
-            y=8,
-            x_units="screen",
-            y_units="screen",
-            text="",
-            text_color=look.text,
-            text_font_size=look.font(12),
-            syncable=False,
-        )
+        words = models.Label(
+            x=10, y=8, x_units="screen", y_units="screen", text="", text_color=look.text, text_font_size=look.font(12), syncable=False
+        )  # fmt: skip
         self.plot.add_layout(words)
         self.cursor.follow(
             _DRAW, self.meta, frames=self.frames, shapes=self.shapes, amplitudes=self.amplitudes, modes=self.modes,
             meta=self.meta, beam=beam, striker=striker, rods=self.rods, words=words,
         )  # fmt: skip
         sheets = [sheet(look), _CONTROLS]
-        toggle = Toggle(label="► Play", name=self.named("play"), width=90, stylesheets=sheets)
-        speed = Select(
-            title="cycles per second",
-            options=["0.02", "0.1", "0.3", "1", "3", "10"],
-            value="1",
-            width=120,
-            stylesheets=sheets,
+        toggle = models.Toggle(label="► Play", name=self.named("play"), width=90, stylesheets=sheets)
+        rates = ["0.02", "0.1", "0.3", "1", "3", "10"]
+        speed = models.Select(
+            title="cycles per second", options=rates, value="1", width=120, stylesheets=sheets
         )
-        linger = Toggle(label="slow at impacts", active=False, width=120, stylesheets=sheets)
-        scrub = Slider(
-            title="",
-            show_value=False,
-            start=0.0,
-            end=1.0,
-            value=0.0,
-            step=0.0005,
-            sizing_mode="stretch_width",
-            name=self.named("scrub"),
-            syncable=False,
-            stylesheets=sheets,
-        )
+        linger = models.Toggle(label="slow at impacts", active=False, width=120, stylesheets=sheets)
+        scrub = models.Slider(
+            title="", show_value=False, start=0.0, end=1.0, value=0.0, step=0.0005, sizing_mode="stretch_width",
+            name=self.named("scrub"), syncable=False, stylesheets=sheets,
+        )  # fmt: skip
         shared = {"toggle": toggle, "frames": self.frames, "place": self.cursor.place}
-        toggle.js_on_change(
-            "active",
-            CustomJS(
-                args=shared | {"speed": speed, "linger": linger, "scrub": scrub, "meta": self.meta},
-                code=_PLAY,
-            ),
-        )
-        scrub.js_on_change("value", CustomJS(args=shared, code=_SCRUB))
-        self.scale = Select(
-            title="",
-            options=["exaggerated to fit", "true proportions", "10 times", "100 times"],
-            value="exaggerated to fit",
-            stylesheets=sheets,
-            width=160,
-        )
+        playing = shared | {"speed": speed, "linger": linger, "scrub": scrub, "meta": self.meta}
+        toggle.js_on_change("active", models.CustomJS(args=playing, code=_PLAY))
+        scrub.js_on_change("value", models.CustomJS(args=shared, code=_SCRUB))
+        scales = ["exaggerated to fit", "true proportions", "10 times", "100 times"]
+        self.scale = models.Select(title="", options=scales, value=scales[0], stylesheets=sheets, width=160)
         self.scale.on_change("value", lambda attr, old, new: self._rescale())
         self.plot.on_change("inner_width", lambda attr, old, new: self._rescale())
         controls = pn.Row(*(pn.pane.Bokeh(item) for item in (toggle, linger, speed, self.scale)), margin=0)
@@ -335,11 +312,9 @@ class BeamPanel(RunPanel):
         self.amplitudes.data = {
             "q": dataset["modal_amplitude"].values[part, :kept].astype(np.float32).ravel()
         }
-        self.rods.data = {
-            "tip": scale * tips.ravel(),
-            "force": np.nan_to_num(forces[:, : tips.shape[1]].ravel()),
-        }
-        self.frames.data = {"t": x[part], "force": np.nan_to_num(forces).max(axis=1, initial=0.0)}
+        forces = np.nan_to_num(forces)
+        self.rods.data = {"tip": scale * tips.ravel(), "force": forces[:, : tips.shape[1]].ravel()}
+        self.frames.data = {"t": x[part], "force": forces.max(axis=1, initial=0.0)}
         self.reach = 1.35 * scale * max(1.0, float(np.nanmax(np.abs(dataset["midspan_displacement"].values))))
         if (
             self.fresh
@@ -347,10 +322,8 @@ class BeamPanel(RunPanel):
             self.fresh = False
             self.cursor.later(self._rescale, 300)
         w = dataset["midspan_displacement"].values[inside]
-        snaps = np.flatnonzero(w[:-1] * w[1:] < 0.0)
-        self.begin = (
-            max(float(x[inside][snaps[0]]) - 0.5, float(x[inside][0])) if snaps.size else float(x[inside][0])
-        )
+        snaps, first = np.flatnonzero(w[:-1] * w[1:] < 0.0), float(x[inside][0])
+        self.begin = max(float(x[inside][snaps[0]]) - 0.5, first) if snaps.size else first
         self.plot.x_range.update(start=-0.02 * along[-1], end=1.02 * along[-1])
         self._rescale()
 
@@ -361,9 +334,8 @@ class BeamPanel(RunPanel):
         length = 1e3 * beam.length
         width, height = inner_size(self.plot, (560, 270))
         fit = 0.5 * 1.04 * length * height / width
-        half = {"true proportions": fit, "10 times": fit / 10.0, "100 times": fit / 100.0}.get(
-            self.scale.value, self.reach
-        )
+        scales = {"true proportions": fit, "10 times": fit / 10.0, "100 times": fit / 100.0}
+        half = scales.get(self.scale.value, self.reach)
         self.plot.y_range.update(start=-half, end=half)
         true = self.scale.value == "true proportions"
         drawn = "thickness to scale" if true else "the beam as a line, without its thickness"
@@ -411,11 +383,6 @@ def envelope(x: _Array, y: _Array, low: float, high: float, pixels: int = 1000) 
     return x[kept], y[kept]
 
 
-def round_trip(value: float) -> str:
-    """A number as text that gives the same number again."""
-    return repr(float(value))
-
-
 # ----------------------------------------------------------------------------------------------------
 # The energy balance: work of the striker, energy of the beam, energy lost.
 
@@ -441,17 +408,13 @@ class Energy(RunPanel):
         look = self.look
         self.sources = {name: columns(x=[], y=[]) for name in _CURVES}
         self.sources["striker_work"].name = self.named("energy")
-        self.plot = figure(
-            look, height=360, used=260, x_range=self.cursor.range, y_axis_label="energy (µJ)", y_range=(0.0, 1.0),
-            tools="xpan,xbox_zoom,xwheel_zoom,reset", active_drag="xbox_zoom", active_scroll="xwheel_zoom",
-        )  # fmt: skip
+        self.plot = self.over_time(height=360, used=260, y_axis_label="energy (µJ)", y_range=(0.0, 1.0))
         for name, (label, color) in _CURVES.items():
             self.plot.line(
                 "x", "y", source=self.sources[name], color=getattr(look, color), line_width=1.4, legend_label=label,
                 line_dash="dashed" if name in ("energy_contact", "energy_striker", "energy_circuit") else "solid",
             )  # fmt: skip
         legend(self.plot, look)
-        self.cursor.attach(self.plot)
         self.words = Html("", sizing_mode="stretch_width")
         return [self.wrap(self.plot), self.words]
 
@@ -511,19 +474,15 @@ class Impacts(RunPanel):
             "duration": ("duration (µs)", "0.0"), "peak": ("peak force (N)", "0.000"),
             "impulse": ("impulse (mN s)", "0.0000"),
         }  # fmt: skip
-        self.source = ColumnDataSource({name: [] for name in names}, name=self.named("impacts"))
+        self.source = models.ColumnDataSource({name: [] for name in names}, name=self.named("impacts"))
         shown = [
-            TableColumn(field=name, title=title, formatter=NumberFormatter(format=digits))
+            models.TableColumn(field=name, title=title, formatter=models.NumberFormatter(format=digits))
             for name, (title, digits) in names.items()
         ]
-        table = DataTable(
-            source=self.source,
-            columns=shown,
-            sizing_mode="stretch_width",
-            height=400,
-            index_position=None,
+        table = models.DataTable(
+            source=self.source, columns=shown, sizing_mode="stretch_width", height=400, index_position=None,
             stylesheets=[sheet(self.look), _TABLE],
-        )
+        )  # fmt: skip
         self.source.selected.on_change("indices", self._chosen)
         self.words = Html("", sizing_mode="stretch_width")
         return [self.words, pn.pane.Bokeh(table, sizing_mode="stretch_width")]
@@ -532,11 +491,7 @@ class Impacts(RunPanel):
         """Show a run between two cycles."""
         found = run.impacts.isel(impact=slice(0, _MOST))
         time = found["onset"].values
-        cycle = (
-            np.interp(time, run.dataset["time"].values, run.dataset["cycle"].values)
-            if "cycle" in run.dataset.variables
-            else time
-        )
+        cycle = np.interp(time, run.dataset["time"].values, across(run)[0])
         self.source.data = {
             "cycle": cycle, "time": 1e3 * time, "duration": 1e6 * found["duration"].values,
             "peak": found["peak_force"].values, "impulse": 1e3 * found["impulse"].values,
@@ -606,16 +561,14 @@ class Modal(RunPanel):
     def build(self) -> list[Any]:
         """Return the models of this view."""
         look = self.look
-        plot = figure(
-            look, height=260, used=215, share=0.6, x_range=self.cursor.range, y_axis_label="αᵢ over α₁ of the well", y_range=(-1.5, 1.5),
-            tools="xpan,xbox_zoom,xwheel_zoom,reset", active_drag="xbox_zoom", active_scroll="xwheel_zoom",
-        )  # fmt: skip
+        plot = self.over_time(
+            height=260, used=215, share=0.6, y_axis_label="αᵢ over α₁ of the well", y_range=(-1.5, 1.5)
+        )
         self.lines = [columns(x=[], y=[]) for _ in range(_SHOWN)]
         for at, source in enumerate(self.lines):
             color = _COLORS[at] or look.text
             plot.line("x", "y", source=source, color=color, line_width=1.2, legend_label=f"mode {at + 1}")
         legend(plot, look)
-        self.cursor.attach(plot)
         self.bars = columns(mode=[], rms=[], top=[])
         self.bars.name = self.named("modal")
         low = figure(
@@ -692,7 +645,7 @@ class Phase(RunPanel):
         )
         self.line, self.dots = columns(t=[], w=[], v=[]), columns(t=[], w=[], v=[])
         self.dots.name = self.named("section")
-        dot = ColumnDataSource({"w": [], "v": []}, syncable=False)
+        dot = models.ColumnDataSource({"w": [], "v": []}, syncable=False)
         plots = [
             figure(look, height=370, used=280, tools="pan,box_zoom,wheel_zoom,reset", x_range=(-1.6, 1.6), y_range=(-1.6, 1.6),
                    title=title, x_axis_label="displacement w (b)", y_axis_label="velocity (b ω₁)", min_border_left=50)
@@ -782,16 +735,14 @@ class Spectrum(RunPanel):
             x_axis_label="frequency over f₁", x_range=(0.0, 12.0), y_range=(1e-7, 1.0),
             tools="pan,box_zoom,wheel_zoom,reset", active_drag="box_zoom",
         )  # fmt: skip
-        for (name, source), color, label in zip(
-            self.sources.items(),
-            (look.center, look.beam),
-            ("beam, centre", "beam, at the striker"),
-            strict=True,
-        ):
-            plot.line("x", "y", source=source, color=color, legend_label=label, name=name)
+        for name, source in self.sources.items():
+            label, color, _, _ = _DISPLACEMENTS[name]
+            plot.line("x", "y", source=source, color=getattr(look, color), legend_label=label, name=name)
         legend(plot, look)
-        self.drive = Span(dimension="height", line_color=look.striker, line_dash="dashed", line_width=1.2)
-        self.first = Span(dimension="height", line_color=look.faint, line_dash="dotted", location=1.0)
+        self.drive = models.Span(
+            dimension="height", line_color=look.striker, line_dash="dashed", line_width=1.2
+        )
+        self.first = models.Span(dimension="height", line_color=look.faint, line_dash="dotted", location=1.0)
         plot.add_layout(self.drive)
         plot.add_layout(self.first)
         self.plot = plot
@@ -849,36 +800,31 @@ class WaveformPanel(RunPanel):
         self.span = (0.0, 1.0)
         self.sources = {name: columns(x=[], y=[]) for name in _DISPLACEMENTS}
         self.sources["midspan_displacement"].name = self.named("waveform")
-        self.force = ColumnDataSource({"x": [], "y": []}, name=self.named("force"))
+        self.force = models.ColumnDataSource({"x": [], "y": []}, name=self.named("force"))
         self.further = [
-            ColumnDataSource({"x": [], "y": []}, name=self.named(name)) for name in ("strikers", "below")
+            models.ColumnDataSource({"x": [], "y": []}, name=self.named(name))
+            for name in ("strikers", "below")
         ]
         self.below = pn.widgets.Select(options={}, width=230, margin=(0, 10))
         self.below.param.watch(lambda _: self.cursor.later(self._draw, 1), "value")
-        common: dict[str, Any] = {
-            "x_range": self.cursor.range, "tools": "xpan,xbox_zoom,xwheel_zoom,reset",
-            "active_drag": "xbox_zoom", "active_scroll": "xwheel_zoom", "output_backend": "canvas",
-        }  # fmt: skip
-        top = figure(
-            look, name=self.named("waveform-plot"), height=265, used=250, share=0.6, y_axis_label="displacement w (b)",
-            y_range=(-1.5, 1.5), **common,
+        top = self.over_time(
+            name=self.named("waveform-plot"), height=265, used=250, share=0.6, y_axis_label="displacement w (b)",
+            y_range=(-1.5, 1.5), output_backend="canvas",
         )  # fmt: skip
         for name, (label, color, width, dash) in _DISPLACEMENTS.items():
             top.line(
                 "x", "y", source=self.sources[name], color=getattr(look, color), line_width=width, line_dash=dash,
                 legend_label=label,
             )  # fmt: skip
-        low = figure(
-            look, height=165, used=250, share=0.4, y_range=(0.0, 1.0), x_axis_label="cycles of excitation τ", **common
-        )  # fmt: skip
+        low = self.over_time(height=165, used=250, share=0.4, y_range=(0.0, 1.0), output_backend="canvas")
         low.line("x", "y", source=self.force, color=look.beam, line_width=1.2)
         for plot, source in zip((top, low), self.further, strict=True):
             plot.multi_line("x", "y", source=source, color=look.second, line_width=1.2, line_dash="dotdash")
         self.others = top.renderers[-1]
         legend(top, look)
-        top.legend[0].items.append(LegendItem(label="other strikers", renderers=[self.others], visible=False))
-        for plot in (top, low):
-            self.cursor.attach(plot)
+        top.legend[0].items.append(
+            models.LegendItem(label="other strikers", renderers=[self.others], visible=False)
+        )
         self.low, self.top = low, top
         return [self.wrap(top), self.below, self.wrap(low)]
 
@@ -886,19 +832,14 @@ class WaveformPanel(RunPanel):
         """Show a run between two cycles."""
         self.run, self.span = run, (low, high)
         data = run.dataset
-        names = [
-            str(name)
-            for name, item in data.data_vars.items()
-            if name not in _DISPLACEMENTS
-            and name != "striker_displacements"
-            and set(item.dims) <= {"time", "striker"}
-        ]
+        drawn = {*_DISPLACEMENTS, "striker_displacements"}
+        over = {str(name): set(item.dims) for name, item in data.data_vars.items() if name not in drawn}
+        names = [name for name, dims in over.items() if dims <= {"time", "striker"}]
         names.sort(key=lambda each: _FIRST_BELOW.index(each) if each in _FIRST_BELOW else len(_FIRST_BELOW))
         options = {str(data[name].attrs.get("long_name", name)): name for name in names}
         if options != self.below.options:
-            self.below.param.update(
-                options=options, value=self.below.value if self.below.value in names else names[0]
-            )
+            held = self.below.value if self.below.value in names else names[0]
+            self.below.param.update(options=options, value=held)
         self._draw()
 
     def _draw(self) -> None:
@@ -915,12 +856,10 @@ class WaveformPanel(RunPanel):
             own = [envelope(x, each, *self.span) for each in _columns_of(data, name).T] if there else []
             source.data = _curve(own)
             shown += [y for _, y in own]
-        more = (
-            _columns_of(data, "striker_displacements")[:, 1:]
-            if "striker_displacements" in data
-            else x[:, None][:, 1:]
-        )
-        own = [envelope(x, each, *self.span) for each in more.T]
+        more: Any = ()
+        if "striker_displacements" in data:
+            more = _columns_of(data, "striker_displacements").T[1:]
+        own = [envelope(x, each, *self.span) for each in more]
         self.further[0].data = _curves(own)
         self.top.legend[0].items[-1].visible = bool(own)
         fit(self.top, *shown, *(y for _, y in own))
@@ -953,9 +892,7 @@ _SETTLE = 60
 """Milliseconds that a range must rest before the samples in it are sent."""
 
 
-_BUSY = Markup('<span class="busy">{}</span>')
 _BAD = Markup('<span class="bad">{}</span>')
-_FAINT = Markup('<span class="faint">{}</span>')
 FIRST = "Click on the map, use the arrow keys, or type numbers, to see the run of a point."
 """Text of a run that is not requested yet."""
 
@@ -976,13 +913,7 @@ class RunView:
         ``post(work)``: do something on the page's own thread; ``later(work, milliseconds)``: a little later.
     """
 
-    def __init__(
-        self,
-        look: Look,
-        name: str,
-        post: Callable[[Callable[[], None]], None],
-        later: Callable[[Callable[[], None], int], Any],
-    ) -> None:
+    def __init__(self, look: Look, name: str, post: Post, later: Later) -> None:
         self.look, self.name, self.later = look, name, later
         self.run: Run | None = None
         self.cursor = Cursor(look, "" if name == "A" else f"-{name}", later)
@@ -991,10 +922,9 @@ class RunView:
             Modal(look, self.cursor), Energy(look, self.cursor), Impacts(look, self.cursor, self._closer),
             BeamPanel(look, self.cursor), Numbers(look, self.cursor),
         ]  # fmt: skip
-        self.head = Html(
-            _FAINT.format(FIRST), sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-head"]
-        )
-        self.note = Html("", sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-note"])
+        wide = {"sizing_mode": "stretch_width", "margin": (0, 0, 2, 0)}
+        self.head = Html(FAINT.format(FIRST), css_classes=["run-head"], **wide)
+        self.note = Html("", css_classes=["run-note"], **wide)
         self.tabs = pn.Tabs(
             *((part.title, part.place) for part in self.parts), dynamic=True, sizing_mode="stretch_width", margin=0
         )  # fmt: skip
@@ -1003,9 +933,8 @@ class RunView:
         self._quiet = False
         for edge in ("start", "end"):
             self.cursor.range.on_change(edge, lambda attr, old, new: self._range_moved())
-        self.layout = pn.Column(
-            self.head, self.note, self.tabs, sizing_mode="stretch_width", css_classes=["card", "run"]
-        )
+        parts = (self.head, self.note, self.tabs)
+        self.layout = pn.Column(*parts, sizing_mode="stretch_width", css_classes=["card", "run"])
         self.notes: dict[str, str] = {}
         self.turned: Callable[[], None] = lambda: None
 
@@ -1025,16 +954,15 @@ class RunView:
     def begin(self, words: str) -> None:
         """Say what is computed, over the run before."""
         self._write_notes()
-        self._head(_BUSY.format("computing"), words)
+        self._head(BUSY.format("computing"), words)
 
     def wait(self, words: str, seconds: float, why: str) -> None:
         """Say for how long it has been computed, and what takes the time if that is known."""
-        self._head(_BUSY.format(f"computing, {seconds:.0f} s"), words, _FAINT.format(why) if why else "")
+        self._head(BUSY.format(f"computing, {seconds:.0f} s"), words, FAINT.format(why) if why else "")
 
     def fail(self, words: str) -> None:
         """Say why there is no run; the pictures of the run before are greyed."""
-        self.notes = {}
-        self._write_notes()
+        self.forget()
         self.tabs.css_classes = ["stale"]
         self._head(_BAD.format("no run"), words)
 
@@ -1043,7 +971,7 @@ class RunView:
         self.notes = {}
         self._write_notes()
         self.tabs.css_classes = ["stale"] if self.run is not None else []
-        self.head.object = _FAINT.format(words)
+        self.head.object = FAINT.format(words)
 
     def _head(self, kind: str, words: str, below: str = "") -> None:
         line = Markup("<br>{}").format(below) if below else ""
@@ -1060,27 +988,22 @@ class RunView:
         if answer.status in (RunStatus.OK, RunStatus.EARLY_STOP):
             well = "upper" if answer.final_well > 0 else "lower"
             final = ", for good" if answer.final_well_proven else ""
-            crossings, impacts = (
-                _counted(answer.zero_crossings, "crossing"),
-                _counted(answer.impacts, "impact"),
-            )
-            counts = f"{crossings}, {impacts}, ends in the {well} well{final}"
-            self._head(class_chip(answer.response_class), words, _FAINT.format(counts))
+            counts = f"{_counted(answer.zero_crossings, 'crossing')}, {_counted(answer.impacts, 'impact')}"
+            counts += f", ends in the {well} well{final}"
+            self._head(class_chip(answer.response_class), words, FAINT.format(counts))
         else:
             why = _BAD.format(f"{answer.status.name}: {answer.status.advice}")
             self._head(class_chip(ResponseClass.UNKNOWN), words, why)
         if fresh:
-            x, _ = across(run)
+            first, last = across(run)[0][[0, -1]].tolist()
             self._quiet = True
-            self.cursor.range.update(
-                start=float(x[0]), end=float(x[-1]), reset_start=float(x[0]), reset_end=float(x[-1])
-            )
+            self.cursor.range.update(start=first, end=last, reset_start=first, reset_end=last)
             self._quiet = False
         self._draw()
 
     def say(self, about: str, words: str, bad: bool = False) -> None:
         """Put a line under the class, one for each thing that it is about."""
-        self.notes[about] = (_BAD if bad else _FAINT).format(words) if words else ""
+        self.notes[about] = (_BAD if bad else FAINT).format(words) if words else ""
         self._write_notes()
 
     def _write_notes(self) -> None:
@@ -1089,8 +1012,7 @@ class RunView:
     def _draw(self) -> None:
         self.active.activate()
         if self.run is not None:
-            start, end = float(self.cursor.range.start), float(self.cursor.range.end)
-            self.active.show(self.run, min(start, end), max(start, end))
+            self.active.show(self.run, *self.window)
 
     def stand(self) -> None:
         """Build the view that is seen."""
@@ -1127,6 +1049,5 @@ class RunView:
     @property
     def window(self) -> tuple[float, float]:
         """The part that is seen, in cycles."""
-        return float(np.min([self.cursor.range.start, self.cursor.range.end])), float(
-            np.max([self.cursor.range.start, self.cursor.range.end])
-        )
+        low, high = sorted((float(self.cursor.range.start), float(self.cursor.range.end)))
+        return low, high

@@ -23,7 +23,6 @@ from snapbeam.plot.style import CLASS_COLORS
 
 if TYPE_CHECKING:
     from snapbeam.explorer.page import Page
-    from snapbeam.explorer.run_view import RunView
 
 __all__ = [
     "DARK", "LIGHT", "Cursor", "Html", "Look", "blend", "class_chip", "colors_of", "columns", "figure",
@@ -56,31 +55,11 @@ class Look:
 
 
 LIGHT = Look(
-    "default",
-    "#f3f4f6",
-    "#ffffff",
-    "#1b1f24",
-    "#59636e",
-    "#e4e7eb",
-    "#000000",
-    "#2a87c8",
-    "#b03a27",
-    "#1a62d2",
-    "#8250df",
-)
+    "default", "#f3f4f6", "#ffffff", "#1b1f24", "#59636e", "#e4e7eb", "#000000", "#2a87c8", "#b03a27", "#1a62d2", "#8250df",
+)  # fmt: skip
 DARK = Look(
-    "dark",
-    "#0f1318",
-    "#181d24",
-    "#e6e9ed",
-    "#9aa4af",
-    "#2c333c",
-    "#f2f4f6",
-    "#70bbf0",
-    "#f08a75",
-    "#6cb0ff",
-    "#c297ff",
-)
+    "dark", "#0f1318", "#181d24", "#e6e9ed", "#9aa4af", "#2c333c", "#f2f4f6", "#70bbf0", "#f08a75", "#6cb0ff", "#c297ff",
+)  # fmt: skip
 
 
 LECTURE = 1.4
@@ -131,17 +110,10 @@ def figure(look: Look, *, used: int = 0, share: float = 1.0, **options: Any) -> 
     share : float
     """
     settings: dict[str, Any] = {
-        "sizing_mode": "stretch_width",
-        "toolbar_location": "right",
-        "tools": "pan,box_zoom,wheel_zoom,reset",
-        "border_fill_color": look.card,
-        "background_fill_color": look.card,
-        "outline_line_color": look.faint,
-        "min_border_left": round(58 * look.scale),
-        "min_border_right": 6,
-        "min_border_top": 6,
-        "lod_threshold": None,
-    }
+        "sizing_mode": "stretch_width", "toolbar_location": "right", "tools": "pan,box_zoom,wheel_zoom,reset",
+        "border_fill_color": look.card, "background_fill_color": look.card, "outline_line_color": look.faint,
+        "min_border_left": round(58 * look.scale), "min_border_right": 6, "min_border_top": 6, "lod_threshold": None,
+    }  # fmt: skip
     plot = bokeh_figure(**(settings | options))
     for axis in plot.axis:
         style_axis(axis, look)
@@ -149,26 +121,20 @@ def figure(look: Look, *, used: int = 0, share: float = 1.0, **options: Any) -> 
     plot.stylesheets = plot.toolbar.stylesheets = [focused(look)]
     if used:
         tall = f"max(calc(var(--sb-share, 1) * {plot.height}px), calc(var(--sb-share, 1) * {share:g} * (100vh - {used}px)))"
-        plot.stylesheets = [
-            *plot.stylesheets,
-            f"@media (min-width: 1000px) {{ :host {{ min-height: {tall} !important; }} }}",
-        ]
-    plot.toolbar.logo = None
-    plot.toolbar.autohide = False
-    plot.title.text_color = look.text
-    plot.title.text_font_size = look.font(12)
-    plot.title.text_font_style = "normal"
+        high = f"@media (min-width: 1000px) {{ :host {{ min-height: {tall} !important; }} }}"
+        plot.stylesheets = [*plot.stylesheets, high]
+    plot.toolbar.update(logo=None, autohide=False)
+    plot.title.update(text_color=look.text, text_font_size=look.font(12), text_font_style="normal")
     return plot
 
 
 def style_axis(axis: Any, look: Look) -> None:
     """Give an axis the style of the page."""
-    axis.axis_label_text_color = axis.major_label_text_color = look.text
-    axis.axis_label_text_font_style = "normal"
-    axis.axis_label_text_font_size = look.font(12)
-    axis.major_label_text_font_size = look.font(11)
-    axis.axis_line_color = axis.major_tick_line_color = look.faint
-    axis.minor_tick_line_color = None
+    axis.update(
+        axis_label_text_color=look.text, major_label_text_color=look.text, axis_label_text_font_style="normal",
+        axis_label_text_font_size=look.font(12), major_label_text_font_size=look.font(11),
+        axis_line_color=look.faint, major_tick_line_color=look.faint, minor_tick_line_color=None,
+    )  # fmt: skip
 
 
 def framed_plot(plot: Any, **options: Any) -> Any:
@@ -191,36 +157,26 @@ def legend(plot: Any, look: Look) -> None:
     for item in list(plot.legend):
         plot.center.remove(item)
         plot.add_layout(item, "above")
-        item.location = "top_left"
-        item.orientation = "horizontal"
-        item.background_fill_color = look.card
-        item.background_fill_alpha = 0.75
-        item.label_text_color = look.text
-        item.label_text_font_size = look.font(11)
-        item.border_line_color = None
-        item.padding, item.spacing, item.margin = 3, 5, 4
-        item.glyph_height = item.label_height = round(14 * look.scale)
-        item.glyph_width = 22
-        item.click_policy = "hide"
+        item.update(
+            location="top_left", orientation="horizontal", click_policy="hide", border_line_color=None,
+            background_fill_color=look.card, background_fill_alpha=0.75, label_text_color=look.text,
+            label_text_font_size=look.font(11), padding=3, spacing=5, margin=4, glyph_width=22,
+            glyph_height=round(14 * look.scale), label_height=round(14 * look.scale),
+        )  # fmt: skip
 
 
 def inner_size(plot: Any, otherwise: tuple[int, int]) -> tuple[int, int]:
     """Pixels of what a figure shows; *otherwise* until the browser has said it."""
-    found = []
-    for name, value in zip(("inner_width", "inner_height"), otherwise, strict=True):
-        try:
-            found.append(int(getattr(plot, name) or value))
-        except UnsetValueError:
-            found.append(value)
-    return found[0], found[1]
+    try:
+        return int(plot.inner_width or otherwise[0]), int(plot.inner_height or otherwise[1])
+    except UnsetValueError:
+        return otherwise
 
 
 def blend(first: str, last: str, steps: int = 64) -> list[str]:
     """Colours from one to another."""
     ends = [np.array([int(color[i : i + 2], 16) for i in (1, 3, 5)]) for color in (first, last)]
-    mixed = [
-        np.round(ends[0] + share * (ends[1] - ends[0])).astype(int) for share in np.linspace(0.0, 1.0, steps)
-    ]
+    mixed = np.round(np.linspace(ends[0], ends[1], steps)).astype(int)
     return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in mixed]
 
 
@@ -279,14 +235,30 @@ class Html(pn.pane.HTML):
 
 def class_chip(kind: ResponseClass) -> Markup:
     """The name of a class on its colour."""
-    ink = (
-        "#111"
-        if kind in (ResponseClass.TRANSIENT_2, ResponseClass.CONTINUOUS, ResponseClass.UNKNOWN)
-        else "#fff"
-    )
+    light = (ResponseClass.TRANSIENT_2, ResponseClass.CONTINUOUS, ResponseClass.UNKNOWN)
+    ink = "#111" if kind in light else "#fff"
     return Markup('<span class="chip" style="background:{};color:{}">{}</span>').format(
         CLASS_COLORS[kind], ink, kind.label
     )
+
+
+Post = Callable[[Callable[[], None]], None]
+"""Does something on the page's own thread."""
+Later = Callable[[Callable[[], None], int], Any]
+"""Does it some milliseconds later."""
+NOTE = Markup('<p class="note">{}</p>')
+HEADING = Markup("<h2>{}</h2>")
+REFUSED = Markup('<p class="bad" role="alert">{}</p>')
+WRONG = Markup('<span class="bad" role="alert">{}</span>')
+BUSY = Markup('<span class="busy">{}</span>')
+FAINT = Markup('<span class="faint">{}</span>')
+
+
+def button(name: str, post: Post, work: Callable[[], None], **options: Any) -> Any:
+    """A button that does *work* on the page's own thread."""
+    made = pn.widgets.Button(name=name, **options)
+    made.on_click(lambda _: post(work))
+    return made
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -300,21 +272,15 @@ class Cursor:
     ``place``.
     """
 
-    def __init__(self, look: Look, suffix: str, later: Callable[[Callable[[], None], int], Any]) -> None:
+    def __init__(self, look: Look, suffix: str, later: Later) -> None:
         self.look, self.suffix, self.later = look, suffix, later
         self.range = Range1d(0.0, 1.0)
         self.place = ColumnDataSource({"t": [0.0]}, syncable=False)
 
     def attach(self, plot: Any) -> None:
         """Give a picture over time the cursor."""
-        line = Span(
-            dimension="height",
-            line_color=self.look.accent,
-            line_width=1.2,
-            line_alpha=0.9,
-            syncable=False,
-            location=None,
-        )
+        accent = {"line_color": self.look.accent, "line_width": 1.2, "line_alpha": 0.9}
+        line = Span(dimension="height", syncable=False, location=None, **accent)
         plot.add_layout(line)
         move = CustomJS(args={"place": self.place}, code="place.data = {t: [cb_obj.x]};")
         plot.js_on_event("mousemove", move)
@@ -422,16 +388,8 @@ def framed(page: Page) -> Any:
     dark.js_on_click(code=_TURN % {"name": "theme", "value": "dark"})
     lecture = pn.widgets.Button(name="Lecture" if look.scale == 1.0 else "Desk", align="center")
     lecture.js_on_click(code=_TURN % {"name": "type", "value": "large"})
-    top = pn.Row(
-        title,
-        page.target,
-        page.compare,
-        lecture,
-        dark,
-        sizing_mode="stretch_width",
-        css_classes=["top"],
-        margin=0,
-    )
+    controls = (page.target, page.compare, lecture, dark)
+    top = pn.Row(title, *controls, sizing_mode="stretch_width", css_classes=["top"], margin=0)
     map_tab = pn.Column(page.old, page.card.layout, sizing_mode="stretch_width", margin=0)
     others = page_tabs(page)
     left = pn.Tabs(
@@ -452,42 +410,21 @@ def framed(page: Page) -> Any:
 
     left.param.watch(lambda _: page.post(turned), "active")
     page.cards, page.card_names = left, ["Map", *others]
-    runs = pn.FlexBox(page.runs[0].layout, margin=0, css_classes=["right"])
-    body = pn.FlexBox(
-        left,
-        runs,
-        margin=0,
-        sizing_mode="stretch_width",
-        flex_wrap="wrap",
-        css_classes=["body"],
-    )
-    whole = pn.Column(top, body, sizing_mode="stretch_width", margin=0, css_classes=["whole"])
+    page.runs_box = runs = pn.FlexBox(page.runs[0].layout, margin=0, css_classes=["right"])
+    wide = {"sizing_mode": "stretch_width", "margin": 0}
+    body = pn.FlexBox(left, runs, flex_wrap="wrap", css_classes=["body"], **wide)
+    whole = pn.Column(top, body, css_classes=["whole"], **wide)
     styled(whole, look)
 
-    def add_run(view: RunView) -> None:
-        styled(view.layout, look)
-        runs.append(view.layout)
-
-    def share_height(two: bool) -> None:
-        """Let two runs, one over the other, have the height of one."""
-        runs.css_classes = ["right", "two"] if two else ["right"]
-
-    page.add_run, page.share_height = add_run, share_height
     doc = page.doc
     page.bar.js_on_change("data", CustomJS(args={"bar": page.bar}, code=_ADDRESS))
     if doc is not None:
-        doc.js_on_event(DocumentReady, CustomJS(args={"keys": page.keys}, code=_KEYS))
-        doc.js_on_event(DocumentReady, CustomJS(code=_TABS))
-        doc.js_on_event(DocumentReady, CustomJS(args={"back": page.back}, code=_HISTORY))
-        doc.js_on_event(DocumentReady, CustomJS(code=_FOCUS))
-        large = CustomJS(args={"refused": page.refused}, code=_TOO_LARGE % UPLOAD)
-        doc.js_on_event(DocumentReady, large)
+        sources = {"keys": page.keys, "back": page.back, "refused": page.refused}
+        for code in (_KEYS, _TABS, _HISTORY, _FOCUS, _TOO_LARGE % UPLOAD):
+            doc.js_on_event(DocumentReady, CustomJS(args=sources, code=code))
         doc.js_on_event(ConnectionLost, CustomJS(code=_GONE))
-        doc.add_root(page.bar)
-        doc.add_root(page.keys)
-        doc.add_root(page.back)
-        doc.add_root(page.refused)
-        doc.add_root(page.downloads.source)
+        for source in (page.bar, page.downloads.source, *sources.values()):
+            doc.add_root(source)
     return whole
 
 
