@@ -76,7 +76,7 @@ def test_random_states_come_back_from_their_addresses():
             x="frequency_ratio", y=str(rng.choice(["velocity_amplitude", "location"])), show="peak_force",
             at=point(), b=point() if rng.integers(2) else {}, cut=point(), view=(low, high, low - 1.0, high),
             changes=difference(files[one], files[other]), theme=str(rng.choice(["dark", "default"])),
-            type=str(rng.choice(["", "large"])), tab="Phase", card="System",
+            type=str(rng.choice(["", "large"])), units=str(rng.choice(["", "physical"])), tab="Phase", card="System",
         )  # fmt: skip
         assert again(state) == state, state
         assert patched(files[one], again(state).changes) == files[other]

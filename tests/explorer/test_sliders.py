@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import wave
+from urllib.parse import parse_qs
+
 import numpy as np
 import pytest
 
 import snapbeam as sb
+from snapbeam.explorer.cards import write_sound
 from snapbeam.explorer.maps import opened, python_lines
 from snapbeam.model.parameter_file import Config
 
@@ -75,3 +79,107 @@ def test_the_lines_of_python_draw_the_view_that_is_seen(page, tmp_path, monkeypa
     again = sb.load(tmp_path / "run.nc")
     assert again.summary.zero_crossings == view.run.summary.zero_crossings
     np.testing.assert_array_equal(again.dataset["time"][0], view.run.dataset["time"][0])
+
+
+def _state(page):
+    """All that the page shows, computed from the page itself."""
+    return (
+        page.card.plane.names, page.card.show.value, page.card.view.view, page.points[0] and page.points[0].values,
+        page.changes, page.card.system, page.card.integration, page.runs[0].tabs.active, page.look,
+    )  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
+def test_a_page_read_from_the_address_of_another_shows_the_same(page):
+    rng = np.random.default_rng(11)
+    for _ in range(4):
+        page.card.show.value = str(rng.choice(page.card.source.variables()))
+        left, low = rng.uniform(0.4, 1.0), rng.uniform(0.02, 0.1)
+        page.card.view.view = (left, left + 0.5, low, low + 0.2)
+        page.runs[0].tabs.active = int(rng.integers(len(page.runs[0].parts)))
+        page._adopt(
+            {
+                "beam.thickness": float(rng.uniform(3.9e-4, 4.1e-4)),
+                "integration.cycles": int(rng.integers(5, 9)),
+            }
+        )
+        page.ask(page.card.point(float(left + 0.2), float(low + 0.1)))
+        given = {
+            name: [each.encode() for each in values] for name, values in parse_qs(page._search()).items()
+        }
+        again = Page(page.shared, given)
+        again._show_runs(again.address)
+        assert _state(again) == _state(page)
+        assert again._search() == page._search()
+
+
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
+def test_a_field_shows_six_digits_and_keeps_all(page):
+    value = 1.1434782608695653
+    page.ask(page.card.point(value, 0.2))
+    exact = page.points[0].values
+    assert all(len(field.value) <= 8 for field in page.fields.values())
+    page._ask_typed()
+    assert page.points[0].values == exact
+    page.fields["drive.velocity_amplitude"].value = "0.3000000003"
+    page._ask_typed()
+    assert page.points[0].values["drive.velocity_amplitude"] == 0.3000000003
+    assert page.fields["drive.velocity_amplitude"].value == "0.3000000003", "as it was typed"
+
+
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
+def test_one_switch_gives_all_views_physical_units(page):
+    page.ask(page.card.point(1.0, 0.2))
+    physical = Page(page.shared, {"units": [b"physical"]})
+    physical.ask(physical.card.point(1.0, 0.2))
+    system = page.runs[0].run.system
+    length, first = 1e3 * system.scale.length, system.model.reference_frequency
+    for active, name, factor, label in (
+        (0, "midspan_displacement", length, "displacement w (mm)"),
+        (2, "midspan_displacement", length, "amplitude (mm)"),
+    ):
+        views = [each.runs[0] for each in (page, physical)]
+        for view in views:
+            view.tabs.active = active
+            view._draw()
+        ratios, units = (view.active.sources[name].data for view in views)
+        np.testing.assert_allclose(units["y"], np.maximum(factor * ratios["y"], units["y"].min()), rtol=1e-5)
+        plot = getattr(views[1].active, "top", None) or views[1].active.plot
+        assert plot.yaxis.axis_label == label
+    np.testing.assert_allclose(units["x"], first * ratios["x"], rtol=1e-12)
+    for view in views:
+        view.tabs.active = 1
+        view._draw()
+    v = [view.active.line.data["v"] for view in views]
+    np.testing.assert_allclose(v[1], length * system.scale.omega * v[0], rtol=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
+def test_the_figure_of_the_map_is_that_of_the_view(page, monkeypatch):
+    axes = {"frequency_ratio": np.linspace(0.5, 1.5, 4), "velocity_amplitude": np.linspace(0.1, 0.4, 4)}
+    shared = Shared(opened(sb.sweep(SYSTEM, axes, sb.Integration(cycles=3))))
+    shared.close()
+    shared.jobs = _Now()
+    zoomed = Page(shared, {"view": [b"0.7,1.1,0.15,0.3"]})
+    limits = []
+    monkeypatch.setattr(
+        "snapbeam.explorer.cards.save_figure",
+        lambda figure, path: (
+            limits.append((figure.axes[0].get_xlim(), figure.axes[0].get_ylim())),
+            path.touch(),
+        ),
+    )
+    for name in ("response_class", "peak_force"):
+        zoomed.card.show.value = name
+        zoomed.take_card()._map_picture()
+    assert limits == [((0.7, 1.1), (0.15, 0.3))] * 2
+
+
+def test_a_velocity_is_heard_at_its_own_pitch(tmp_path):
+    time = np.sort(np.random.default_rng(2).uniform(0.0, 0.5, 20_000))
+    write_sound(time, 0.03 * np.sin(2 * np.pi * 440.0 * time), tmp_path / "velocity.wav")
+    with wave.open(str(tmp_path / "velocity.wav")) as file:
+        rate, series = file.getframerate(), np.frombuffer(file.readframes(file.getnframes()), dtype="<i2")
+    assert series.size == pytest.approx(0.5 * rate, rel=1e-3) and np.abs(series).max() == 32767
+    spectrum = np.abs(np.fft.rfft(series))
+    assert np.argmax(spectrum) * rate / series.size == pytest.approx(440.0, abs=2.5)

@@ -21,9 +21,9 @@ from snapbeam.model.quantity import split_name
 __all__ = ["Address", "number", "typed"]
 
 
-_KEYS = ("x", "y", "show", "cut", "at", "b", "view", "set", "theme", "type", "tab", "card")
+_KEYS = ("x", "y", "show", "cut", "at", "b", "view", "set", "theme", "type", "tab", "card", "units")
 _NAMES = ("x", "y", "show", "tab", "card")
-_WORDS = {"theme": ("default", "dark"), "type": ("large",)}
+_WORDS = {"theme": ("default", "dark"), "type": ("large",), "units": ("physical",)}
 _MOST = 64
 _NAME = r"[a-z]\w*(\.[1-9]\d*)?(\.\w+)?"
 
@@ -46,6 +46,8 @@ class Address:
         Parameters that differ from the map's system, by dotted name; None for a parameter, or a section, that it has not.
     theme, type : str
         "dark" or "default"; "large" for a lecture.
+    units : str
+        "physical" for Hz, mm and mm/s in the views of a run.
     tab, card : str
         View of the run and card next to it; empty for the first ones.
     words : tuple of str
@@ -64,6 +66,7 @@ class Address:
     type: str = ""
     tab: str = ""
     card: str = ""
+    units: str = ""
     words: tuple[str, ...] = ()
 
     @classmethod
@@ -90,11 +93,9 @@ class Address:
         parts["set"] = ",".join(f"{name}:{_written(value)}" for name, value in self.changes.items())
         if self.view is not None:
             parts["view"] = ",".join(repr(float(value)) for value in self.view)
-        if self.theme != "default":
-            parts["theme"] = self.theme
-        if self.type:
-            parts["type"] = self.type
-        return urlencode({name: value for name, value in parts.items() if value}, safe=",:")
+        parts |= {name: getattr(self, name) for name in _WORDS}
+        held = {name: value for name, value in parts.items() if value and value != "default"}
+        return urlencode(held, safe=",:")
 
 
 def _with(found: Address, name: str, text: str) -> Address:

@@ -590,7 +590,9 @@ class MapCard:
             if kind is ResponseClass.UNKNOWN and int(kind) not in shares:
                 continue
             share = f" {100.0 * shares.get(int(kind), 0.0):.1f} %" if shares else ""
-            swatch = Markup('<span class="swatch" style="background:{}"></span>{}{}')
+            swatch = Markup(
+                '<span class="item"><span class="swatch" style="background:{}"></span>{}{}</span>'
+            )
             items.append(swatch.format(CLASS_COLORS[kind], kind.label, share))
         if shares:
             part = "the map" if self.view.is_whole else "the view"

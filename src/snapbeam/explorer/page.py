@@ -134,7 +134,11 @@ class Page(Tab):
         super().__init__()
         self.shared = shared
         self.address = Address.read(arguments)
-        self.look: Look = look_of(self.address.theme, lecture=self.address.type == "large")
+        self.look: Look = look_of(
+            self.address.theme,
+            lecture=self.address.type == "large",
+            physical=self.address.units == "physical",
+        )
         self.card = MapCard(self.look, shared, self.address, self.post, self.later)
         self.card.asked = self.ask
         self.card.moved = self.write_address
@@ -156,6 +160,8 @@ class Page(Tab):
         self.downloads = Downloads()
         self.fields: dict[str, Any] = {}
         self.errors: dict[str, Any] = {}
+        self._exact: dict[str, tuple[str, Any]] = {}
+        """Text of a field, of at most six digits unless they were typed, and the value that it stands for."""
         self.old = Html("", sizing_mode="stretch_width", margin=0, css_classes=["old-words"])
         self.go = pn.widgets.Button(name="Run", button_type="primary", width=70, align="end")
         self.go.on_click(lambda _: self.post(self._ask_typed))
@@ -230,7 +236,7 @@ class Page(Tab):
 
     def _make_fields(self) -> None:
         names = self.card.plane.parameters
-        self.fields, self.errors = {}, {}
+        self.fields, self.errors, self._exact = {}, {}, {}
         for name, words in maps.short_names(names).items():
             row = lookup(name)
             unit = "" if row.quantity.unit == "1" else f" ({row.quantity.unit})"
@@ -511,7 +517,12 @@ class Page(Tab):
             self._make_fields()
         for name, value in point.values.items():
             if name in self.fields:
-                self.fields[name].value = repr(value) if isinstance(value, float) else str(value)
+                text = f"{value:.6g}" if isinstance(value, float) else str(value)
+                typed_so = str(self.fields[name].value_input or self.fields[name].value)
+                if isinstance(value, float) and typed_so.strip() and _same(typed_so, value):
+                    text = typed_so
+                self._exact[name] = (text, value)
+                self.fields[name].value = text
                 self.errors[name].object = ""
         if self._system is not None:
             self._system.fill(keep=True)
@@ -521,7 +532,8 @@ class Page(Tab):
         for name, field in self.fields.items():
             self.errors[name].object = ""
             try:
-                values[name] = typed(lookup(name).short, str(field.value_input or field.value))
+                text, value = str(field.value_input or field.value), self._exact.get(name)
+                values[name] = value[1] if value and value[0] == text else typed(lookup(name).short, text)
             except InputError as error:
                 self.errors[name].object = WRONG.format(error)
         if len(values) < len(self.fields):
@@ -570,7 +582,15 @@ class Page(Tab):
         return Address(
             card.x.value, card.y.value, card.show.value, card.cut(), at, b if self.compare.value else {}, view, self.changes,
             self.address.theme, self.address.type, self.runs[0].parts[tab].title if tab else "", self.card_names[shown] if shown else "",
+            self.address.units,
         ).write()  # fmt: skip
+
+
+def _same(text: str, value: float) -> bool:
+    try:
+        return float(text) == value
+    except ValueError:
+        return False
 
 
 def _brief(value: Any) -> str:

@@ -50,7 +50,9 @@ class ResultPage(Tab):
         assert isinstance(shared.source, ResultSource)
         self.shared, self.source = shared, shared.source
         address = Address.read(arguments)
-        self.look = look_of(address.theme, lecture=address.type == "large")
+        self.look = look_of(
+            address.theme, lecture=address.type == "large", physical=address.units == "physical"
+        )
         names = list(self.source.figures)
         self.shown = pn.widgets.Select(
             options={name.replace("_", " "): name for name in names}, width=240,

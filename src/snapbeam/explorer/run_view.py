@@ -103,6 +103,20 @@ class RunPanel:
         self.cursor.attach(plot)
         return plot
 
+    def scales(self, run: Run) -> tuple[float, float, float]:
+        """Factors of the displacements, velocities and frequency ratios that are shown: mm, mm/s and Hz, or 1."""
+        if not self.look.physical:
+            return 1.0, 1.0, 1.0
+        length, first = 1e3 * run.system.scale.length, run.system.model.reference_frequency
+        return length, length * run.system.scale.omega, first
+
+    @property
+    def units(self) -> tuple[str, str, str]:
+        """Labels of those displacements, velocities and frequencies."""
+        if self.look.physical:
+            return "mm", "mm/s", "frequency (Hz)"
+        return "b", "b ω₁", "frequency over f₁"
+
     def named(self, name: str) -> str:
         """The name of something in this view, another one in each of two runs."""
         return f"{name}{self.cursor.suffix}"
@@ -648,7 +662,7 @@ class Phase(RunPanel):
         dot = models.ColumnDataSource({"w": [], "v": []}, syncable=False)
         plots = [
             figure(look, height=370, used=280, tools="pan,box_zoom,wheel_zoom,reset", x_range=(-1.6, 1.6), y_range=(-1.6, 1.6),
-                   title=title, x_axis_label="displacement w (b)", y_axis_label="velocity (b ω₁)", min_border_left=50)
+                   title=title, x_axis_label=f"displacement w ({self.units[0]})", y_axis_label=f"velocity ({self.units[1]})", min_border_left=50)
             for title in ("Phase portrait", "Stroboscopic section")
         ]  # fmt: skip
         plots[0].line("w", "v", source=self.line, color=look.center, line_width=0.8)
@@ -679,7 +693,8 @@ class Phase(RunPanel):
         x, _ = across(self.run)
         inside = within(x, *self.span)
         step = max(1, -(-(inside.stop - inside.start) // _MOST_PHASE))
-        w, v = (dataset[name].values for name in _SIGNALS[self.where.value])
+        names = zip(_SIGNALS[self.where.value], self.scales(self.run), strict=False)
+        w, v = (scale * dataset[name].values for name, scale in names)
         part = slice(inside.start, inside.stop, step)
         for axis_range, values in ((self.section.x_range, w[inside]), (self.section.y_range, v[inside])):
             good = values[np.isfinite(values)]
@@ -731,8 +746,8 @@ class Spectrum(RunPanel):
         }
         self.sources["midspan_displacement"].name = self.named("spectrum")
         plot = figure(
-            look, height=420, used=230, title=" ", y_axis_type="log", y_axis_label="amplitude (b)",
-            x_axis_label="frequency over f₁", x_range=(0.0, 12.0), y_range=(1e-7, 1.0),
+            look, height=420, used=230, title=" ", y_axis_type="log", y_axis_label=f"amplitude ({self.units[0]})",
+            x_axis_label=self.units[2], x_range=(0.0, 12.0), y_range=(1e-7, 1.0),
             tools="pan,box_zoom,wheel_zoom,reset", active_drag="box_zoom",
         )  # fmt: skip
         for name, source in self.sources.items():
@@ -755,7 +770,8 @@ class Spectrum(RunPanel):
         time, first = run.dataset["time"].values[inside], run.system.model.reference_frequency
         given = run.system.parameters
         ratio = next((value for name, value in given.items() if name.endswith(".frequency_ratio")), None)
-        self.drive.location = ratio
+        length, _, shown = self.scales(run)
+        self.drive.location, self.first.location = ratio and ratio * shown, shown
         self.plot.title.text = (
             f"Cycles {low:.4g} to {high:.4g}, Hann window; dashed: the excitation, dotted: f₁"
         )
@@ -763,10 +779,13 @@ class Spectrum(RunPanel):
         for name, source in self.sources.items():
             frequency, amplitude = amplitude_spectrum(time, run.dataset[name].values[inside])
             kept = (frequency > 0.0) & (frequency <= 40.0 * first)
-            source.data = {"x": frequency[kept] / first, "y": np.maximum(amplitude[kept], 1e-12)}
-            most = max(most, float(amplitude[kept].max(initial=0.0)))
+            source.data = {
+                "x": frequency[kept] / first * shown,
+                "y": np.maximum(length * amplitude[kept], 1e-12),
+            }
+            most = max(most, length * float(amplitude[kept].max(initial=0.0)))
         self.plot.y_range.update(start=1e-7 * most, end=3.0 * most)
-        self.plot.x_range.update(start=0.0, end=max(12.0, 4.0 * (ratio or 1.0)))
+        self.plot.x_range.update(start=0.0, end=shown * max(12.0, 4.0 * (ratio or 1.0)))
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -808,7 +827,7 @@ class WaveformPanel(RunPanel):
         self.below = pn.widgets.Select(options={}, width=230, margin=(0, 10))
         self.below.param.watch(lambda _: self.cursor.later(self._draw, 1), "value")
         top = self.over_time(
-            name=self.named("waveform-plot"), height=265, used=250, share=0.6, y_axis_label="displacement w (b)",
+            name=self.named("waveform-plot"), height=265, used=250, share=0.6, y_axis_label=f"displacement w ({self.units[0]})",
             y_range=(-1.5, 1.5), output_backend="canvas",
         )  # fmt: skip
         for name, (label, color, width, dash) in _DISPLACEMENTS.items():
@@ -847,18 +866,20 @@ class WaveformPanel(RunPanel):
             return
         data = self.run.dataset
         x, label = across(self.run)
+        scale = self.scales(self.run)[0]
         self.low.xaxis.axis_label = label
         shown = []
         struck = "striker_displacement" in data or "midspan_displacement" not in data
         for (name, source), entry in zip(self.sources.items(), self.top.legend[0].items, strict=False):
             there = name in data and (struck or name != "displacement_at_striker")
             entry.visible = there
-            own = [envelope(x, each, *self.span) for each in _columns_of(data, name).T] if there else []
+            series = scale * _columns_of(data, name).T if there else ()
+            own = [envelope(x, each, *self.span) for each in series]
             source.data = _curve(own)
             shown += [y for _, y in own]
         more: Any = ()
         if "striker_displacements" in data:
-            more = _columns_of(data, "striker_displacements").T[1:]
+            more = scale * _columns_of(data, "striker_displacements").T[1:]
         own = [envelope(x, each, *self.span) for each in more]
         self.further[0].data = _curves(own)
         self.top.legend[0].items[-1].visible = bool(own)

@@ -49,6 +49,9 @@ class Look:
     scale: float = 1.0
     """Size of all type over the usual one."""
 
+    physical: bool = False
+    """Whether the views of a run have Hz, mm and mm/s."""
+
     def font(self, size: int) -> str:
         """A size of type, of one in pixels."""
         return f"{round(size * self.scale)}px"
@@ -66,9 +69,9 @@ LECTURE = 1.4
 """Size of type for a projector."""
 
 
-def look_of(theme: str, *, lecture: bool = False) -> Look:
-    """The look of a theme of Panel's; with larger type and lines for a *lecture*."""
-    look = DARK if theme == "dark" else LIGHT
+def look_of(theme: str, *, lecture: bool = False, physical: bool = False) -> Look:
+    """The look of a theme of Panel's; with larger type and lines for a *lecture*, and numbers in *physical* units."""
+    look = replace(DARK if theme == "dark" else LIGHT, physical=physical)
     return replace(look, scale=LECTURE) if lecture else look
 
 
@@ -388,7 +391,9 @@ def framed(page: Page) -> Any:
     dark.js_on_click(code=_TURN % {"name": "theme", "value": "dark"})
     lecture = pn.widgets.Button(name="Lecture" if look.scale == 1.0 else "Desk", align="center")
     lecture.js_on_click(code=_TURN % {"name": "type", "value": "large"})
-    controls = (page.target, page.compare, lecture, dark)
+    units = pn.widgets.Button(name="Ratios" if look.physical else "Hz, mm/s", align="center")
+    units.js_on_click(code=_TURN % {"name": "units", "value": "physical"})
+    controls = (page.target, page.compare, units, lecture, dark)
     top = pn.Row(title, *controls, sizing_mode="stretch_width", css_classes=["top"], margin=0)
     map_tab = pn.Column(page.old, page.card.layout, sizing_mode="stretch_width", margin=0)
     others = page_tabs(page)
