@@ -1,4 +1,4 @@
-"""The explorer in a browser: from the address to the map, and from a click to the waveform.
+"""The explorer in a browser: address to map, first and later clicks to the waveform, a dragged slider, 20 pages at once.
 
 Both are taken by the browser's own clock, after the frame that shows them has been drawn.  A page of HoloViews and
 SciPy (:mod:`benchmarks.peers.scipy_page`) is timed by the same script on the same map.
@@ -45,6 +45,9 @@ _PLACE = """([x, y]) => { const p = Bokeh.index.find_one(Bokeh.documents[0].get_
   return [b.left + p.frame.x_scale.compute(x), b.top + p.frame.y_scale.compute(y)]; }"""
 
 
+_DRAG = """(share) => { for (const model of Bokeh.documents[0]._all_models.values()) {
+  if (model.type === 'Slider' && model.title.includes('thickness')) {
+    window.pressed = performance.now(); model.value = model.start + share * (model.end - model.start); return true; } } return false; }"""
 _BETWEEN = 8.0
 """Seconds between two pages, in which the server ends what it still does for the one before."""
 
@@ -101,10 +104,20 @@ def measured(browser: str, modes: int, cycles: int, clicks: int, paints: int) ->
                 try:
                     first = [_paint(opened, url) for _ in range(paints)]
                     times = _clicks(opened, url, dataset, count, pause)
+                    more = {} if command is peer else {
+                        "slider frame, ms": _summary(_frames(opened, url, dataset)),
+                        "20 pages at once, first paint, ms": _summary(_crowd(opened, url, 20)),
+                    }  # fmt: skip
                 finally:
                     process.terminate()
                     process.wait()
-                found[name] = {"first paint, ms": _summary(first), "click to waveform, ms": _summary(times)}
+                found[name] = {
+                    "first paint, ms": _summary(first),
+                    "click to waveform, ms": _summary(times[2:]),
+                }
+                if command is own:
+                    found[name]["first click, ms"] = round(times[0], 1)
+                    found[name] |= more
         finally:
             opened.close()
     found["case"]["load after"] = list(os.getloadavg()) if hasattr(os, "getloadavg") else []
@@ -162,13 +175,56 @@ def _clicks(browser: Any, url: str, dataset: Any, clicks: int, pause: float) -> 
     page.evaluate(_WATCH)
     rng, times = np.random.default_rng(1), []
     x, y = dataset["frequency_ratio"].values, dataset["velocity_amplitude"].values
-    for at in range(clicks + 2):  # the first two warm the server up
+    for _ in range(clicks + 2):  # the first two warm the server up
         page.evaluate("() => { window.shown = []; }")
         place = [float(x[rng.integers(x.size)]), float(y[rng.integers(y.size)])]
         page.mouse.click(*page.evaluate(_PLACE, place))
         page.wait_for_function("() => window.shown.length > 0")
-        if at > 1:
-            times.append(float(page.evaluate("() => window.shown[0]")))
+        times.append(float(page.evaluate("() => window.shown[0]")))
         time.sleep(pause)  # until the samples that follow, and the neighbour, are computed too
     page.close()
     return times
+
+
+def _frames(browser: Any, url: str, dataset: Any, frames: int = 8) -> list[float]:
+    """From a move of the slider of the thickness to the waveform of its first cycles."""
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.set_default_timeout(120_000.0)
+    page.goto(url)
+    page.wait_for_function(_STAND)
+    page.wait_for_function("() => Bokeh.documents[0].get_model_by_name('waveform')")
+    page.evaluate(_WATCH)
+    page.mouse.click(
+        *page.evaluate(
+            _PLACE, [float(dataset[name][3]) for name in ("frequency_ratio", "velocity_amplitude")]
+        )
+    )
+    page.wait_for_function("() => window.shown.length > 0")
+    page.locator('.bk-tab:has-text("System")').first.click()
+    page.get_by_label("Vary by a slider").select_option(label="beam thickness")
+    page.wait_for_function(_DRAG, arg=0.4)
+    time.sleep(3.0)
+    times = []
+    for share in np.linspace(0.42, 0.6, frames):
+        page.evaluate("() => { window.shown = []; }")
+        page.evaluate(_DRAG, float(share))
+        page.wait_for_function("() => window.shown.length > 0")
+        times.append(float(page.evaluate("() => window.shown[0]")))
+        time.sleep(0.3)
+    page.close()
+    return times
+
+
+def _crowd(browser: Any, url: str, pages: int) -> list[float]:
+    """First paints of pages that are opened at the same time."""
+    opened = [browser.new_page(viewport={"width": 1280, "height": 720}) for _ in range(pages)]
+    for page in opened:
+        page.set_default_timeout(120_000.0)
+        page.goto(url, wait_until="commit")
+    begun = []
+    for page in opened:
+        page.wait_for_function(_STAND, polling=50)
+        begun.append(float(page.evaluate("() => performance.now()")))
+    for page in opened:
+        page.close()
+    return begun

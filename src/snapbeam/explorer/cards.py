@@ -19,33 +19,11 @@ from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 from snapbeam import STATISTICS, InputError, Integration, ResponseClass, RunStatus, System, write_netcdf
-from snapbeam.explorer import maps
+from snapbeam.explorer import jobs, maps, style
 from snapbeam.explorer.address import Address, typed
-from snapbeam.explorer.jobs import (
-    UPLOAD,
-    WINDOW_SECONDS,
-    Token,
-    Waiting,
-    drawing,
-    file_bytes,
-    too_large,
-)
 from snapbeam.explorer.map_view import MapView
 from snapbeam.explorer.run_view import across, within
 from snapbeam.explorer.shared import Shared
-from snapbeam.explorer.style import (
-    BUSY,
-    HEADING,
-    NOTE,
-    REFUSED,
-    Html,
-    Later,
-    Look,
-    Post,
-    button,
-    framed_plot,
-    styled,
-)
 from snapbeam.model.parameter_axes import CHANGES_UNITS
 from snapbeam.model.parameter_file import Config, config_from_mapping
 from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, parameters
@@ -82,10 +60,10 @@ class WindowControl:
 
     def __init__(self, card: MapCard) -> None:
         self.card = card
-        self._token: Token | None = None
+        self._token: jobs.Token | None = None
         self._moved, self._pushed = 0, 0.0
         self._awake = False
-        self._waiting = Waiting(card.shared.compiling, card.later)
+        self._waiting = jobs.Waiting(card.shared.compiling, card.later)
 
     def wake(self) -> None:
         """Start computing visible windows; the page is now loaded in a browser."""
@@ -162,7 +140,7 @@ class WindowControl:
             self.card.show_windows()
             self.card.tell("" if window.finished or not force else "the map is as fine as the screen shows")
             return
-        self._token = token = Token(WINDOW_SECONDS)
+        self._token = token = jobs.Token(jobs.WINDOW_SECONDS)
         self.card.stop.visible, self.card.more.visible = True, False
         self.card.tell("computing this view")
         self._waiting.begin(0, self._still)
@@ -189,7 +167,7 @@ class WindowControl:
             found += [least, most]
         return found[0], found[1], found[2], found[3]
 
-    def _grew(self, window: maps.Window, token: Token) -> None:
+    def _grew(self, window: maps.Window, token: jobs.Token) -> None:
         now = time.monotonic()
         if now - self._pushed > _PUSH and not token.cancelled:
             self._pushed = now
@@ -199,7 +177,7 @@ class WindowControl:
         if self._token is not None:
             self.card.tell(f"computing this view, {seconds:.0f} s" + (f"; {why}" if why else ""))
 
-    def _draw_growing(self, window: maps.Window, token: Token) -> None:
+    def _draw_growing(self, window: maps.Window, token: jobs.Token) -> None:
         if token is not self._token:
             return
         self._waiting.end(0)
@@ -210,7 +188,7 @@ class WindowControl:
             f"window: {window.done} of {window.wanted} points; blocks of {finest} cells now; about {left} left"
         )
 
-    def _ended(self, window: maps.Window, token: Token, words: str) -> None:
+    def _ended(self, window: maps.Window, token: jobs.Token, words: str) -> None:
         if token is self._token:
             self._waiting.end(0)
             self.card.stop.visible = False
@@ -265,7 +243,9 @@ class MapCard:
         ``post(work)`` does something on the page's own thread, ``later(work, milliseconds)`` does it later.
     """
 
-    def __init__(self, look: Look, shared: Shared, address: Address, post: Post, later: Later) -> None:
+    def __init__(
+        self, look: style.Look, shared: Shared, address: Address, post: style.Post, later: style.Later
+    ) -> None:
         self.look, self.shared, self.post, self.later = look, shared, post, later
         self.source = shared.source
         self.system, self.integration = shared.system, shared.integration
@@ -316,7 +296,7 @@ class MapCard:
         self.sliders = {name: self._slider(name, address) for name in grid}
         self.auto = pn.widgets.Checkbox(name="compute the view automatically", value=True, align="center")
         hidden: dict[str, Any] = {"visible": False, "align": "center"}
-        self.stop = button(
+        self.stop = style.button(
             "Stop",
             self.post,
             lambda: self.control.cancel("stopped"),
@@ -324,8 +304,10 @@ class MapCard:
             width=70,
             **hidden,
         )
-        self.more = button("Finer", self.post, lambda: self.control.more(), button_type="primary", **hidden)
-        self.again = button(
+        self.more = style.button(
+            "Finer", self.post, lambda: self.control.more(), button_type="primary", **hidden
+        )
+        self.again = style.button(
             "Compute view",
             self.post,
             lambda: self.control.compute_view(force=True),
@@ -339,10 +321,14 @@ class MapCard:
             },
             value=["windows"], button_type="default",
         )  # fmt: skip
-        self.hover = Html("\xa0", sizing_mode="stretch_width", css_classes=["hover"], margin=(0, 0, 0, 4))
+        self.hover = style.Html(
+            "\xa0", sizing_mode="stretch_width", css_classes=["hover"], margin=(0, 0, 0, 4)
+        )
         self._selected: Markup = Markup("&nbsp;")
-        self.state = Html("", sizing_mode="stretch_width", css_classes=["map-state"], margin=(0, 0, 0, 4))
-        self.key = Html("", sizing_mode="stretch_width", margin=(0, 0, 0, 4), css_classes=["key-box"])
+        self.state = style.Html(
+            "", sizing_mode="stretch_width", css_classes=["map-state"], margin=(0, 0, 0, 4)
+        )
+        self.key = style.Html("", sizing_mode="stretch_width", margin=(0, 0, 0, 4), css_classes=["key-box"])
         for widget in (self.x, self.y):
             widget.param.watch(self._axes_changed, "value")
         self.show.param.watch(lambda _: self.post(self.redraw), "value")
@@ -452,7 +438,7 @@ class MapCard:
         self.slider_box.objects = [
             slider for name, slider in self.sliders.items() if name not in (self.x.value, self.y.value)
         ]  # fmt: skip
-        self.holder.objects = [framed_plot(self.view.plot, margin=0)]
+        self.holder.objects = [style.framed_plot(self.view.plot, margin=0)]
         self.redraw()
         self.control.view_moved()
 
@@ -767,12 +753,12 @@ class SystemCard:
         self.fields: dict[str, Any] = {}
         self._varied = 0.0
         self._filled: dict[str, Any] = {}
-        self.words = Html("", sizing_mode="stretch_width", css_classes=["system-words"])
-        self.facts = Html("", sizing_mode="stretch_width", css_classes=["system-facts"])
+        self.words = style.Html("", sizing_mode="stretch_width", css_classes=["system-words"])
+        self.facts = style.Html("", sizing_mode="stretch_width", css_classes=["system-facts"])
         self.box = pn.Column(sizing_mode="stretch_width", margin=0)
-        apply = button("Use this system", page.post, self.apply, button_type="primary", width=130)
-        back = button("Back to the map's", page.post, self._back, width=130)
-        save = button("Save as TOML", page.post, self.save, width=110)
+        apply = style.button("Use this system", page.post, self.apply, button_type="primary", width=130)
+        back = style.button("Back to the map's", page.post, self._back, width=130)
+        save = style.button("Save as TOML", page.post, self.save, width=110)
         self.preset = pn.widgets.Select(name="Preset", options=["", *_PRESETS], width=210)
         self.preset.param.watch(lambda event: page.post(lambda: self._chosen(event.new)), "value")
         self.vary = pn.widgets.Select(name="Vary by a slider", width=210)
@@ -878,9 +864,12 @@ class SystemCard:
                 if section == "contact" and self.system.contacts:
                     fields = [self.law, *fields]
                 if fields:
-                    parts += [Html(HEADING.format(title), margin=0), pn.FlexBox(*fields, margin=0)]
+                    parts += [
+                        style.Html(style.HEADING.format(title), margin=0),
+                        pn.FlexBox(*fields, margin=0),
+                    ]
             for part in parts:
-                styled(part, self.page.look)
+                style.styled(part, self.page.look)
             self.box.objects = parts
         for row in rows:
             value = held.get(row.name)
@@ -965,18 +954,18 @@ class SystemCard:
     def _given(self, content: bytes | None) -> None:
         if not content:
             return
-        if len(content) > UPLOAD:
-            self.refuse(too_large("the file", len(content)))
+        if len(content) > jobs.UPLOAD:
+            self.refuse(jobs.too_large("the file", len(content)))
             return
 
         def done(config: Config | None, error: str) -> None:
             self.page.post(lambda: self.refuse(error) if config is None else self._open(config))
 
-        self.page.shared.jobs.run(lambda _: _uploaded_config(content), done, Token())
+        self.page.shared.jobs.run(lambda _: _uploaded_config(content), done, jobs.Token())
 
     def refuse(self, words: str) -> None:
         """Say what cannot be done."""
-        self.words.object = REFUSED.format(words)
+        self.words.object = style.REFUSED.format(words)
 
     def save(self) -> None:
         """Give the parameter file of the system."""
@@ -1002,7 +991,7 @@ class SystemCard:
         cell = Markup('<td><span class="faint">{}</span> <b>{}</b></td>')
         cells = Markup("").join(cell.format(name, value) for name, value in facts)
         found = [each.message for each in self.system.diagnostics()]
-        doubts = Markup("").join(REFUSED.format(each) for each in found)
+        doubts = Markup("").join(style.REFUSED.format(each) for each in found)
         self.facts.object = Markup('<table class="facts"><tr>{}</tr></table>{}').format(cells, doubts)
 
 
@@ -1051,8 +1040,8 @@ class TakeCard:
 
     def __init__(self, page: Page) -> None:
         self.page = page
-        self.words = Html("", sizing_mode="stretch_width", css_classes=["take-words"])
-        self.text = Html("", sizing_mode="stretch_width", css_classes=["take-text"])
+        self.words = style.Html("", sizing_mode="stretch_width", css_classes=["take-words"])
+        self.text = style.Html("", sizing_mode="stretch_width", css_classes=["take-text"])
         self.kind = pn.widgets.RadioButtonGroup(options=["png", "pdf", "svg"], value="png")
         slow, length = "slow motion at the hardest impact (s)", "length of the animation (s)"
         self.slow = pn.widgets.FloatInput(name=slow, value=2.0, start=0.0, end=30.0, width=260)
@@ -1067,27 +1056,27 @@ class TakeCard:
             "Map as NetCDF": self._map_data, "Window as NetCDF": self._window_data,
         }  # fmt: skip
         self.buttons = {
-            name: button(name, page.post, partial(self._tried, work), width=145)
+            name: style.button(name, page.post, partial(self._tried, work), width=145)
             for name, work in buttons.items()
         }
         self.link = pn.widgets.Button(name="Copy the link", width=145)
         self.link.js_on_click(args={"button": self.link}, code=_COPY)
         stop: dict[str, Any] = {"button_type": "warning", "width": 180, "visible": False}
-        self.cancel = button("Cancel the animation", page.post, self._cancelled, **stop)
-        self._animating: Token | None = None
+        self.cancel = style.button("Cancel the animation", page.post, self._cancelled, **stop)
+        self._animating: jobs.Token | None = None
 
     @property
     def layout(self) -> Any:
         """The card."""
         make = self.buttons
         return pn.Column(
-            Html(HEADING.format("Figures in the style of the journal, of what is in view"), margin=0),
+            style.Html(style.HEADING.format("Figures in the style of the journal, of what is in view"), margin=0),
             pn.FlexBox(make["Map"], make["Run"], self.kind, margin=0, align_items="center"),
-            Html(HEADING.format(f"Animation of at most {_LONGEST:g} of the visible cycles, and their sound"), margin=0),
+            style.Html(style.HEADING.format(f"Animation of at most {_LONGEST:g} of the visible cycles, and their sound"), margin=0),
             pn.FlexBox(make["MP4"], make["GIF"], self.length, self.slow, make["WAV"], margin=0, align_items="center"),
-            Html(HEADING.format("Data"), margin=0),
+            style.Html(style.HEADING.format("Data"), margin=0),
             pn.FlexBox(make["Parameter file"], make["Run as NetCDF"], make["Map as NetCDF"], make["Window as NetCDF"], self.link, margin=0),
-            Html(HEADING.format("Measured points to lay over the map (CSV)"), margin=0), self.dots,
+            style.Html(style.HEADING.format("Measured points to lay over the map (CSV)"), margin=0), self.dots,
             pn.FlexBox(self.words, self.cancel, margin=0), self.text, sizing_mode="stretch_width", css_classes=["card", "take"],
         )  # fmt: skip
 
@@ -1114,11 +1103,11 @@ class TakeCard:
             texts.append(
                 part.format(f"The command that makes the finest window{beside}", "map-command", command)
             )
-        self.text.object = Markup("").join(texts) or NOTE.format("Click on a point of the map first.")
+        self.text.object = Markup("").join(texts) or style.NOTE.format("Click on a point of the map first.")
 
     def refuse(self, words: str) -> None:
         """Say what cannot be done."""
-        self.words.object = REFUSED.format(words)
+        self.words.object = style.REFUSED.format(words)
 
     # ------------------------------------------------------------------ files
 
@@ -1129,11 +1118,11 @@ class TakeCard:
             self.refuse(str(error))
 
     def _make(
-        self, name: str, suffix: str, write: Callable[[Any], object], token: Token | None = None
+        self, name: str, suffix: str, write: Callable[[Any], object], token: jobs.Token | None = None
     ) -> None:
         """Make a file in the background and send it to the browser."""
-        page, token = self.page, token or Token(_EXPORT_SECONDS)
-        self.words.object = BUSY.format(f"making {name}{suffix}")
+        page, token = self.page, token or jobs.Token(_EXPORT_SECONDS)
+        self.words.object = style.BUSY.format(f"making {name}{suffix}")
 
         def done(content: bytes | None, error: str) -> None:
             def tell() -> None:
@@ -1142,18 +1131,18 @@ class TakeCard:
                 if content is None:
                     self.refuse(error)
                 else:
-                    self.words.object = NOTE.format(f"{name}{suffix}, {len(content) / 1e3:.0f} kB")
+                    self.words.object = style.NOTE.format(f"{name}{suffix}, {len(content) / 1e3:.0f} kB")
                     page.downloads.give(f"{name}{suffix}", content)
 
             page.post(tell)
 
-        page.shared.jobs.export(lambda _: file_bytes(suffix, write), done, token)
+        page.shared.jobs.export(lambda _: jobs.file_bytes(suffix, write), done, token)
 
     def _cancelled(self) -> None:
         if self._animating is not None:
             self._animating.cancel()
         self._animating, self.cancel.visible = None, False
-        self.words.object = NOTE.format("the animation was cancelled")
+        self.words.object = style.NOTE.format("the animation was cancelled")
 
     def _run(self) -> Run:
         """The run that is shown; refused (InputError) if there is none."""
@@ -1165,9 +1154,10 @@ class TakeCard:
     def _run_picture(self) -> None:
         """Give the figure of the view that is seen, of the part of the run that is seen."""
         run, view = self._run(), self.page.runs[self.page.which]
-        name, data, options = view.picture, run.dataset, {"window": view.window}
+        name, data = view.picture, run.dataset
+        options: dict[str, Any] = {"window": view.window} if name == "run" else {}
         if name != "run":
-            data, options = data.isel(time=within(across(run)[0], *view.window)), {}
+            data = data.isel(time=within(across(run)[0], *view.window))
         self._make(name, f".{self.kind.value}", partial(draw, partial(plot_dataset, data, name, **options)))
 
     def _map_picture(self) -> None:
@@ -1175,7 +1165,7 @@ class TakeCard:
         card = self.page.card
         left, right, low, high = view = card.view.view
         cut, name, plane = self._cut(view), card.show.value, card.plane
-        overlay = {
+        overlay: dict[str, Any] = {
             "quasi_static_line": "quasi" in card.layers.value, "measurements": card.dots if "dots" in card.layers.value else None
         }  # fmt: skip
         painter: Callable[..., Any] = partial(plot_statistic, cut, name=name)
@@ -1223,14 +1213,14 @@ class TakeCard:
         length, slow = float(self.length.value), float(self.slow.value)
         if self._animating is not None:
             self._animating.cancel()
-        self._animating = token = Token(_EXPORT_SECONDS)
+        self._animating = token = jobs.Token(_EXPORT_SECONDS)
         self.cancel.visible = True
         told = 0.0
 
         def progress(done: int, total: int) -> None:
             nonlocal told
             token.check(done)
-            drawing.release()  # between two frames another picture may be drawn
+            jobs.drawing.release()  # between two frames another picture may be drawn
             try:
                 time.sleep(0.002)
                 if time.monotonic() - told > _PROGRESS:
@@ -1238,19 +1228,19 @@ class TakeCard:
                     words = f"making run{suffix}: {100 * done / total:.0f} %"
                     self.page.post(lambda: self._report(words, token))
             finally:
-                drawing.acquire()
+                jobs.drawing.acquire()
 
         def write(path: Any) -> None:
             from snapbeam.plot.animation import animate_run
 
-            with drawing:
+            with jobs.drawing:
                 animate_run(run.dataset, path, window, duration=length, slow_motion=slow, progress=progress)
 
         self._make("run", suffix, write, token)
 
-    def _report(self, words: str, token: Token) -> None:
+    def _report(self, words: str, token: jobs.Token) -> None:
         if token is self._animating:
-            self.words.object = BUSY.format(words)
+            self.words.object = style.BUSY.format(words)
 
     def _sound(self) -> None:
         """Give the velocity of mid-span, as long as it lasts, as sound."""
@@ -1277,8 +1267,8 @@ class TakeCard:
     def _dots(self, content: bytes | None) -> None:
         if not content:
             return
-        if len(content) > UPLOAD:
-            self.refuse(too_large("the table", len(content)))
+        if len(content) > jobs.UPLOAD:
+            self.refuse(jobs.too_large("the table", len(content)))
             return
         page, attrs = self.page, self.page.card.source.attrs
 
@@ -1287,11 +1277,11 @@ class TakeCard:
 
         def tell(dots: Any) -> None:
             page.card.dots = dots
-            self.words.object = NOTE.format(f"{len(dots)} measured points")
+            self.words.object = style.NOTE.format(f"{len(dots)} measured points")
             page.card.layers.value = list(dict.fromkeys([*page.card.layers.value, "dots"]))
             page.card.redraw()
 
-        page.shared.jobs.run(lambda _: _uploaded_points(content, attrs), done, Token())
+        page.shared.jobs.run(lambda _: _uploaded_points(content, attrs), done, jobs.Token())
 
 
 _RATE = 44_100
@@ -1329,7 +1319,7 @@ def _uploaded_points(content: bytes, attrs: dict[str, Any]) -> Any:
 
 def draw(painter: Callable[[], Any], path: Any) -> None:
     """Write the figure of the axes that a function draws; one thread at a time may draw."""
-    with drawing:
+    with jobs.drawing:
         figure = painter().get_figure(root=True)
         try:
             save_figure(figure, path)

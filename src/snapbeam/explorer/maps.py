@@ -18,17 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam import (
-    STATISTICS,
-    InputError,
-    InputTypeError,
-    Integration,
-    ResponseClass,
-    RunStatus,
-    RunSummary,
-    System,
-    sweep,
-)
 from snapbeam.explorer.jobs import WINDOW_POINTS, Jobs, Token, check_run
 from snapbeam.model.parameter_axes import to_physical
 from snapbeam.model.parameter_file import config_from_mapping, config_text
@@ -91,7 +80,7 @@ def parameter_name(skeleton: xr.Dataset, name: str) -> str | None:
     said = skeleton[name].attrs.get("parameter", "")
     try:
         return lookup(str(said)).name
-    except InputError:
+    except sb.InputError:
         return None
 
 
@@ -124,11 +113,11 @@ def layers_of(skeleton: xr.Dataset) -> dict[str, MapLayer]:
                 found[f"{name}_{label.replace(' ', '_')}"] = MapLayer(
                     str(name), {further[0]: at}, f"{words}: {label}", unit, shown=not limit
                 )
-    order = list(STATISTICS)
+    order = list(sb.STATISTICS)
 
     def place(name: str) -> tuple[bool, int, str]:
         # those of one of several strikers after those of all
-        whole = name.partition("_contact_")[0] if name in STATISTICS else name
+        whole = name.partition("_contact_")[0] if name in sb.STATISTICS else name
         return (
             name != "response_class",
             order.index(whole) if whole in order else -1,
@@ -140,7 +129,7 @@ def layers_of(skeleton: xr.Dataset) -> dict[str, MapLayer]:
 
 def _entry(dimension: str, value: Any) -> str:
     if dimension == "class_code":
-        return ResponseClass(int(value)).label
+        return sb.ResponseClass(int(value)).label
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
@@ -265,7 +254,7 @@ class Source:
         if name in self.skeleton.variables:
             attrs = self.skeleton[name].attrs
             return str(attrs.get("long_name", name)), str(attrs.get("units", "1"))
-        row = STATISTICS.get(name)
+        row = sb.STATISTICS.get(name)
         return (name, "1") if row is None else (row.long_name, row.unit)
 
     def values(self, name: str) -> xr.DataArray | None:
@@ -288,7 +277,7 @@ class Source:
             with self._reading:
                 return part.load()
         except (OSError, ValueError, RuntimeError) as error:
-            raise InputError(f"{self.name}: cannot be read ({error})") from error
+            raise sb.InputError(f"{self.name}: cannot be read ({error})") from error
 
     def point(self, where: Mapping[str, int]) -> dict[str, Any]:
         """All that the map holds of one point, by name; of a large file only that is read."""
@@ -318,7 +307,7 @@ class DatasetSource(Source):
 
     def __init__(self, dataset: xr.Dataset, name: str = "map") -> None:
         if not is_map(dataset):
-            raise InputError(f"{name}: must be a map over two parameters")
+            raise sb.InputError(f"{name}: must be a map over two parameters")
         self.skeleton = dataset
         self.name = name
 
@@ -327,7 +316,7 @@ def is_map(dataset: xr.Dataset) -> bool:
     """Return whether a dataset has numbers over two parameters, and no figure of its own that shows more."""
     try:
         kind = figures_of(dataset)[0]
-    except InputError:
+    except sb.InputError:
         kind = "map"
     return kind in _MAPS and bool(layers_of(dataset)) and len(_axes_of(dataset)) > 1
 
@@ -347,28 +336,30 @@ class ResultSource(Source):
     def __init__(self, dataset: xr.Dataset, name: str = "result", run: sb.Run | None = None) -> None:
         try:
             self.kind, self.figures = figures_of(dataset)
-        except InputError as error:
-            raise InputError(f"{name}: {str(error).partition(': ')[2]}") from None
+        except sb.InputError as error:
+            raise sb.InputError(f"{name}: {str(error).partition(': ')[2]}") from None
         if not self.figures or self.kind in _MAPS[:1]:
-            raise InputError(f"{name}: a {self.kind} needs two parameters in its axes or coordinates")
+            raise sb.InputError(f"{name}: a {self.kind} needs two parameters in its axes or coordinates")
         self.skeleton, self.name, self.run = dataset, name, run
 
 
 class SystemSource(Source):
     """Axes over a system, without numbers."""
 
-    def __init__(self, system: System, axes: Mapping[str, Any], integration: Integration, name: str) -> None:
+    def __init__(
+        self, system: sb.System, axes: Mapping[str, Any], integration: sb.Integration, name: str
+    ) -> None:
         self.skeleton = axes_dataset(system, axes, integration)
         self.name = name
         self.strikers = len(system.contacts)
 
     def variables(self) -> list[str]:
         """All that a sweep gives."""
-        names = [name for name in STATISTICS if name != "status"]
+        names = [name for name in sb.STATISTICS if name != "status"]
         if self.strikers == 1:
             return names
         each = [f"{name}_contact_{number}" for number in range(1, self.strikers + 1) for name in names]
-        return names + [name for name in each if name in STATISTICS]
+        return names + [name for name in each if name in sb.STATISTICS]
 
 
 def _axes_of(skeleton: xr.Dataset) -> list[str]:
@@ -393,7 +384,7 @@ def _axes_of(skeleton: xr.Dataset) -> list[str]:
     return [*found, *spare[: max(2 - len(found), 0)]]
 
 
-def default_axes(system: System) -> dict[str, Any]:
+def default_axes(system: sb.System) -> dict[str, Any]:
     """Two axes over a system: frequency and amplitude of its excitation, else the first parameters that it has.
 
     Raises
@@ -416,7 +407,7 @@ def default_axes(system: System) -> dict[str, Any]:
     ]
     rows.sort(key=lambda row: (not row.name.endswith("frequency_ratio"), "amplitude" not in row.name))
     if len(rows) < 2:
-        raise InputError(
+        raise sb.InputError(
             "system: has no two parameters of a run, such as an excitation, for the axes of a map"
         )
     axes = {}
@@ -427,7 +418,7 @@ def default_axes(system: System) -> dict[str, Any]:
     return axes
 
 
-def axes_dataset(system: System, axes: Mapping[str, Any], integration: Integration) -> xr.Dataset:
+def axes_dataset(system: sb.System, axes: Mapping[str, Any], integration: sb.Integration) -> xr.Dataset:
     """Coordinates and attributes of a sweep that is not computed."""
     from snapbeam.util.datasets import xr
 
@@ -449,7 +440,7 @@ def axes_dataset(system: System, axes: Mapping[str, Any], integration: Integrati
     return xr.Dataset(coords=coords, attrs=attrs)
 
 
-def integration_mapping(integration: Integration) -> dict[str, Any]:
+def integration_mapping(integration: sb.Integration) -> dict[str, Any]:
     """An integration as plain values, without what does not change a number."""
     return {name: value for name, value in asdict(integration).items() if name != "threads"}
 
@@ -463,7 +454,9 @@ def plain(value: Any) -> Any:
     return value
 
 
-def opened(what: Any, *, system: System | None = None, integration: Integration | None = None) -> Source:
+def opened(
+    what: Any, *, system: sb.System | None = None, integration: sb.Integration | None = None
+) -> Source:
     """The source that was named.
 
     Parameters
@@ -480,13 +473,13 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
     """
     from snapbeam.util.datasets import xr
 
-    if what is None or isinstance(what, System):
+    if what is None or isinstance(what, sb.System):
         from snapbeam.model.parameter_file import Config
 
         chosen = what or system or Config().system
         axes = default_axes(chosen)
         name = "the paper's beam" if what is None and system is None else "a system"
-        return SystemSource(chosen, axes, integration or Integration(), name)
+        return SystemSource(chosen, axes, integration or sb.Integration(), name)
     if isinstance(what, sb.Run):
         return ResultSource(what.dataset, "run", what)
     if isinstance(what, xr.Dataset):
@@ -496,17 +489,17 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
         try:
             folder = path.is_dir()
         except (OSError, ValueError) as error:  # a name that no file can have
-            raise InputError(f"file: is no path ({error})") from None
+            raise sb.InputError(f"file: is no path ({error})") from None
         if folder:
             return CheckpointSource(path)
         if not split_group(path)[0].exists():
-            raise InputError(f"map = {str(path)!r}: there is no such file or checkpoint")
+            raise sb.InputError(f"map = {str(path)!r}: there is no such file or checkpoint")
         dataset = read_result(path, "map", lazily=True)
         if is_map(dataset):
             return DatasetSource(dataset, path.name)
         run = sb.load(path) if "snapbeam_system" in dataset.attrs else None
         return ResultSource(dataset.load() if run is None else run.dataset, path.name, run)
-    raise InputTypeError(
+    raise sb.InputTypeError(
         f"map is a {type(what).__name__}: must be a result, a file, a checkpoint, a System, or None"
     )
 
@@ -530,7 +523,7 @@ class Point:
     values: dict[str, Any]
     expected: dict[str, Any] = field(default_factory=dict)
 
-    def system(self, base: System, integration: Integration) -> tuple[System, Integration]:
+    def system(self, base: sb.System, integration: sb.Integration) -> tuple[sb.System, sb.Integration]:
         """System and solver settings of the run at this point."""
         of_run = {
             split_name(name)[1]: value
@@ -566,7 +559,7 @@ def _brief(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def system_of(attrs: Mapping[str, Any], name: str) -> System:
+def system_of(attrs: Mapping[str, Any], name: str) -> sb.System:
     """System stored in a map.
 
     Raises
@@ -576,32 +569,32 @@ def system_of(attrs: Mapping[str, Any], name: str) -> System:
     """
     text = attrs.get("system")
     if not isinstance(text, str):
-        raise InputError(f"{name}: does not hold the system that it was computed of")
+        raise sb.InputError(f"{name}: does not hold the system that it was computed of")
     sections = _parsed(text, name)
     if any(isinstance(value, dict) for values in sections.values() for value in values.values()):
-        raise InputError(f"{name}: was driven by a record, which is too long to be kept in it")
+        raise sb.InputError(f"{name}: was driven by a record, which is too long to be kept in it")
     arrays = {
         section: {key: np.array(value) if isinstance(value, list) else value for key, value in values.items()}
         for section, values in sections.items()
     }
-    return System.from_mapping(arrays)
+    return sb.System.from_mapping(arrays)
 
 
 def _parsed(text: str, name: str) -> dict[str, Any]:
     try:
         found = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{name}: its description is damaged ({error})") from None
+        raise sb.InputError(f"{name}: its description is damaged ({error})") from None
     if not isinstance(found, dict):
-        raise InputError(f"{name}: its description is damaged")
+        raise sb.InputError(f"{name}: its description is damaged")
     return found
 
 
-def integration_of(attrs: Mapping[str, Any]) -> Integration:
+def integration_of(attrs: Mapping[str, Any]) -> sb.Integration:
     """Solver settings stored in a map; the engine is left out, because single runs use the CPU."""
     found = _parsed(str(attrs.get("integration", "{}")), "integration")
     known = {item: value for item, value in found.items() if value is not None and item != "engine"}
-    return Integration(**known)
+    return sb.Integration(**known)
 
 
 def parameter_of(skeleton: xr.Dataset, name: str) -> str:
@@ -614,12 +607,12 @@ NOT_COMPUTED = "the map has no result here yet"
 """Text of a cell that is not computed, as in an unfinished checkpoint."""
 
 
-def compared(expected: Mapping[str, Any], outcome: RunSummary, engine: str) -> tuple[bool, str]:
+def compared(expected: Mapping[str, Any], outcome: sb.RunSummary, engine: str) -> tuple[bool, str]:
     """Return whether a run is bitwise equal to the values of a map, and a message."""
     expected = {name: value for name, value in expected.items() if name in outcome}
     if not expected:
         return True, ""
-    if expected.get("status") == RunStatus.NOT_RUN:
+    if expected.get("status") == sb.RunStatus.NOT_RUN:
         return True, NOT_COMPUTED
     differing = []
     for name, value in expected.items():
@@ -636,7 +629,7 @@ def compared(expected: Mapping[str, Any], outcome: RunSummary, engine: str) -> t
 
 
 def _why(expected: Mapping[str, Any], engine: str) -> str:
-    if expected.get("status") == RunStatus.FILLED:
+    if expected.get("status") == sb.RunStatus.FILLED:
         return ": the map inferred it from its neighbours"
     if engine == "cuda":
         return ": the map was computed by another engine"
@@ -826,9 +819,11 @@ class _Cut:
         """Refuse (InputError) names that are no two axes of a source."""
         for name in (x, y):
             if name not in source.dims:
-                raise InputError(f"{name}: is no axis of this map, whose axes are {', '.join(source.dims)}")
+                raise sb.InputError(
+                    f"{name}: is no axis of this map, whose axes are {', '.join(source.dims)}"
+                )
         if x == y:
-            raise InputError(f"{x}: stands along both axes")
+            raise sb.InputError(f"{x}: stands along both axes")
 
 
 @dataclass(frozen=True, eq=False)
@@ -1100,8 +1095,8 @@ class Window:
         Statistics by name.
     """
 
-    system: System
-    integration: Integration
+    system: sb.System
+    integration: sb.Integration
     names: tuple[str, str]
     x: NDArray[Any]
     y: NDArray[Any]
@@ -1307,8 +1302,8 @@ def _spread(low: float, high: float, cells: int, log: bool) -> _Array:
 
 
 def planned(
-    system: System,
-    integration: Integration,
+    system: sb.System,
+    integration: sb.Integration,
     names: tuple[str, str],
     bounds: tuple[float, float, float, float],
     log: tuple[bool, bool],
@@ -1443,7 +1438,7 @@ def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) 
         {window.names[0]: ("point", window.x[columns]), window.names[1]: ("point", window.y[rows])}
     )
     spare = max(1, (os.cpu_count() or 2) - 1)  # a run that is clicked on needs a core
-    found = sweep(window.system, table, window.integration.replace(threads=spare), progress=token.check)
+    found = sb.sweep(window.system, table, window.integration.replace(threads=spare), progress=token.check)
     return {str(name): item.values for name, item in found.data_vars.items() if item.dims == ("point",)}
 
 
@@ -1454,8 +1449,8 @@ def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) 
 _CONFIG = "system.toml"
 
 
-def _integration_section(integration: Integration) -> dict[str, Any]:
-    default = integration_mapping(Integration())
+def _integration_section(integration: sb.Integration) -> dict[str, Any]:
+    default = integration_mapping(sb.Integration())
     return {
         name: value
         for name, value in integration_mapping(integration).items()
@@ -1463,30 +1458,30 @@ def _integration_section(integration: Integration) -> dict[str, Any]:
     }
 
 
-def system_toml(system: System, integration: Integration, comment: str = "") -> str:
+def system_toml(system: sb.System, integration: sb.Integration, comment: str = "") -> str:
     """A parameter file of a system, which ``--config`` reads back equal."""
     return config_text(config_from_mapping(sections_of(system, integration)), comment)
 
 
-def sections_of(system: System, integration: Integration) -> dict[str, dict[str, Any]]:
+def sections_of(system: sb.System, integration: sb.Integration) -> dict[str, dict[str, Any]]:
     """A system and how it is integrated, as a parameter file holds them."""
     found = plain(system.to_mapping()) | {"integration": _integration_section(integration)}
     return {section: values for section, values in found.items() if values}
 
 
-def system_from(sections: Mapping[str, Any], name: str = "sections") -> tuple[System, Integration]:
+def system_from(sections: Mapping[str, Any], name: str = "sections") -> tuple[sb.System, sb.Integration]:
     """The system and the integration of a parameter file; refused (InputError) if a page may not ask for them."""
     own = dict(sections)
     start = own.pop("initial_state", None)  # in the units of a system, not in those of a parameter file
     config = config_from_mapping(own, name)
     system, integration = config.system, config.integration
     if start is not None:
-        system = System.from_mapping(system.to_mapping() | {"initial_state": start})
+        system = sb.System.from_mapping(system.to_mapping() | {"initial_state": start})
     check_run(system, integration)
     return system, integration
 
 
-def started(sections: Mapping[str, Any], state: Mapping[str, float]) -> System:
+def started(sections: Mapping[str, Any], state: Mapping[str, float]) -> sb.System:
     """The system of some sections, started from a *state* of amplitudes and velocities by name."""
     own = {section: values for section, values in sections.items() if section != "initial_state"}
     return config_from_mapping(own | {"initial_state": dict(state)}).system
@@ -1516,7 +1511,7 @@ def patched(sections: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str
     return {section: values for section, values in found.items() if values}
 
 
-def values_of(names: Iterable[str], system: System, integration: Integration) -> dict[str, Any]:
+def values_of(names: Iterable[str], system: sb.System, integration: sb.Integration) -> dict[str, Any]:
     """The values of some parameters, also in physical units, by dotted name; without those that a system has not."""
     held = dict(system.parameters) | {"integration.cycles": integration.cycles_or_default}
     found = {}
@@ -1556,7 +1551,7 @@ def map_command(window: Window, fixed: Mapping[str, Any]) -> str:
     return shlex.join([*parts, "-o", "window.nc", "--plot", "window.png"])
 
 
-def python_lines(system: System, integration: Integration, figure: str = "run") -> str:
+def python_lines(system: sb.System, integration: sb.Integration, figure: str = "run") -> str:
     """Self-contained Python code that computes a run of a system and draws a *figure* of it."""
     run = _integration_section(integration)
     arguments = ", ".join(f"{name}={value!r}" for name, value in run.items())

@@ -16,21 +16,9 @@ from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam import InputError, Integration, Run, RunStatus, System
-from snapbeam.explorer import maps
+from snapbeam.explorer import jobs, maps
 from snapbeam.explorer.address import Address, typed
 from snapbeam.explorer.cards import MapCard, SystemCard, TakeCard
-from snapbeam.explorer.jobs import (
-    ADDRESS,
-    RUN_SECONDS,
-    Downloads,
-    Tab,
-    Token,
-    Waiting,
-    check_run,
-    conditioned,
-    samples_of,
-    too_large,
-)
 from snapbeam.explorer.maps import chances as chances_of
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
@@ -61,15 +49,15 @@ class Answer:
 
 
 def answer(
-    card: MapCard, point: maps.Point, base: Any, how: Any, token: Token, look: Callable[[Run], None]
+    card: MapCard, point: maps.Point, base: Any, how: Any, token: jobs.Token, look: Callable[[Run], None]
 ) -> Answer:
     """Compute a point of a card's map; *look* is given the run at a few instants before it is recorded whole."""
     system, integration = point.system(base, how.replace(engine="auto", threads=None))
-    check_run(system, integration)
+    jobs.check_run(system, integration)
     quick = _quick(system, integration, token)
     if quick is not None:
         look(quick)
-    count = samples_of(system, integration)
+    count = jobs.samples_of(system, integration)
     times = None if count is None else _even_times(system, integration, count)
     run = sb.simulate(system, integration, sample_times=times, progress=token.check)
     chances, source = "", card.shared.source
@@ -84,7 +72,7 @@ def answer(
     return Answer(run, words, same, chances)
 
 
-def _quick(system: Any, integration: Any, token: Token) -> Run | None:
+def _quick(system: Any, integration: Any, token: jobs.Token) -> Run | None:
     """The run at a few instants, all that its pictures need made; None where those instants cannot be known."""
     if system.striker is None or not system.striker.drive.harmonic or integration.early_termination:
         return None
@@ -119,7 +107,7 @@ _LONGEST = 1.0
 """Seconds for which the rest of a run waits until its first look has been sent."""
 
 
-class Page(Tab):
+class Page(jobs.Tab):
     """Content of one tab of a browser.
 
     Parameters
@@ -143,11 +131,11 @@ class Page(Tab):
         self.card.asked = self.ask
         self.card.moved = self.write_address
         self.card.cut_moved = self._cut_moved
-        self.waiting = Waiting(shared.compiling, self.later)
+        self.waiting = jobs.Waiting(shared.compiling, self.later)
         self.runs = [RunView(self.look, "A", self.post, self.later)]
         self.runs[0].turned = self.write_address
         self.points: list[maps.Point | None] = [None, None]
-        self._tokens: list[Token | None] = [None, None]
+        self._tokens: list[jobs.Token | None] = [None, None]
         self._dragged: Mapping[str, Any] = {}
         self._dragging = False
         self.runs_box: Any = None
@@ -157,7 +145,7 @@ class Page(Tab):
         )
         self.compare.param.watch(lambda _: self.post(self._compared), "value")
         self.target.param.watch(lambda _: self.post(self._follow), "value")
-        self.downloads = Downloads()
+        self.downloads = jobs.Downloads()
         self.fields: dict[str, Any] = {}
         self.errors: dict[str, Any] = {}
         self._exact: dict[str, tuple[str, Any]] = {}
@@ -317,7 +305,7 @@ class Page(Tab):
 
             self.post(tell)
 
-        self.shared.jobs.export(lambda _: source.refresh(), done, Token())
+        self.shared.jobs.export(lambda _: source.refresh(), done, jobs.Token())
 
     # ------------------------------------------------------------------ runs
 
@@ -337,11 +325,11 @@ class Page(Tab):
         before = self._tokens[which]
         if before is not None:
             before.cancel()
-        self._tokens[which] = token = Token(RUN_SECONDS)
+        self._tokens[which] = token = jobs.Token(jobs.RUN_SECONDS)
         self.points[which] = point
         base, how = self.card.system, self.card.integration
 
-        def work(token: Token) -> Answer:
+        def work(token: jobs.Token) -> Answer:
             return answer(
                 self.card, point, base, how, token, lambda run: self._first(which, point, token, run)
             )
@@ -365,19 +353,23 @@ class Page(Tab):
         if point is not None and point.values | cut != point.values:
             self.ask(maps.Point(point.values | cut))
 
-    def _first(self, which: int, point: maps.Point, token: Token, run: Run) -> None:
+    def _first(self, which: int, point: maps.Point, token: jobs.Token, run: Run) -> None:
         """Show a first look, asked on a thread of the server, and wait until it is on its way to the browser."""
         sent = threading.Event()
         self.post(lambda: self._look(which, point, token, run, sent))
         sent.wait(_LONGEST)  # Python does one thing at a time
 
-    def _look(self, which: int, point: maps.Point, token: Token, run: Run, sent: threading.Event) -> None:
+    def _look(
+        self, which: int, point: maps.Point, token: jobs.Token, run: Run, sent: threading.Event
+    ) -> None:
         if not token.cancelled and self.points[which] is point:
             self.waiting.end(which)
             self.runs[which].show(run, point.words(), fresh=True)
         self.later(sent.set, _SENT)
 
-    def _done(self, which: int, point: maps.Point, token: Token, found: Answer | None, error: str) -> None:
+    def _done(
+        self, which: int, point: maps.Point, token: jobs.Token, found: Answer | None, error: str
+    ) -> None:
         if token.cancelled or self.points[which] is not point:
             return
         self.waiting.end(which)
@@ -395,7 +387,7 @@ class Page(Tab):
             self._take.refresh()
         self._condition(which, point, run, token)
 
-    def _condition(self, which: int, point: maps.Point, run: Run, token: Token) -> None:
+    def _condition(self, which: int, point: maps.Point, run: Run, token: jobs.Token) -> None:
         def done(words: str | None, error: str) -> None:
             def tell() -> None:
                 if not token.cancelled and self.points[which] is point:
@@ -403,7 +395,7 @@ class Page(Tab):
 
             self.post(tell)
 
-        self.shared.jobs.run(lambda t: conditioned(run, t), done, token)
+        self.shared.jobs.run(lambda t: jobs.conditioned(run, t), done, token)
 
     def drag(self, changes: Mapping[str, Any]) -> None:
         """Show the first cycles of the run with some parameters changed; without any, no more of them."""
@@ -413,7 +405,7 @@ class Page(Tab):
         self._dragging, which, (base, how) = True, self.which, self.shown_system()
         how = how.replace(cycles=min(how.cycles_or_default, _DRAGGED), engine="auto", threads=None)
 
-        def work(token: Token) -> Run:
+        def work(token: jobs.Token) -> Run:
             system, short = maps.system_from(maps.patched(maps.sections_of(base, how), changes))
             return _quick(system, short, token) or sb.simulate(system, short, progress=token.check)
 
@@ -434,7 +426,7 @@ class Page(Tab):
                 self.card.marks = [(values, "")]
                 self.card._draw_marks()
 
-        self.shared.jobs.run(work, done, Token(RUN_SECONDS))
+        self.shared.jobs.run(work, done, jobs.Token(jobs.RUN_SECONDS))
 
     def use(self, system: System, integration: Integration, given: Collection[str]) -> None:
         """Compute with another system from now on; the point moves to those of the *given* parameters that the map sweeps.
@@ -556,7 +548,7 @@ class Page(Tab):
 
     def _too_large(self, file: Any) -> None:
         """A file that the browser did not send; said wherever one can be given."""
-        words = too_large(str(file["name"][0]), int(file["bytes"][0]))
+        words = jobs.too_large(str(file["name"][0]), int(file["bytes"][0]))
         for card in (self._take, self._system):
             if card is not None:
                 card.refuse(words)
@@ -566,7 +558,7 @@ class Page(Tab):
     def write_address(self) -> None:
         """Write what is shown into the address: a step in the history of the browser."""
         search = "" if self._quiet else self._search()
-        if len(search) > ADDRESS:
+        if len(search) > jobs.ADDRESS:
             self.card.tell("the system is too long for an address: save it as TOML to open it again")
         elif search and search != self._written:
             step = self.bar.data["step"][0] + 1 if self._written else 0

@@ -14,25 +14,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from snapbeam import STATISTICS, ResponseClass, RunStatus
-from snapbeam.explorer.style import (
-    BUSY,
-    FAINT,
-    Cursor,
-    Html,
-    Later,
-    Look,
-    Post,
-    blend,
-    class_chip,
-    columns,
-    figure,
-    fit,
-    framed_plot,
-    inner_size,
-    legend,
-    sheet,
-    styled,
-)  # fmt: skip
+from snapbeam.explorer import style
 from snapbeam.plot.dataset import figures_of
 from snapbeam.util.si_prefixes import scale_of
 
@@ -69,7 +51,7 @@ class RunPanel:
     picture = "run"
     """The figure of a run that shows the same in a file."""
 
-    def __init__(self, look: Look, cursor: Cursor) -> None:
+    def __init__(self, look: style.Look, cursor: style.Cursor) -> None:
         self.look, self.cursor = look, cursor
         self.place = pn.Column(sizing_mode="stretch_width", margin=0)
         self.built = False
@@ -81,7 +63,7 @@ class RunPanel:
             parts = self.build()
             for part in parts:  # before they are on the page, not after
                 if hasattr(part, "select"):
-                    styled(part, self.look)
+                    style.styled(part, self.look)
             self.place.objects = parts
 
     def build(self) -> list[Any]:
@@ -99,7 +81,7 @@ class RunPanel:
             "active_drag": "xbox_zoom",
             "active_scroll": "xwheel_zoom",
         }
-        plot = figure(self.look, x_range=self.cursor.range, **tools, **options)
+        plot = style.figure(self.look, x_range=self.cursor.range, **tools, **options)
         self.cursor.attach(plot)
         return plot
 
@@ -123,7 +105,7 @@ class RunPanel:
 
     def wrap(self, plot: Any) -> Any:
         """A figure in the page."""
-        return framed_plot(plot, margin=(0, 0, 4, 0))
+        return style.framed_plot(plot, margin=(0, 0, 4, 0))
 
 
 def across(run: Run) -> tuple[NDArray[np.float64], str]:
@@ -249,7 +231,7 @@ class BeamPanel(RunPanel):
             {"x": empty, "top": empty, "low": empty}, syncable=False, name=self.named("beam")
         )
         striker = models.ColumnDataSource({"x": empty, "y": empty, "color": empty}, syncable=False)
-        self.plot = figure(
+        self.plot = style.figure(
             look, name=self.named("beam-plot"), height=330, used=330, title=" ",
             x_axis_label="position (mm)", y_axis_label="displacement (mm)",
             x_range=models.Range1d(0.0, 1.0), y_range=models.Range1d(-1.0, 1.0), tools="pan,wheel_zoom,reset",
@@ -273,7 +255,7 @@ class BeamPanel(RunPanel):
             _DRAW, self.meta, frames=self.frames, shapes=self.shapes, amplitudes=self.amplitudes, modes=self.modes,
             meta=self.meta, beam=beam, striker=striker, rods=self.rods, words=words,
         )  # fmt: skip
-        sheets = [sheet(look), _CONTROLS]
+        sheets = [style.sheet(look), _CONTROLS]
         toggle = models.Toggle(label="► Play", name=self.named("play"), width=90, stylesheets=sheets)
         rates = ["0.02", "0.1", "0.3", "1", "3", "10"]
         speed = models.Select(
@@ -346,14 +328,14 @@ class BeamPanel(RunPanel):
             return
         run, beam = self.run, self.run.system.model.beam
         length = 1e3 * beam.length
-        width, height = inner_size(self.plot, (560, 270))
-        fit = 0.5 * 1.04 * length * height / width
-        scales = {"true proportions": fit, "10 times": fit / 10.0, "100 times": fit / 100.0}
+        width, height = style.inner_size(self.plot, (560, 270))
+        true_half = 0.5 * 1.04 * length * height / width
+        scales = {"true proportions": true_half, "10 times": true_half / 10.0, "100 times": true_half / 100.0}
         half = scales.get(self.scale.value, self.reach)
         self.plot.y_range.update(start=-half, end=half)
         true = self.scale.value == "true proportions"
         drawn = "thickness to scale" if true else "the beam as a line, without its thickness"
-        self.plot.title.text = f"Displacements {fit / half:.3g} times as large as lengths; {drawn}"
+        self.plot.title.text = f"Displacements {true_half / half:.3g} times as large as lengths; {drawn}"
         tall = 0.12 * half
         self.supports.data = {
             "left": [-0.02 * length, length], "right": [0.0, 1.02 * length], "low": [-tall] * 2, "top": [tall] * 2
@@ -420,7 +402,7 @@ class Energy(RunPanel):
     def build(self) -> list[Any]:
         """Return the models of this view."""
         look = self.look
-        self.sources = {name: columns(x=[], y=[]) for name in _CURVES}
+        self.sources = {name: style.columns(x=[], y=[]) for name in _CURVES}
         self.sources["striker_work"].name = self.named("energy")
         self.plot = self.over_time(height=360, used=260, y_axis_label="energy (µJ)", y_range=(0.0, 1.0))
         for name, (label, color) in _CURVES.items():
@@ -428,8 +410,8 @@ class Energy(RunPanel):
                 "x", "y", source=self.sources[name], color=getattr(look, color), line_width=1.4, legend_label=label,
                 line_dash="dashed" if name in ("energy_contact", "energy_striker", "energy_circuit") else "solid",
             )  # fmt: skip
-        legend(self.plot, look)
-        self.words = Html("", sizing_mode="stretch_width")
+        style.legend(self.plot, look)
+        self.words = style.Html("", sizing_mode="stretch_width")
         return [self.wrap(self.plot), self.words]
 
     def show(self, run: Run, low: float, high: float) -> None:
@@ -443,7 +425,7 @@ class Energy(RunPanel):
             item.visible = bool(own)
             source.data = _curve([(at, 1e6 * y) for at, y in own])
             shown += [1e6 * y for _, y in own]
-        fit(self.plot, *shown)
+        style.fit(self.plot, *shown)
         words = ""
         ends = {name: dataset[name].values[[0, -1]] for name in _CURVES if name in dataset}
         works = sum(float(each[1]) for name, each in ends.items() if name.endswith("_work"))
@@ -477,7 +459,9 @@ class Impacts(RunPanel):
 
     title = "Impacts"
 
-    def __init__(self, look: Look, cursor: Cursor, closer: Callable[[float, float], None]) -> None:
+    def __init__(
+        self, look: style.Look, cursor: style.Cursor, closer: Callable[[float, float], None]
+    ) -> None:
         super().__init__(look, cursor)
         self.closer = closer
 
@@ -495,10 +479,10 @@ class Impacts(RunPanel):
         ]
         table = models.DataTable(
             source=self.source, columns=shown, sizing_mode="stretch_width", height=400, index_position=None,
-            stylesheets=[sheet(self.look), _TABLE],
+            stylesheets=[style.sheet(self.look), _TABLE],
         )  # fmt: skip
         self.source.selected.on_change("indices", self._chosen)
-        self.words = Html("", sizing_mode="stretch_width")
+        self.words = style.Html("", sizing_mode="stretch_width")
         return [self.words, pn.pane.Bokeh(table, sizing_mode="stretch_width")]
 
     def show(self, run: Run, low: float, high: float) -> None:
@@ -531,7 +515,7 @@ class Numbers(RunPanel):
 
     def build(self) -> list[Any]:
         """Return the models of this view."""
-        self.table = Html("", sizing_mode="stretch_width")
+        self.table = style.Html("", sizing_mode="stretch_width")
         return [self.table]
 
     def show(self, run: Run, low: float, high: float) -> None:
@@ -578,14 +562,14 @@ class Modal(RunPanel):
         plot = self.over_time(
             height=260, used=215, share=0.6, y_axis_label="αᵢ over α₁ of the well", y_range=(-1.5, 1.5)
         )
-        self.lines = [columns(x=[], y=[]) for _ in range(_SHOWN)]
+        self.lines = [style.columns(x=[], y=[]) for _ in range(_SHOWN)]
         for at, source in enumerate(self.lines):
             color = _COLORS[at] or look.text
             plot.line("x", "y", source=source, color=color, line_width=1.2, legend_label=f"mode {at + 1}")
-        legend(plot, look)
-        self.bars = columns(mode=[], rms=[], top=[])
+        style.legend(plot, look)
+        self.bars = style.columns(mode=[], rms=[], top=[])
         self.bars.name = self.named("modal")
-        low = figure(
+        low = style.figure(
             look, height=170, used=215, share=0.4, y_axis_type="log", x_axis_label="buckling mode i", y_axis_label="rms αᵢ / α₁",
             tools="reset", x_range=(0.4, 32.6), y_range=(1e-8, 1.0),
         )  # fmt: skip
@@ -610,7 +594,7 @@ class Modal(RunPanel):
                 shown.append(inside[1])
             else:
                 source.data = {"x": [], "y": []}
-        fit(self.plot, *shown)
+        style.fit(self.plot, *shown)
         part = alpha[within(x, low, high)]
         rms = np.sqrt(np.mean((part - part.mean(axis=0)) ** 2, axis=0))
         self.bars.data = {"mode": np.arange(1, rms.size + 1), "rms": np.maximum(rms, 1e-16), "top": rms}
@@ -657,17 +641,17 @@ class Phase(RunPanel):
         self.phase = pn.widgets.FloatSlider(
             name="Section at the phase (cycles)", start=0.0, end=1.0, step=0.01, value=0.0, width=240
         )
-        self.line, self.dots = columns(t=[], w=[], v=[]), columns(t=[], w=[], v=[])
+        self.line, self.dots = style.columns(t=[], w=[], v=[]), style.columns(t=[], w=[], v=[])
         self.dots.name = self.named("section")
         dot = models.ColumnDataSource({"w": [], "v": []}, syncable=False)
         plots = [
-            figure(look, height=370, used=280, tools="pan,box_zoom,wheel_zoom,reset", x_range=(-1.6, 1.6), y_range=(-1.6, 1.6),
+            style.figure(look, height=370, used=280, tools="pan,box_zoom,wheel_zoom,reset", x_range=(-1.6, 1.6), y_range=(-1.6, 1.6),
                    title=title, x_axis_label=f"displacement w ({self.units[0]})", y_axis_label=f"velocity ({self.units[1]})", min_border_left=50)
             for title in ("Phase portrait", "Stroboscopic section")
         ]  # fmt: skip
         plots[0].line("w", "v", source=self.line, color=look.center, line_width=0.8)
         plots[0].scatter("w", "v", source=dot, size=9, color=look.accent)
-        palette = blend(look.accent, look.striker)
+        palette = style.blend(look.accent, look.striker)
         colors = linear_cmap("t", palette, 0.0, 1.0)
         self.mapper = colors.transform
         plots[1].scatter("w", "v", source=self.dots, size=5, color=colors)
@@ -742,10 +726,10 @@ class Spectrum(RunPanel):
         """Return the models of this view."""
         look = self.look
         self.sources = {
-            name: columns(x=[], y=[]) for name in ("midspan_displacement", "displacement_at_striker")
+            name: style.columns(x=[], y=[]) for name in ("midspan_displacement", "displacement_at_striker")
         }
         self.sources["midspan_displacement"].name = self.named("spectrum")
-        plot = figure(
+        plot = style.figure(
             look, height=420, used=230, title=" ", y_axis_type="log", y_axis_label=f"amplitude ({self.units[0]})",
             x_axis_label=self.units[2], x_range=(0.0, 12.0), y_range=(1e-7, 1.0),
             tools="pan,box_zoom,wheel_zoom,reset", active_drag="box_zoom",
@@ -753,7 +737,7 @@ class Spectrum(RunPanel):
         for name, source in self.sources.items():
             label, color, _, _ = _DISPLACEMENTS[name]
             plot.line("x", "y", source=source, color=getattr(look, color), legend_label=label, name=name)
-        legend(plot, look)
+        style.legend(plot, look)
         self.drive = models.Span(
             dimension="height", line_color=look.striker, line_dash="dashed", line_width=1.2
         )
@@ -817,7 +801,7 @@ class WaveformPanel(RunPanel):
         look = self.look
         self.run: Run | None = None
         self.span = (0.0, 1.0)
-        self.sources = {name: columns(x=[], y=[]) for name in _DISPLACEMENTS}
+        self.sources = {name: style.columns(x=[], y=[]) for name in _DISPLACEMENTS}
         self.sources["midspan_displacement"].name = self.named("waveform")
         self.force = models.ColumnDataSource({"x": [], "y": []}, name=self.named("force"))
         self.further = [
@@ -840,7 +824,7 @@ class WaveformPanel(RunPanel):
         for plot, source in zip((top, low), self.further, strict=True):
             plot.multi_line("x", "y", source=source, color=look.second, line_width=1.2, line_dash="dotdash")
         self.others = top.renderers[-1]
-        legend(top, look)
+        style.legend(top, look)
         top.legend[0].items.append(
             models.LegendItem(label="other strikers", renderers=[self.others], visible=False)
         )
@@ -883,14 +867,14 @@ class WaveformPanel(RunPanel):
         own = [envelope(x, each, *self.span) for each in more]
         self.further[0].data = _curves(own)
         self.top.legend[0].items[-1].visible = bool(own)
-        fit(self.top, *shown, *(y for _, y in own))
+        style.fit(self.top, *shown, *(y for _, y in own))
         item = data[self.below.value]
         factor, unit = scale_of(item.values, str(item.attrs.get("units", "1")).removesuffix("1"))
         own = [envelope(x, each / factor, *self.span) for each in _columns_of(data, self.below.value).T]
         self.force.data, self.further[1].data = _curve(own), _curves(own[1:])
         words = str(self.below.value).replace("_", " ")
         self.low.yaxis.axis_label = f"{words} ({unit})" if unit else words
-        fit(self.low, *(np.append(y, 0.0) for _, y in own))
+        style.fit(self.low, *(np.append(y, 0.0) for _, y in own))
 
 
 def _curve(curves: list[tuple[_Array, _Array]]) -> dict[str, Any]:
@@ -934,18 +918,18 @@ class RunView:
         ``post(work)``: do something on the page's own thread; ``later(work, milliseconds)``: a little later.
     """
 
-    def __init__(self, look: Look, name: str, post: Post, later: Later) -> None:
+    def __init__(self, look: style.Look, name: str, post: style.Post, later: style.Later) -> None:
         self.look, self.name, self.later = look, name, later
         self.run: Run | None = None
-        self.cursor = Cursor(look, "" if name == "A" else f"-{name}", later)
+        self.cursor = style.Cursor(look, "" if name == "A" else f"-{name}", later)
         self.parts = [
             WaveformPanel(look, self.cursor), Phase(look, self.cursor), Spectrum(look, self.cursor),
             Modal(look, self.cursor), Energy(look, self.cursor), Impacts(look, self.cursor, self._closer),
             BeamPanel(look, self.cursor), Numbers(look, self.cursor),
         ]  # fmt: skip
         wide = {"sizing_mode": "stretch_width", "margin": (0, 0, 2, 0)}
-        self.head = Html(FAINT.format(FIRST), css_classes=["run-head"], **wide)
-        self.note = Html("", css_classes=["run-note"], **wide)
+        self.head = style.Html(style.FAINT.format(FIRST), css_classes=["run-head"], **wide)
+        self.note = style.Html("", css_classes=["run-note"], **wide)
         self.tabs = pn.Tabs(
             *((part.title, part.place) for part in self.parts), dynamic=True, sizing_mode="stretch_width", margin=0
         )  # fmt: skip
@@ -975,11 +959,13 @@ class RunView:
     def begin(self, words: str) -> None:
         """Say what is computed, over the run before."""
         self._write_notes()
-        self._head(BUSY.format("computing"), words)
+        self._head(style.BUSY.format("computing"), words)
 
     def wait(self, words: str, seconds: float, why: str) -> None:
         """Say for how long it has been computed, and what takes the time if that is known."""
-        self._head(BUSY.format(f"computing, {seconds:.0f} s"), words, FAINT.format(why) if why else "")
+        self._head(
+            style.BUSY.format(f"computing, {seconds:.0f} s"), words, style.FAINT.format(why) if why else ""
+        )
 
     def fail(self, words: str) -> None:
         """Say why there is no run; the pictures of the run before are greyed."""
@@ -992,7 +978,7 @@ class RunView:
         self.notes = {}
         self._write_notes()
         self.tabs.css_classes = ["stale"] if self.run is not None else []
-        self.head.object = FAINT.format(words)
+        self.head.object = style.FAINT.format(words)
 
     def _head(self, kind: str, words: str, below: str = "") -> None:
         line = Markup("<br>{}").format(below) if below else ""
@@ -1011,10 +997,10 @@ class RunView:
             final = ", for good" if answer.final_well_proven else ""
             counts = f"{_counted(answer.zero_crossings, 'crossing')}, {_counted(answer.impacts, 'impact')}"
             counts += f", ends in the {well} well{final}"
-            self._head(class_chip(answer.response_class), words, FAINT.format(counts))
+            self._head(style.class_chip(answer.response_class), words, style.FAINT.format(counts))
         else:
             why = _BAD.format(f"{answer.status.name}: {answer.status.advice}")
-            self._head(class_chip(ResponseClass.UNKNOWN), words, why)
+            self._head(style.class_chip(ResponseClass.UNKNOWN), words, why)
         if fresh:
             first, last = across(run)[0][[0, -1]].tolist()
             self._quiet = True
@@ -1024,7 +1010,7 @@ class RunView:
 
     def say(self, about: str, words: str, bad: bool = False) -> None:
         """Put a line under the class, one for each thing that it is about."""
-        self.notes[about] = (_BAD if bad else FAINT).format(words) if words else ""
+        self.notes[about] = (_BAD if bad else style.FAINT).format(words) if words else ""
         self._write_notes()
 
     def _write_notes(self) -> None:
