@@ -201,7 +201,7 @@ def _frames(browser: Any, url: str, dataset: Any, frames: int = 8) -> list[float
     )
     page.wait_for_function("() => window.shown.length > 0")
     page.locator('.bk-tab:has-text("System")').first.click()
-    page.get_by_label("Vary by a slider").select_option(label="beam thickness")
+    page.get_by_label("Vary by a slider").select_option(label="beam.thickness")
     page.wait_for_function(_DRAG, arg=0.4)
     time.sleep(3.0)
     times = []
