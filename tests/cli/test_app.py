@@ -136,7 +136,7 @@ def test_map_writes_what_it_says(cli, tmp_path):
         refused = cli(*MAP, "-o", "c.nc", *wrong)
         assert refused.exit_code == 2 and words in " ".join(refused.stderr.split())
     refused = cli("plot", "map.nc", "-o", "b.png", "--location", "0.3")
-    assert refused.exit_code == 2 and "location: is not an axis of this map" in refused.stderr
+    assert refused.exit_code == 2 and "location: is not an axis of this file" in refused.stderr
 
 
 def test_file_and_options_together(cli, tmp_path):
@@ -186,8 +186,8 @@ def test_a_threshold_and_options_of_other_figures(cli):
     args = ("threshold", "--modes", "1", "--cycles", "8", "--frequency-ratio", "1:2:2", "-o", "border.nc")
     assert cli(*args).exit_code == 0
     assert cli("plot", "border.nc", "-o", "border.png").exit_code == 0
-    for option, value in (("--window", "0:2"), ("--quasi-static-line", None)):
-        refused = cli("plot", "border.nc", "-o", "b.png", option, *([] if value is None else [value]))
+    for options in (("--window", "0:2"), ("--quasi-static-line",), ("--velocity-amplitude", "0.2")):
+        refused = cli("plot", "border.nc", "-o", "b.png", *options)
         assert refused.exit_code == 2 and "leave" in refused.output
 
 

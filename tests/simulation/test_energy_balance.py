@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 
 import numpy as np
@@ -66,3 +67,24 @@ def test_free_vibration_is_balanced() -> None:
     )
     assert run.summary.status == sb.RunStatus.OK
     assert abs(run.dataset.attrs["energy_error"]) < 1e-4
+
+
+@pytest.mark.parametrize("modes", [1, 4])
+def test_rounding_at_rest_is_no_error(modes) -> None:
+    """Without contact the state decays until only the rounding of its energy is left."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes, damping_ratio=0.05)
+    away = sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.01))
+    below = sb.simulate(sb.System(model, contacts=[away]), sb.Integration(cycles=1)).final_state
+    assert below is not None
+    at_well = -np.asarray(model.well_amplitude)
+    state = dataclasses.replace(below, amplitude=at_well * (1.0 + 1e-9), velocity=0.0 * at_well, modal=None)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for _ in range(6):
+            run = sb.simulate(
+                sb.System(model, contacts=[away], initial_state=state), sb.Integration(cycles=15)
+            )
+            assert run.summary.status == sb.RunStatus.OK
+            state = run.final_state
+            assert state is not None
+    assert run.summary["impacts"] == 0

@@ -263,7 +263,7 @@ def bifurcation_diagram(
 
 @dynamics.command("hysteresis", cls=ShortHelpCommand)
 @cli_command
-@with_parameters(*_ALL, axes=_AXES[:3])
+@with_parameters(*_ALL)
 def hysteresis(
     given: Any,
     parameter: Parameter = "velocity_amplitude",

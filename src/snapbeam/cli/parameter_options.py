@@ -909,7 +909,7 @@ def coordinate_on_axis(dataset: xr.Dataset, option: str, text: str) -> tuple[str
     dim = next((each for each, full in axes.items() if full in (row.name, ratio_of(row.name))), None)
     if dim is None:
         raise InputError(
-            f"{option} = {text!r}: {name} is not an axis of the file; its axes are {', '.join(axes)}"
+            f"{option} = {text!r}: {name} is not an axis of the file; its axes: {', '.join(axes) or 'none'}"
         )
     if dataset[dim].dtype.kind in "OU":
         return dim, value

@@ -17,6 +17,8 @@ __all__ = ["plot"]
 
 
 _SLICE = "Slice of a map, at the nearest grid value"
+_OVER = ("lower_threshold", "threshold", "probability", "lifetime", "response_class")
+"""Variables over the axes of a sweep; the first of a file tells its axes."""
 
 
 @cli_command
@@ -99,9 +101,10 @@ def _sliced(dataset: xr.Dataset, wanted: dict[str, float | None], at: list[str])
 
     chosen = {name: value for name, value in wanted.items() if value is not None}
     chosen |= dict(opt.coordinate_on_axis(dataset, "at", text) for text in at)
+    over = next((dataset[name].dims for name in _OVER if name in dataset), ())
     for name in chosen:
-        if name not in dataset.dims:
+        if name not in over:
             raise InputError(
-                f"{name}: is not an axis of this map; available axes: {', '.join(map(str, dataset.dims))}"
+                f"{name}: is not an axis of this file; its axes: {', '.join(map(str, over)) or 'none'}; leave it out"
             )
     return dataset.sel(chosen, method="nearest") if chosen else dataset

@@ -50,7 +50,7 @@ class Look:
     """Size of all type over the usual one."""
 
     physical: bool = False
-    """Whether the views of a run have Hz, mm and mm/s."""
+    """Units of the views of a run: Hz, mm and mm/s if True, ratios if False."""
 
     def font(self, size: int) -> str:
         """A size of type, of one in pixels."""

@@ -251,6 +251,6 @@ def plot_dataset(
     name = next(iter(figures), "") if variable is None else variable
     if name not in figures:
         raise InputError(
-            f"variable = {shown(name)}: is not drawn of this {words}; choose one of {', '.join(figures) or 'none'}"
+            f"variable = {shown(name)}: is no figure of this file ({words}); choose one of {', '.join(figures) or 'none'}"
         )
     return figures[name](dataset, ax=ax, **options)

@@ -172,10 +172,12 @@ def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
     named = [str(name) for name in response.dims]
     if len(named) != 2 or "point" in named:
         sizes = ", ".join(f"{name} {size}" for name, size in response.sizes.items()) or "none"
-        raise InputError(
-            f"a map is drawn over two axes of more than one point; this one has {sizes}: select one point of the "
-            "others, as with dataset.isel(location=0)"
+        more = (
+            f"select one value of {named[-1]}, by --at {named[-1]}=VALUE or dataset.sel({named[-1]}=VALUE, method='nearest')"
+            if len(named) > 2
+            else "select fewer values"
         )
+        raise InputError(f"a map is drawn over two axes of more than one point; this one has {sizes}: {more}")
     across, upward = _in_order(named)
     return across, upward, response.transpose(upward, across).values
 

@@ -81,7 +81,10 @@ def load(path: str | os.PathLike[str]) -> Run:
     dataset = read_netcdf(path)
     attrs = dict(dataset.attrs)
     if attrs.pop("snapbeam_format", None) != _FORMAT:
-        raise InputError(f"path = {str(path)!r}: is not a run that Run.save wrote; simulate it again")
+        raise InputError(
+            f"path = {str(path)!r}: is not a run that Run.save wrote; open a map or another result with "
+            "xarray.open_dataset"
+        )
     parts = {name: read_netcdf(path, group=name) for name in _GROUPS}
     try:
         system = System.from_mapping(_arrays(json.loads(attrs.pop("snapbeam_system"))))

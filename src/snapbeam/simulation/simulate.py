@@ -27,7 +27,7 @@ from snapbeam.solver.assemble import make_ensemble, plans_of, run_columns
 from snapbeam.solver.cpu.driver import usable_cores
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.registry import resolve
-from snapbeam.solver.statistics import Recorded, lost_in_circuits, statistics_of
+from snapbeam.solver.statistics import Recorded, lost_in_circuits, rounding_energy, statistics_of
 from snapbeam.solver.step_size import Plan
 from snapbeam.solver.terms import WORKS
 from snapbeam.util.diagnostics import Diagnostic, counting, sharing, tell
@@ -222,9 +222,20 @@ def run_attributes(run: Prepared, summary: RunSummary, accumulators_of_runs: Any
     more["status"] = f"{summary.status.name}: {summary.status.advice}"
     attrs = attributes_of("run of a struck bistable beam", run.system, run.integration, run.plan, more)
     attrs["gross_work"] = float(accumulators_of_runs["gross_work"][0])
-    attrs["energy_error"] = _energy_error(accumulators_of_runs)
-    if summary.status is not RunStatus.DIVERGED:
-        tell(_energy_diagnostics(attrs["energy_error"]))
+    missed, scale = _energy_balance(accumulators_of_runs)
+    attrs["energy_error"] = missed / scale
+    rounding = float(rounding_energy(run.ensemble, accumulators_of_runs)[0])
+    if summary.status is not RunStatus.DIVERGED and abs(missed) > _ENERGY_ERROR * scale + rounding:
+        tell(
+            [
+                Diagnostic(
+                    "energy-balance",
+                    f"the energy-balance error is {abs(missed / scale):.2g} of the gross work: the steps are too long; use "
+                    "accuracy = 'reference', a tolerance, or a smaller step",
+                    {"energy_error": missed / scale},
+                )
+            ]
+        )
     if run.accuracy is not None:
         attrs |= run.accuracy.attributes()
     return attrs
@@ -251,10 +262,11 @@ def _own_attributes(system: System, integration: Integration, lasted: float) -> 
     return attrs
 
 
-def _energy_error(accumulators_of_runs: Any) -> float:
-    """Return the energy-balance error of a recorded run at its end, over the gross work; 0 for exact steps.
+def _energy_balance(accumulators_of_runs: Any) -> tuple[float, float]:
+    """Return the energy-balance error of a recorded run at its end, J, and the gross work; (0, W) for exact steps.
 
-    The error is the external work minus the energy gain of beam, contact and circuit and the dissipated energy.
+    Without work the energies take its place.  The error is the external work minus the energy gain of beam, contact and
+    circuit and the dissipated energy.
     """
     accumulators = accumulators_of_runs[0]
     with np.errstate(invalid="ignore"):  # a run that failed has no numbers
@@ -270,20 +282,7 @@ def _energy_error(accumulators_of_runs: Any) -> float:
         or float(abs(accumulators["first_energy"]) + abs(accumulators["energy"]))
         or 1.0
     )
-    return float(missed) / scale
-
-
-def _energy_diagnostics(error: float) -> list[Diagnostic]:
-    if not abs(error) > _ENERGY_ERROR:
-        return []
-    return [
-        Diagnostic(
-            "energy-balance",
-            f"the energy-balance error is {abs(error):.2g} of the gross work: the steps are too long; use "
-            "accuracy = 'reference', a tolerance, or a smaller step",
-            {"energy_error": error},
-        )
-    ]
+    return float(missed), scale
 
 
 def _regular_count(system: System, end: float, period: float) -> int:

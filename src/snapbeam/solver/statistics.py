@@ -40,6 +40,7 @@ __all__ = [
     "lost_in_circuits",
     "of_one_named",
     "register_statistic",
+    "rounding_energy",
     "rows_for",
     "statistics_of",
     "unregister_statistic",
@@ -50,6 +51,8 @@ _MADE = 0.01
 """Tolerance of the energy balance over the gross work: a run that gains more energy is not accepted."""
 _ROUNDED = 1e-6
 """The same over the energies, for rounding."""
+_CANCELLED = 1e-12
+"""The same over the energy of the well, which energies are differences from."""
 _Array = NDArray[np.float64]
 
 
@@ -482,6 +485,12 @@ def empty_accumulators(runs: int, others: int = 0, circuits: int = 0) -> Any:
     return accumulators_of_runs
 
 
+def rounding_energy(ensemble: Ensemble, accumulators_of_runs: NDArray[Any]) -> _Array:
+    """Energy that rounding may add to each run, J, even where nothing does work."""
+    ends = np.abs(accumulators_of_runs["energy"]) + np.abs(accumulators_of_runs["first_energy"])
+    return np.asarray(_ROUNDED * ends + _CANCELLED * abs(ensemble.structure.model.well_energy))
+
+
 def lost_in_circuits(accumulators_of_runs: Any) -> NDArray[np.float64]:
     """Energy lost in all circuits of each run, J."""
     if "circuits" not in accumulators_of_runs.dtype.names:
@@ -569,8 +578,7 @@ class Reading:
         with np.errstate(invalid="ignore"):  # runs that failed have no numbers
             given = sum((accumulators[name] for name in WORKS), start=accumulators["work"])
             made = accumulators["energy"] - accumulators["first_energy"] - given
-        allowed = _MADE * accumulators["gross_work"]
-        allowed = allowed + _ROUNDED * (np.abs(accumulators["energy"]) + np.abs(accumulators["first_energy"]))
+        allowed = _MADE * accumulators["gross_work"] + rounding_energy(self.ensemble, accumulators)
         return np.where(done & (made > allowed), RunStatus.ENERGY_ERROR, status)
 
     @cached_property
