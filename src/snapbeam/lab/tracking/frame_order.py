@@ -2,9 +2,9 @@
 
 A frame that is lost makes both move two steps in one; a frame shown twice makes both stand still for one.  Some
 frames before a place and as many after it are fitted with one polynomial over time, whose clock runs on evenly, jumps by
-the frames that were lost, or stops for a frame.  The striker moves smoothly, so more frames tell more of it.  Where
-the motion turns back, a cubic over few frames may be too stiff and a jump of the clock makes up for it: a place
-counts only if no other fit, over more frames or of a higher degree, is good with the even clock alone.
+the frames that were lost, or stops for a frame.  The striker moves smoothly, so more frames tell more of it.  With an even clock the motion may also bend faster, or
+change its velocity about the place as a body does that is struck or starts; a place counts only if no such motion, and
+no fit over more frames, explains it as well.
 """
 
 from __future__ import annotations
@@ -25,11 +25,12 @@ __all__ = ["FrameOrder", "find_order", "without_repeats"]
 
 _HALVES = (5, 8, 12)  # frames on either side of a place; of the beam the first
 _DEGREES = (3, 5)
+_BENDS = 7  # degree of a motion over many frames with an even clock
 _MOST = 3  # frames lost at one place
-_BETTER = 30.0  # chi-square by which a clock must be better than one that runs on evenly
-_TOUCHING = 3.0  # times as much, where the tip may touch the beam
+_BETTER = 50.0  # chi-square by which a clock must be better than one that runs on evenly
+_FURTHER = 15.0  # the same, in a recording in which one place is known
+_PARAMETER = 3.0  # chi-square that a parameter more of the motion must explain
 _SPREADS = 5.5  # standard deviations of chi-square that a fit may leave beyond its degrees of freedom
-_APART = 2.0  # px of gap at which beam and tip move on their own
 _LEAST_NOISE = 0.005  # px
 
 
@@ -45,35 +46,20 @@ class FrameOrder(NamedTuple):
     clock: tuple[tuple[str, dict[str, float]], ...] = ()
 
 
-def find_order(row: Floats, shaker: Floats, penetration: Floats) -> FrameOrder:
-    """Detect lost and repeated frames.
-
-    Parameters
-    ----------
-    row, shaker
-        Rows [px] of beam and shaker, NaN where unknown.
-    penetration
-        Of the tip into the beam [px].
-    """
+def find_order(row: Floats, shaker: Floats) -> FrameOrder:
+    """Detect lost and repeated frames from the rows [px] of beam and shaker, NaN where unknown."""
     if row.size < 4 * _HALVES[-1]:
         return FrameOrder((), (), ())
-    followed = bool(np.isfinite(shaker).any())
-    # a beam that may be struck changes its velocity; without a shaker nothing tells when
-    beam = _better(row, penetration, _HALVES[0], _DEGREES[0], 0.0 if followed else 1.0 / _TOUCHING)
-    gain = np.max(
-        [
-            beam + _better(shaker, penetration, half, degree, 1.0 / _TOUCHING)
-            for half in _HALVES
-            for degree in _DEGREES
-        ],
-        axis=0,
-    )
+    beam = _better(row, _HALVES[0])
+    gain = np.max([beam + _better(shaker, half) for half in _HALVES], axis=0)
     for values in (row, shaker):
         gain[_contradicted(values)] = 0.0
     best = gain.argmax(0)
     size = gain.max(0)
-    repeated, missing, many = [], [], []
-    while size.max() > _BETTER:
+    repeated: list[int] = []
+    missing: list[int] = []
+    many: list[int] = []
+    while size.max() > (_FURTHER if repeated or missing else _BETTER):
         at = int(size.argmax())
         if best[at] == 0:
             repeated.append(at)
@@ -102,23 +88,31 @@ def without_repeats(rows: TrackedRows, order: FrameOrder) -> TrackedRows:
     return dataclasses.replace(rows, flags=flags, confidence=confidence, **changed)
 
 
-def _better(values: Floats, penetration: Floats, half: int, degree: int, touching: float) -> Floats:
+def _better(values: Floats, half: int) -> Floats:
     """Chi-square by which each clock is better than an even one, before each frame.
 
-    *touching* is the share of it that counts where the tip may touch the beam.
+    With the even one the motion may also turn faster (a higher degree), or change its velocity about the place as a
+    body does that is struck or starts; each parameter more costs :data:`_PARAMETER`.
     """
     out = np.zeros((_MOST + 1, values.size))
     noise = _noise(values)
     if not math.isfinite(noise):
         return out
-    views = np.lib.stride_tricks.sliding_window_view
-    windows = views(values, 2 * half)
-    left = np.stack([_left(windows, clock, degree) for clock in _clocks(half)]) / noise**2
-    fits = _good(half, degree)
-    better = np.where((left[0] > fits) & (left[1:] > fits), 0.0, left[0] - left[1:])
-    with np.errstate(invalid="ignore"):
-        flying = (views(penetration, 2 * half) < -_APART).all(1)
-    better *= np.where(flying, 1.0, touching)
+    windows = np.lib.stride_tricks.sliding_window_view(values, 2 * half)
+    even, *others = _clocks(half)
+    fits = _good(half, _DEGREES[0])
+
+    def least(designs: list[Floats]) -> Floats:
+        costs = [_PARAMETER * (design.shape[1] - _DEGREES[0] - 1) for design in designs]
+        left = [_left(windows, one) / noise**2 + cost for one, cost in zip(designs, costs, strict=True)]
+        return np.min(left, axis=0)
+
+    left = np.stack([least([_powers(clock, degree) for degree in _DEGREES]) for clock in others])
+    struck = [np.maximum(even - at, 0.0) for at in (-0.5, 0.0, 0.5)]
+    smooth = [_powers(even, degree) for degree in _DEGREES]
+    smooth += [_powers(even, _BENDS)] * (half > _HALVES[0])
+    best = least([*smooth, *(np.column_stack([smooth[0], hinge]) for hinge in struck)])
+    better = np.where((best > fits) & (left > fits), 0.0, best - left)
     out[:, half : half + better.shape[1]] = np.where(np.isfinite(better), better, 0.0)
     return out
 
@@ -132,7 +126,7 @@ def _contradicted(values: Floats) -> NDArray[np.bool_]:
     for half in _HALVES:
         windows = np.lib.stride_tricks.sliding_window_view(values, 2 * half)
         for degree in _DEGREES:
-            left = np.stack([_left(windows, clock, degree) for clock in _clocks(half)]) / noise**2
+            left = np.stack([_left(windows, _powers(clock, degree)) for clock in _clocks(half)]) / noise**2
             fits = _good(half, degree)
             with np.errstate(invalid="ignore"):
                 out[:, half : half + left.shape[1]] |= (left[0] <= fits) & (left[1:] > fits)
@@ -154,10 +148,13 @@ def _clocks(half: int) -> Floats:
     return np.stack([even, twice, *late])
 
 
-def _left(windows: Floats, clock: Floats, degree: int) -> Floats:
-    """Sum of squares that a polynomial over *clock* leaves of each window."""
-    middle = (clock - clock.mean()) / clock.size
-    basis = np.linalg.qr(np.vander(middle, degree + 1))[0]
+def _powers(clock: Floats, degree: int) -> Floats:
+    return np.vander((clock - clock.mean()) / clock.size, degree + 1)
+
+
+def _left(windows: Floats, design: Floats) -> Floats:
+    """Sum of squares that the columns of *design* leave of each window."""
+    basis = np.linalg.qr(design)[0]
     left: Floats = ((windows - (windows @ basis) @ basis.T) ** 2).sum(1)
     return left
 
@@ -168,4 +165,5 @@ def _noise(values: Floats) -> float:
     bends = bends[np.isfinite(bends)]
     if bends.size < 4 * _HALVES[0]:
         return math.nan
-    return max(1.4826 * float(np.median(np.abs(bends))) / math.sqrt(70.0), _LEAST_NOISE)
+    # the quarter, which many frames out of order do not move; of normal noise it is 0.3186
+    return max(float(np.percentile(np.abs(bends), 25.0)) / 0.3186 / math.sqrt(70.0), _LEAST_NOISE)

@@ -81,8 +81,12 @@ def tracked_dataset(
     rows = _as_filtered(rows, scene.noise, fields, trail)
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
     if not rest.indices.size:
+        located = int(np.isfinite(rows.row).sum())
+        counts = {str(flag.name).lower().replace("_", " "): rows.flagged(flag) for flag in FrameFlag if flag}
+        reasons = ", ".join(f"{name}: {number}" for name, number in counts.items() if number)
         raise InputError(
-            f"{recording.path}: the beam was found in none of the frames at rest; "
+            f"{recording.path}: the beam was found in none of the frames at rest, in {located} of {rows.row.size} at all "
+            f"(flags: {reasons}); "
             + (
                 "set rest_frames (--rest-frames)"
                 if settings.rest_frames is None
@@ -95,12 +99,9 @@ def tracked_dataset(
     beam, shaker = scene.beam, scene.shaker
     order = FrameOrder((), (), ())
     if not (fields.shift or fields.apart or scene.noise.lag):
-        depth = (
-            rows.row + beam.thickness - rows.shaker - (shaker.tip_offset if shaker is not None else np.nan)
-        )
         clock = tuple(drive_clock(rows.shaker))
         if all(kind != "scattered" for kind, _ in clock):  # frames at uneven times look like lost ones
-            order = find_order(rows.row, rows.shaker, depth)
+            order = find_order(rows.row, rows.shaker)
             rows = without_repeats(rows, order)
             clock = tuple(drive_clock(rows.shaker))
         order = order._replace(clock=clock)
