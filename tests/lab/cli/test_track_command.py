@@ -82,3 +82,29 @@ def test_a_recording_in_which_nothing_is_found_leaves_a_picture_with_rows_and_co
     result = run(recorded[1], "--region", "140:158,0:64", "-o", tmp_path / "t.nc")
     assert result.exit_code == 2 and "t.png" in result.output
     assert [file.name for file in tmp_path.iterdir()] == ["t.png"]
+
+
+def speckled(count=4):
+    """Frames of a beam with speckles as dark as a clamp's shadow, clamps at both ends, and a sensor above it."""
+    rng = np.random.default_rng(3)
+    frames = 30.0 + 5.0 * rng.standard_normal((count, 80, 400))
+    grain = np.kron(rng.random((7, 70)) < 0.5, np.ones((4, 4)))
+    for k, frame in enumerate(frames):
+        frame[25 + k : 53 + k, 60:340] += 90.0 + 90.0 * grain
+        frame[:, :20] += 150.0
+        frame[5 + k : 25 + k, 100:108] += 150.0
+    return frames.clip(0, 255).astype(np.uint8)
+
+
+def test_a_recording_without_scales_is_looked_at_and_its_regions_are_options_to_repeat(tmp_path):
+    path = tmp_path / "speckled.npy"
+    np.save(path, speckled())
+    result = run(path, "-o", tmp_path / "t.nc")
+    assert result.exit_code == 2 and "frame_rate" in result.output and (tmp_path / "t.png").exists()
+    given = [line.split() for line in result.output.splitlines() if line.strip().startswith("--region")]
+    assert given
+    scales = ("--frame-rate", 1000, "--pixel-size", 1e-5, "--rest-frames", 1)
+    result = run(path, *scales, *given[-1], "-o", tmp_path / "t.nc")
+    assert result.exit_code == 0, result.output
+    with xr.open_dataset(tmp_path / "t.nc", engine="h5netcdf") as dataset:
+        np.testing.assert_allclose(np.diff(dataset["beam_row"]), 1.0, atol=0.5)

@@ -16,6 +16,7 @@ from snapbeam.lab.cli import options as lab
 
 if TYPE_CHECKING:
     from snapbeam.lab.camera import Recording
+    from snapbeam.lab.tracking.settings import TrackingSettings
 
 __all__ = [
     "Background",
@@ -250,8 +251,9 @@ def track(
 
     The command finds the beam, the shaker and a sticker on it, fits their edges to a fraction of a pixel, and writes the
     displacements with standard errors and flags to a NetCDF file.  Frames without a valid edge are NaN and have a flag.
-    Diagnostics report doubtful results; with --strict they are errors.  Where tracking fails, the command writes a
-    picture of the frame with rows and columns for --region, to the file of --picture or beside --output.
+    Diagnostics report doubtful results; with --strict they are errors.  Where tracking fails, or a scale is missing, the
+    command writes a first look, to the file of --picture or beside --output: a frame with the objects at the threshold
+    and the regions in which it finds a beam, whose options it prints.
 
     Example: snapbeam track test.cihx --pixel-size 12e-6 --buckling-level 0.335e-3 -o test.nc --picture
     frame.png --report quality.png
@@ -285,12 +287,15 @@ def track(
     )  # fmt: skip
     part = None if region is None else lab.whole_numbers("region", region, 4)
     start = time.monotonic()
-    with _opened(recording, frame_rate, pixel_size, part, scale_marks) as opened:
+    look = (settings, frame, picture or output)
+    with _first_look_at(recording, part, look):
+        opened = _opened(recording, frame_rate, pixel_size, part, scale_marks)
+    with opened:
         if picture is not None:
             integer("frame", frame, 0, len(opened) - 1)
         if background is not None:
             settings = settings.changed(background=_picture(background, opened))
-        with progress(len(opened), "track", "frames") as tell, _pictured(opened, frame, picture or output):
+        with progress(len(opened), "track", "frames") as tell, _first_look_at(recording, part, look):
             dataset = track_recording(opened, settings, progress=tell)
         elapsed = time.monotonic() - start
         files = []
@@ -370,24 +375,42 @@ def _opened(
 
 
 @contextmanager
-def _pictured(recording: Recording, frame: int, path: Path) -> Iterator[None]:
-    """Write a picture of a frame as it was recorded if tracking fails, beside *path* unless that is a figure."""
+def _first_look_at(
+    path: Path, region: tuple[int, ...] | None, look: tuple[TrackingSettings, int, Path]
+) -> Iterator[None]:
+    """If a recording cannot be opened or tracked, write its first look beside the output unless that is a figure."""
+    from snapbeam.lab.camera import open_recording
     from snapbeam.util.validation import InputError
 
     try:
         yield
     except InputError as error:
-        import matplotlib
-
-        matplotlib.use("Agg")
-        from snapbeam.lab.plot.tracking import plot_recorded_frame
-        from snapbeam.plot.style import save_figure
+        from snapbeam.lab.tracking.first_look import first_look
         from snapbeam.util.files import check_writable
 
-        path = path.with_suffix(".png") if path.suffix == ".nc" else path
-        check_writable(path, "picture")
-        save_figure(plot_recorded_frame(recording, min(frame, len(recording) - 1)), path)
-        raise InputError(f"{error}; see the rows and columns in {path}") from error
+        settings, frame, target = look
+        try:  # with any scale
+            recording = open_recording(path, frame_rate=1.0, pixel_size=1e-5, region=region)  # type: ignore[arg-type]
+        except InputError:
+            raise error from None
+        with recording:
+            try:
+                settings.checked_for(recording.shape, len(recording))
+                found = first_look(recording, settings)
+            except InputError:
+                raise error from None
+            import matplotlib
+
+            matplotlib.use("Agg")
+            from snapbeam.lab.plot.tracking import plot_first_look
+            from snapbeam.plot.style import save_figure
+
+            target = target.with_suffix(".png") if target.suffix == ".nc" else target
+            check_writable(target, "picture")
+            save_figure(plot_first_look(recording, found, settings, min(frame, len(recording) - 1)), target)
+        regions = "".join(f"\n  {one}" for one in found.options.values())
+        told = f"; a beam is found with{regions}" if regions else "; no beam is found in any part of it"
+        raise InputError(f"{error}; see the rows, columns and objects in {target}{told}") from error
 
 
 def _picture(path: Path, recording: Recording) -> Any:

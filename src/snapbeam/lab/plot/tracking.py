@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
 
 from snapbeam.lab.tracking.settings import FrameFlag, Orientation
 from snapbeam.lab.tracking.track import check_tracked, tracking_quality
@@ -32,8 +33,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from snapbeam.lab.camera import Recording
+    from snapbeam.lab.tracking.first_look import FirstLook
+    from snapbeam.lab.tracking.settings import TrackingSettings
 
-__all__ = ["annotated_video", "found_edges", "plot_frame", "plot_recorded_frame", "plot_tracking_quality"]
+__all__ = ["annotated_video", "found_edges", "plot_first_look", "plot_frame", "plot_tracking_quality"]
 
 
 # Bright colours that stand out on grey pictures and differ for every kind of colour vision (Okabe and Ito).
@@ -113,16 +116,31 @@ def plot_frame(recording: Recording, dataset: xr.Dataset, frame: int = 0) -> Fig
     return figure
 
 
-def plot_recorded_frame(recording: Recording, index: int = 0) -> Figure:
-    """One frame of a recording as it is, with rows and columns."""
+def plot_first_look(
+    recording: Recording, look: FirstLook, settings: TrackingSettings, index: int = 0
+) -> Figure:
+    """One frame that was not tracked: objects at the threshold, and the regions in which a beam was found."""
+    picture = recording.frame(index)
     with figure_style():
-        figure, axes = _frame_axes(recording, recording.frame(index), ())
-        axes.set_title(f"frame {index}, not tracked")
+        figure, axes = _frame_axes(recording, picture, (), scale=False)
+        smooth = uniform_filter(picture.astype(float), 3)
+        axes.contour(smooth, [look.level], colors=SHAKER_MARK, linewidths=0.4)
+        axes.plot([], [], color=SHAKER_MARK, label=f"threshold {look.level:.4g}")
+        for (top, bottom, left, right), words in look.options.items():
+            x, y = (
+                np.array([left, right]) - recording.region[2],
+                np.array([top, bottom]) - recording.region[0],
+            )
+            axes.plot(
+                x[[0, 1, 1, 0, 0]] - 0.5, y[[0, 0, 1, 1, 0]] - 0.5, color=BEAM_MARK, lw=1.2, label=words
+            )
+        axes.set_title(f"frame {index}, not tracked, side = {settings.side}")
+        figure.legend(loc="outside lower center", handlelength=1.8)
     return figure
 
 
 def _frame_axes(
-    recording: Recording, picture: NDArray[Any], told: tuple[Diagnostic, ...]
+    recording: Recording, picture: NDArray[Any], told: tuple[Diagnostic, ...], scale: bool = True
 ) -> tuple[Figure, Any]:
     """A figure of a frame with its scale bar and diagnostics, and its axes."""
     height, width = picture.shape
@@ -134,7 +152,8 @@ def _frame_axes(
     axes.imshow(picture, cmap="gray", vmin=low, vmax=max(high, low + 1), interpolation="nearest")
     axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5), xlabel="column (px)", ylabel="row (px)")
     axes.autoscale(False)
-    _scale_bar(axes, recording, width, height)
+    if scale:
+        _scale_bar(axes, recording, width, height)
     return figure, axes
 
 
