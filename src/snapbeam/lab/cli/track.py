@@ -18,37 +18,7 @@ if TYPE_CHECKING:
     from snapbeam.lab.camera import Recording
     from snapbeam.lab.tracking.settings import TrackingSettings
 
-__all__ = [
-    "Background",
-    "BeamThickness",
-    "BlurLimit",
-    "BucklingLevel",
-    "Columns",
-    "ContactColumn",
-    "FixedMark",
-    "Frame",
-    "FrameRate",
-    "Gamma",
-    "Location",
-    "Marker",
-    "Objects",
-    "Output",
-    "Picture",
-    "PixelSize",
-    "RecordingFile",
-    "Region",
-    "Report",
-    "RestDisplacement",
-    "RestFrames",
-    "ScaleMarks",
-    "Shaker",
-    "Side",
-    "Threshold",
-    "TipDistance",
-    "Video",
-    "VideoEvery",
-    "track",
-]
+__all__ = ["track"]
 
 
 # ----------------------------------------------------------------------------------------------------
