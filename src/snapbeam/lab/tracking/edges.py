@@ -21,6 +21,7 @@ from scipy.special import ndtr
 __all__ = [
     "EdgeFit",
     "Floats",
+    "alike_columns",
     "edge_noise",
     "edge_profile",
     "fit_edges",
@@ -31,6 +32,7 @@ __all__ = [
 
 
 Floats = NDArray[np.floating]
+_ALIKE = 0.1  # correlation of columns that counts
 MIN_WIDTH = 0.05
 _ROOT_2PI = math.sqrt(2.0 * math.pi)
 
@@ -175,6 +177,27 @@ def masked_median(values: Floats, kept: NDArray[np.bool_]) -> Floats:
     return np.where(count > 0, middle.mean(-1), np.nan)
 
 
+def alike_columns(off: Floats, kept: NDArray[np.bool_], fitted: int) -> float:
+    """Variance of a mean over columns, over that of columns independent of each other: 1 + 2 sum of correlations.
+
+    Texture and dust shift edges of neighbouring columns alike.  The correlations of residuals *off* are pooled over
+    frames up to the first that is small, and those that *fitted* parameters take out are added.
+    """
+    off = np.where(kept, off, 0.0)
+    count = max(float(kept.sum(-1).mean()), 1.0)
+    power = float((off * off).sum()) / max(int(kept.sum()), 1)
+    total = 1.0
+    for lag in range(1, off.shape[-1] // 2):
+        both = int((kept[..., lag:] & kept[..., :-lag]).sum())
+        if not both or power <= 0.0:
+            break
+        alike = float((off[..., lag:] * off[..., :-lag]).sum()) / both / power + fitted / count
+        if alike < _ALIKE:
+            break
+        total += 2.0 * alike * (1.0 - lag / count)
+    return max(total, 1.0)
+
+
 def fit_line(
     x: Floats, y: Floats, good: NDArray[np.bool_], limit: float, noise: float = 0.0
 ) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
@@ -201,12 +224,14 @@ def fit_line(
             slope = np.where(sxx > 0.0, (dx * values).sum(-1) / sxx, 0.0)
             if trial == 0:  # start from medians, which a minority of bad columns cannot pull
                 my = masked_median(y - slope[:, None] * x, kept) + slope * mx
-            miss = np.abs(values - my[:, None] - slope[:, None] * (x - mx[:, None]))
+            off = values - my[:, None] - slope[:, None] * (x - mx[:, None])
+            miss = np.abs(off)
             spread = masked_median(miss, kept) / 0.6745
             if trial < 2:
                 kept = kept & (miss <= np.clip(4.0 * spread, least, limit)[:, None])
         value = my - slope * mx
         variance = (np.where(kept, miss, 0.0) ** 2).sum(-1) / np.maximum(n - 2.0, 1.0)
+        variance *= alike_columns(off, kept, 2)
         error = np.sqrt(variance * (1.0 / n + np.where(sxx > 0.0, mx * mx / sxx, 0.0)))
     short = n < 3
     for one in (value, error, slope):

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from snapbeam.lab.camera import Recording
-from snapbeam.lab.tracking.edges import Floats, edge_noise, edge_profile, fit_edges, fit_line, masked_median
+from snapbeam.lab.tracking.edges import (
+    Floats,
+    alike_columns,
+    edge_noise,
+    edge_profile,
+    fit_edges,
+    fit_line,
+    masked_median,
+)
 from snapbeam.lab.tracking.settings import (
     HALF,
     HOT,
@@ -1015,7 +1023,8 @@ def tip_rows(
     enough = (number >= MIN_FLANK) & (saturated <= view.hot_share + HOT)
     total = np.maximum(number, 1)
     row = np.where(good, centred, 0.0).sum(1) / total
-    spread = np.where(good, (centred - row[:, None]) ** 2, 0.0).sum(1) / np.maximum(total - 1, 1)
+    off = np.where(good, centred - row[:, None], 0.0)
+    spread = (off**2).sum(1) / np.maximum(total - 1, 1) * alike_columns(off, good, 1)
     nothing = np.full(row.shape, np.nan)
     return ShakerRows(
         row=np.where(enough, row, np.nan),
