@@ -14,11 +14,11 @@ _HOMES = {
     "Alignment": "drive_alignment",
     "align": "drive_alignment",
     "Calibration": "calibration",
-    "ContactTest": "calibration",
-    "Measurements": "calibration",
+    "ContactTest": ".uncertainty.measurements",
+    "Measurements": ".uncertainty.measurements",
     "calibrate": "calibration",
     "stiffness_from_impacts": "calibration",
-    "load_measurements": "calibration",
+    "load_measurements": ".uncertainty.measurements",
     "MapComparison": "map_comparison",
     "compare_measured_points": "map_comparison",
     "compare_waveforms": "waveform_comparison",
@@ -62,7 +62,7 @@ __all__ = ["Diagnostic", "DiagnosticError", "Severity", "diagnostics_of", *sorte
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return getattr(import_module(f".{_HOMES[name]}", __name__), name)
 
 
 def __dir__() -> list[str]:

@@ -36,19 +36,6 @@ from snapbeam.util.validation import InputError, integer, positive, shown, withi
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "COLUMNS",
-    "SeriesSettings",
-    "Test",
-    "TestResult",
-    "find_tests",
-    "kept_result",
-    "load_settings",
-    "run_test",
-    "run_test_series",
-    "write_table",
-]
-
 
 # ----------------------------------------------------------------------------------------------------
 # Which files of a folder are one test: paired by their names, or by a table.

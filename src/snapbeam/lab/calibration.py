@@ -24,39 +24,12 @@ from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.imperfection_identification import identify_imperfection
 from snapbeam.model.parameter_file import config_from_mapping, dump_config
 from snapbeam.model.reduced_model import ReducedModel
-from snapbeam.uncertainty.measurements import HERTZ_TIME, ContactTest, Measurements, load_measurements
+from snapbeam.uncertainty.measurements import HERTZ_TIME, Measurements
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.validation import InputError, InputTypeError, choice, integer, positive, shown
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = [
-    "ASSUMED",
-    "Calibration",
-    "ContactStiffness",
-    "ContactTest",
-    "Measurements",
-    "Residual",
-    "at_least",
-    "boundary_section",
-    "calibrate",
-    "directions",
-    "doubts",
-    "either_well",
-    "imperfection_section",
-    "links",
-    "load_measurements",
-    "open_upwards",
-    "remarks",
-    "search",
-    "sensitivity",
-    "shape_diagnostics",
-    "stiffness_from_impacts",
-    "uneven_beam",
-    "uneven_words",
-    "with_error",
-]
 
 
 # ----------------------------------------------------------------------------------------------------

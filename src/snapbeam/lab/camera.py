@@ -28,16 +28,6 @@ from snapbeam.util.validation import (
     within,
 )
 
-__all__ = [
-    "Recording",
-    "open_recording",
-    "pixel_size_from_marks",
-    "profile_shift",
-    "write_photron",
-    "write_video",
-]
-
-
 _LARGEST_PIXEL = 0.01  # m
 
 

@@ -7,20 +7,6 @@ from dataclasses import dataclass
 
 from snapbeam.util.diagnostics import Diagnostic, Severity
 
-__all__ = [
-    "KINDS_ALIGNMENT",
-    "KINDS_CALIBRATION",
-    "KINDS_COMPARISON",
-    "KINDS_DECAY",
-    "KINDS_RECORDING",
-    "KINDS_SIGNAL",
-    "KINDS_VIBROMETER",
-    "LOSSY_ERROR",
-    "Kind",
-    "table",
-]
-
-
 INFO, WARNING, ERROR = Severity.INFO, Severity.WARNING, Severity.ERROR
 
 

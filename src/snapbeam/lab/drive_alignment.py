@@ -23,8 +23,6 @@ from snapbeam.util.validation import InputError, choice, finite, positive, shown
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Alignment", "align", "recorded_drive"]
-
 
 _Array = NDArray[np.float64]
 _SAME = 0.02  # share by which two calibrated amplitudes may differ

@@ -24,28 +24,6 @@ from snapbeam.util.input_files import refuse_inflated
 from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError
 
-__all__ = [
-    "ARRAY_SUFFIXES",
-    "IMAGE_SUFFIXES",
-    "LOSSLESS",
-    "RECORDING_SUFFIXES",
-    "TIFF_SUFFIXES",
-    "VIDEO_SUFFIXES",
-    "ArraySource",
-    "FrameSource",
-    "ImageSource",
-    "PhotronSource",
-    "TiffSource",
-    "VideoSource",
-    "float_range",
-    "grey_of",
-    "images_of_header",
-    "load_image",
-    "open_source",
-    "scaled_floats",
-    "take_header",
-]
-
 TIFF_SUFFIXES = (".tif", ".tiff")
 _LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micron": 1e-6, "µm": 1e-6, "\\u00b5m": 1e-6}
 ARRAY_SUFFIXES = (".npy", ".h5", ".hdf5")

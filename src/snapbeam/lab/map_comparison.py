@@ -18,8 +18,6 @@ from snapbeam.util.validation import InputError, axis, finite, instance
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MapComparison", "compare_measured_points"]
-
 
 _Array = NDArray[np.float64]
 _AXES = ("frequency_ratio", "velocity_amplitude", "location")

@@ -21,23 +21,6 @@ from snapbeam.lab.diagnostics import KINDS_RECORDING
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.validation import InputError, shown
 
-__all__ = [
-    "NAMES",
-    "CameraHeader",
-    "HeaderFields",
-    "Timing",
-    "check_pixels",
-    "frame_bytes",
-    "header_text",
-    "pack_12bit",
-    "read_fields",
-    "read_header",
-    "read_mraw",
-    "read_timing",
-    "unpack_12bit",
-]
-
-
 _MAX_HEADER_BYTES = 64 * 1024 * 1024
 
 # Name in a .cih file and path of tags in a .cihx file, for each field used here.

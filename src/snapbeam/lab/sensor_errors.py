@@ -19,22 +19,6 @@ from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import SineFit
 from snapbeam.util.diagnostics import Diagnostic
 
-__all__ = [
-    "FALSE_ALARM_RATE",
-    "Hypothesis",
-    "LowPass",
-    "Record",
-    "beside_acceleration",
-    "beyond_shakers",
-    "find_crosstalk",
-    "find_errors",
-    "find_low_pass",
-    "noise_colour",
-    "one_sided",
-    "with_loss",
-]
-
-
 _Array = NDArray[np.float64]
 
 

@@ -25,8 +25,6 @@ from snapbeam.util.validation import InputError, InputTypeError, positive, shown
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["read_channels", "read_columns", "read_signal", "write_signal"]
-
 
 def read_channels(
     path: str | os.PathLike[str], sampling_frequency: float | None = None, columns: str | None = None

@@ -27,41 +27,6 @@ from snapbeam.util.validation import InputError, positive
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "READERS",
-    "TIME_NAMES",
-    "UNIT_NAMES",
-    "WRITERS",
-    "Channel",
-    "Table",
-    "TextBlock",
-    "Told",
-    "agree",
-    "header_rate",
-    "header_unit",
-    "header_values",
-    "is_time",
-    "numbered",
-    "read_block",
-    "read_csv",
-    "read_hdf5",
-    "read_lvm",
-    "read_matlab",
-    "read_numpy",
-    "read_table",
-    "read_tdms",
-    "read_uff",
-    "read_wav",
-    "split_unit",
-    "to_number",
-    "with_time",
-    "write_csv",
-    "write_hdf5",
-    "write_npz",
-    "write_tdms",
-    "write_uff",
-    "write_wav",
-]
 
 Channel = dict[str, Any]
 """One channel in the units of the file: ``data``, ``name``, ``unit_str`` (None where the file states

@@ -18,16 +18,6 @@ from snapbeam.util.validation import InputError, InputTypeError, finite, finite_
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "KNOWN_UNITS",
-    "SignalSamples",
-    "check_signal",
-    "even_sampling",
-    "make_signal",
-    "parse_sensitivity",
-    "si_unit",
-]
-
 
 # ----------------------------------------------------------------------------------------------------
 # Units of measured signals: into SI, and the sensitivities of sensors.

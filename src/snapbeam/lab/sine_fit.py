@@ -21,19 +21,6 @@ from snapbeam.util.validation import InputError, integer, positive
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "Clipping",
-    "Flaw",
-    "SineFit",
-    "find_clipping",
-    "find_flaws",
-    "fit_sine",
-    "sound_samples",
-    "spectral_peak",
-    "stuck_runs",
-    "white_variance",
-]
-
 
 _Array = NDArray[np.float64]
 _MIN_CYCLES = 2.0

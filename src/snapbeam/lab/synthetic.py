@@ -44,29 +44,6 @@ from snapbeam.util.validation import (
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "FRAME_LISTS",
-    "TABLE_ENTRIES_PER_PIXEL",
-    "AreaPicture",
-    "Defects",
-    "Fixture",
-    "GaussianPicture",
-    "Outline",
-    "SyntheticCamera",
-    "SyntheticRecording",
-    "SyntheticStage",
-    "disk_kernel",
-    "expose",
-    "glare_light",
-    "lamp_light",
-    "read_out",
-    "render_recording",
-    "render_run",
-    "render_vibrometer",
-    "step_table",
-    "with_fixture",
-]
-
 
 # ----------------------------------------------------------------------------------------------------
 # The picture of a few edges, summed over an exposure: compiled loops for the synthetic camera.

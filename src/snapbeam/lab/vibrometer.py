@@ -48,27 +48,6 @@ from snapbeam.util.validation import InputError, finite, positive, within
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "SNR_LIMIT",
-    "DriveLines",
-    "DriveMeasurement",
-    "StartUp",
-    "beside_lines",
-    "displacement_from_velocity",
-    "find_drive_lines",
-    "find_onset",
-    "measure_drive",
-    "mended",
-    "moves_outside",
-    "moving_part",
-    "robust_fit",
-    "settled_cycles",
-    "shaker_signal",
-    "steady_fit",
-    "with_wander",
-    "without_hum",
-]
-
 
 # ----------------------------------------------------------------------------------------------------
 # The steady sine of a shaker's record: without its flaws, and with errors that hold its wandering.

@@ -29,16 +29,6 @@ from snapbeam.util.validation import (
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "LEAST_CYCLES",
-    "TOO_SHORT",
-    "MeasuredResponse",
-    "WaveformComparison",
-    "compare_waveforms",
-    "measure_response",
-    "start_of_shaker",
-]
-
 
 # ----------------------------------------------------------------------------------------------------
 # When the excitation of a measured run starts, read from its own shaker.

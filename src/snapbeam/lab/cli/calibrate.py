@@ -16,24 +16,6 @@ if TYPE_CHECKING:
     from snapbeam.uncertainty.measurements import ContactTest
     from snapbeam.util.diagnostics import Diagnostic
 
-__all__ = [
-    "Config",
-    "Damping",
-    "EffectiveMass",
-    "Fit",
-    "FrequencySe",
-    "Impacts",
-    "LowerWell",
-    "MeasuredBucklingLevel",
-    "MeasuredThickness",
-    "Measurements",
-    "Modes",
-    "Output",
-    "Straight",
-    "UpperWell",
-    "calibrate",
-]
-
 
 # ----------------------------------------------------------------------------------------------------
 # Options of ``snapbeam calibrate``.

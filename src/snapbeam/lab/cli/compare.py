@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from snapbeam.util.diagnostics import Diagnostic
 
-__all__ = ["compare"]
-
 
 _RUN = "Measured run"
 _AT = {"striker": "displacement_at_striker", "midspan": "midspan_displacement"}

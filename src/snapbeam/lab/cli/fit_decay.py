@@ -11,21 +11,6 @@ from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import add_json, cli_command, file_line, out
 from snapbeam.lab.cli import options as lab
 
-__all__ = [
-    "BucklingLevel",
-    "ExponentialWindow",
-    "Frequencies",
-    "Method",
-    "MirrorChannel",
-    "Modes",
-    "Soften",
-    "Stabilisation",
-    "Start",
-    "Stop",
-    "fit_decay",
-]
-
-
 # ----------------------------------------------------------------------------------------------------
 # Options of ``snapbeam fit-decay``.
 

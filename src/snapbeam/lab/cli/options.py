@@ -17,20 +17,6 @@ if TYPE_CHECKING:
 
     from snapbeam.util.diagnostics import Diagnostic
 
-__all__ = [
-    "Channel",
-    "Columns",
-    "SamplingFreq",
-    "Sensitivity",
-    "SignalFile",
-    "Strict",
-    "Units",
-    "numbers",
-    "open_signal",
-    "print_diagnostics",
-    "whole_numbers",
-]
-
 
 _SIGNAL = "Signal"
 _OUTPUT = "Output"

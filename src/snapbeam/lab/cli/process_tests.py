@@ -12,9 +12,6 @@ from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import FAILED, add_json, cli_command, file_line, out
 from snapbeam.lab.cli import options as lab
 
-__all__ = ["process_tests"]
-
-
 _TESTS = "Tests"
 _CAMERA = "Camera"
 _OUTPUT = "Output"

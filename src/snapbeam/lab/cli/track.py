@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from snapbeam.lab.camera import Recording
     from snapbeam.lab.tracking.settings import TrackingSettings
 
-__all__ = ["track"]
-
 
 # ----------------------------------------------------------------------------------------------------
 # Options of ``snapbeam track``.

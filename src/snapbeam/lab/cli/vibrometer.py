@@ -11,21 +11,6 @@ from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import add_json, cli_command, file_line, out
 from snapbeam.lab.cli import options as lab
 
-__all__ = [
-    "Acceleration",
-    "Amplitude",
-    "AmplitudeFrom",
-    "Camera",
-    "DriveOutput",
-    "DriveSamplingFreq",
-    "Frequency",
-    "Near",
-    "Polarity",
-    "SnrLimit",
-    "vibrometer",
-]
-
-
 # ----------------------------------------------------------------------------------------------------
 # Options of ``snapbeam vibrometer``.
 

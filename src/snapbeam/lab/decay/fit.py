@@ -22,9 +22,6 @@ from snapbeam.lab.sine_fit import white_variance
 from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError
 
-__all__ = ["FitResult", "explain", "fit_decay"]
-
-
 _SLOW = 4  # degree of the polynomial that is fitted beside the modes
 
 _Array = NDArray[np.float64]

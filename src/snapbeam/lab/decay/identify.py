@@ -34,8 +34,6 @@ from snapbeam.util.validation import InputError, choice, finite_array, integer, 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["METHODS", "identify_decay"]
-
 
 _Array = NDArray[np.float64]
 METHODS = ("fit", "hilbert", "log_decrement")

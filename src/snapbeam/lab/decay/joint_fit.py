@@ -26,9 +26,6 @@ from snapbeam.lab.sine_fit import fit_sine
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.validation import InputError
 
-__all__ = ["fit_modes", "mode_by_cycles"]
-
-
 _MISFIT = 1.7  # times the noise that a fit may leave near the first mode
 _MANY = 12_000  # samples from which a record is thinned before it is fitted
 

@@ -30,26 +30,6 @@ from snapbeam.util.validation import InputError, nonnegative, positive
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "LAWS",
-    "SHAPES",
-    "Cycles",
-    "DampingLaw",
-    "DecayFit",
-    "ModeEstimate",
-    "WellComparison",
-    "backbone",
-    "compare_wells",
-    "envelope",
-    "find_law",
-    "hilbert_cycles",
-    "law_priors",
-    "mode_shapes",
-    "noise_level",
-    "peak_cycles",
-    "regress",
-]
-
 
 _Array = NDArray[np.float64]
 

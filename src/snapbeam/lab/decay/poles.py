@@ -22,19 +22,6 @@ from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import fit_sine
 from snapbeam.util.validation import InputError
 
-__all__ = [
-    "Line",
-    "Pole",
-    "Stabilisation",
-    "find_drift",
-    "find_lines",
-    "find_poles",
-    "thinned",
-    "without_lines",
-    "without_poles",
-]
-
-
 _Array = NDArray[np.float64]
 _WINDOW = 240  # samples of a window
 _WINDOWS = 6000  # of them used

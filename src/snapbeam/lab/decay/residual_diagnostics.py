@@ -16,9 +16,6 @@ from snapbeam.lab.diagnostics import KINDS_DECAY
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.util.diagnostics import Diagnostic
 
-__all__ = ["Misfit", "diagnostics_about", "judged", "misfit_of", "sampled_diagnostics", "widened"]
-
-
 _Array = NDArray[np.float64]
 _RATIO = 1.6  # of what is left to what the noise explains, from which the fit is in doubt
 _MATTERS = 0.003  # of the amplitude; what is left below that is of no matter

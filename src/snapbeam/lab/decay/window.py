@@ -29,29 +29,6 @@ from snapbeam.lab.sine_fit import stuck_runs
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.validation import InputError, finite
 
-__all__ = [
-    "CLOSE",
-    "ENERGY",
-    "AmplitudeJump",
-    "Ceiling",
-    "Centres",
-    "Decay",
-    "NoiseFall",
-    "dominant",
-    "find_ceiling",
-    "find_centres",
-    "find_jump",
-    "find_release",
-    "frequency_drift",
-    "noise_fall",
-    "one_sided",
-    "prepared",
-    "steadied",
-    "undone",
-    "unexplained",
-]
-
-
 # ----------------------------------------------------------------------------------------------------
 # Which part of a record is a free decay: from the release on, below the ceiling, until something disturbs it.
 

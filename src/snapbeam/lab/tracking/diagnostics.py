@@ -20,9 +20,6 @@ from snapbeam.lab.tracking.settings import (
 from snapbeam.lab.tracking.survey import CLIPPED
 from snapbeam.util.diagnostics import Diagnostic, Severity
 
-__all__ = ["KINDS", "SeenMotion", "contact_shift", "never_touching", "rounding_shift", "tracking_diagnostics"]
-
-
 INFO, WARNING, ERROR = Severity.INFO, Severity.WARNING, Severity.ERROR
 
 KINDS = table(

@@ -18,9 +18,6 @@ from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.vibrometer import moving_part
 from snapbeam.util.validation import InputError
 
-__all__ = ["drive_clock"]
-
-
 _RATE = 1e-4  # of false alarms of a pattern over a recording with normal noise
 _CYCLES = 4.0  # of steady motion, at least
 _MOST = 3000  # frames of a recording that are looked at

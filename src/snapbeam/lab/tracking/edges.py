@@ -18,19 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-__all__ = [
-    "EdgeFit",
-    "Floats",
-    "alike_columns",
-    "edge_noise",
-    "edge_profile",
-    "fit_edges",
-    "fit_line",
-    "masked_median",
-    "width_calibration",
-]
-
-
 Floats = NDArray[np.floating]
 _ALIKE = 0.1  # correlation of columns that counts
 MIN_WIDTH = 0.05

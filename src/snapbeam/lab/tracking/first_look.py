@@ -13,9 +13,6 @@ from snapbeam.lab.tracking.settings import Orientation, TrackingSettings
 from snapbeam.lab.tracking.survey import longest_stretch, otsu, survey
 from snapbeam.util.validation import InputError
 
-__all__ = ["FirstLook", "first_look"]
-
-
 _FRAMES = 16
 _SPECKLE = 7  # px over which dark spots of a textured surface are filled
 _MARGIN = 8  # rows

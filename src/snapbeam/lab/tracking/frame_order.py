@@ -20,9 +20,6 @@ from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.tracking.measure import TrackedRows
 from snapbeam.lab.tracking.settings import FrameFlag
 
-__all__ = ["FrameOrder", "find_order", "without_repeats"]
-
-
 _HALVES = (5, 8, 12)  # frames on either side of a place; of the beam the first
 _DEGREES = (3, 5)
 _BENDS = 7  # degree of a motion over many frames with an even clock

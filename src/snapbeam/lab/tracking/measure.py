@@ -34,35 +34,6 @@ from snapbeam.lab.tracking.settings import (
     gather,
 )
 
-__all__ = [
-    "MIN_GAP",
-    "BeamRows",
-    "Drift",
-    "Follower",
-    "Rest",
-    "ShakerRows",
-    "Touch",
-    "TrackedRows",
-    "alternation",
-    "distortion",
-    "fields_apart",
-    "find_rest",
-    "image_lag",
-    "jumps",
-    "measure_beam",
-    "measure_shaker",
-    "pooled",
-    "seen_fields",
-    "sticker_rows",
-    "sticker_thickness",
-    "tip_edges",
-    "tip_rows",
-    "touching",
-    "unexplained_blur",
-    "wanderings",
-]
-
-
 _WIDER = 1.6  # times the width that is explained
 _FAR = 5.0  # standard deviations of the thickness that are no chance
 _STRETCH = 32  # frames that faint light must last to be told

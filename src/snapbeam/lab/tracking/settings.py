@@ -26,26 +26,6 @@ from snapbeam.util.validation import (
     within,
 )
 
-__all__ = [
-    "HALF",
-    "HOT",
-    "SIDES",
-    "BeamView",
-    "EdgeShape",
-    "FrameFlag",
-    "NoiseShape",
-    "Orientation",
-    "Scene",
-    "ShakerView",
-    "Sticker",
-    "TipOutline",
-    "TrackingSettings",
-    "VideoFields",
-    "gather",
-    "spread_columns",
-]
-
-
 # ----------------------------------------------------------------------------------------------------
 # Rows and columns: the turn that brings the shaker below the beam, and windows of pixels about an edge.
 #

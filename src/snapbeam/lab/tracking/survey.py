@@ -45,35 +45,6 @@ from snapbeam.lab.tracking.settings import (
 from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError
 
-__all__ = [
-    "CLIPPED",
-    "Apex",
-    "BeamBands",
-    "ColumnObjects",
-    "Wanted",
-    "beam_light",
-    "beam_view",
-    "border_bar",
-    "column_objects",
-    "edge_shape",
-    "find_apex",
-    "find_bands",
-    "find_rod",
-    "find_sticker",
-    "fixed_bars",
-    "longest_stretch",
-    "noise_shape",
-    "otsu",
-    "pixel_noise",
-    "placed",
-    "rod_middle",
-    "saturation_level",
-    "shaker_view",
-    "survey",
-    "tip_outline",
-]
-
-
 # ----------------------------------------------------------------------------------------------------
 # Objects in each column of a binary sample, counted from the far side, and bars that never move.
 

@@ -49,8 +49,6 @@ from snapbeam.util.validation import InputError, InputTypeError, instance, integ
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["contact_onsets", "track", "tracked_dataset", "tracking_quality", "tracking_report"]
-
 
 # ----------------------------------------------------------------------------------------------------
 # From rows of pixels to a labelled dataset: the common scale of beam and shaker, errors and diagnostics.
