@@ -11,119 +11,77 @@ from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import add_json, cli_command, file_line, out
 from snapbeam.cli.parameter_options import configured
 from snapbeam.lab.cli import options as lab
+from snapbeam.lab.cli.options import option
 
 if TYPE_CHECKING:
     from snapbeam.uncertainty.measurements import ContactTest
     from snapbeam.util.diagnostics import Diagnostic
 
 
-# ----------------------------------------------------------------------------------------------------
-# Options of ``snapbeam calibrate``.
-
-
 _FIT = "Fit"
-
-
 _MEASURED = "Measured (instead of, or beside, the file)"
-
-
-def _list_option(about: str) -> Any:
-    return typer.Option(help=about, metavar="F,F", rich_help_panel=_MEASURED)
-
-
-Measurements = Annotated[
-    Path | None,
-    typer.Argument(help="TOML file with a section [measured].", metavar="[MEASUREMENTS]"),
-]
-Straight = Annotated[str | None, _list_option("Natural frequencies without load, Hz.")]
-LowerWell = Annotated[
-    str | None,
-    _list_option(
-        "Natural frequencies about the lower well, Hz; suffix s or a: symmetric or antisymmetric (81.3s,159a)."
-    ),
-]
-UpperWell = Annotated[
-    str | None, _list_option("Natural frequencies about the upper well, Hz, in the same form.")
-]
-Damping = Annotated[str | None, _list_option("Damping ratios of free decays.")]
-FrequencySe = Annotated[
-    float | None, opt.number_option("Standard error of these frequencies, Hz (0.5 %).", _MEASURED)
-]
-MeasuredThickness = Annotated[
-    float | None, opt.number_option("Thickness by gauge, m, for comparison.", _MEASURED)
-]
-MeasuredBucklingLevel = Annotated[
-    float | None, opt.number_option("Buckling level by gauge, m, for comparison.", _MEASURED)
-]
-Impacts = Annotated[
-    Path | None,
-    typer.Option(
-        help="NetCDF file of tracked impacts on a heavy body, for the contact stiffness.",
-        metavar="FILE",
-        rich_help_panel=_MEASURED,
-    ),
-]
-EffectiveMass = Annotated[
-    float | None,
-    opt.number_option("Effective mass 1/(1/m1 + 1/m2) of the two bodies of --impacts, kg.", _MEASURED),
-]
-Config = Annotated[
-    Path | None,
-    typer.Option("--config", "-c", help="TOML file with the parameters of beam and model.", metavar="FILE"),
-]
-Fit = Annotated[
-    str | None,
-    typer.Option(
-        help="Parameters to fit: thickness, young_modulus, density, length, buckling_level; by default "
-        "those that the measurements determine.",
-        metavar="NAME,NAME",
-        rich_help_panel=_FIT,
-    ),
-]
-Imperfection = Annotated[
-    str | None,
-    typer.Option(
-        help="Imperfection, fitted to the first frequencies about both wells: midspan_amplitude, point_load or "
-        "uniform_load.",
-        rich_help_panel=_FIT,
-    ),
-]
-Modes = Annotated[int | None, opt.count_option("Number N of buckling modes, 1 to 256.", _FIT)]
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        help="TOML file to write, for snapbeam map --config.",
-        metavar="FILE",
-        rich_help_panel="Output",
-    ),
-]
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 @cli_command
 def calibrate(
-    measurements: Measurements = None,
-    straight: Straight = None,
-    lower_well: LowerWell = None,
-    upper_well: UpperWell = None,
-    damping: Damping = None,
-    frequency_se: FrequencySe = None,
-    measured_thickness: MeasuredThickness = None,
-    measured_buckling_level: MeasuredBucklingLevel = None,
-    impacts: Impacts = None,
-    effective_mass: EffectiveMass = None,
-    config: Config = None,
-    fit: Fit = None,
-    imperfection: Imperfection = None,
-    modes: Modes = None,
-    output: Output = None,
+    measurements: Annotated[
+        Path | None, typer.Argument(help="TOML file with a section [measured].", metavar="[MEASUREMENTS]")
+    ] = None,
+    straight: Annotated[str | None, option("Natural frequencies without load, Hz.", _MEASURED, "F,F")] = None,
+    lower_well: Annotated[
+        str | None,
+        option(
+            "Natural frequencies about the lower well, Hz; suffix s or a: symmetric or antisymmetric (81.3s,159a).",
+            _MEASURED, "F,F",
+        ),
+    ] = None,
+    upper_well: Annotated[
+        str | None, option("Natural frequencies about the upper well, Hz, in the same form.", _MEASURED, "F,F")
+    ] = None,
+    damping: Annotated[str | None, option("Damping ratios of free decays.", _MEASURED, "F,F")] = None,
+    frequency_se: Annotated[
+        float | None, opt.number_option("Standard error of these frequencies, Hz (0.5 %).", _MEASURED)
+    ] = None,
+    measured_thickness: Annotated[
+        float | None, opt.number_option("Thickness by gauge, m, for comparison.", _MEASURED)
+    ] = None,
+    measured_buckling_level: Annotated[
+        float | None, opt.number_option("Buckling level by gauge, m, for comparison.", _MEASURED)
+    ] = None,
+    impacts: Annotated[
+        Path | None,
+        option("NetCDF file of tracked impacts on a heavy body, for the contact stiffness.", _MEASURED, "FILE"),
+    ] = None,
+    effective_mass: Annotated[
+        float | None, opt.number_option("Effective mass 1/(1/m1 + 1/m2) of the two bodies of --impacts, kg.", _MEASURED)
+    ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", "-c", help="TOML file with the parameters of beam and model.", metavar="FILE"),
+    ] = None,
+    fit: Annotated[
+        str | None,
+        option(
+            "Parameters to fit: thickness, young_modulus, density, length, buckling_level; by default those that the "
+            "measurements determine.",
+            _FIT, "NAME,NAME",
+        ),
+    ] = None,
+    imperfection: Annotated[
+        str | None,
+        option(
+            "Imperfection, fitted to the first frequencies about both wells: midspan_amplitude, point_load or "
+            "uniform_load.",
+            _FIT,
+        ),
+    ] = None,
+    modes: Annotated[int | None, opt.count_option("Number N of buckling modes, 1 to 256.", _FIT)] = None,
+    output: Annotated[
+        Path | None, option("TOML file to write, for snapbeam map --config.", lab.OUTPUT, "FILE", "--output", "-o")
+    ] = None,
     plot: opt.Plot = None,
     strict: lab.Strict = False,
-) -> None:
+) -> None:  # fmt: skip
     """Fit thickness and buckling level to natural frequencies, and report parameters that the data do not determine.
 
     Parameters that are not fitted come from --config, or from the section [beam] of the measurements, or are the
@@ -137,17 +95,13 @@ def calibrate(
     from snapbeam.lab.calibration import calibrate as fit_beam
     from snapbeam.lab.calibration import with_error
     from snapbeam.model.parameter_file import config_from_mapping, override
-    from snapbeam.plot.style import FIGURE_SUFFIXES, save_figure
+    from snapbeam.plot.style import FIGURE_SUFFIXES
     from snapbeam.uncertainty.measurements import Measurements, load_measurements
     from snapbeam.util.diagnostics import refuse
-    from snapbeam.util.files import check_writable
     from snapbeam.util.validation import InputError
 
-    for name, path, suffixes in (
-        ("output", output, (".toml",)), ("plot", plot, FIGURE_SUFFIXES),
-    ):  # fmt: skip
-        if path is not None:
-            check_writable(path, name, suffixes)
+    lab.check_files((".toml",), output=output)
+    lab.check_files(FIGURE_SUFFIXES, plot=plot)
     settings = configured({"config": config, "model.modes": modes})
     given: dict[str, Any] = {}
     if measurements is not None:
@@ -213,8 +167,7 @@ def calibrate(
     if plot is not None:
         from snapbeam.lab.plot.calibration import plot_calibration
 
-        save_figure(plot_calibration(result), plot)
-        console.print(f"Written: {file_line(plot)}")
+        lab.save_plot(plot_calibration(result), plot)
     add_json(**result.summary())
 
 

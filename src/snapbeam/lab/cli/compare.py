@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import add_json, cli_command, file_line, open_result, out
+from snapbeam.cli.console import add_json, cli_command, open_result, out
 from snapbeam.lab.cli import options as lab
 from snapbeam.util.status_codes import ResponseClass
 
@@ -40,8 +40,7 @@ def compare(
     start: Annotated[float | None, opt.number_option("Start of the excitation, s.", _RUN)] = None,
     cycles: Annotated[int, opt.count_option("Number of cycles for the response class (200).", _RUN)] = 200,
     at: Annotated[
-        str,
-        typer.Option(help="Location of the measured displacement: striker or midspan.", rich_help_panel=_RUN),
+        str, lab.option("Location of the measured displacement: striker or midspan.", _RUN)
     ] = "striker",
     channel: lab.Channel = None,
     units: lab.Units = None,
@@ -52,10 +51,8 @@ def compare(
     plot: opt.Plot = None,
     overlay: Annotated[
         bool,
-        typer.Option(
-            "--overlay",
-            help="Superimpose the waveforms of --plot, and draw their difference.",
-            rich_help_panel="Output",
+        lab.option(
+            "Superimpose the waveforms of --plot, and draw their difference.", lab.OUTPUT, None, "--overlay"
         ),
     ] = False,
     strict: lab.Strict = False,
@@ -69,13 +66,11 @@ def compare(
     Example: snapbeam compare laser.csv run.nc --at midspan --frequency 100 --start 0.2 --plot waves.png
     """
     from snapbeam.lab.waveform_comparison import run_of_signal
-    from snapbeam.plot.style import FIGURE_SUFFIXES, save_figure
+    from snapbeam.plot.style import FIGURE_SUFFIXES
     from snapbeam.util.diagnostics import refuse
-    from snapbeam.util.files import check_writable
     from snapbeam.util.validation import choice
 
-    if plot is not None:
-        check_writable(plot, "plot", FIGURE_SUFFIXES)
+    lab.check_files(FIGURE_SUFFIXES, plot=plot)
     dataset = open_result(simulated)
     place = choice("at", at, tuple(_AT))
     if "time" not in dataset.dims:
@@ -96,10 +91,8 @@ def compare(
             opt.parse_window(window),
             ("overlay" if overlay else "beside") if plot is not None else "",
         )
-    console = out()
     if plot is not None and figure is not None:
-        save_figure(figure, plot)
-        console.print(f"Written: {file_line(plot)}")
+        lab.save_plot(figure, plot)
     if strict:
         refuse(diagnostics, str(measured))
     add_json(**summary)

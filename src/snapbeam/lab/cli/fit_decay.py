@@ -5,93 +5,57 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import add_json, cli_command, file_line, out
+from snapbeam.cli.console import add_json, cli_command, out
 from snapbeam.lab.cli import options as lab
-
-# ----------------------------------------------------------------------------------------------------
-# Options of ``snapbeam fit-decay``.
-
+from snapbeam.lab.cli.options import option
 
 _DECAY = "Decay"
-
-
-Modes = Annotated[int, opt.count_option("Number of modes to fit (1).", _DECAY)]
-Frequencies = Annotated[
-    str | None,
-    typer.Option(
-        help="Approximate frequencies of the modes, Hz, instead of --modes.",
-        metavar="F,F",
-        rich_help_panel=_DECAY,
-    ),
-]
-Method = Annotated[
-    str, typer.Option(help="Method: fit, hilbert, log_decrement, or all.", rich_help_panel=_DECAY)
-]
-Start = Annotated[float | None, opt.number_option("Start of the free decay, s.", _DECAY)]
-Stop = Annotated[float | None, opt.number_option("End of the free decay, s.", _DECAY)]
-Soften = Annotated[
-    bool,
-    typer.Option(
-        "--soften/--linear", help="Fit the dependence of frequency on amplitude.", rich_help_panel=_DECAY
-    ),
-]
-BucklingLevel = Annotated[
-    float | None,
-    opt.number_option(
-        "Buckling level b, m, for a prior of the softening near that of one mode, 0.75 (a/b)^2.", _DECAY
-    ),
-]
-ExponentialWindow = Annotated[
-    float | None,
-    opt.number_option(
-        "Time constant T, s, of an exponential window exp(-t/T) of the analyser, to correct.", _DECAY
-    ),
-]
-MirrorChannel = Annotated[
-    str | None,
-    typer.Option(
-        help="Channel of a second sensor at the mirror location, to distinguish symmetric from antisymmetric modes.",
-        metavar="NAME",
-        rich_help_panel=_DECAY,
-    ),
-]
-Stabilisation = Annotated[
-    Path | None,
-    typer.Option(
-        help="Figure of the stabilisation diagram to write.",
-        metavar="FILE",
-        rich_help_panel="Output",
-    ),
-]
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 @cli_command
 def fit_decay(
     signal: lab.SignalFile,
-    modes: Modes = 1,
-    frequencies: Frequencies = None,
-    method: Method = "fit",
-    start: Start = None,
-    stop: Stop = None,
-    soften: Soften = True,
-    buckling_level: BucklingLevel = None,
-    exponential_window: ExponentialWindow = None,
-    mirror_channel: MirrorChannel = None,
+    modes: Annotated[int, opt.count_option("Number of modes to fit (1).", _DECAY)] = 1,
+    frequencies: Annotated[
+        str | None, option("Approximate frequencies of the modes, Hz, instead of --modes.", _DECAY, "F,F")
+    ] = None,
+    method: Annotated[str, option("Method: fit, hilbert, log_decrement, or all.", _DECAY)] = "fit",
+    start: Annotated[float | None, opt.number_option("Start of the free decay, s.", _DECAY)] = None,
+    stop: Annotated[float | None, opt.number_option("End of the free decay, s.", _DECAY)] = None,
+    soften: Annotated[
+        bool, option("Fit the dependence of frequency on amplitude.", _DECAY, None, "--soften/--linear")
+    ] = True,
+    buckling_level: Annotated[
+        float | None,
+        opt.number_option(
+            "Buckling level b, m, for a prior of the softening near that of one mode, 0.75 (a/b)^2.", _DECAY
+        ),
+    ] = None,
+    exponential_window: Annotated[
+        float | None,
+        opt.number_option(
+            "Time constant T, s, of an exponential window exp(-t/T) of the analyser, to correct.", _DECAY
+        ),
+    ] = None,
+    mirror_channel: Annotated[
+        str | None,
+        option(
+            "Channel of a second sensor at the mirror location, to distinguish symmetric from antisymmetric modes.",
+            _DECAY, "NAME",
+        ),
+    ] = None,
     channel: lab.Channel = None,
     units: lab.Units = None,
     sensitivity: lab.Sensitivity = None,
     sampling_frequency: lab.SamplingFreq = None,
     columns: lab.Columns = None,
     plot: opt.Plot = None,
-    stabilisation: Stabilisation = None,
+    stabilisation: Annotated[
+        Path | None, option("Figure of the stabilisation diagram to write.", lab.OUTPUT, "FILE")
+    ] = None,
     strict: lab.Strict = False,
-) -> None:
+) -> None:  # fmt: skip
     """Fit frequency, damping ratio and softening to a free decay, with standard errors.
 
     The frequency is the limit at zero amplitude, because a buckled beam softens about a well.
@@ -102,14 +66,11 @@ def fit_decay(
 
     from snapbeam.lab.decay.identify import METHODS, identify_decay
     from snapbeam.lab.decay.model import mode_shapes
-    from snapbeam.plot.style import FIGURE_SUFFIXES, save_figure
+    from snapbeam.plot.style import FIGURE_SUFFIXES
     from snapbeam.util.diagnostics import refuse
-    from snapbeam.util.files import check_writable
     from snapbeam.util.validation import choice
 
-    for name, path in (("plot", plot), ("stabilisation", stabilisation)):
-        if path is not None:
-            check_writable(path, name, FIGURE_SUFFIXES)
+    lab.check_files(FIGURE_SUFFIXES, plot=plot, stabilisation=stabilisation)
     choice("method", method, (*METHODS, "all"))
     data = lab.open_signal(signal, channel, units, sensitivity, sampling_frequency, columns)
     rough = lab.numbers("frequencies", frequencies) or None
@@ -156,13 +117,11 @@ def fit_decay(
     if plot is not None:
         from snapbeam.lab.plot.fit_decay import plot_decay
 
-        save_figure(plot_decay(data, first), plot)
-        console.print(f"Written: {file_line(plot)}")
+        lab.save_plot(plot_decay(data, first), plot)
     if stabilisation is not None:
         from snapbeam.lab.plot.fit_decay import plot_stabilisation
 
-        save_figure(plot_stabilisation(data, first), stabilisation)
-        console.print(f"Written: {file_line(stabilisation)}")
+        lab.save_plot(plot_stabilisation(data, first), stabilisation)
     if strict:
         refuse(diagnostics, str(signal))
     add_json(**{name: fit.summary() for name, fit in fits.items()})

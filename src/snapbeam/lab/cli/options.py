@@ -4,22 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 
 from snapbeam.cli import parameter_options as opt
+from snapbeam.cli.console import file_line, out
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
     from snapbeam.util.diagnostics import Diagnostic
 
 
 _SIGNAL = "Signal"
-_OUTPUT = "Output"
+OUTPUT = "Output"
+
+
+def option(about: str, panel: str, metavar: str | None = None, *names: str) -> Any:
+    """Option of a command."""
+    return typer.Option(*names, help=about, rich_help_panel=panel, metavar=metavar)
+
 
 SignalFile = Annotated[
     Path,
@@ -28,41 +36,44 @@ SignalFile = Annotated[
         metavar="SIGNAL",
     ),
 ]
-Channel = Annotated[
-    str | None,
-    typer.Option(help="Name of the channel, or its number from 0.", rich_help_panel=_SIGNAL, metavar="NAME"),
-]
-Units = Annotated[
-    str | None,
-    typer.Option(help="Unit of the values if the file has none, such as mm/s.", rich_help_panel=_SIGNAL),
-]
+Channel = Annotated[str | None, option("Name of the channel, or its number from 0.", _SIGNAL, "NAME")]
+Units = Annotated[str | None, option("Unit of the values if the file has none, such as mm/s.", _SIGNAL)]
 Sensitivity = Annotated[
     str | None,
-    typer.Option(
-        help="Sensitivity of the sensor, per volt or per full scale (FS) of a sound file: '125 mm/s/V', '100 mV/g', '0.5 m/s/FS'.",
-        rich_help_panel=_SIGNAL,
+    option(
+        "Sensitivity of the sensor, per volt or per full scale (FS) of a sound file: '125 mm/s/V', '100 mV/g', '0.5 m/s/FS'.",
+        _SIGNAL,
     ),
 ]
 SamplingFreq = Annotated[
-    float | None,
-    opt.number_option("Sampling frequency, Hz, if the file has none.", _SIGNAL),
+    float | None, opt.number_option("Sampling frequency, Hz, if the file has none.", _SIGNAL)
 ]
 Columns = Annotated[
     str | None,
-    typer.Option(
-        help="Names and units of the columns of a table without a header: 'time [s],velocity [mm/s]'.",
-        rich_help_panel=_SIGNAL,
-        metavar="NAME [UNIT],...",
+    option(
+        "Names and units of the columns of a table without a header: 'time [s],velocity [mm/s]'.",
+        _SIGNAL,
+        "NAME [UNIT],...",
     ),
 ]
-Strict = Annotated[
-    bool,
-    typer.Option(
-        "--strict",
-        help="Treat warnings as errors: write no result.",
-        rich_help_panel=_OUTPUT,
-    ),
-]
+Strict = Annotated[bool, option("Treat warnings as errors: write no result.", OUTPUT, None, "--strict")]
+
+
+def check_files(suffixes: tuple[str, ...], **paths: Path | None) -> None:
+    """Refuse paths of options that cannot be written, or whose suffix is not one of *suffixes*."""
+    from snapbeam.util.files import check_writable
+
+    for name, path in paths.items():
+        if path is not None:
+            check_writable(path, name, suffixes)
+
+
+def save_plot(figure: Figure, path: Path) -> None:
+    """Write a figure, and print its path."""
+    from snapbeam.plot.style import save_figure
+
+    save_figure(figure, path)
+    out().print(f"Written: {file_line(path)}")
 
 
 def open_signal(

@@ -11,10 +11,10 @@ import typer
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import FAILED, add_json, cli_command, file_line, out
 from snapbeam.lab.cli import options as lab
+from snapbeam.lab.cli.options import option
 
 _TESTS = "Tests"
 _CAMERA = "Camera"
-_OUTPUT = "Output"
 
 
 @cli_command
@@ -24,18 +24,15 @@ def process_tests(
     ],
     table: Annotated[
         Path | None,
-        typer.Option(
-            help="Table of tests: test, recording, vibrometer, frequency_hz, velocity_m_s, location; by default, "
-            "files are paired by name.",
-            metavar="FILE", rich_help_panel=_TESTS,
+        option(
+            "Table of tests: test, recording, vibrometer, frequency_hz, velocity_m_s, location; by default, files are "
+            "paired by name.",
+            _TESTS, "FILE",
         ),
     ] = None,
     settings: Annotated[
         Path | None,
-        typer.Option(
-            help="TOML file with the sections [camera], [tracking], [signal] and [test_series].", metavar="FILE",
-            rich_help_panel=_TESTS,
-        ),
+        option("TOML file with the sections [camera], [tracking], [signal] and [test_series].", _TESTS, "FILE"),
     ] = None,
     cycles: Annotated[
         int | None, opt.count_option("Number of cycles for the response class (200).", _TESTS)
@@ -47,22 +44,16 @@ def process_tests(
     ] = None,
     frame_rate: Annotated[float | None, opt.number_option("Frame rate, Hz.", _CAMERA)] = None,
     pixel_size: Annotated[float | None, opt.number_option("Pixel size, m.", _CAMERA)] = None,
-    side: Annotated[
-        str | None, typer.Option(help="Side of the beam on which the shaker is.", rich_help_panel=_CAMERA)
-    ] = None,
+    side: Annotated[str | None, option("Side of the beam on which the shaker is.", _CAMERA)] = None,
     units: lab.Units = None,
     sensitivity: lab.Sensitivity = None,
     sampling_frequency: lab.SamplingFreq = None,
     simulated: Annotated[
-        Path | None,
-        typer.Option("--map", help="Map to compare the responses with.", metavar="FILE", rich_help_panel=_OUTPUT),
+        Path | None, option("Map to compare the responses with.", lab.OUTPUT, "FILE", "--map")
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output", "-o", help="Folder of the results; FOLDER/test_series by default.", metavar="FOLDER",
-            rich_help_panel=_OUTPUT,
-        ),
+        option("Folder of the results; FOLDER/test_series by default.", lab.OUTPUT, "FOLDER", "--output", "-o"),
     ] = None,
     strict: lab.Strict = False,
 ) -> None:  # fmt: skip

@@ -13,208 +13,99 @@ import typer
 
 from snapbeam.cli.console import add_json, cli_command, duration, file_line, out, progress
 from snapbeam.lab.cli import options as lab
+from snapbeam.lab.cli.options import option
 
 if TYPE_CHECKING:
     from snapbeam.lab.camera import Recording
     from snapbeam.lab.tracking.settings import TrackingSettings
 
 
-# ----------------------------------------------------------------------------------------------------
-# Options of ``snapbeam track``.
-
-
 _CAMERA = "Camera"
 _SCENE = "Scene"
-_OUTPUT = "Output"
-
-
-RecordingFile = Annotated[
-    Path,
-    typer.Argument(
-        help="Photron .cih/.cihx, .cine, .avi, .mp4, .mov, TIFF, .npy, .h5, or a folder of numbered images.",
-        metavar="RECORDING",
-    ),
-]
-FrameRate = Annotated[
-    float | None,
-    typer.Option(help="Frame rate, Hz; required for videos and images.", rich_help_panel=_CAMERA),
-]
-PixelSize = Annotated[
-    float | None,
-    typer.Option(
-        help="Pixel size, m, such as 12e-6; required if the file has none.", rich_help_panel=_CAMERA
-    ),
-]
-Region = Annotated[
-    str | None,
-    typer.Option(help="Part of the frame to use.", metavar="ROW:ROW,COLUMN:COLUMN", rich_help_panel=_CAMERA),
-]
-Side = Annotated[
-    str,
-    typer.Option(
-        help="Side of the beam on which the shaker is: below, above, left or right.",
-        rich_help_panel=_SCENE,
-    ),
-]
-Objects = Annotated[
-    str,
-    typer.Option(
-        help="Brightness of the objects against the background: bright, dark or auto.", rich_help_panel=_SCENE
-    ),
-]
-Threshold = Annotated[
-    float | None,
-    typer.Option(help="Grey level of the binarisation threshold; Otsu's by default.", rich_help_panel=_SCENE),
-]
-ContactColumn = Annotated[
-    float | None,
-    typer.Option(help="Column of the contact; by default, that of the tip.", rich_help_panel=_SCENE),
-]
-Shaker = Annotated[
-    bool, typer.Option("--shaker/--no-shaker", help="Track the shaker too.", rich_help_panel=_SCENE)
-]
-Marker = Annotated[
-    bool,
-    typer.Option("--marker/--no-marker", help="Look for a sticker on the shaker.", rich_help_panel=_SCENE),
-]
-TipDistance = Annotated[
-    float | None,
-    typer.Option(
-        help="Distance from the tip of the shaker to the nearer edge of the sticker, m.",
-        rich_help_panel=_SCENE,
-    ),
-]
-BeamThickness = Annotated[
-    float | None,
-    typer.Option(help="Thickness of the beam by gauge, m, for a check.", rich_help_panel=_SCENE),
-]
-Columns = Annotated[
-    int,
-    typer.Option(help="Number of columns in which the edge of the beam is fitted.", rich_help_panel=_SCENE),
-]
-BlurLimit = Annotated[
-    float | None,
-    typer.Option(help="Edge width, px, above which a frame is flagged as blurred.", rich_help_panel=_SCENE),
-]
-Gamma = Annotated[
-    float,
-    typer.Option(
-        help="Gamma of the camera (exponent of grey level over light), to correct.", rich_help_panel=_CAMERA
-    ),
-]
-Background = Annotated[
-    Path | None,
-    typer.Option(
-        help="Image of the scene without beam and shaker, to subtract.",
-        metavar="FILE",
-        rich_help_panel=_CAMERA,
-    ),
-]
-FixedMark = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="Part of the region with a stationary object; snapbeam subtracts the camera drift measured "
-        "there. May be repeated.",
-        metavar="ROW:ROW,COLUMN:COLUMN",
-        rich_help_panel=_CAMERA,
-    ),
-]
-ScaleMarks = Annotated[
-    str | None,
-    typer.Option(
-        help="Pixel size from two marks a known distance apart, m: ROW,COLUMN:ROW,COLUMN=0.010.",
-        metavar="MARKS",
-        rich_help_panel=_CAMERA,
-    ),
-]
-RestFrames = Annotated[
-    str | None,
-    typer.Option(
-        help="Frames at rest: number at the start, or FIRST:LAST+1; negative numbers count from the end.",
-        metavar="N or A:B",
-        rich_help_panel=_SCENE,
-    ),
-]
-BucklingLevel = Annotated[
-    float | None,
-    typer.Option(
-        help="Buckling level b, m, for normalised displacements; by default in mm only.",
-        rich_help_panel=_SCENE,
-    ),
-]
-Location = Annotated[
-    float, typer.Option(help="Location of the contact over the length (x_s).", rich_help_panel=_SCENE)
-]
-RestDisplacement = Annotated[
-    float | None,
-    typer.Option(
-        help="Displacement of the beam at rest, m; the well facing the shaker by default.",
-        rich_help_panel=_SCENE,
-    ),
-]
-Output = Annotated[
-    Path,
-    typer.Option("--output", "-o", help="NetCDF file to write.", metavar="FILE", rich_help_panel=_OUTPUT),
-]
-Picture = Annotated[
-    Path | None,
-    typer.Option(
-        help="Figure of a frame with the fitted edges to write.", metavar="FILE", rich_help_panel=_OUTPUT
-    ),
-]
-Frame = Annotated[int, typer.Option(help="Number of the frame of --picture.", rich_help_panel=_OUTPUT)]
-Report = Annotated[
-    Path | None,
-    typer.Option(
-        help="Figure of the tracking quality over time to write.", metavar="FILE", rich_help_panel=_OUTPUT
-    ),
-]
-Video = Annotated[
-    Path | None,
-    typer.Option(
-        help="Annotated video to write, .mp4, .mov or .avi.", metavar="FILE", rich_help_panel=_OUTPUT
-    ),
-]
-VideoEvery = Annotated[
-    int, typer.Option(help="Interval of the frames shown in --video.", rich_help_panel=_OUTPUT)
-]
-
-
-# ----------------------------------------------------------------------------------------------------
+_OUTPUT = lab.OUTPUT
 
 
 @cli_command
 def track(
-    recording: RecordingFile,
-    frame_rate: FrameRate = None,
-    pixel_size: PixelSize = None,
-    region: Region = None,
-    side: Side = "below",
-    objects: Objects = "auto",
-    threshold: Threshold = None,
-    contact_column: ContactColumn = None,
-    shaker: Shaker = True,
-    marker: Marker = True,
-    tip_distance: TipDistance = None,
-    beam_thickness: BeamThickness = None,
-    columns: Columns = 24,
-    blur_limit: BlurLimit = None,
-    gamma: Gamma = 1.0,
-    background: Background = None,
-    fixed_mark: FixedMark = None,
-    scale_marks: ScaleMarks = None,
-    rest_frames: RestFrames = None,
-    buckling_level: BucklingLevel = None,
-    location: Location = 1 / 2.1,
-    rest_displacement: RestDisplacement = None,
-    output: Output = Path("track.nc"),
-    picture: Picture = None,
-    frame: Frame = 0,
-    report: Report = None,
-    video: Video = None,
-    video_every: VideoEvery = 1,
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            help="Photron .cih/.cihx, .cine, .avi, .mp4, .mov, TIFF, .npy, .h5, or a folder of numbered images.",
+            metavar="RECORDING",
+        ),
+    ],
+    frame_rate: Annotated[float | None, option("Frame rate, Hz; required for videos and images.", _CAMERA)] = None,
+    pixel_size: Annotated[
+        float | None, option("Pixel size, m, such as 12e-6; required if the file has none.", _CAMERA)
+    ] = None,
+    region: Annotated[str | None, option("Part of the frame to use.", _CAMERA, "ROW:ROW,COLUMN:COLUMN")] = None,
+    side: Annotated[
+        str, option("Side of the beam on which the shaker is: below, above, left or right.", _SCENE)
+    ] = "below",
+    objects: Annotated[
+        str, option("Brightness of the objects against the background: bright, dark or auto.", _SCENE)
+    ] = "auto",
+    threshold: Annotated[
+        float | None, option("Grey level of the binarisation threshold; Otsu's by default.", _SCENE)
+    ] = None,
+    contact_column: Annotated[
+        float | None, option("Column of the contact; by default, that of the tip.", _SCENE)
+    ] = None,
+    shaker: Annotated[bool, option("Track the shaker too.", _SCENE, None, "--shaker/--no-shaker")] = True,
+    marker: Annotated[bool, option("Look for a sticker on the shaker.", _SCENE, None, "--marker/--no-marker")] = True,
+    tip_distance: Annotated[
+        float | None, option("Distance from the tip of the shaker to the nearer edge of the sticker, m.", _SCENE)
+    ] = None,
+    beam_thickness: Annotated[float | None, option("Thickness of the beam by gauge, m, for a check.", _SCENE)] = None,
+    columns: Annotated[int, option("Number of columns in which the edge of the beam is fitted.", _SCENE)] = 24,
+    blur_limit: Annotated[
+        float | None, option("Edge width, px, above which a frame is flagged as blurred.", _SCENE)
+    ] = None,
+    gamma: Annotated[
+        float, option("Gamma of the camera (exponent of grey level over light), to correct.", _CAMERA)
+    ] = 1.0,
+    background: Annotated[
+        Path | None, option("Image of the scene without beam and shaker, to subtract.", _CAMERA, "FILE")
+    ] = None,
+    fixed_mark: Annotated[
+        list[str] | None,
+        option(
+            "Part of the region with a stationary object; snapbeam subtracts the camera drift measured there. May be "
+            "repeated.",
+            _CAMERA, "ROW:ROW,COLUMN:COLUMN",
+        ),
+    ] = None,
+    scale_marks: Annotated[
+        str | None,
+        option("Pixel size from two marks a known distance apart, m: ROW,COLUMN:ROW,COLUMN=0.010.", _CAMERA, "MARKS"),
+    ] = None,
+    rest_frames: Annotated[
+        str | None,
+        option(
+            "Frames at rest: number at the start, or FIRST:LAST+1; negative numbers count from the end.",
+            _SCENE, "N or A:B",
+        ),
+    ] = None,
+    buckling_level: Annotated[
+        float | None, option("Buckling level b, m, for normalised displacements; by default in mm only.", _SCENE)
+    ] = None,
+    location: Annotated[float, option("Location of the contact over the length (x_s).", _SCENE)] = 1 / 2.1,
+    rest_displacement: Annotated[
+        float | None,
+        option("Displacement of the beam at rest, m; the well facing the shaker by default.", _SCENE),
+    ] = None,
+    output: Annotated[Path, option("NetCDF file to write.", _OUTPUT, "FILE", "--output", "-o")] = Path("track.nc"),
+    picture: Annotated[
+        Path | None, option("Figure of a frame with the fitted edges to write.", _OUTPUT, "FILE")
+    ] = None,
+    frame: Annotated[int, option("Number of the frame of --picture.", _OUTPUT)] = 0,
+    report: Annotated[
+        Path | None, option("Figure of the tracking quality over time to write.", _OUTPUT, "FILE")
+    ] = None,
+    video: Annotated[Path | None, option("Annotated video to write, .mp4, .mov or .avi.", _OUTPUT, "FILE")] = None,
+    video_every: Annotated[int, option("Interval of the frames shown in --video.", _OUTPUT)] = 1,
     strict: lab.Strict = False,
-) -> None:
+) -> None:  # fmt: skip
     """Track beam and shaker in every frame of a high-speed recording.
 
     The command finds the beam, the shaker and a sticker on it, fits their edges to a fraction of a pixel, and writes the
@@ -226,19 +117,15 @@ def track(
     Example: snapbeam track test.cihx --pixel-size 12e-6 --buckling-level 0.335e-3 -o test.nc --picture
     frame.png --report quality.png
     """
-    from snapbeam.util.files import check_writable
     from snapbeam.util.netcdf import write_netcdf
     from snapbeam.util.validation import integer
 
-    check_writable(output, "output", (".nc",))
+    lab.check_files((".nc",), output=output)
     if picture is not None or report is not None:
         from snapbeam.plot.style import FIGURE_SUFFIXES
 
-        for name, path in (("picture", picture), ("report", report)):
-            if path is not None:
-                check_writable(path, name, FIGURE_SUFFIXES)
-    if video is not None:
-        check_writable(video, "video", (".mp4", ".mov", ".avi"))
+        lab.check_files(FIGURE_SUFFIXES, picture=picture, report=report)
+    lab.check_files((".mp4", ".mov", ".avi"), video=video)
     integer("frame", frame, 0)
     integer("video_every", video_every, 1)
     from snapbeam.lab.tracking.settings import TrackingSettings

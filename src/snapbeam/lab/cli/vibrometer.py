@@ -5,93 +5,57 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import add_json, cli_command, file_line, out
 from snapbeam.lab.cli import options as lab
-
-# ----------------------------------------------------------------------------------------------------
-# Options of ``snapbeam vibrometer``.
-
-
-Frequency = Annotated[
-    float | None, opt.number_option("Set excitation frequency, Hz, as the initial guess.", "Drive")
-]
-SnrLimit = Annotated[
-    float | None, opt.number_option("Minimum signal-to-noise ratio (SINAD) to accept, dB (15).", "Drive")
-]
-Camera = Annotated[
-    Path | None,
-    typer.Option(
-        help="NetCDF file of the tracked recording of the same test, for the alignment.",
-        metavar="FILE",
-        rich_help_panel="Drive",
-    ),
-]
-Polarity = Annotated[
-    int | None,
-    typer.Option(
-        help="Polarity of the vibrometer relative to the camera, 1 or -1; by default from the onset of the motion.",
-        rich_help_panel="Drive",
-    ),
-]
-Near = Annotated[
-    float | None,
-    opt.number_option(
-        "Approximate delay of the camera's clock, s, to half a cycle, such as from a trigger.", "Drive"
-    ),
-]
-Acceleration = Annotated[
-    Path | None,
-    typer.Option(
-        help="Acceleration of the same shaker, for a check of units and sampling rate.",
-        metavar="FILE",
-        rich_help_panel="Drive",
-    ),
-]
-Amplitude = Annotated[float | None, opt.number_option("Set amplitude, m/s (or m), for a check.", "Drive")]
-AmplitudeFrom = Annotated[
-    str,
-    typer.Option(help="Source of the amplitude of the drive: vibrometer or camera.", rich_help_panel="Drive"),
-]
-DriveOutput = Annotated[
-    Path | None,
-    typer.Option(
-        help="NetCDF file of the drive to write, drift-free and resampled.",
-        metavar="FILE",
-        rich_help_panel="Output",
-    ),
-]
-DriveSamplingFreq = Annotated[
-    float | None, opt.number_option("Sampling frequency of --drive-output, Hz (100000).", "Output")
-]
-
-
-# ----------------------------------------------------------------------------------------------------
+from snapbeam.lab.cli.options import option
 
 
 @cli_command
 def vibrometer(
     signal: lab.SignalFile,
-    frequency: Frequency = None,
-    snr_limit: SnrLimit = None,
+    frequency: Annotated[
+        float | None, opt.number_option("Set excitation frequency, Hz, as the initial guess.", "Drive")
+    ] = None,
+    snr_limit: Annotated[
+        float | None, opt.number_option("Minimum signal-to-noise ratio (SINAD) to accept, dB (15).", "Drive")
+    ] = None,
     channel: lab.Channel = None,
     units: lab.Units = None,
     sensitivity: lab.Sensitivity = None,
     sampling_frequency: lab.SamplingFreq = None,
     columns: lab.Columns = None,
-    camera: Camera = None,
-    polarity: Polarity = None,
-    near: Near = None,
-    amplitude: Amplitude = None,
-    acceleration: Acceleration = None,
-    amplitude_from: AmplitudeFrom = "vibrometer",
-    drive_output: DriveOutput = None,
-    drive_sampling_frequency: DriveSamplingFreq = None,
+    camera: Annotated[
+        Path | None,
+        option("NetCDF file of the tracked recording of the same test, for the alignment.", "Drive", "FILE"),
+    ] = None,
+    polarity: Annotated[
+        int | None,
+        option(
+            "Polarity of the vibrometer relative to the camera, 1 or -1; by default from the onset of the motion.", "Drive"
+        ),
+    ] = None,
+    near: Annotated[
+        float | None,
+        opt.number_option("Approximate delay of the camera's clock, s, to half a cycle, such as from a trigger.", "Drive"),
+    ] = None,
+    amplitude: Annotated[float | None, opt.number_option("Set amplitude, m/s (or m), for a check.", "Drive")] = None,
+    acceleration: Annotated[
+        Path | None,
+        option("Acceleration of the same shaker, for a check of units and sampling rate.", "Drive", "FILE"),
+    ] = None,
+    amplitude_from: Annotated[
+        str, option("Source of the amplitude of the drive: vibrometer or camera.", "Drive")
+    ] = "vibrometer",
+    drive_output: Annotated[
+        Path | None, option("NetCDF file of the drive to write, drift-free and resampled.", lab.OUTPUT, "FILE")
+    ] = None,
+    drive_sampling_frequency: Annotated[
+        float | None, opt.number_option("Sampling frequency of --drive-output, Hz (100000).", lab.OUTPUT)
+    ] = None,
     plot: opt.Plot = None,
     strict: lab.Strict = False,
-) -> None:
+) -> None:  # fmt: skip
     """Measure the motion of the shaker from a vibrometer signal, and check whether the test is acceptable.
 
     The command fits the steady sine with standard errors, separates noise from distortion, and describes the start-up
@@ -101,17 +65,12 @@ def vibrometer(
     Example: snapbeam vibrometer velocity.csv --frequency 100 --plot drive.png --json drive.json
     """
     from snapbeam.lab.vibrometer import SNR_LIMIT, measure_drive
-    from snapbeam.plot.style import FIGURE_SUFFIXES, save_figure
+    from snapbeam.plot.style import FIGURE_SUFFIXES
     from snapbeam.util.diagnostics import doubtful, refuse
-    from snapbeam.util.files import check_writable
     from snapbeam.util.netcdf import write_netcdf
 
-    for name, path, suffixes in (
-        ("plot", plot, FIGURE_SUFFIXES),
-        ("drive_output", drive_output, (".nc",)),
-    ):
-        if path is not None:
-            check_writable(path, name, suffixes)
+    lab.check_files(FIGURE_SUFFIXES, plot=plot)
+    lab.check_files((".nc",), drive_output=drive_output)
     data = lab.open_signal(signal, channel, units, sensitivity, sampling_frequency, columns)
     limit = SNR_LIMIT if snr_limit is None else snr_limit
     other = None if acceleration is None else lab.open_signal(acceleration, None, None, None, None, None)
@@ -154,8 +113,7 @@ def vibrometer(
     if plot is not None:
         from snapbeam.lab.plot.vibrometer import plot_drive
 
-        save_figure(plot_drive(data, drive), plot)
-        console.print(f"Written: {file_line(plot)}")
+        lab.save_plot(plot_drive(data, drive), plot)
     if strict:
         refuse(diagnostics, str(signal))
     if drive_output is not None:
