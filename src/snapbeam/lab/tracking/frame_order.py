@@ -1,10 +1,10 @@
 """Frames that are lost, or shown twice, located by the motion of striker and beam.
 
 A frame that is lost makes both move two steps in one; a frame shown twice makes both stand still for one.  Some
-frames before a place and as many after it are fitted with one polynomial over time, whose clock runs on evenly, jumps by
-the frames that were lost, or stops for a frame.  The striker moves smoothly, so more frames tell more of it.  With an even clock the motion may also bend faster, or
-change its velocity about the place as a body does that is struck or starts; a place counts only if no such motion, and
-no fit over more frames, explains it as well.
+frames before a place and as many after it are fitted with one polynomial over time, whose clock runs on evenly, jumps
+by the frames that were lost, or stops for a frame.  The striker moves smoothly, so more frames tell more of it.  With
+an even clock the motion may also bend faster, or change its velocity about the place as a body does that is struck or
+starts; a place counts only if no such motion, and no fit over more frames, explains it as well.
 """
 
 from __future__ import annotations

@@ -99,7 +99,8 @@ def tracked_dataset(
     if not (fields.shift or fields.apart or scene.noise.lag):
         clock = tuple(drive_clock(rows.shaker))
         if all(kind != "scattered" for kind, _ in clock):  # frames at uneven times look like lost ones
-            order = find_order(rows.row, rows.shaker)
+            blurred = (rows.flags & int(FrameFlag.BLUR)) != 0  # which pulls the rows
+            order = find_order(*(np.where(blurred, np.nan, one) for one in (rows.row, rows.shaker)))
             rows = without_repeats(rows, order)
             clock = tuple(drive_clock(rows.shaker))
         order = order._replace(clock=clock)
