@@ -37,15 +37,8 @@ TIME_NAMES = (
     "timevector", "timevec", "timebase", "timearray", "timestamp", "timestamps",
 )  # fmt: skip
 """Names of time axes, in small letters and digits."""
-_SECONDS = {
-    "minute": 60.0,
-    "minutes": 60.0,
-    "min": 60.0,
-    "hour": 3600.0,
-    "hours": 3600.0,
-    "day": 86400.0,
-    "days": 86400.0,
-}
+_SECONDS = dict.fromkeys(("minute", "minutes", "min"), 60.0) | {"hour": 3600.0, "hours": 3600.0}
+_SECONDS |= {"day": 86400.0, "days": 86400.0}
 _LONGEST_SIDE = 64  # channels in a matrix
 _SCALES = (
     "scale", "scalefactor", "scaling", "gain", "factor", "slope", "multiplier", "conversion", "conversionfactor", "lsb",
@@ -71,34 +64,15 @@ _STEPS = (
 )  # fmt: skip
 _LONGEST_LINE = 2000
 """Letters of a line of a header that is looked into."""
-_PER_SECOND = {
-    "": 1.0,
-    "hz": 1.0,
-    "khz": 1e3,
-    "mhz": 1e6,
-    "s/s": 1.0,
-    "sa/s": 1.0,
-    "ks/s": 1e3,
-    "ms/s": 1e6,
-    "1/s": 1.0,
-}
+_PER_SECOND = dict.fromkeys(("", "hz", "s/s", "sa/s", "1/s"), 1.0)
+_PER_SECOND |= {"khz": 1e3, "ks/s": 1e3, "mhz": 1e6, "ms/s": 1e6}
 _LONGEST_NAME = 500
 """Letters of a name of a column that a unit is looked for in."""
 _SUFFIX_UNITS = {
-    "_m_s": "m/s",
-    "_mm_s": "mm/s",
-    "_um_s": "um/s",
-    "_mm": "mm",
-    "_um": "um",
-    "_ms": "ms",
-    "_us": "us",
-    "_m": "m",
-    "_s": "s",
-    "_v": "V",
-    "_n": "N",
-    "_hz": "Hz",
-}
-_UFF_UNITS = {8: "m", 11: "m/s", 12: "m/s^2", 13: "N"}
+    "_m_s": "m/s", "_mm_s": "mm/s", "_um_s": "um/s", "_mm": "mm", "_um": "um", "_ms": "ms", "_us": "us", "_m": "m",
+    "_s": "s", "_v": "V", "_n": "N", "_hz": "Hz",
+}  # fmt: skip
+_UFF_TYPES = {"m": 8, "m/s": 11, "m/s^2": 12, "N": 13}
 _INTEGER_SCALE = {"int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "uint8": (128.0, 128.0)}
 
 
@@ -137,6 +111,20 @@ def _seconds(name: str, unit: str | None) -> float:
     return factor
 
 
+def _time_unit(name: str, unit: str) -> float | None:
+    """Seconds in a unit; None if it is not one of time."""
+    try:
+        factor, base = si_unit(name, unit)
+    except InputError:
+        return None
+    return factor if base == "s" else None
+
+
+def _stated_unit(attributes: Mapping[str, Any]) -> str:
+    """Unit among attributes; empty if there is none."""
+    return next((_text(attributes[key]).strip() for key in UNIT_NAMES if key in attributes), "")
+
+
 def with_time(channels: list[Channel]) -> list[Channel]:
     """Take the time axes out of *channels* and give each to the channels of its group and length.
 
@@ -170,18 +158,15 @@ def with_time(channels: list[Channel]) -> list[Channel]:
         if not fitting:
             if found:
                 first, axis = next(iter(found.items()))
-                raise InputError(
-                    f"{name} has {np.size(channel['data'])} samples, its time axis {first} {axis.size}"
-                )
+                size = np.size(channel["data"])
+                raise InputError(f"{name} has {size} samples, its time axis {first} {axis.size}")
             continue
         (first, axis), *others = fitting.items()
+        least = 1e-3 * abs(axis[-1] - axis[0]) / axis.size
         for other, times in others:
-            if not np.allclose(
-                times - times[0], axis - axis[0], rtol=0.0, atol=1e-3 * abs(axis[-1] - axis[0]) / axis.size
-            ):
-                raise InputError(
-                    f"{name} has the time axes {first} and {other}, which differ: remove the wrong one"
-                )
+            if not np.allclose(times - times[0], axis - axis[0], rtol=0.0, atol=least):
+                both = f"{first} and {other}"
+                raise InputError(f"{name} has the time axes {both}, which differ: remove the wrong one")
         if "fs" in channel:
             agree(name, axis, channel.pop("fs"), "rename or remove the wrong one")
         channel["time"] = axis
@@ -269,7 +254,7 @@ def _unpacked(name: str, data: NDArray[Any], attributes: Mapping[str, Any]) -> N
     from snapbeam.util.datasets import xr
 
     packing: dict[str, Any] = {}
-    for key in (
+    numbers = (
         "scale_factor",
         "add_offset",
         "_FillValue",
@@ -277,19 +262,17 @@ def _unpacked(name: str, data: NDArray[Any], attributes: Mapping[str, Any]) -> N
         "valid_min",
         "valid_max",
         "valid_range",
-    ):
-        if key in attributes:
-            value = np.asarray(attributes[key])
-            filling = key in ("_FillValue", "missing_value")
-            size = 2 if key == "valid_range" else 1
-            finite = value.dtype.kind in "iuf" and (
-                filling or (value.size == size and np.isfinite(value).all())
+    )
+    for key in (key for key in numbers if key in attributes):
+        value = np.asarray(attributes[key])
+        filling = key in ("_FillValue", "missing_value")
+        size = 2 if key == "valid_range" else 1
+        finite = value.dtype.kind in "iuf" and (filling or (value.size == size and np.isfinite(value).all()))
+        if not finite or (key == "scale_factor" and value.item() == 0.0):
+            raise InputError(
+                f"{name}: attribute {key!r} = {_text(attributes[key])}: must be a finite number, a scale not 0"
             )
-            if not finite or (key == "scale_factor" and value.item() == 0.0):
-                raise InputError(
-                    f"{name}: attribute {key!r} = {_text(attributes[key])}: must be a finite number, a scale not 0"
-                )
-            packing[key] = value if filling and value.size > 1 else value.ravel()[0] if size == 1 else value
+        packing[key] = value if filling and value.size > 1 else value.ravel()[0] if size == 1 else value
     low, high = packing.pop("valid_range", (None, None))
     low, high = packing.pop("valid_min", low), packing.pop("valid_max", high)
     _refuse_scales(name, data, {key: value for key, value in attributes.items() if key not in packing})
@@ -329,7 +312,7 @@ def _channels(stored: Mapping[str, _Stored], groups: Mapping[str, Mapping[str, A
         if item.data.size == 1 and item.data.dtype.kind in "iufUSO":
             folder, _, last = name.rpartition("/")
             value = item.data.reshape(-1)[0]
-            stated = next((_text(item.attributes[key]) for key in UNIT_NAMES if key in item.attributes), "")
+            stated = _stated_unit(item.attributes)
             texts[name] = _text(value)
             levels.setdefault(folder, {})[last] = f"{_text(value)} {stated}" if stated else value
     vectors = {
@@ -360,29 +343,18 @@ def _channels(stored: Mapping[str, _Stored], groups: Mapping[str, Mapping[str, A
         time = is_time(split_unit(last)[0])
         for _, values in () if time else around[1:]:
             _refuse_scales(name, data, values)
-        unit = next(
-            (_text(item.attributes[key]).strip() for key in UNIT_NAMES if key in item.attributes), None
-        )
-        rates = (
-            {}
-            if time
-            else {
-                f"{place}/{key}".lstrip("/"): rate
-                for place, values in around
-                for key, value in values.items()
-                if (rate := _rate_of(key, value)) is not None
-            }
-        )
+        rates = {
+            f"{place}/{key}".lstrip("/"): rate
+            for place, values in (() if time else around)
+            for key, value in values.items()
+            if (rate := _rate_of(key, value)) is not None
+        }
         rows = np.atleast_2d(_unpacked(name, data, item.attributes))
         rows = rows if rows.shape[0] <= rows.shape[1] else rows.T
         for k, row in enumerate(rows):
             own = name if rows.shape[0] == 1 else f"{name} {k + 1}"
-            channel: Channel = {
-                "data": row,
-                "name": own,
-                "unit_str": unit or _unit(texts, name) or None,
-                "axis": item.axis,
-            }
+            unit = _stated_unit(item.attributes) or _unit(texts, name)
+            channel: Channel = {"data": row, "name": own, "unit_str": unit, "axis": item.axis}
             if rates:
                 channel["fs"] = _one_rate(rates, own)
             channels.append(channel)
@@ -498,7 +470,7 @@ def _stating(attributes: Mapping[str, Any]) -> dict[str, Any]:
 
 def _is_axis(name: str, attributes: Mapping[str, Any]) -> bool:
     """Return whether a dimension scale contains times."""
-    stated = next((_text(attributes[key]) for key in UNIT_NAMES if key in attributes), "")
+    stated = _stated_unit(attributes)
     try:
         return is_time(split_unit(name.rpartition("/")[2])[0]) or (
             stated != "" and _seconds(name, stated) > 0.0
@@ -670,13 +642,8 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
     if len(cells) != len(lines) - first:
         raise InputError(f"{path}: a quoted value runs over the end of a line")
     if not text.endswith("\n") and _is_short(cells):
-        tell(
-            [
-                KINDS_SIGNAL["cut_in_number"].found(
-                    told=f"{path}: ends inside its last number, {cells[-1][-1].strip()!r}"
-                )
-            ]
-        )
+        last = f"{path}: ends inside its last number, {cells[-1][-1].strip()!r}"
+        tell([KINDS_SIGNAL["cut_in_number"].found(told=last)])
     return TextBlock(
         path=path,
         header=(*comments, *(line for k, line in enumerate(lines[: dialect.first]) if k not in taken)),
@@ -743,17 +710,12 @@ def _heads(
     above: list[tuple[int, list[str]]] = []
     count = len(dialect.used)
     for k in range(dialect.first - 1, max(dialect.first - 3, -1), -1):
-        cells = (
-            [lines[k].strip()]
-            if count == 1 and dialect.separator is None
-            else _cells([lines[k]], dialect.separator)[0]
-        )
+        blanks = dialect.separator is None
+        cells = [lines[k].strip()] if blanks and count == 1 else _cells([lines[k]], dialect.separator)[0]
         row = dialect.row_of(cells)
         fits = len([cell for cell in cells if cell]) >= count and all(row)
         text = any(re.search(r"[^\W\d_]", cell) and not math.isfinite(to_number(cell)) for cell in row)
-        if dialect.separator is None and len(cells) != count:
-            fits = False
-        if not fits or not text:
+        if not fits or not text or (blanks and len(cells) != count):
             break
         above.append((k, row))
     if not above:
@@ -765,8 +727,6 @@ def _heads(
 
 
 def _like_unit(cell: str) -> bool:
-    from snapbeam.lab.signals import si_unit
-
     word = cell.strip().strip("[]()").strip()
     try:
         si_unit("column", word)
@@ -846,15 +806,8 @@ def read_lvm(path: Path, _told: Told) -> list[Channel]:
         bad = np.flatnonzero(~np.isfinite(data))
         if bad.size:
             raise InputError(f"line {rows[int(bad[0])][0]}, column {names[k]!r}: is not a finite number")
-        channels.append(
-            {
-                "data": data,
-                "name": names[k],
-                "unit_str": (units[number].strip() or None) if number < len(units) else None,
-                "diagnostics": told,
-                **clock,
-            }
-        )
+        unit = (units[number].strip() or None) if number < len(units) else None
+        channels.append({"data": data, "name": names[k], "unit_str": unit, "diagnostics": told, **clock})
     return numbered(channels)
 
 
@@ -888,10 +841,8 @@ def read_matlab(path: Path, _told: Told) -> list[Channel]:
     """
     with open(path, "rb") as file:
         start = file.read(512)
-    if start[:8] == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in start[:128]:
-        values = _version_73(path)
-    else:
-        values = _version_5(path)
+    newer = start[:8] == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in start[:128]
+    values = _version_73(path) if newer else _version_5(path)
     channels = _channels({name: _Stored(value, {}) for name, value in values.items()}, {})
     if not channels:
         raise InputError(
@@ -912,11 +863,8 @@ def _version_5(path: Path) -> dict[str, Any]:
         if array.dtype.names and depth < 4:
             for key in array.dtype.names:
                 inner = array[key]
-                take(
-                    f"{name}/{key}",
-                    inner.item() if inner.dtype == object and inner.ndim == 0 else inner,
-                    depth + 1,
-                )
+                nested = inner.dtype == object and inner.ndim == 0
+                take(f"{name}/{key}", inner.item() if nested else inner, depth + 1)
         elif array.dtype.kind in "iufU":
             values[name] = array
 
@@ -961,13 +909,8 @@ def _version_73(path: Path) -> dict[str, Any]:
     with h5py.File(path, "r") as file:
 
         def visit(name: str, item: Any) -> None:
-            if (
-                not isinstance(item, h5py.Dataset)
-                or name.startswith("#refs#")
-                or item.dtype.kind not in "iuf"
-            ):
-                return
-            if item.attrs.get("MATLAB_empty", 0):
+            numbers = isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf"
+            if not numbers or name.startswith("#refs#") or item.attrs.get("MATLAB_empty", 0):
                 return
             array = np.asarray(item[()])
             if item.attrs.get("MATLAB_class", b"") == b"char":
@@ -1039,17 +982,8 @@ def _rate_of(name: str, value: Any) -> float | None:
     number, unit = _quantity(_text(value))
     unit = unit or suffix or ""
     step = key in _STEPS
-    if not step and unit.lower() not in _PER_SECOND:
-        return None
-    factor = 1.0 if step else _PER_SECOND[unit.lower()]
-    if step:
-        try:
-            factor, base = si_unit(name, unit or "s")
-        except InputError:
-            return None
-        if base != "s":
-            return None
-    if number == 0.0 or math.isnan(number):
+    factor = _time_unit(name, unit or "s") if step else _PER_SECOND.get(unit.lower())
+    if factor is None or number == 0.0 or math.isnan(number):
         return None
     rate = 1.0 / (number * factor) if step else number * factor
     return positive(f"{name}: sampling rate", rate, "Hz")
@@ -1077,13 +1011,10 @@ def _quantity(text: str) -> tuple[float, str]:
 
 
 class Table(NamedTuple):
-    """A text table: its ``columns`` of cells by name, the ``lines`` they stand on, and the lines above."""
+    """A text table: its ``columns`` of cells by name, and the ``block`` of the file that they are of."""
 
-    path: Path
+    block: TextBlock
     columns: dict[str, tuple[str, ...]]
-    lines: list[int]
-    header: tuple[str, ...]
-    decimal_comma: bool
 
     def numbers(self, name: str) -> NDArray[np.float64]:
         """Return a column as floats; refuse a cell that is no finite number, naming its line.
@@ -1093,20 +1024,17 @@ class Table(NamedTuple):
         InputError
             Naming the file, the line, the column and the cell.
         """
-        cells = self.columns[name]
+        cells, block = self.columns[name], self.block
         try:
-            if self.decimal_comma:
+            if block.decimal_comma:
                 raise ValueError
             numbers = np.array(cells, dtype=np.float64)
         except ValueError:
-            numbers = np.array([to_number(cell, self.decimal_comma) for cell in cells])
+            numbers = np.array([to_number(cell, block.decimal_comma) for cell in cells])
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
-            at = int(bad[0])
-            cell = self.columns[name][at]
-            raise InputError(
-                f"{self.path}: line {self.lines[at]}, column {name!r}: {cell!r} is not a finite number"
-            )
+            where = f"{block.path}: line {block.lines[bad[0]]}, column {name!r}"
+            raise InputError(f"{where}: {cells[bad[0]]!r} is not a finite number")
         return numbers
 
 
@@ -1141,9 +1069,7 @@ def read_table(path: Path, columns: str | None = None) -> Table:
         )
     if "" in names or len(set(names)) < len(names):
         raise InputError(f"{path}: columns {list(names)}: each must have a name of its own")
-    cells = zip(*block.rows, strict=True)
-    table = {name: tuple(column) for name, column in zip(names, cells, strict=True)}
-    return Table(path, table, block.lines, block.header, block.decimal_comma)
+    return Table(block, dict(zip(names, zip(*block.rows, strict=True), strict=True)))
 
 
 def _names(block: TextBlock) -> tuple[str, ...] | None:
@@ -1170,10 +1096,10 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
     columns = {name: split_unit(name) for name in table.columns}
     times = [name for name, (word, unit) in columns.items() if _is_time(word, unit)]
     if not times:  # a row of units only, as "[ s ]"
-        times = [name for name, (_, unit) in columns.items() if unit and _in_seconds(name, unit)]
+        times = [name for name, (_, unit) in columns.items() if unit and _time_unit(name, unit)]
     if len(times) > 1:
         raise InputError(f"{path}: columns {times}: only one may be the time")
-    values = header_values(table.header)
+    values = header_values(table.block.header)
     rate = header_rate(values, str(path))
     first, (word, unit) = next(iter(columns.items()))
     if not times and (unit == "Hz" or word.lower().startswith("freq")):
@@ -1206,13 +1132,6 @@ def _is_time(word: str, unit: str | None) -> bool:
     if not is_time(word) or unit is None or _key(word) not in ("xaxis", "xvalue"):
         return is_time(word)
     return si_unit(f"column {word!r}", unit)[1] == "s"
-
-
-def _in_seconds(name: str, unit: str) -> bool:
-    try:
-        return si_unit(name, unit)[1] == "s"
-    except InputError:
-        return False
 
 
 def agree(name: str, time: NDArray[np.float64], rate: float, way_out: str) -> None:
@@ -1300,20 +1219,13 @@ def write_tdms(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
     from nptdms import ChannelObject, TdmsWriter
 
     values, time, rate = check_signal(signal)
-    properties = {
-        "wf_increment": 1.0 / rate,
-        "wf_start_offset": float(time[0]),
-        "wf_samples": values.size,
-        "unit_string": signal.attrs["units"],
-    }
+    properties = {"wf_increment": 1.0 / rate, "wf_start_offset": float(time[0]), "wf_samples": values.size}
+    properties["unit_string"] = signal.attrs["units"]
     with TdmsWriter(str(path)) as writer:
         writer.write_segment([ChannelObject("snapbeam", str(signal.name), values, properties=properties)])
 
 
 # Universal files, dataset 58, ASCII or binary.
-
-
-_UFF_TYPES = {unit: code for code, unit in _UFF_UNITS.items()}
 
 
 _FORTRAN = re.compile(rb"(\.\d*)[Dd]([-+]\d\d)")
@@ -1324,9 +1236,8 @@ def read_uff(path: Path, told: Told) -> list[Channel]:
     import pyuff
 
     content = path.read_bytes()
-    if (
-        _FORTRAN.search(content) and b"58b" not in content
-    ):  # exponents as Fortran writes them, which pyuff does not read
+    # exponents as Fortran writes them, which pyuff does not read
+    if _FORTRAN.search(content) and b"58b" not in content:
         with tempfile.TemporaryDirectory() as folder:
             copy = Path(folder) / path.name
             copy.write_bytes(_FORTRAN.sub(rb"\1E\2", content))
@@ -1354,15 +1265,9 @@ def read_uff(path: Path, told: Told) -> list[Channel]:
             )
         if np.iscomplexobj(data):
             raise InputError(f"{name}: complex numbers are no time series")
-        label = _first(entry.get("abscissa_axis_units_lab"), "s")
-        factor, base = si_unit(f"{name}: abscissa", label)
-        if base != "s":
-            raise InputError(f"{name}: the abscissa is in {label!r}, not in seconds")
-        channel: Channel = {
-            "data": data,
-            "name": name,
-            "unit_str": _first(entry.get("ordinate_axis_units_lab"), "") or None,
-        }
+        factor = _seconds(f"{name}: the abscissa", _first(entry.get("abscissa_axis_units_lab"), "s"))
+        unit = _first(entry.get("ordinate_axis_units_lab"), "") or None
+        channel: Channel = {"data": data, "name": name, "unit_str": unit}
         if entry["abscissa_spacing"] == 1:
             step = float(entry["abscissa_inc"]) * factor
             if not step > 0.0:
@@ -1420,33 +1325,15 @@ def write_uff(path: Path, signal: xr.DataArray, _full_scale: float | None) -> No
     values, time, rate = check_signal(signal)
     unit = signal.attrs["units"]
     entry = pyuff.prepare_58(
-        binary=1,
-        id1=str(signal.name)[:80],
-        func_type=1,
-        rsp_node=1,
-        rsp_dir=3,
-        ref_node=0,
-        ref_dir=0,
-        data=values,
-        x=time,
-        num_pts=values.size,
-        abscissa_spacing=1,
-        abscissa_min=float(time[0]),
-        abscissa_inc=1.0 / rate,
-        abscissa_spec_data_type=17,
-        abscissa_axis_units_lab="s",
-        ordinate_spec_data_type=_UFF_TYPES.get(unit, 0),
-        ordinate_axis_units_lab=unit,
-        orddenom_spec_data_type=0,
-        z_axis_spec_data_type=0,
-        return_full_dict=False,
-    )
+        binary=1, id1=str(signal.name)[:80], func_type=1, rsp_node=1, rsp_dir=3, ref_node=0, ref_dir=0, data=values,
+        x=time, num_pts=values.size, abscissa_spacing=1, abscissa_min=float(time[0]), abscissa_inc=1.0 / rate,
+        abscissa_spec_data_type=17, abscissa_axis_units_lab="s", ordinate_spec_data_type=_UFF_TYPES.get(unit, 0),
+        ordinate_axis_units_lab=unit, orddenom_spec_data_type=0, z_axis_spec_data_type=0, return_full_dict=False,
+    )  # fmt: skip
     entry["n_bytes"] = values.nbytes
     path.unlink(missing_ok=True)
-    with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", ResourceWarning
-        )  # pyuff leaves a file object to the garbage collector
+    with warnings.catch_warnings():  # pyuff leaves a file object to the garbage collector
+        warnings.simplefilter("ignore", ResourceWarning)
         pyuff.UFF(str(path)).write_sets([entry], mode="add")
 
 
@@ -1507,23 +1394,10 @@ def write_wav(path: Path, signal: xr.DataArray, full_scale: float | None) -> Non
 
 
 READERS: dict[str, Callable[[Path, Told], list[Channel]]] = {
-    ".csv": read_csv,
-    ".txt": read_csv,
-    ".asc": read_csv,
-    ".dat": read_csv,
-    ".tsv": read_csv,
-    ".lvm": read_lvm,
-    ".wav": read_wav,
-    ".uff": read_uff,
-    ".unv": read_uff,
-    ".tdms": read_tdms,
-    ".mat": read_matlab,
-    ".h5": read_hdf5,
-    ".hdf5": read_hdf5,
-    ".nc": read_hdf5,
-    ".npz": read_numpy,
-    ".npy": read_numpy,
-}
+    **dict.fromkeys((".csv", ".txt", ".asc", ".dat", ".tsv"), read_csv), ".lvm": read_lvm, ".wav": read_wav,
+    ".uff": read_uff, ".unv": read_uff, ".tdms": read_tdms, ".mat": read_matlab,
+    **dict.fromkeys((".h5", ".hdf5", ".nc"), read_hdf5), ".npz": read_numpy, ".npy": read_numpy,
+}  # fmt: skip
 WRITERS: dict[str, Callable[[Path, Any, float | None], None]] = {
     ".csv": write_csv,
     ".wav": write_wav,
