@@ -24,17 +24,11 @@ if TYPE_CHECKING:
 
 
 _PREFIX = {"": 1.0, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9}
+_WITH_PREFIX = ("m", "m/s", "m/s^2", "N", "V", "s", "Hz", "Pa")
 _GRAVITY = 9.80665  # m/s^2, standard acceleration of free fall
 _INCH = 0.0254  # m
 _TO_SI: dict[str, tuple[float, str]] = {
-    **{f"{p}m": (s, "m") for p, s in _PREFIX.items()},
-    **{f"{p}m/s": (s, "m/s") for p, s in _PREFIX.items()},
-    **{f"{p}m/s^2": (s, "m/s^2") for p, s in _PREFIX.items()},
-    **{f"{p}N": (s, "N") for p, s in _PREFIX.items()},
-    **{f"{p}V": (s, "V") for p, s in _PREFIX.items()},
-    **{f"{p}s": (s, "s") for p, s in _PREFIX.items()},
-    **{f"{p}Hz": (s, "Hz") for p, s in _PREFIX.items()},
-    **{f"{p}Pa": (s, "Pa") for p, s in _PREFIX.items()},
+    **{f"{p}{unit}": (s, unit) for unit in _WITH_PREFIX for p, s in _PREFIX.items()},
     "g": (_GRAVITY, "m/s^2"),
     "g_n": (_GRAVITY, "m/s^2"),
     "in": (_INCH, "m"),
@@ -268,3 +262,9 @@ def check_signal(
     values = finite_array(label, signal.values, 1)
     start, rate = even_sampling(label, signal["time"].values)
     return SignalSamples(values, start + np.arange(values.size) / rate, rate)
+
+
+def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and one past the last index of each stretch of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.lab.least_squares import covariance, sines, solve
-from snapbeam.lab.signals import SignalSamples, check_signal
+from snapbeam.lab.signals import SignalSamples, check_signal, stretches
 from snapbeam.util.validation import InputError, integer, positive
 
 if TYPE_CHECKING:
@@ -411,10 +411,5 @@ def _exact(values: _Array, none: Clipping) -> Clipping:
 
 def stuck_runs(values: _Array, least: int) -> list[Flaw]:
     """Runs of at least so many samples that are equal to the last digit."""
-    same = np.concatenate([[False], np.diff(values) == 0.0, [False]])
-    edges = np.flatnonzero(np.diff(same.astype(np.int8)))
-    return [
-        Flaw(int(first), int(last) + 1)
-        for first, last in zip(edges[::2], edges[1::2], strict=True)
-        if last - first + 1 >= least
-    ]
+    equal = stretches(np.diff(values) == 0.0)
+    return [Flaw(first, last + 1) for first, last in equal if last - first + 1 >= least]

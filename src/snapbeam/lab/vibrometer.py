@@ -30,7 +30,7 @@ from snapbeam.lab.sensor_errors import (
     one_sided,
     with_loss,
 )
-from snapbeam.lab.signals import SignalSamples, check_signal, make_signal
+from snapbeam.lab.signals import SignalSamples, check_signal, make_signal, stretches
 from snapbeam.lab.sine_fit import (
     Clipping,
     Flaw,
@@ -224,14 +224,12 @@ def find_drive_lines(samples: SignalSamples, first: int, last: int, rough: SineF
         if peak is None:
             break
         base, *found = _refined(part, [base, *found, peak], sound)
-        if (
-            min(abs(found[-1] - f) for f in (base, *found[:-1])) * part.values.size
-            < 0.5 * part.sampling_frequency
-        ):
+        apart = min(abs(found[-1] - f) for f in (base, *found[:-1]))
+        if apart * part.values.size < 0.5 * part.sampling_frequency:
             return DriveLines((), ())  # two that cannot be parted are a motion that wanders
     if not found:
         return DriveLines((), ())
-    moving = _phasors(part, [base, *found], sound)[1:]
+    moving = phasors(_left(part, [base, *found], sound)[1])[1 : 1 + len(found)]
     still, error = _at_rest(samples, rest, found)
     hum: list[Line] = []
     beside: list[Line] = []
@@ -278,13 +276,6 @@ def _left(part: SignalSamples, frequencies: list[float], sound: NDArray[np.bool_
     left: _Array = np.asarray(part.values - design @ solution, dtype=np.float64)
     left[~sound] = 0.0
     return left, solution
-
-
-def _phasors(
-    part: SignalSamples, frequencies: list[float], sound: NDArray[np.bool_]
-) -> NDArray[np.complex128]:
-    """Complex amplitudes c of lines Re(c exp(i 2 pi f t))."""
-    return phasors(_left(part, frequencies, sound)[1])[: len(frequencies)]
 
 
 def _peak(left: _Array, rate: float, rough: SineFit) -> float | None:
@@ -357,6 +348,12 @@ def _level(samples: SignalSamples, frequency: float, width: int) -> _Array:
     return level
 
 
+def _moving(samples: SignalSamples, frequency: float, width: int) -> NDArray[np.bool_]:
+    """Samples from which on a cycle oscillates at *frequency*, above 30 % of the level."""
+    level = _level(samples, frequency, width)
+    return np.asarray(level > 0.3 * np.quantile(level, 0.9))
+
+
 def moving_part(samples: SignalSamples, frequency: float) -> tuple[int, int]:
     """First and last (exclusive) sample of the longest stretch that oscillates at *frequency*.
 
@@ -366,26 +363,22 @@ def moving_part(samples: SignalSamples, frequency: float) -> tuple[int, int]:
     width = max(3, round(samples.sampling_frequency / frequency))
     if width >= n:
         return 0, n
-    level = _level(samples, frequency, width)
-    on = level > 0.3 * np.quantile(level, 0.9)
-    bounds = np.flatnonzero(np.diff(np.concatenate(([0], on.astype(np.int8), [0])))).reshape(-1, 2)
-    joined = [bounds[0].tolist()]
-    for first, last in bounds[1:].tolist():
-        if first - joined[-1][1] < 10 * width:
-            joined[-1][1] = last
+    joined: list[tuple[int, int]] = []
+    for first, last in stretches(_moving(samples, frequency, width)):
+        if joined and first - joined[-1][1] < 10 * width:
+            joined[-1] = (joined[-1][0], last)
         else:
-            joined.append([first, last])
+            joined.append((first, last))
     start, stop = max(joined, key=lambda run: run[1] - run[0])
-    return int(start), min(int(stop) + width - 1, n)
+    return start, min(stop + width - 1, n)
 
 
 def moves_outside(samples: SignalSamples, frequency: float, first: int, last: int) -> float:
-    """Duration [s] of oscillation at *frequency* before *first* and after *last*, above 30 % of the level."""
+    """Duration [s] of oscillation at *frequency* before *first* and after *last*."""
     width = max(3, round(samples.sampling_frequency / frequency))
     if width >= samples.values.size:
         return 0.0
-    level = _level(samples, frequency, width)
-    on = level > 0.3 * np.quantile(level, 0.9)
+    on = _moving(samples, frequency, width)
     on[max(first - width, 0) : last + width] = False
     return float(np.count_nonzero(on)) / samples.sampling_frequency
 
@@ -451,11 +444,8 @@ def _quiet_end(samples: SignalSamples, first: int, rough: SineFit, width: int) -
     """The last sample before the motion rises out of the noise, at least a cycle before *first*."""
     level = _level(samples, rough.frequency, width)
     sure = max(first - 30 * width, 1)
-    noise = (
-        1.4826 * float(np.median(level[:sure]))
-        if sure > 2 * width
-        else float(np.median(level[: max(first - width, 1)]))
-    )
+    whole = sure > 2 * width
+    noise = (1.4826 if whole else 1.0) * float(np.median(level[: sure if whole else max(first - width, 1)]))
     limit = max(3.0 * noise, 0.01 * rough.amplitude)
     below = np.flatnonzero(level[: max(first - width // 4, 1)] < limit)
     return int(below[-1]) if below.size else 0
@@ -502,11 +492,12 @@ def _weighed(
     if unit > 1.0 + 4.0 * math.sqrt(2.0 / freedom):
         unit *= max(0.25 * width, 1.0)
     spacing = np.gradient(starts) if starts.size > 1 else np.ones(1)
-    weights = []
-    for degree, scan in zip(_DEGREES, scans, strict=True):
-        score = (scan - least) / unit + 2.0 * (degree + 1) * math.log(count)
-        weights.append(score)
-    table = np.array(weights)
+    table = np.array(
+        [
+            (scan - least) / unit + 2.0 * (degree + 1) * math.log(count)
+            for degree, scan in zip(_DEGREES, scans, strict=True)
+        ]
+    )
     share = np.exp(-0.5 * (table - table.min())) * spacing
     share /= share.sum()
     mean = float((share * starts).sum())
@@ -686,21 +677,23 @@ def measure_drive(
         raise InputError(
             f"signal: the shaker moves for {span:.1f} cycles of {guess:g} Hz: must be at least 8"
         )
-    rough = robust_fit(_slice(moving, moving.values.size // 3, None), guess, 3)
+    settled_part = _slice(moving, moving.values.size // 3, None)
+    rough = robust_fit(settled_part, guess, 3)
     lines = find_drive_lines(samples, first, last, rough)
     if lines.hum:
         samples = without_hum(samples, lines)
         first, last = moving_part(samples, rough.frequency)
         moving = _slice(samples, first, last)
-        rough = robust_fit(_slice(moving, moving.values.size // 3, None), rough.frequency, 3)
-    settled_part = _slice(moving, moving.values.size // 3, None)
+        settled_part = _slice(moving, moving.values.size // 3, None)
+        rough = robust_fit(settled_part, rough.frequency, 3)
     left = settled_part.values - rough.waveform(settled_part.time)
     low_pass = None
     if (
         float(np.std(left)) > _NOISE_FLOOR * rough.amplitude
     ):  # a computed signal has no noise that a filter shapes
         low_pass = find_low_pass(left, samples.sampling_frequency, rough.frequency)
-    crosstalk = _crosstalk(samples, first, rough)
+    rest_end = _rest_end(samples, first, rough)
+    crosstalk = find_crosstalk(samples, rest_end, rough)
     onset, uncertainty = find_onset(
         without_lines(samples, [crosstalk]) if crosstalk is not None else samples, first, rough
     )
@@ -715,7 +708,7 @@ def measure_drive(
     settled, stray = settled_cycles(cycles, tol)
     margin = 1 if settled == 0 else max(2 * settled, 5)
     begin = start + min(settled + margin, max(settled, cycles.size // 2)) * period
-    part = _between(samples, begin, stop - 0.25 * period)
+    part = _slice(samples, *np.searchsorted(samples.time, (begin, stop - 0.25 * period)).tolist())
     steady, flaws, clipping = steady_fit(part, rough.frequency)
     if steady.cycles < 5.0:
         raise InputError(f"signal: only {steady.cycles:.1f} cycles of steady motion: must be at least 5")
@@ -735,12 +728,17 @@ def measure_drive(
         steady = with_loss(steady, low_pass.loss(steady.frequency))
     if crosstalk is not None:
         steady = beside_lines(steady, DriveLines((), (crosstalk,)))
-    mean_moves = one_sided(samples, _rest_end(samples, first, rough), first, last, rough)
+    mean_moves = one_sided(samples, rest_end, first, last, rough)
     startup = None
     amplitudes = np.abs(cycles)
     broken: list[Flaw] = []
     if onset is not None:
-        startup = _start_up(onset, uncertainty, settled, period, amplitudes, steady.amplitude, tol)
+        peak = float(amplitudes[: settled + 1].max() / steady.amplitude - 1.0)
+        startup = StartUp(
+            onset=onset, onset_uncertainty=uncertainty, duration=settled * period, cycles=float(settled),
+            overshoot=peak if peak > tol else 0.0, first_cycle_ratio=float(amplitudes[0] / steady.amplitude),
+            tolerance=tol,
+        )  # fmt: skip
         broken = _broken_start(samples, onset, onset + settled * period, steady, clipping)
     diagnostics = [
         *diagnostics_of(signal),
@@ -752,12 +750,9 @@ def measure_drive(
         *_not_there(samples, steady, frequency),
         *beyond_shakers(steady, str(signal.attrs["units"])),
         *_against(acceleration, steady, str(signal.attrs["units"])),
-        *(
-            [KINDS_VIBROMETER["interrupted"].found(outside_ms=1e3 * outside)]
-            if outside > 3.0 * period
-            else []
-        ),
     ]
+    if outside > 3.0 * period:
+        diagnostics.append(KINDS_VIBROMETER["interrupted"].found(outside_ms=1e3 * outside))
     return DriveMeasurement(
         steady=steady,
         startup=startup,
@@ -770,27 +765,6 @@ def measure_drive(
         diagnostics=tuple(diagnostics),
         cycle_time=times,
         cycle_amplitude=amplitudes,
-    )
-
-
-def _start_up(
-    onset: float,
-    uncertainty: float,
-    settled: int,
-    period: float,
-    amplitudes: _Array,
-    steady: float,
-    tol: float,
-) -> StartUp:
-    peak = float(amplitudes[: settled + 1].max() / steady - 1.0)
-    return StartUp(
-        onset=onset,
-        onset_uncertainty=uncertainty,
-        duration=settled * period,
-        cycles=float(settled),
-        overshoot=peak if peak > tol else 0.0,
-        first_cycle_ratio=float(amplitudes[0] / steady),
-        tolerance=tol,
     )
 
 
@@ -813,10 +787,8 @@ def _broken_start(
     least = max(5, int(0.06 * samples.sampling_frequency / steady.frequency))
     cut = clipping.touches(values)
     found = [run for run in stuck_runs(values, least) if not cut[run.first]]
-    if jumps.size >= 2:
+    if jumps.size:
         found.append(Flaw(int(jumps[0]), int(jumps[-1]) + 2))
-    elif jumps.size:
-        found.append(Flaw(int(jumps[0]), int(jumps[0]) + 2))
     return [Flaw(flaw.first + first, flaw.last + first) for flaw in found]
 
 
@@ -846,9 +818,8 @@ def _doubts(
     noise = steady.noise_rms * math.sqrt(2.0 * steady.cycles / steady.samples) / steady.amplitude
     if wander > max(_STEADY, 3.0 * noise) or stray > 0.05:
         told.append(KINDS_VIBROMETER["unsteady"].found(stray_percent=100.0 * max(wander, stray)))
-    if frequency is not None and abs(steady.frequency - frequency) > max(
-        0.002 * frequency, 6.0 * steady.frequency_se
-    ):
+    unsure = 6.0 * steady.frequency_se
+    if frequency is not None and abs(steady.frequency - frequency) > max(0.002 * frequency, unsure):
         told.append(KINDS_VIBROMETER["frequency"].found(found=steady.frequency, stated=frequency))
     if stated is not None and abs(steady.amplitude - stated) > max(0.05 * stated, 6.0 * steady.amplitude_se):
         share = 100.0 * (steady.amplitude / stated - 1.0)
@@ -876,10 +847,6 @@ def _rest_end(samples: SignalSamples, first: int, rough: SineFit) -> int:
     return max(_quiet_end(samples, first, rough, width) - width, 0) if first > width else 0
 
 
-def _crosstalk(samples: SignalSamples, first: int, rough: SineFit) -> Line | None:
-    return find_crosstalk(samples, _rest_end(samples, first, rough), rough)
-
-
 def _sensor_diagnostics(
     steady: SineFit,
     low_pass: LowPass | None,
@@ -889,14 +856,9 @@ def _sensor_diagnostics(
 ) -> list[Diagnostic]:
     told = []
     if low_pass is not None:
-        told.append(
-            KINDS_VIBROMETER["low_pass"].found(
-                corner=low_pass.corner,
-                loss_percent=100.0 * low_pass.loss(steady.frequency),
-                delay_ms=1e3 * low_pass.delay,
-                wanted=20.0 * steady.frequency,
-            )
-        )
+        loss, wanted = 100.0 * low_pass.loss(steady.frequency), 20.0 * steady.frequency
+        numbers = {"corner": low_pass.corner, "loss_percent": loss, "delay_ms": 1e3 * low_pass.delay}
+        told.append(KINDS_VIBROMETER["low_pass"].found(None, "", **numbers, wanted=wanted))
     if crosstalk is not None:
         share = 100.0 * crosstalk.amplitude / steady.amplitude
         told.append(KINDS_VIBROMETER["crosstalk"].found(share_percent=share))
@@ -942,13 +904,6 @@ def _start_diagnostics(startup: StartUp | None, period: float) -> list[Diagnosti
 
 def _slice(samples: SignalSamples, first: int, last: int | None) -> SignalSamples:
     return SignalSamples(samples.values[first:last], samples.time[first:last], samples.sampling_frequency)
-
-
-def _between(samples: SignalSamples, start: float, stop: float) -> SignalSamples:
-    inside = np.flatnonzero((samples.time >= start) & (samples.time < stop))
-    if inside.size == 0:
-        return _slice(samples, 0, 0)
-    return _slice(samples, int(inside[0]), int(inside[-1]) + 1)
 
 
 def _cycle_phasors(samples: SignalSamples, fit: SineFit, start: float, stop: float) -> tuple[_Array, Any]:
@@ -1047,14 +1002,9 @@ def mended(samples: SignalSamples, drive: DriveMeasurement) -> SignalSamples:
     late = bad | (cut & (samples.time >= drive.steady.start))
     model = drive.steady.waveform(samples.time, harmonics=not drive.clipping.found)
     values[late] = model[late]
-    for first, last in _stretches(early):
+    for first, last in stretches(early):
         values[first:last] = _about(samples, drive, first, last, ~(cut | bad))
     return SignalSamples(values, samples.time, samples.sampling_frequency)
-
-
-def _stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def _about(

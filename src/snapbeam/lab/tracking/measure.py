@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from snapbeam.lab.camera import Recording
+from snapbeam.lab.signals import stretches
 from snapbeam.lab.tracking.edges import (
     Floats,
     alike_columns,
@@ -30,7 +31,6 @@ from snapbeam.lab.tracking.settings import (
     ShakerView,
     Sticker,
     TipOutline,
-    VideoFields,
     gather,
 )
 
@@ -126,10 +126,8 @@ def jumps(rows: Floats) -> NDArray[np.bool_]:
         least = np.abs(bend).min(0)
         same = (bend > 0.0).all(0) | (bend < 0.0).all(0)
         usual = 1.4826 * float(np.median(np.abs(bend)))
-        own = np.maximum(
-            np.abs(np.diff(values, prepend=values[0]))[:n],
-            np.abs(np.diff(values, append=values[-1]))[length + 1 :],
-        )
+        step = np.abs(np.diff(values, prepend=values[0], append=values[-1]))
+        own = np.maximum(step[:n], step[length + 2 :])
         steps = np.minimum(np.abs(inside[0] - before), np.abs(behind - inside[-1]))
         near = at[length + 1 :] - at[:n] <= length + 5
         for k in np.flatnonzero(same & near & (least > max(_JUMP, 10.0 * usual)) & (steps > 3.0 * own + 1.0)):
@@ -248,7 +246,8 @@ def find_rest(row: Floats, error: Floats, shaker: Floats, given: tuple[int, int]
         if not used.size:
             return Rest(used, math.nan, math.nan, False, math.nan)
         noise = max(float(np.sqrt(np.mean(error[used] ** 2))), _STEADY)
-        drift = float(np.ptp(_thirds(row[used]))) / (noise / math.sqrt(max(used.size / 3.0, 1.0)))
+        thirds = [part.mean() for part in np.array_split(row[used], 3) if part.size]
+        drift = float(np.ptp(thirds)) / (noise / math.sqrt(max(used.size / 3.0, 1.0)))
         drift = max(drift, _beside(row[known], np.flatnonzero(np.isin(known, used)), noise))
         return Rest(used, float(row[used].mean()), _mean_error(row[used], noise), drift < 8.0, drift)
     if not known.size:
@@ -268,7 +267,7 @@ def find_rest(row: Floats, error: Floats, shaker: Floats, given: tuple[int, int]
         still = _still(values[quiet:], length, noise)
         if np.isfinite(shaker[known]).mean() > 0.5:
             still &= _still(shaker[known][quiet:], length, noise)
-        found = int(np.count_nonzero(np.diff(np.concatenate([[0], still.astype(np.int8)])) == 1)) < _OFTEN
+        found = len(stretches(still)) < _OFTEN
     return Rest(used, mean, _mean_error(row[used], noise), found, 0.0)
 
 
@@ -298,10 +297,6 @@ def _still(values: Floats, length: int, noise: float) -> NDArray[np.bool_]:
     low = minimum_filter1d(filled, length, origin=shift)
     still: NDArray[np.bool_] = ((high - low) < 6.0 * noise)[: values.size - length + 1]
     return still
-
-
-def _thirds(values: Floats) -> Floats:
-    return np.array([part.mean() for part in np.array_split(values, 3) if part.size])
 
 
 def _mean_error(values: Floats, noise: float) -> float:
@@ -420,13 +415,12 @@ def _first_band(level: Floats, thickness: float, longest: float) -> Floats:
 
     ``level`` is positive inside objects.
     """
-    steps = np.diff(np.pad((level > 0.0).astype(np.int8), ((0, 0), (1, 1))), axis=1)
     out = np.full(level.shape[0], np.nan)
-    for k, step in enumerate(steps):
-        starts, stops = np.flatnonzero(step == 1), np.flatnonzero(step == -1)
-        fitting = (stops - starts >= 0.6 * thickness) & (stops - starts <= longest) & (starts > 0)
-        if fitting.any():
-            out[k] = starts[fitting.argmax()] - 0.5
+    for k, solid in enumerate(level > 0.0):
+        bands = (
+            first for first, last in stretches(solid) if 0.6 * thickness <= last - first <= longest and first
+        )
+        out[k] = next(bands, np.nan) - 0.5
     return out
 
 
@@ -437,12 +431,9 @@ def _thickness(view: BeamView, frames: NDArray[np.floating], row: Floats, slope:
     """
     if view.merged:
         return np.full(row.shape, np.nan)
-    columns = np.concatenate(
-        [
-            group[:_CHECKED] if group.mean() < view.contact_column else group[-_CHECKED:]
-            for group in view.groups
-        ]
-    )
+    before = [group.mean() < view.contact_column for group in view.groups]
+    ends = zip(view.groups, before, strict=True)
+    columns = np.concatenate([group[:_CHECKED] if first else group[-_CHECKED:] for group, first in ends])
     across = columns - view.contact_column
     expected = row[:, None] + slope[:, None] * across + view.thickness
     windows, inside = gather(frames, expected, columns, half)
@@ -794,20 +785,6 @@ _PART = 0.15  # of the step from frame to frame by which rows must differ; field
 _SHIFT = 0.02  # px
 
 
-def seen_fields(
-    recording: Recording,
-    prepare: Callable[[NDArray[np.integer]], NDArray[np.float32]],
-    view: BeamView,
-    rows: TrackedRows,
-    along_rows: bool,
-) -> VideoFields:
-    """Signs of interlaced fields in a tracked recording; *along_rows*: the beam is along image rows.
-
-    *prepare* turns frames as they were tracked.
-    """
-    return VideoFields(fields_apart(recording, prepare, view, rows, along_rows), alternation(rows.row))
-
-
 def fields_apart(
     recording: Recording,
     prepare: Callable[[NDArray[np.integer]], NDArray[np.float32]],
@@ -817,6 +794,7 @@ def fields_apart(
 ) -> float:
     """Difference between odd and even rows, as a fraction of the step between frames; 0 if there is none.
 
+    *prepare* turns frames as they were tracked; *along_rows*: the beam is along image rows.
     In the fastest frames the edge is sought in odd and in even rows: with d_k the difference and v_k the step a frame,
     the share is the slope of d over v through 0.  Rows taken together differ by nothing, fields half a frame apart by
     half a step, whatever the sign.

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.optimize import minimize_scalar
 
+from snapbeam.lab.signals import stretches
 from snapbeam.lab.tracking.edges import (
     EdgeFit,
     Floats,
@@ -95,13 +96,8 @@ def column_objects(mask: NDArray[np.bool_]) -> ColumnObjects:
 
 
 def longest_stretch(columns: NDArray[np.bool_]) -> tuple[int, int]:
-    """First and one past the last of the longest stretch of True."""
-    steps = np.diff(np.concatenate([[0], columns.astype(np.int8), [0]]))
-    starts, stops = np.flatnonzero(steps == 1), np.flatnonzero(steps == -1)
-    if not starts.size:
-        return 0, 0
-    best = int(np.argmax(stops - starts))
-    return int(starts[best]), int(stops[best])
+    """First and one past the last of the longest stretch of True; 0, 0 if there is none."""
+    return max(stretches(columns), key=lambda run: run[1] - run[0], default=(0, 0))
 
 
 def fixed_bars(mask: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
@@ -156,17 +152,12 @@ def _still_bands(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
             stops = falling[falling > first]
             if stops.size and not ((rising > first) & (rising < stops[0])).any():
                 marks[first + 1 : stops[0] + 1, c] = True
-    across = marks.mean(1) >= _ACROSS
-    edges = np.diff(np.concatenate([[0], across.astype(np.int8), [0]]))
-    return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
+    return stretches(marks.mean(1) >= _ACROSS)
 
 
 def _peaks(share: NDArray[np.floating]) -> NDArray[np.intp]:
     """Middle of each range of rows with an edge in most of the sample."""
-    still = share >= _STILL
-    steps = np.diff(np.concatenate([[0], still.astype(np.int8), [0]]))
-    middle: NDArray[np.intp] = (np.flatnonzero(steps == 1) + np.flatnonzero(steps == -1) - 1) // 2
-    return middle
+    return np.array([(first + last - 1) // 2 for first, last in stretches(share >= _STILL)], dtype=np.intp)
 
 
 def _moving_beam(mask: NDArray[np.bool_], edge: NDArray[np.intp] | None = None) -> bool:
@@ -263,10 +254,8 @@ def _symmetry(x: Floats, y: Floats, error: Floats, ratio: float, sign: float) ->
     if least and (scatter[other] - scatter[best]) / unit < _CERTAIN:
         best, unit = other, max(1.0, scatter[other] / freedom)
     worse = (float(np.interp(0.0, np.log(_GAMMAS), scatter)) - scatter[best]) / unit
-    alike = (np.abs(scatter - scatter[best]) / unit < 1.0) & (
-        np.abs(np.log(_GAMMAS / _GAMMAS[best])) < _LIKELY
-    )
-    spread = np.log(_GAMMAS[alike])
+    alike = np.abs(scatter - scatter[best]) / unit < 1.0
+    spread = np.log(_GAMMAS[alike & (np.abs(np.log(_GAMMAS / _GAMMAS[best])) < _LIKELY)])
     log_se = max(0.5 * float(np.ptp(spread)), 0.5 * math.log(_GAMMAS[1] / _GAMMAS[0]))
     gamma = float(_GAMMAS[best])
     shift = float(centres[best]) if worse > _CERTAIN else 0.0
@@ -781,15 +770,11 @@ def find_apex(outline: TipOutline, rod: tuple[int, int], contact_column: float) 
     ]
     centre = float(grid[int(np.argmin(cost))])
     solution, variance = fitted(centre)
-    rounded = float(np.polynomial.polynomial.polyval(0.9, _full(solution, powers))) - float(solution[0]) > 0.3
+    full = np.zeros(5)
+    full[list(powers)] = solution
+    rounded = float(np.polynomial.polynomial.polyval(0.9, full)) - float(solution[0]) > 0.3
     error = math.sqrt(max(variance, 1e-5) * 2.0 / independent)
     return Apex(float(solution[0]), error, centre * half) if rounded or covered else None
-
-
-def _full(solution: Floats, powers: tuple[int, ...]) -> Floats:
-    out = np.zeros(5)
-    out[list(powers)] = solution
-    return out
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -26,11 +26,12 @@ from snapbeam.lab.tracking.measure import (
     Follower,
     Rest,
     TrackedRows,
+    alternation,
+    fields_apart,
     find_rest,
     image_lag,
     measure_beam,
     measure_shaker,
-    seen_fields,
     touching,
 )
 from snapbeam.lab.tracking.settings import (
@@ -331,7 +332,8 @@ def track(
         if progress is not None:
             progress(done, len(recording))
     rows = follower.result(recording.numbers)
-    fields = seen_fields(recording, prepare, scene.beam, rows, wanted.side in ("below", "above"))
+    apart = fields_apart(recording, prepare, scene.beam, rows, wanted.side in ("below", "above"))
+    fields = VideoFields(apart, alternation(rows.row))
     return tracked_dataset(rows, recording, scene, wanted, marks.largest, fields)
 
 
