@@ -12,6 +12,7 @@ from snapbeam.lab.synthetic import SyntheticCamera, SyntheticStage, render_recor
 from snapbeam.lab.tracking.settings import FrameFlag
 from snapbeam.lab.tracking.track import contact_onsets, track, tracking_quality, tracking_report
 from snapbeam.simulation.dataset import check_trajectory
+from snapbeam.util.diagnostics import diagnostics_of, doubtful
 
 STICKER = {"shaker_width": 0.8e-3}
 PLAIN_TIP = {"shaker_width": 1.0e-3, "tip_radius": 0.6e-3, "marker_thickness": 0.0}
@@ -129,6 +130,18 @@ def test_trouble_is_flagged_and_never_filled_in(tmp_path):
     report = tracking_report(tracked)
     assert "glare: 2 frames - light saturates" in report and report.endswith("in frames: 2")
     assert quality["snr_db"] == pytest.approx(30.0, abs=1.0)
+
+
+def test_a_striker_that_never_touches_is_no_doubt_about_the_track(tmp_path):
+    time, _, shaker, *_ = impacts(5)
+    beam = -BUCKLING_LEVEL + 8.0 * PIXEL * np.exp(-20.0 * time) * np.sin(2.0 * np.pi * 190.0 * time)
+    recording = rendered((time, beam, shaker - 20.0 * PIXEL), stage=PLAIN_TIP)
+    tracked = followed(recording, tmp_path)
+    codes = [one.code for one in diagnostics_of(tracked)]
+    assert "camera.no_contact" in codes and not doubtful(diagnostics_of(tracked)), codes
+    miss = errors_px(tracked, recording.truth, "shaker_displacement_mm")
+    stated = tracked["shaker_stderr_mm"].values / (PIXEL * 1e3)
+    assert np.nanmax(np.abs(miss) / stated) < 6.0 and np.nanmedian(stated) < 0.2
 
 
 def test_a_flat_tip_without_sticker_merges_at_contact_and_says_so(tmp_path):

@@ -141,6 +141,11 @@ KINDS = table(
         ("tip_distance",),
     ),
     Kind(
+        "camera.no_contact", INFO,
+        "the gap between a tip without doubt and the beam over the recording, while the beam moves",
+        "the tip never comes nearer to the beam than {gap_px:.1f} px: no contact is recorded",
+    ),
+    Kind(
         "camera.contact_offset", WARNING,
         "penetration while beam and shaker move together, which is zero",
         "while beam and shaker move together the tip seems to stand {depth_px:+.2f} +- {error_px:.2f} px inside the "
@@ -477,7 +482,7 @@ def _of_the_tip(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
         told.append(KINDS["sticker_alone"].found(height_px=shaker.sticker.thickness, gap_px=nearest))
     closest = never_touching(seen.penetration, seen.rows)
     if closest > 0.0:
-        told.append(KINDS["never_touches"].found(gap_px=closest))
+        told.append(KINDS["no_contact" if shaker.certain else "never_touches"].found(gap_px=closest))
     if contact_shift(seen.touch, scene.placed_error) > 0.0:
         told.append(KINDS["contact_offset"].found(depth_px=seen.touch.penetration, error_px=seen.touch.error))
     with np.errstate(invalid="ignore"):

@@ -334,7 +334,8 @@ class ShakerView:
 
     The reference row is the middle of the sticker, or without one the tip itself; ``tip_offset`` is the row
     of the tip at the contact counted from it and ``tip_error`` its standard error; ``tip_source`` says in
-    words where that is known from; ``isolated`` that the sticker was all that could be seen of the shaker.
+    words where that is known from; ``isolated`` that the sticker was all that could be seen of the shaker;
+    ``certain`` that the tip is no sticker, by its distance or since its body has no gap down to the border.
     """
 
     rod: tuple[int, int]
@@ -344,6 +345,7 @@ class ShakerView:
     tip_error: float
     tip_source: str
     isolated: bool
+    certain: bool
 
     @property
     def mark(self) -> str:

@@ -836,7 +836,8 @@ def shaker_view(
         reference = sticker_rows(view, sticker, frames, near).row
     outline = _outline(view, frames, bands, rod, beam, reference, learn=not isolated)
     column = view.contact_column
-    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated)
+    certain = _reaches_border(bands, middle) if sticker is None else wanted.tip_distance is not None
+    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain)
     if sticker is not None and wanted.tip_distance is not None:
         offset = -(wanted.tip_distance + 0.5 * sticker.thickness)
         return dataclasses.replace(
@@ -858,6 +859,13 @@ def shaker_view(
         "so it cannot be followed; set region (--region) or threshold (--threshold), or track the beam alone "
         "with shaker=False (--no-shaker)"
     )
+
+
+def _reaches_border(bands: BeamBands, middle: NDArray[np.intp]) -> bool:
+    """Return whether what stands apart below the beam goes on to the border without a gap."""
+    objects = bands.objects
+    shown = (bands.alone & objects.follows)[:, middle]
+    return bool(shown.any() and (objects.after_end[:, middle] == objects.height)[shown].mean() > 0.9)
 
 
 def _stands_alone(bands: BeamBands, middle: NDArray[np.intp], near: Floats) -> bool:

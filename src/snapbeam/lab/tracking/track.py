@@ -120,7 +120,8 @@ def tracked_dataset(
     # a shift of the edges by the camera's curve moves the shaker against the beam, not the beam against itself
     placed = scene.placed_error
     bent = math.hypot(2.0 * scene.shape.shift, contact_shift(touch, placed), placed)
-    bent = math.hypot(bent, never_touching(penetration, rows), rounding_shift(scene.beam), 2.0 * rows.hollow)
+    apart = 0.0 if shaker is None or shaker.certain else never_touching(penetration, rows)
+    bent = math.hypot(bent, apart, rounding_shift(scene.beam), 2.0 * rows.hollow)
     # an edge that is no blurred step is found a little off, by where in its pixel it lies
     share = float(np.interp(beam.edge_width, *_PIXEL_PHASE))
     misfit = share * float(np.nan_to_num(scene.shape.misfit))
