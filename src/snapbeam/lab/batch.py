@@ -239,19 +239,11 @@ class SeriesSettings:
 
     def fingerprint(self, *files: Path) -> str:
         """A number that changes with any setting and any of the files."""
-        tracking = {
-            item.name: getattr(self.tracking, item.name) for item in dataclasses.fields(self.tracking)
-        }
-        parts = [
-            __version__,
-            repr(sorted(self.camera.items())),
-            repr(sorted(tracking.items())),
-            repr(sorted(self.signal.items())),
-        ]
+        parts = [__version__]
+        parts += [repr(sorted(one.items())) for one in (self.camera, vars(self.tracking), self.signal)]
         parts.append(repr(self.cycles))
         for file in files:
-            whole = sorted(file.iterdir()) if file.is_dir() else [file, file.with_suffix(".mraw")]
-            for one in whole:
+            for one in sorted(file.iterdir()) if file.is_dir() else [file, file.with_suffix(".mraw")]:
                 if one.exists():
                     state = one.stat()
                     parts.append(f"{one.name} {state.st_size} {state.st_mtime_ns}")
@@ -360,10 +352,9 @@ def run_test(test: Test, settings: SeriesSettings, folder: Path, fingerprint: st
     except (InputError, OSError) as error:
         if isinstance(error, OSError):
             fingerprint = ""  # perhaps it can be read the next time
-        reason = _wrong(diagnostics) or _short(str(error), test)
-        result = _row(
-            test, status="spoiled", reason=reason, diagnostics=tuple(_plain(one) for one in diagnostics)
-        )
+        # a message without the folder of the test's files
+        reason = _wrong(diagnostics) or str(error).replace(f"{test.recording.parent}{os.sep}", "")
+        result = _row(test, diagnostics, status="spoiled", reason=reason)
     result = replace(result, fingerprint=fingerprint)
     plain = {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
@@ -374,18 +365,14 @@ def run_test(test: Test, settings: SeriesSettings, folder: Path, fingerprint: st
     return result
 
 
-def _row(test: Test, **values: Any) -> TestResult:
+def _row(test: Test, diagnostics: list[Diagnostic], **values: Any) -> TestResult:
     return TestResult(
         test=test.name,
         recording=test.recording.name,
         vibrometer=test.vibrometer.name if test.vibrometer is not None else "",
+        diagnostics=tuple((one.code, one.severity.value, one.message) for one in diagnostics),
         **values,
     )
-
-
-def _short(message: str, test: Test) -> str:
-    """A message without the folder of the test's files."""
-    return message.replace(f"{test.recording.parent}{os.sep}", "")
 
 
 def _wrong(diagnostics: list[Diagnostic]) -> str:
@@ -423,8 +410,12 @@ def _measured(
         short = all(one.startswith(TOO_SHORT) for one in response.reasons)
         status = TOO_SHORT if short else "spoiled"
     valid = tracked["valid"].values.astype(bool)
+    aligned: dict[str, float] = {}
+    if alignment is not None:
+        aligned = {"delay_s": alignment.delay, "polarity": alignment.polarity, "gain": alignment.gain}
     return _row(
         test,
+        diagnostics,
         status=status,
         reason=reason,
         frequency_hz=drive.steady.frequency,
@@ -437,15 +428,8 @@ def _measured(
         cycles=response.cycles,
         snr_db=drive.steady.sinad,
         measured_share=float(np.mean(valid)),
-        delay_s=_NAN if alignment is None else alignment.delay,
-        polarity=_NAN if alignment is None else alignment.polarity,
-        gain=_NAN if alignment is None else alignment.gain,
-        diagnostics=tuple(_plain(one) for one in diagnostics),
+        **aligned,
     )
-
-
-def _plain(diagnostic: Diagnostic) -> tuple[str, str, str]:
-    return diagnostic.code, diagnostic.severity.value, diagnostic.message
 
 
 def _stated(signal: xr.DataArray, test: Test) -> float | None:
@@ -520,7 +504,8 @@ def run_test_series(
     if progress is not None:
         progress(0, len(tests), None)
     for test in tests:
-        fingerprint = settings.fingerprint(*_files(test)) + _set(test)
+        files = [path for path in (test.recording, test.vibrometer) if path is not None]
+        fingerprint = settings.fingerprint(*files) + _set(test)
         result = kept_result(kept / f"{test.name}.json", fingerprint)
         if result is None:
             result = run_test(test, settings, kept, fingerprint)
@@ -539,18 +524,11 @@ def strictly(result: TestResult) -> TestResult:
     return dataclasses.replace(result, status="spoiled", reason=words)
 
 
-def _files(test: Test) -> list[Path]:
-    return [path for path in (test.recording, test.vibrometer) if path is not None]
-
-
 def _set(test: Test) -> str:
     """Values of a test as text, for its fingerprint."""
     values = (test.frequency, test.velocity, test.location)
-    return (
-        ""
-        if not any(values)
-        else " " + " ".join("-" if value is None else f"{value:.12g}" for value in values)
-    )
+    words = " ".join("-" if value is None else f"{value:.12g}" for value in values)
+    return f" {words}" if any(values) else ""
 
 
 def write_table(path: Path, results: list[TestResult]) -> None:

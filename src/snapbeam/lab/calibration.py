@@ -45,21 +45,25 @@ def uneven_beam(beam: Beam, measured: Measurements, kind: str, modes: int) -> Re
     Of the beam, the buckling level alone changes: two numbers from two frequencies, see
     :func:`snapbeam.model.imperfection_identification.identify_imperfection`.
     """
-    both = {}
+    both = []
     for well in ("lower", "upper"):
-        values, shapes = (
-            getattr(measured, f"{well}_well_frequencies"),
-            getattr(measured, f"{well}_well_shape"),
-        )
-        own = (
-            [f for f, shape in zip(values, shapes, strict=True) if shape == "symmetric"] if shapes else values
-        )
+        own = _symmetric(measured, well)
         if not own:
             raise InputError(
                 f"imperfection = {kind!r}: needs the first frequency about both wells; the {well} one's is not given"
             )
-        both[well] = float(own[0])
-    return identify_imperfection(beam, both["lower"], both["upper"], kind, modes)
+        both.append(float(own[0]))
+    return identify_imperfection(beam, both[0], both[1], kind, modes)
+
+
+def _symmetric(measured: Measurements, well: str) -> list[float]:
+    """Frequencies [Hz] about a well that belong to symmetric modes, or all if their shapes are not given."""
+    values, shapes = getattr(measured, f"{well}_well_frequencies"), getattr(measured, f"{well}_well_shape")
+    return [
+        f
+        for f, shape in zip(values, shapes or ["symmetric"] * len(values), strict=True)
+        if shape == "symmetric"
+    ]
 
 
 def uneven_words(kind: str, model: ReducedModel) -> str:
@@ -188,25 +192,15 @@ def either_well(beam: Beam, measured: Measurements, modes: int) -> tuple[float, 
     """Buckling level [m] that the first symmetric frequency of each well alone asks for; empty if they agree."""
     from scipy.optimize import newton
 
-    goals = []
-    for state in ("lower_well", "upper_well"):
-        values, shapes = getattr(measured, f"{state}_frequencies"), getattr(measured, f"{state}_shape")
-        fitting = (
-            [f for f, shape in zip(values, shapes, strict=True) if shape == "symmetric"] if shapes else values
-        )
-        goals += list(fitting[:1])
+    goals = [*_symmetric(measured, "lower")[:1], *_symmetric(measured, "upper")[:1]]
     if len(goals) < 2 or goals[0] == goals[1]:
         return ()
     level, levels = beam.buckling_level, []
 
     def symmetric(at: float) -> float:
         model = ReducedModel.from_beam(beam.replace(buckling_level=abs(at) * level), modes)
-        own = (
-            model.natural_frequencies[model.parity > 0]
-            if (model.parity > 0).any()
-            else model.natural_frequencies
-        )
-        return float(own[0])
+        even = model.parity > 0
+        return float(model.natural_frequencies[even if even.any() else slice(None)][0])
 
     here = symmetric(1.0)
     for goal in goals:
@@ -269,11 +263,8 @@ def links(names: list[str], covariance: NDArray[np.float64], hidden: tuple[str, 
         if name in hidden:
             continue
         if spread[i] > _VAGUE:
-            told.append(
-                KINDS_CALIBRATION["vague"].found(
-                    told=f"{name} is known to {spread[i]:.0%} only", share=spread[i]
-                )
-            )
+            words = f"{name} is known to {spread[i]:.0%} only"
+            told.append(KINDS_CALIBRATION["vague"].found(told=words, share=spread[i]))
         for j, other in enumerate(names[:i]):
             linked = 0.0 if other in hidden else covariance[i, j] / (spread[i] * spread[j])
             if abs(linked) > _LINKED:
@@ -298,9 +289,8 @@ def at_least(level: float) -> Diagnostic:
 def remarks(result: Calibration, measured: Measurements) -> list[str]:
     """Remarks on the result: frequencies about the wells, and measured against fitted geometry."""
     told = []
-    first = [
-        values[0] for values in (measured.lower_well_frequencies, measured.upper_well_frequencies) if values
-    ]
+    wells = (measured.lower_well_frequencies, measured.upper_well_frequencies)
+    first = [values[0] for values in wells if values]
     if first and result.well_frequency is not None:
         mean = float(np.mean(first))
         told.append(
@@ -454,10 +444,10 @@ class Calibration:
         else:
             beam["axial_load"] = float(self.beam.axial_load)
         sections: dict[str, dict[str, Any]] = {"beam": beam, "model": {"modes": self.modes}}
-        sections |= (
-            {"boundary": boundary_section(self.beam)} if self.beam.boundary != BoundaryConditions() else {}
-        )
-        sections |= {"imperfection": imperfection_section(self.imperfection)} if self.imperfection else {}
+        if self.beam.boundary != BoundaryConditions():
+            sections["boundary"] = boundary_section(self.beam)
+        if self.imperfection:
+            sections["imperfection"] = imperfection_section(self.imperfection)
         if self.damping_ratio is not None:
             sections["model"]["damping_ratio"] = self.damping_ratio
         if self.contact_stiffness is not None:

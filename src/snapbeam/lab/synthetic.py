@@ -616,7 +616,6 @@ class SyntheticRecording:
         self.truth = truth
         self.seed = seed
         self._instants = instants
-        self._turn = Orientation(stage.side, camera.shape)
         self._picture = (
             GaussianPicture(camera, stage)
             if camera.lens == "gaussian"
@@ -638,7 +637,8 @@ class SyntheticRecording:
             return self.frame(index - 1)
         rng = np.random.default_rng([self.seed, index])
         grey = read_out(self._light(index), self.camera, self.stage, self.defects, rng)
-        return _turn_back(self._turn, grey)
+        grey = grey[::-1] if self.stage.side in ("above", "left") else grey
+        return np.ascontiguousarray(grey.T if self.stage.side in ("left", "right") else grey)
 
     def _light(self, index: int) -> NDArray[np.float32]:
         """Light of one frame on the sensor, shares of full scale, shaker below."""
@@ -735,12 +735,6 @@ class _Instants:
         at = opened + self.exposure * (np.arange(count) + 0.5) / count
         beam = self.zero_row - np.interp(at, self.time, self.beam) / size
         return beam, self.zero_row - np.interp(at, self.time, self.shaker) / size
-
-
-def _turn_back(turn: Orientation, picture: NDArray[np.uint16]) -> NDArray[np.uint16]:
-    if turn.side in ("above", "left"):
-        picture = picture[::-1]
-    return np.ascontiguousarray(picture.T if turn.side in ("left", "right") else picture)
 
 
 def render_recording(
