@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from snapbeam.util import interrupts
 
-__all__ = ["main"]
-
 
 def main() -> None:
     """Run the program."""

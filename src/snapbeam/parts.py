@@ -10,8 +10,6 @@ from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
 
-__all__ = ["PARTS", "installed_parts", "load_part", "signal_files"]
-
 PARTS = {
     "lab": "lab",  # camera recordings, vibrometer signals, free decays, calibration, comparison with simulations
     "explorer": "explorer",  # interactive maps in the browser

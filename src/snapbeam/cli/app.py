@@ -12,9 +12,6 @@ from snapbeam.cli.short_help import ShortHelpCommand, ShortHelpGroup
 from snapbeam.parts import PARTS, installed_parts
 from snapbeam.util.packages import needs
 
-__all__ = ["app", "main"]
-
-
 # Module and function of each command.
 _COMMANDS = {
     "simulate": "snapbeam.cli.simulate:simulate",

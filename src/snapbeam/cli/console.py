@@ -34,31 +34,6 @@ from snapbeam.util.work_rate import WorkRate
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "FAILED",
-    "INTERRUPTED",
-    "REFUSED",
-    "add_json",
-    "check_pictures",
-    "cli_command",
-    "count_text",
-    "draw",
-    "duration",
-    "errors",
-    "file_line",
-    "notes",
-    "open_result",
-    "out",
-    "pace",
-    "progress",
-    "read_overlay",
-    "show_compilation",
-    "write_json",
-    "write_json_now",
-    "write_map",
-]
-
-
 FAILED = 1
 REFUSED = 2
 INTERRUPTED = 130

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from snapbeam.dynamics.basins import BasinEntropy
     from snapbeam.model.parameter_file import Config
 
-__all__ = ["dynamics"]
-
 
 class _Analyses(ShortHelpGroup):
     """The commands, with a suggestion for a name that is part of a command or a word of its description."""

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from snapbeam.model.potential import Potential
     from snapbeam.model.system import System
 
-__all__ = ["equilibria"]
-
 
 @cli_command
 @with_parameters(*BEAM, *BOUNDARY, *IMPERFECTION, *MODEL)

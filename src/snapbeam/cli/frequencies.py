@@ -13,8 +13,6 @@ from snapbeam.cli.parameter_options import BEAM, BOUNDARY, IMPERFECTION, MODEL, 
 if TYPE_CHECKING:
     from snapbeam.model.potential import Potential
 
-__all__ = ["frequencies"]
-
 
 @cli_command
 @with_parameters(*BEAM, *BOUNDARY, *IMPERFECTION, *MODEL)

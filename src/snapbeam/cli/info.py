@@ -12,8 +12,6 @@ from snapbeam.cli.console import add_json, cli_command, file_line, notes, out
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["info"]
-
 
 @cli_command
 def info(

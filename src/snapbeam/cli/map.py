@@ -21,9 +21,6 @@ from snapbeam.cli.parameter_options import (
     with_parameters,
 )
 
-__all__ = ["compute_map"]
-
-
 _AXES = (
     "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
     "contact.location", "contact.location_m", "model.modes",

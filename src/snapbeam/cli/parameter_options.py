@@ -24,34 +24,6 @@ if TYPE_CHECKING:
     from snapbeam.model.parameter_file import Config
     from snapbeam.sweeps.compute import SweepReport
 
-__all__ = [
-    "BEAM",
-    "BOUNDARY",
-    "CONTACT",
-    "DRIVE",
-    "IMPERFECTION",
-    "MODEL",
-    "RUN",
-    "STRIKER",
-    "LongReport",
-    "config_of_file",
-    "configured",
-    "count_option",
-    "is_long",
-    "kept_config",
-    "number_option",
-    "parse_range",
-    "parse_window",
-    "point_text",
-    "report",
-    "resumed",
-    "sweep_options",
-    "sweep_report_lines",
-    "with_checkpoint",
-    "with_parameters",
-]
-
-
 BEAM = ("beam.length", "beam.thickness", "beam.width", "beam.density", "beam.young_modulus", "beam.buckling_level",
         "beam.axial_load")  # fmt: skip
 BOUNDARY = (

@@ -13,9 +13,6 @@ from snapbeam.cli.console import add_json, cli_command, file_line, out
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["plot"]
-
-
 _SLICE = "Slice of a map, at the nearest grid value"
 _OVER = ("lower_threshold", "threshold", "probability", "lifetime", "response_class")
 """Variables over the axes of a sweep; the first of a file tells its axes."""

@@ -20,8 +20,6 @@ from snapbeam.cli.parameter_options import (
     with_parameters,
 )
 
-__all__ = ["schematic"]
-
 
 @cli_command
 @with_parameters(*BEAM, *BOUNDARY, *IMPERFECTION, *MODEL, *CONTACT, *STRIKER, *DRIVE)

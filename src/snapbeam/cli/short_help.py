@@ -8,8 +8,6 @@ from typing import Any
 
 from typer.core import TyperCommand, TyperGroup
 
-__all__ = ["ShortHelpCommand", "ShortHelpGroup", "wants_all"]
-
 LINES = 25
 """Lines of the first screen."""
 _WIDTH = 80

@@ -34,8 +34,6 @@ from snapbeam.cli.parameter_options import (
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["simulate"]
-
 
 @cli_command
 @with_parameters(*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN, "integration.tolerance")

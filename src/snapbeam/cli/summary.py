@@ -24,19 +24,6 @@ from snapbeam.util.validation import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "class_table",
-    "coordinate_text",
-    "deepest_notch",
-    "lowest_interwell",
-    "map_facts",
-    "map_summary",
-    "parameter_table",
-    "status_lines",
-    "value_text",
-]
-
-
 _SYMBOLS = {"frequency_ratio": "Omega", "velocity_amplitude": "V", "location": "x_s", "modes": "N"}
 _PAPER = ("frequency_ratio", "velocity_amplitude", "location")
 

@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 
     from snapbeam.model.parameter_file import Config
 
-__all__ = ["threshold"]
-
-
 _AXES = (
     "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
     "contact.location", "contact.location_m", "model.modes",

@@ -20,21 +20,6 @@ if TYPE_CHECKING:
     from snapbeam.uncertainty.cost import CostEstimate
     from snapbeam.uncertainty.distributions import ParameterUncertainty
 
-__all__ = [
-    "Checkpoint",
-    "EstimateCost",
-    "File",
-    "Output",
-    "Yes",
-    "agreed",
-    "design",
-    "finish",
-    "probability",
-    "read",
-    "taken",
-]
-
-
 File = Annotated[
     Path,
     typer.Argument(

@@ -39,19 +39,6 @@ from snapbeam.util.validation import InputError, checked, finite_array, integer,
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "KINDS",
-    "UNDECIDED",
-    "Attractor",
-    "Attractors",
-    "Ball",
-    "Cloud",
-    "balls_of",
-    "cloud_of",
-    "find_attractors",
-    "spread_states",
-]
-
 _TRIED = 48
 """States on each shell that are tried."""
 _SHELLS = 9

@@ -27,9 +27,6 @@ from snapbeam.util.validation import (
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["backbone_curve"]
-
-
 _Array = NDArray[np.float64]
 
 _WELLS = ("lower", "upper", "both")

@@ -19,16 +19,6 @@ from snapbeam.util.validation import InputError, InputTypeError, axis, checked, 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "BasinEntropy",
-    "Integrity",
-    "UncertaintyExponent",
-    "basin_entropy",
-    "basins_of_attraction",
-    "dynamical_integrity",
-    "uncertainty_exponent",
-]
-
 _SIGMAS = 3.0
 
 

@@ -25,9 +25,6 @@ from snapbeam.util.validation import InputError, InputTypeError, axis, checked, 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["bifurcation_diagram", "minimal_period"]
-
-
 _Array = NDArray[np.float64]
 SWEEPS = ("up", "down")
 _SEEN = ("midspan_displacement", "displacement_at_striker", "midspan_velocity", "velocity_at_striker")

@@ -47,8 +47,6 @@ from snapbeam.util.validation import InputError, checked, instance, integer, int
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CURVES", "bifurcation_curve"]
-
 _Array = NDArray[np.float64]
 CURVES = ("fold", "flip", "Neimark-Sacker", "grazing")
 _TOLERANCE = 1e-9

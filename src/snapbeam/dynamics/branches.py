@@ -33,16 +33,6 @@ from snapbeam.util.validation import InputError, checked, choice, integer, shown
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "SPECIAL_POINTS",
-    "Branch",
-    "SpecialPoint",
-    "between",
-    "continuation",
-    "grazing_end",
-    "switch_branch",
-]
-
 SPECIAL_POINTS = ("fold", "flip", "Neimark-Sacker", "branch point", "grazing")
 _LOCATED = 1e-9
 """Tolerance of a multiplier at an event."""

@@ -27,9 +27,6 @@ from snapbeam.util.validation import InputError, InputTypeError, checked, finite
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["EdgeState", "edge_tracking", "kicked"]
-
-
 _Array = NDArray[np.float64]
 _PIECES = 16
 """States between the two that are tried at once."""

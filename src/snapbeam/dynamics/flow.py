@@ -36,22 +36,6 @@ from snapbeam.util.provenance import canonical_json
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, flag, integer, nonnegative, shown
 
-__all__ = [
-    "AdvancedStates",
-    "Flow",
-    "InitialConditions",
-    "Stroboscope",
-    "common_cycles",
-    "dimensionless",
-    "fixed_parameters",
-    "flow_of",
-    "frequencies_of",
-    "held_in_space",
-    "leaving",
-    "settling_periods",
-    "starts_of",
-]
-
 _Array = NDArray[np.float64]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
 _SAME_PHASE = 1e-6

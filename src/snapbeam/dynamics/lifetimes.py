@@ -30,17 +30,6 @@ from snapbeam.util.validation import InputError, InputTypeError, checked, intege
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "LifetimeFit",
-    "LifetimeSettings",
-    "LifetimeWork",
-    "fit_lifetime",
-    "lifetime_map",
-    "proportion",
-    "refit",
-    "require_excitation",
-]
-
 _Array = NDArray[np.float64]
 _JEFFREYS = 0.5
 _REFUSED = 0.01

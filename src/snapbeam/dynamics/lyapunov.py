@@ -37,9 +37,6 @@ from snapbeam.util.validation import (
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["largest_lyapunov", "lyapunov_spectrum"]
-
-
 _Array = NDArray[np.float64]
 _DOUBTFUL = 1e-3
 """Relative error of tangents by differences beyond which their growth in a period is in doubt."""

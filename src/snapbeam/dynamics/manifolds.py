@@ -22,9 +22,6 @@ from snapbeam.util.validation import InputError, checked, choice, instance, inte
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["homoclinic_points", "homoclinic_tangency", "invariant_manifold"]
-
-
 _Array = NDArray[np.float64]
 _BEGUN = 5
 """Points of a fundamental segment at first."""

@@ -34,28 +34,6 @@ from snapbeam.util.validation import (
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "LARGEST_TOLERANCE",
-    "Corrector",
-    "Family",
-    "OrbitNotFoundError",
-    "Passage",
-    "PeriodicOrbit",
-    "Return",
-    "Shot",
-    "Spot",
-    "jacobian",
-    "newton",
-    "orbit_at",
-    "orbit_tolerance",
-    "passage_of",
-    "penetrations",
-    "periodic_orbit",
-    "require_isolated_orbits",
-    "shoot",
-    "turning_points",
-]
-
 _LARGEST_ERROR = 1e-3
 """Error of a derivative by differences beyond which it counts as unknown."""
 _SPLIT = 16

@@ -16,9 +16,6 @@ from snapbeam.util.validation import InputError, InputTypeError, checked, choice
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["poincare_section"]
-
-
 _Array = NDArray[np.float64]
 SECTIONS = ("stroboscopic", "impact")
 _LEVELS = (

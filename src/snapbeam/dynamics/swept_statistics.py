@@ -24,9 +24,6 @@ from snapbeam.util.validation import InputError, InputTypeError, axis, checked, 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["hysteresis"]
-
-
 _SWEEPS = ("up", "down")
 
 

@@ -18,9 +18,6 @@ from snapbeam.explorer.jobs import ADDRESS
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import split_name
 
-__all__ = ["Address", "number", "typed"]
-
-
 _KEYS = ("x", "y", "show", "cut", "at", "b", "view", "set", "theme", "type", "tab", "card", "units")
 _NAMES = ("x", "y", "show", "tab", "card")
 _WORDS = {"theme": ("default", "dark"), "type": ("large",), "units": ("physical",)}

@@ -38,9 +38,6 @@ if TYPE_CHECKING:
     from snapbeam import Run
     from snapbeam.explorer.page import Page
 
-__all__ = ["MapCard", "SystemCard", "TakeCard", "WindowControl", "draw", "window_dataset", "write_sound"]
-
-
 # ----------------------------------------------------------------------------------------------------
 # When a part of the map is computed again, and what the page shows meanwhile.
 

@@ -10,9 +10,6 @@ import typer
 
 from snapbeam.cli.console import INTERRUPTED, cli_command, out, write_json_now
 
-__all__ = ["explore"]
-
-
 COMMANDS = {"explore": "snapbeam.explorer.cli:explore"}
 """Module and function of each command, by name."""
 

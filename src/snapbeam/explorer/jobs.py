@@ -26,13 +26,6 @@ from bokeh.models import ColumnDataSource, CustomJS
 import snapbeam as sb
 from snapbeam import CheckpointError, InputError, Integration, Run, RunStatus, System
 
-__all__ = [
-    "ADDRESS", "BODY", "CYCLES", "MODES", "NEIGHBOUR", "RUN_SECONDS", "SAMPLES", "SESSIONS", "UPLOAD",
-    "WINDOW_POINTS", "Cancelled", "Compiling", "Downloads", "Jobs", "Tab", "Token", "Waiting", "check_run",
-    "conditioned", "drawing", "file_bytes", "samples_of", "too_large",
-]  # fmt: skip
-
-
 _LOG = logging.getLogger("snapbeam.explorer")
 
 

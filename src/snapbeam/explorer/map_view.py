@@ -15,9 +15,6 @@ from snapbeam.explorer.style import Look, colors_of, columns, figure, inner_size
 from snapbeam.model import quasi_static_threshold
 from snapbeam.plot.style import CLASS_COLORS
 
-__all__ = ["MapView"]
-
-
 View = tuple[float, float, float, float]
 _THROTTLE = 50
 """Milliseconds between two looks at where the pointer is."""

@@ -31,16 +31,6 @@ from snapbeam.util.netcdf import read_result, split_group
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "NOT_COMPUTED", "POINT", "Axis", "CheckpointSource", "DatasetSource", "MapLayer", "Picture", "Plane",
-    "Point", "ResultSource", "Scatter", "Source", "SystemSource", "Window", "chances", "compared",
-    "compute", "difference", "drawn_shares", "integration_of", "known_cells", "layers_of", "map_command",
-    "opened", "parameter_dims", "parameter_name", "parameter_of", "patched", "picture", "plain",
-    "plain_symbol", "planned", "python_lines", "run_command", "sections_of", "started", "system_from",
-    "system_of", "system_toml", "values_of", "visible_strides",
-]  # fmt: skip
-
-
 # ----------------------------------------------------------------------------------------------------
 # What a dataset can show over its parameters: its variables, and each entry of those that have one dimension more.
 

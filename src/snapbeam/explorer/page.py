@@ -25,9 +25,6 @@ from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.style import WRONG, Html, Look, framed, look_of, styled
 from snapbeam.model.parameters import PHYSICAL, lookup
 
-__all__ = ["Answer", "Page", "answer"]
-
-
 # ----------------------------------------------------------------------------------------------------
 # What a page computes of a point, beside the page: a first look at the run, the run, and how it compares.
 

@@ -26,9 +26,6 @@ from snapbeam.explorer.style import NOTE, REFUSED, Html, button, look_of, sheet,
 from snapbeam.model.parameters import parameters
 from snapbeam.plot.dataset import start_of
 
-__all__ = ["ResultPage"]
-
-
 _DOTS = 150
 """Dots per inch of a figure on the page."""
 _CLICK = "Click on the figure to compute the run that starts there."

@@ -23,12 +23,6 @@ if TYPE_CHECKING:
 
     from snapbeam import ReducedModel, Run
 
-__all__ = [
-    "BeamPanel", "Energy", "Impacts", "Modal", "Numbers", "Phase", "RunPanel", "RunView", "Spectrum",
-    "WaveformPanel", "across", "amplitude_spectrum", "envelope", "within",
-]  # fmt: skip
-
-
 # ----------------------------------------------------------------------------------------------------
 # What every view of a run is: built when it is first looked at, filled when there is a run to show.
 

@@ -25,9 +25,6 @@ from snapbeam import InputError, InputTypeError, Integration, System
 from snapbeam.explorer.jobs import BODY, SESSIONS
 from snapbeam.explorer.shared import Shared
 
-__all__ = ["Explorer", "Gate", "explore", "is_loopback", "kept_token", "make_server", "serve"]
-
-
 _LOG = logging.getLogger("snapbeam.explorer")
 _ICON = "/favicon.ico"
 _PORT, _PORTS = 8760, 20

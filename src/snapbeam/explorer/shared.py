@@ -12,9 +12,6 @@ from snapbeam import InputError, Integration, System
 from snapbeam.explorer.jobs import Compiling, Jobs, Token
 from snapbeam.explorer.maps import Source, Window, integration_of, system_of
 
-__all__ = ["Shared"]
-
-
 _WINDOWS = 48
 """Windows that are kept; of more the one that was looked at longest ago is dropped."""
 

@@ -24,12 +24,6 @@ from snapbeam.plot.style import CLASS_COLORS
 if TYPE_CHECKING:
     from snapbeam.explorer.page import Page
 
-__all__ = [
-    "DARK", "LIGHT", "Cursor", "Html", "Look", "blend", "class_chip", "colors_of", "columns", "figure",
-    "fit", "focused", "framed", "framed_plot", "inner_size", "legend", "look_of", "sequential", "sheet",
-    "styled",
-]  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Look:

@@ -14,9 +14,6 @@ from snapbeam.model.drive.base import Drive, Scale, Timed, smooth_rise
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.validation import InputTypeError, shown
 
-__all__ = ["LOADS", "AxialLoadModulation", "HarmonicLoad", "LoadMotion", "LoadRamp"]
-
-
 _Array = NDArray[np.float64]
 
 LOADS: dict[str, type[Drive]] = {}

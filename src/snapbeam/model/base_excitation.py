@@ -14,9 +14,6 @@ from snapbeam.model.quantity import STRUCTURE, check_fields, quantity
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.validation import InputError, InputTypeError, shown
 
-__all__ = ["DIRECTIONS", "BaseExcitation", "rigid_mass"]
-
-
 DIRECTIONS = ("up", "down")
 
 

@@ -13,8 +13,6 @@ from snapbeam.model.buckling_modes import wavenumbers
 from snapbeam.model.quantity import quantities, quantity
 from snapbeam.util.validation import InputError, InputTypeError, finite, shown
 
-__all__ = ["Beam"]
-
 
 class _Derived(float):
     """A number that followed from another one, and so was not given."""

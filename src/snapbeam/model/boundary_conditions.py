@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from snapbeam.model.buckling_modes import BucklingModes, SpringModes
 from snapbeam.model.quantity import check_fields, quantity
 
-__all__ = ["CLAMPED", "BoundaryConditions", "Modes", "modes_between"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class BoundaryConditions:

@@ -16,18 +16,6 @@ from snapbeam.model.matrix_pairs import eigenpairs, fixed_coordinates, is_positi
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.validation import InputError, finite_array, integer, nonnegative, positive, within
 
-__all__ = [
-    "MAX_MODES",
-    "BucklingModes",
-    "SpringModes",
-    "StructureMatrices",
-    "checked_structure",
-    "damping_ratios",
-    "spring_wavenumbers",
-    "wavenumbers",
-]
-
-
 MAX_MODES = 256
 """Largest number of modes offered; the closed forms themselves know no limit."""
 

@@ -5,9 +5,6 @@ from __future__ import annotations
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact.hertz import HertzContact
 
-__all__ = ["BEAM", "CONTACT", "CYCLES", "DAMPING_RATIO", "LOCATION", "LONG_CYCLES", "MODES", "STRAIGHT_BEAM"]
-
-
 # Section 3.3.  The thickness and the buckling level are those the paper fitted to measured frequencies
 # (measured: 0.44 mm and 0.5 mm).
 BEAM = Beam(

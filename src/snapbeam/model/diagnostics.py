@@ -14,9 +14,6 @@ from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
 from snapbeam.util.diagnostics import Diagnostic
 
-__all__ = ["doubts_of"]
-
-
 _STEEP = 0.2
 """Maximum slope of the buckled beam, pi b / L, up to which w is small against L."""
 _STOCKY = 0.1

@@ -8,9 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.model.equilibria import least_energy_through, pinned_load
 from snapbeam.model.reduced_model import ReducedModel
 
-__all__ = ["RESERVE", "crossing_energy", "decidable_energy", "least_energy_at", "passed_heights"]
-
-
 # Energy kept in hand, as a share of the barrier.  The energy error of a damped free flight at the default step
 # was measured as at most 1.2e-4 of it over 8 cycles, in which damping takes a thousand times as much; undamped,
 # with random motion in all of 32 modes, as at most 5e-4.

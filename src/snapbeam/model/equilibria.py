@@ -13,19 +13,6 @@ from numpy.typing import NDArray
 
 from snapbeam.util.validation import InputError
 
-__all__ = [
-    "Condensed",
-    "Equilibrium",
-    "Landscape",
-    "condensed",
-    "equilibria_of",
-    "landscape_of",
-    "least_energy_through",
-    "pinned_load",
-    "tangent_stiffness",
-]
-
-
 _Array = NDArray[np.float64]
 
 

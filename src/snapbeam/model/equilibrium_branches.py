@@ -21,8 +21,6 @@ from snapbeam.util.validation import InputError, checked, instance, interval, sh
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["equilibrium_branches"]
-
 
 @checked
 def equilibrium_branches(system: System, parameter: str, values: tuple[float, float]) -> xr.Dataset:

@@ -23,18 +23,6 @@ from snapbeam.model.potential import Potential
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.validation import InputError
 
-__all__ = [
-    "EquilibriumPath",
-    "Singular",
-    "attributes",
-    "count_incomplete",
-    "critical_points",
-    "equilibrium_paths",
-    "paths_over_parameter",
-    "stable_parts",
-]
-
-
 _Array = NDArray[np.float64]
 
 _STEP = 1.0 / 80.0

@@ -16,9 +16,6 @@ from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, check_label, q
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.validation import InputError, InputTypeError, finite_array, shown
 
-__all__ = ["FORCES", "ConstantForce", "ExternalForce", "ForceHistory", "HarmonicForce", "RecordedForce"]
-
-
 _Array = NDArray[np.float64]
 
 FORCES: dict[str, type[Drive]] = {}

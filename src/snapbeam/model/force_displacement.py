@@ -24,9 +24,6 @@ from snapbeam.util.validation import InputError, InputTypeError, checked, choice
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["force_displacement"]
-
-
 _Array = NDArray[np.float64]
 
 _MARGIN = 0.25

@@ -16,9 +16,6 @@ from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.validation import InputError, choice, finite, instance, positive, within
 
-__all__ = ["HARVESTERS", "ElectromagneticHarvester", "Harvester", "PiezoelectricHarvester"]
-
-
 _Array = NDArray[np.float64]
 
 HARVESTERS: dict[str, type[Harvester]] = {}

@@ -15,9 +15,6 @@ from snapbeam.model.equilibria import Equilibrium
 from snapbeam.model.quantity import check_fields, quantity
 from snapbeam.util.validation import InputError, finite_array
 
-__all__ = ["FORMS", "Imperfection", "perfect_equilibria", "projected"]
-
-
 # ----------------------------------------------------------------------------------------------------
 # A shape given by points, on the buckling modes.
 

@@ -13,9 +13,6 @@ from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.validation import InputError, choice, instance, integer, positive
 
-__all__ = ["FITTED", "identify_imperfection"]
-
-
 FITTED = ("midspan_amplitude", "point_load", "uniform_load")
 _TOLERANCE = 1e-9
 _TRIES = 60

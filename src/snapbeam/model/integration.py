@@ -9,9 +9,6 @@ from typing import Any
 from snapbeam.model.quantity import check_fields, quantities, quantity
 from snapbeam.util.validation import InputError
 
-__all__ = ["ACCURACIES", "CYCLES", "ENGINES", "Integration"]
-
-
 ACCURACIES = ("standard", "reference")
 ENGINES = ("auto", "cpu", "cuda")
 CYCLES = 200

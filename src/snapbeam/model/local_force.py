@@ -15,17 +15,6 @@ from snapbeam.model.quantity import STRUCTURE, check_fields, check_label, number
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.validation import InputError, finite_array
 
-__all__ = [
-    "LOCAL_FORCES",
-    "CoulombFriction",
-    "ElectrostaticForce",
-    "LocalForce",
-    "LocalSpring",
-    "MagneticForce",
-    "QuadraticDamping",
-]
-
-
 _Array = NDArray[np.float64]
 
 LOCAL_FORCES: dict[str, type[LocalForce]] = {}

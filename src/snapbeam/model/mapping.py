@@ -23,19 +23,6 @@ from snapbeam.model.state import State
 from snapbeam.model.striker import Contact, Striker
 from snapbeam.util.validation import InputError, InputTypeError, mapping, shown
 
-__all__ = [
-    "flattened",
-    "labels_of",
-    "nested",
-    "parts_from_mapping",
-    "parts_to_mapping",
-    "read_file",
-    "replaced",
-    "resolved",
-    "sequence_of",
-]
-
-
 _MATRICES = (
     "mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "well_amplitude", "length_scale",
 )  # fmt: skip

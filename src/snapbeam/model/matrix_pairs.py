@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from snapbeam.util.diagnostics import Diagnostic, Severity, tell
 from snapbeam.util.validation import InputError
 
-__all__ = ["Eigenpairs", "eigenpairs", "fixed_coordinates", "is_positive_definite", "symmetric"]
-
-
 _Array = NDArray[np.float64]
 _EPS = float(np.finfo(np.float64).eps)
 _ROUNDING = 1e-10

@@ -12,9 +12,6 @@ from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
 from snapbeam.util.validation import InputError, InputTypeError, instance, shown, within
 
-__all__ = ["AUTO_ERROR", "converged_modes", "error_of_auto", "modal_error", "well_frequencies"]
-
-
 _ORDER_FACTOR = 4.0 / 3.0
 """Error of N modes over the change with 2 N modes, of a quantity that converges with the second order or faster."""
 _MORE = 4

@@ -23,9 +23,6 @@ from snapbeam.model.beam import Beam
 from snapbeam.model.buckling_modes import MAX_MODES
 from snapbeam.util.validation import InputError, InputTypeError, integer, shown
 
-__all__ = ["exact_natural_frequencies", "spring_natural_frequency"]
-
-
 # ----------------------------------------------------------------------------------------------------
 # Exact natural frequencies of a beam between rotational springs, straight or buckled.
 #

@@ -25,19 +25,6 @@ from snapbeam.util.validation import (
     shown,
 )
 
-__all__ = [
-    "CHANGES_UNITS",
-    "Axis",
-    "axis_that_changes_unit",
-    "checked_physical",
-    "from_physical",
-    "parse_axis",
-    "ratios_of",
-    "to_physical",
-    "unit_of",
-]
-
-
 Axis = float | NDArray[np.float64]
 
 _FORMS = (

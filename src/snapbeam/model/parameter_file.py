@@ -45,30 +45,6 @@ from snapbeam.util.input_files import read_toml
 from snapbeam.util.units import number_in_unit
 from snapbeam.util.validation import InputError, file_path, finite, instance, mapping, shown
 
-__all__ = [
-    "DEFAULT_AXES",
-    "DEFAULT_DRIVE",
-    "MATERIALS",
-    "SECTIONS",
-    "WANTED",
-    "Config",
-    "checked_sections",
-    "config_from_mapping",
-    "config_text",
-    "contact_of",
-    "contact_rivals",
-    "contradictions",
-    "dump_config",
-    "law_of",
-    "load_config",
-    "override",
-    "parsed_axis",
-    "same_axis",
-    "system_of_file",
-    "with_section",
-]
-
-
 # ----------------------------------------------------------------------------------------------------
 # Which law of contact was meant, and the numbers that follow from materials or from a wanted restitution.
 

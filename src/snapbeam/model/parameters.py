@@ -41,22 +41,6 @@ from snapbeam.model.state import START_NAME
 from snapbeam.model.striker import Striker
 from snapbeam.util.validation import InputError, shown
 
-__all__ = [
-    "PHYSICAL",
-    "SECTIONS",
-    "Parameter",
-    "Physical",
-    "kinds_of",
-    "lookup",
-    "named_in",
-    "parameters",
-    "physical_names",
-    "ratio_of",
-    "row_of",
-    "short_names",
-]
-
-
 SECTIONS = (
     "beam", "model", "boundary", "imperfection", "contact", "drive", "base_excitation", "axial_load", "force",
     "harvester", "initial_state",

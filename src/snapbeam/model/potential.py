@@ -19,9 +19,6 @@ from snapbeam.model.local_force import LocalForce
 from snapbeam.model.reduced_model import LinearModes, ReducedModel, linear_modes_about
 from snapbeam.util.validation import InputError, shown
 
-__all__ = ["Potential", "Saddle"]
-
-
 _Array = NDArray[np.float64]
 _STARTS = 512
 """Starting points of Newton's method, in a first search; a second one has eight times as many."""

@@ -26,23 +26,6 @@ from snapbeam.util.validation import (
     within,
 )
 
-__all__ = [
-    "NUMBERED",
-    "RUN",
-    "STRUCTURE",
-    "ParameterField",
-    "check_fields",
-    "check_label",
-    "numbered",
-    "numbers_type",
-    "own_name",
-    "quantities",
-    "quantity",
-    "section_of",
-    "split_name",
-]
-
-
 RUN = "run"
 """Scope of what may differ between the runs of one ensemble."""
 STRUCTURE = "structure"

@@ -11,9 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.model.beam import Beam
 from snapbeam.util.validation import InputError, checked, finite_array
 
-__all__ = ["quasi_static_objection", "quasi_static_threshold"]
-
-
 _OTHER = ("force", "base_excitation", "axial_load", "harvester")
 
 

@@ -35,18 +35,6 @@ from snapbeam.util.validation import (
     within,
 )
 
-__all__ = [
-    "MODEL_QUANTITIES",
-    "LinearModes",
-    "ReducedModel",
-    "Wells",
-    "displacement_along",
-    "linear_modes_about",
-    "linear_modes_of_beam",
-    "rank_one_eigenpairs",
-]
-
-
 # ----------------------------------------------------------------------------------------------------
 # Eigenvalues of the diagonal-plus-rank-one problems into which a buckled beam splits.
 

@@ -15,18 +15,6 @@ from snapbeam.model.striker import Striker
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, finite_array, integer, mapping, shown
 
-__all__ = [
-    "FIELDS",
-    "OWN_FIELDS",
-    "START_NAME",
-    "ModalState",
-    "State",
-    "amplitude_scale",
-    "rest_state",
-    "started",
-]
-
-
 _Array = NDArray[np.float64]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
 OWN_FIELDS = ("striker_shift", "striker_rate", "indentation", "circuit")

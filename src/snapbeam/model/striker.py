@@ -11,14 +11,6 @@ from snapbeam.model.drive.sine import Sine
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, check_label, quantity
 from snapbeam.util.validation import InputError, InputTypeError, shown
 
-__all__ = [
-    "SIDES",
-    "Contact",
-    "Shaker",
-    "Striker",
-]
-
-
 SIDES = ("below", "above")
 
 

@@ -43,9 +43,6 @@ from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.validation import InputError, InputTypeError, instance, shown
 
-__all__ = ["System"]
-
-
 _A: dict[str, tuple[Any, str]] = {
     "contacts": (Contact, "a Contact(law, striker)"),
     "forces": (

@@ -11,9 +11,6 @@ import typer
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import add_json, cli_command, duration, file_line, notes, out
 
-__all__ = ["reproduce"]
-
-
 COMMANDS = {"reproduce": "snapbeam.paper.cli:reproduce"}
 """Module and function of each command, by name."""
 

@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["DATA_VARIABLE", "SIZES", "MissingResults", "Recipe", "Results", "shared_results"]
-
-
 SIZES = ("quick", "full")
 DATA_VARIABLE = "SNAPBEAM_PAPER_DATA"
 """Environment variable with the folder of full-size data, for examples."""

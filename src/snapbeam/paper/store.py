@@ -16,8 +16,6 @@ from snapbeam.util.validation import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["load_results", "save_results"]
-
 
 def save_results(results: Mapping[str, xr.Dataset], path: Path, size: str) -> Path:
     """Write datasets, by name, with 32-bit floats; coordinates keep their 64 bits.

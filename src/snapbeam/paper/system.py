@@ -18,19 +18,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = [
-    "KEPT",
-    "TOLERANCE",
-    "class_map",
-    "legend_handles",
-    "paper_map",
-    "paper_model",
-    "paper_run",
-    "relative_map",
-    "shapes_along",
-]
-
-
 _Array = NDArray[np.float64]
 
 TOLERANCE = 1e-5

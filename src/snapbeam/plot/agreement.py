@@ -18,9 +18,6 @@ from snapbeam.util.status_codes import ResponseClass
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["draw_agreement"]
-
-
 _STEPS = (1.0, 0.75, 0.5, 0.25)
 """Shares of repeats that agree, of which the legend shows the shade."""
 _PALEST = 0.85

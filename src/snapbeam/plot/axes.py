@@ -17,11 +17,6 @@ from snapbeam.util.validation import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "AXIS_LABELS", "axis_label", "dress", "edges_of", "in_units", "is_geometric", "positions", "symbol_of",
-]  # fmt: skip
-
-
 _Array = NDArray[np.float64]
 
 AXIS_LABELS = {

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["Start", "figures_of", "plot_dataset", "start_of"]
-
-
 _Draws = Callable[..., "Axes"]
 _RUN: dict[str, tuple[_Draws, str]] = {
     "run": (run.plot_run, "displacement_at_striker"),

@@ -30,12 +30,6 @@ from snapbeam.util.validation import InputError, checked, choice, instance, show
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "MAX_CURVES", "plot_attractors", "plot_backbone", "plot_basins", "plot_diagram", "plot_edge", "plot_exponents",
-    "plot_homoclinic", "plot_lifetimes", "plot_manifold", "plot_multipliers", "plot_section", "plot_survival",
-]  # fmt: skip
-
-
 _BLUE, _RED, _, _GRAY, _BLACK = SERIES_COLORS
 _STARTS = "#8A8A8A"
 MAX_CURVES = 5

@@ -17,9 +17,6 @@ from snapbeam.util.validation import checked
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["plot_equilibrium_branches", "plot_force_displacement"]
-
-
 _STABLE, _HELD, _UNSTABLE = *SERIES_COLORS[:2], SERIES_COLORS[3]
 _STYLES: dict[str, dict[str, Any]] = {
     "stable": {"color": _STABLE, "linestyle": "-", "linewidth": 1.6},

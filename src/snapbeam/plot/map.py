@@ -39,12 +39,6 @@ from snapbeam.util.validation import InputError, InputTypeError, checked, finite
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "UPWARD", "class_handles", "draw_measurements", "draw_quasi_static_line", "plot_points", "plot_response_map",
-    "plot_statistic", "scaled_values", "wants_powers",
-]  # fmt: skip
-
-
 _Array = NDArray[np.float64]
 
 UPWARD = ("velocity_amplitude", "location")

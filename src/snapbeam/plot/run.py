@@ -32,12 +32,6 @@ from snapbeam.util.validation import InputError, checked, choice, integer, inter
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "across", "cut", "dataset_of", "hardest_impact", "plot_energies", "plot_modal_amplitudes", "plot_perturbation",
-    "plot_phase_portrait", "plot_run", "plot_spectrum",
-]  # fmt: skip
-
-
 # ----------------------------------------------------------------------------------------------------
 # Amplitudes of the modes, energies, spectrum and phase portrait of a run.
 

@@ -29,9 +29,6 @@ from snapbeam.plot.style import (
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.validation import InputError, checked, instance
 
-__all__ = ["FRAME", "draw_surroundings", "draw_tips", "motion_of", "plot_system"]
-
-
 # ----------------------------------------------------------------------------------------------------
 # The motions of tips in the schematic of a system: one, or those of several strikers in one pair of axes.
 

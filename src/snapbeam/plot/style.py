@@ -31,14 +31,6 @@ from snapbeam.util.validation import InputError, choice, finite_array, within
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "BEAM_COLOR", "CENTER_COLOR", "CLASS_COLORS", "COLUMN_WIDTHS", "FIGURE_SUFFIXES", "SERIES_COLORS",
-    "SHAKER_COLOR", "base_and_load", "beam_text", "caption", "cell_edges", "class_cells", "color_bar", "color_of",
-    "contains", "diagnostics_height", "draw_diagnostics", "extend_title", "figure_legend", "figure_style",
-    "fix_ticks", "fixed_value", "frame", "new_figure", "panel_letters", "plot_style", "save_figure", "set_title",
-]  # fmt: skip
-
-
 COLUMN_WIDTHS = {"single": 90.0, "double": 190.0}
 """Widths of one and of two columns of a page, mm."""
 

@@ -18,9 +18,6 @@ from snapbeam.util.validation import InputError, checked
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["plot_threshold"]
-
-
 _Array = NDArray[np.float64]
 _OPEN = "left open by failed runs"
 _NEEDED = ("lower_threshold", "upper_threshold", "lower_threshold_min", "upper_threshold_max", "outcome")

@@ -22,9 +22,6 @@ from snapbeam.util.diagnostics import counting
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, finite_array, flag, instance, positive, shown
 
-__all__ = ["advance", "differences", "tangent_obstacle"]
-
-
 _Array = NDArray[np.float64]
 
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))

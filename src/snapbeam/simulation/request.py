@@ -11,8 +11,6 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.util.validation import InputError, InputTypeError, shown
 
-__all__ = ["checked_request", "cycle_of", "require_motion"]
-
 
 def checked_request(system: Any, integration: Any) -> tuple[System, Integration]:
     """Check a system and an integration.

@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["Run"]
-
-
 _KINDS = ("run", "modal_amplitudes", "energies", "spectrum", "phase_portrait")
 
 

@@ -25,9 +25,6 @@ from snapbeam.util.validation import InputError, file_path
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["compressed", "description", "load", "save_run", "summary_dataset"]
-
-
 _FORMAT = "snapbeam run 3"
 _GROUPS = ("impacts", "summary")
 _COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}

@@ -36,21 +36,6 @@ from snapbeam.util.provenance import array_hash, made_by
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, finite_array, shown
 
-__all__ = [
-    "CONVENTIONS",
-    "MEMORY_LIMIT",
-    "Prepared",
-    "attributes_of",
-    "check_memory",
-    "describe_system",
-    "end_state",
-    "even_instants",
-    "prepared",
-    "reached_by",
-    "run_attributes",
-    "simulate",
-]
-
 CONVENTIONS = "CF-1.11"
 _LONGEST = 1024
 """Maximum size of an array in an attribute."""

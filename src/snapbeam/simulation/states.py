@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from snapbeam.model.state import ModalState, State
 from snapbeam.solver.ensemble import FAR_AWAY, Ensemble
 
-__all__ = ["states_of"]
-
-
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
 

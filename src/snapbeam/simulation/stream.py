@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     import h5netcdf
     import xarray as xr
 
-__all__ = ["simulate_to_file"]
-
-
 _KEPT_BACK = 4096
 """Samples of a piece that are not written yet, because the next piece may contain earlier ones."""
 _CHUNK = 2**16

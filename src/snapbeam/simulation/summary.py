@@ -13,8 +13,6 @@ from snapbeam.util.display import html_table
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError, integer, mapping
 
-__all__ = ["RunSummary"]
-
 
 class RunSummary(Mapping[str, Any]):
     """Response class and statistics of one run: a mapping whose items are also attributes.

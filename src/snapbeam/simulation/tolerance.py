@@ -29,9 +29,6 @@ from snapbeam.util.validation import InputError, choice, positive
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["PERTURBATION", "ErrorEstimate", "perturbation_growth", "steps_for"]
-
-
 _Array = NDArray[np.float64]
 
 PERTURBATION = 1e-13

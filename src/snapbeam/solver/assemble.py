@@ -31,21 +31,6 @@ from snapbeam.solver.structure import Structure, structure_of
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.validation import InputError, shown
 
-__all__ = [
-    "Driven",
-    "begun_at",
-    "cycles_of",
-    "driven_of",
-    "fastest_of",
-    "make_ensemble",
-    "motions_of",
-    "others_of",
-    "phases_of",
-    "plans_of",
-    "run_columns",
-    "tip_of",
-]
-
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
 

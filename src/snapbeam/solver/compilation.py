@@ -32,20 +32,6 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataC
 from numba.core.registry import CPUDispatcher
 from numba.extending import overload
 
-__all__ = [
-    "INLINE",
-    "INLINE_HERE",
-    "called",
-    "compiled",
-    "fingerprint",
-    "inlined",
-    "keep_code",
-    "kernel",
-    "overloaded",
-    "pipeline",
-    "ready",
-]
-
 _IDLE = frozenset({"inline_inlinables", "inline_overloads", "nopython_rewrites", "with_lifting"})
 """Passes for array expressions, for blocks with a context and for functions that are inlined as source."""
 _CHECK = hashlib.sha256

@@ -14,27 +14,6 @@ from snapbeam.solver.compilation import compiled, inlined, overloaded
 from snapbeam.solver.interpolation import cubic, first_upcrossing, turning_point, update_extrema
 from snapbeam.solver.simd import Lanes, select_less
 
-__all__ = [
-    "begins_with_jump",
-    "contact_energy",
-    "contact_force",
-    "contact_slope",
-    "damping_coefficient",
-    "felt_force",
-    "force_break",
-    "is_impulsive",
-    "jumps",
-    "mark_of",
-    "memory_after",
-    "peak_force",
-    "peak_in_step",
-    "released_at",
-    "scalar_function",
-    "with_memory",
-    "yield_penetration",
-]
-
-
 _SMALLEST = 2.2250738585072014e-308
 _ROUNDING = 1e-9
 

@@ -12,8 +12,6 @@ from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.solver.structure import Structure
 
-__all__ = ["FAR_AWAY", "RUN", "CircuitCoupling", "Ensemble", "FurtherContactTable"]
-
 _REALS = (
     "offset",  # penetration of the tip at mid-stroke into the beam at rest
     "tip_speed",  # maximum speed of the tip, ever

@@ -18,24 +18,6 @@ from snapbeam.solver.contact_force import scalar_function
 from snapbeam.solver.physics import shaker_motion, sincos
 from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, splat
 
-__all__ = [
-    "Tip",
-    "acceleration_by_number",
-    "bound_by_number",
-    "drive_rate",
-    "joined_motion",
-    "kind_acceleration",
-    "kind_motion",
-    "motion_by_number",
-    "numbers_of",
-    "part_acceleration",
-    "part_motion",
-    "tip_about_well",
-    "tip_acceleration",
-    "tip_motion",
-    "turned_motion",
-]
-
 _TWO_PI = 2.0 * math.pi
 
 

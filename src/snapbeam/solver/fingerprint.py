@@ -21,9 +21,6 @@ from snapbeam.model.system import System
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.cpu import driver
 
-__all__ = ["solver_fingerprint"]
-
-
 _CASES = ((1, 1.4, 0.02), (4, 1.21, 0.05), (12, 1.4, 0.02))
 """Modes, frequency ratio, velocity amplitude: three cycles of each are conditioned to 1e-11 or better."""
 _HASHED_LEVEL = {"standard": "map", "reference": "reference"}

@@ -32,33 +32,6 @@ from snapbeam.solver.contact_force import (
 )
 from snapbeam.solver.excitation import motion_by_number, part_motion
 
-__all__ = [
-    "Several",
-    "any_damped",
-    "any_jumps",
-    "break_of",
-    "breaks_at",
-    "count_of",
-    "damped_at",
-    "damping_of",
-    "energy_of",
-    "felt_at",
-    "force_of",
-    "jumps_at",
-    "mark_at",
-    "memory_after_of",
-    "memory_place",
-    "motion_of",
-    "peak_in_step_of",
-    "peak_of",
-    "several",
-    "slope_of",
-    "way_to_release",
-    "with_memory_energy_of",
-    "yield_penetration_of",
-]
-
-
 _SEPARATOR = "__"
 NUMBERS = 40
 """Numbers of a striker in memory, a block of whole registers."""

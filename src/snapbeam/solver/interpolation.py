@@ -12,17 +12,6 @@ import math
 
 from snapbeam.solver.compilation import called, inlined
 
-__all__ = [
-    "count_zero_crossings",
-    "first_downcrossing",
-    "first_upcrossing",
-    "hermite_overshoot_bound",
-    "sign_of",
-    "turning_point",
-    "update_extrema",
-]
-
-
 _OVERSHOOT = 0.15
 """Overshoot of a Hermite cubic beyond its end values over h(|v0| + |v1|), at most: 4/27, rounded up."""
 

@@ -14,21 +14,6 @@ from __future__ import annotations
 from snapbeam.solver.compilation import inlined
 from snapbeam.solver.simd import fma, select_less, vfloor
 
-__all__ = [
-    "decay_less_one",
-    "mode_energy",
-    "mode_power",
-    "rotation",
-    "shaker_motion",
-    "sincos",
-    "sincos_cosm1",
-    "tension_acceleration",
-    "tension_energy",
-    "tension_factors",
-    "turned",
-]
-
-
 # pi/2 in three parts of 33 bits each, so that k * part is exact for |k| < 2^20.
 _HALF_PI_1 = 1.5707963267341256
 _HALF_PI_2 = 6.077100506303966e-11

@@ -9,8 +9,6 @@ from snapbeam.model.quantity import own_name
 from snapbeam.solver.compilation import inlined, overloaded
 from snapbeam.solver.statistics import CompletedStep, Statistic, updated
 
-__all__ = ["Extras", "extras_of_table", "observe"]
-
 
 class Extras:
     """Additional statistics that a kernel updates; subclasses represent lists of statistics."""

@@ -18,9 +18,6 @@ from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.statistics import OutputStates, Recorded
 from snapbeam.util.validation import InputError, choice
 
-__all__ = ["Engine", "resolve"]
-
-
 _FEWEST_RUNS = 2000
 """A device integrates one run slower than a core does, but over a thousand at a time: fewer do not fill it."""
 _FEWEST_CYCLES = 2_000_000

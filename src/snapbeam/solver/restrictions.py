@@ -6,8 +6,6 @@ from snapbeam.model.quantity import section_of
 from snapbeam.model.system import System
 from snapbeam.util.validation import InputError
 
-__all__ = ["check_integrable"]
-
 
 def check_integrable(system: System) -> None:
     """Refuse a system that the solver cannot integrate.

@@ -25,35 +25,6 @@ from numba.extending import intrinsic, lower_builtin, models, overload, register
 
 from snapbeam.solver.compilation import INLINE_HERE, inlined, overloaded
 
-__all__ = [
-    "ALL",
-    "WIDTH",
-    "bits",
-    "both",
-    "broadcast_load",
-    "dot",
-    "fma",
-    "halvings",
-    "lanes_sum",
-    "lanes_tuple",
-    "less",
-    "load",
-    "lowest",
-    "mask_of",
-    "move",
-    "pick",
-    "power_of_two",
-    "select_less",
-    "splat",
-    "store",
-    "vabs",
-    "vfloor",
-    "vmax",
-    "vmin",
-    "vtrunc",
-]
-
-
 WIDTH = 8
 ALL = (1 << WIDTH) - 1
 """Every lane, as a whole number."""

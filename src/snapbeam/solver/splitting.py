@@ -17,9 +17,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["COMPOSITIONS", "GENERAL", "TURNS", "Composition", "Stages", "in_memory", "slot_length"]
-
-
 TURNS = 16
 """Room for one number per kick, a multiple of the lanes' width."""
 

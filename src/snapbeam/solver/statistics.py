@@ -22,31 +22,6 @@ from snapbeam.solver.terms import WORKS
 from snapbeam.util.status_codes import ResponseClass, RunStatus, class_of
 from snapbeam.util.validation import InputError, NamedTable, instance, shown
 
-__all__ = [
-    "ACCUMULATORS",
-    "OTHER_IMPACTS",
-    "OTHER_IMPULSE",
-    "OTHER_PEAK",
-    "OTHER_WORK",
-    "STATISTICS",
-    "CompletedStep",
-    "Last",
-    "OutputStates",
-    "Reading",
-    "Recorded",
-    "Statistic",
-    "accumulators_dtype",
-    "empty_accumulators",
-    "lost_in_circuits",
-    "of_one_named",
-    "register_statistic",
-    "rounding_energy",
-    "rows_for",
-    "statistics_of",
-    "unregister_statistic",
-    "updated",
-]
-
 _MADE = 0.01
 """Tolerance of the energy balance over the gross work: a run that gains more energy is not accepted."""
 _ROUNDED = 1e-6

@@ -55,19 +55,6 @@ from snapbeam.solver.contact_force import contact_force
 from snapbeam.solver.physics import tension_factors, turned
 from snapbeam.solver.simd import fma
 
-__all__ = [
-    "ContactIncrement",
-    "Increment",
-    "InnerProducts",
-    "Primitives",
-    "StepFunctions",
-    "build_step",
-    "flow_mode",
-    "kick_mode",
-    "rotate_phase",
-]
-
-
 # One mode: layouts call these in their loops over modes.
 
 

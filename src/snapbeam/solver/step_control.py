@@ -9,34 +9,6 @@ from snapbeam.solver.contact_force import mark_of, peak_force
 from snapbeam.solver.interpolation import count_zero_crossings, first_upcrossing, sign_of, update_extrema
 from snapbeam.solver.simd import select_less
 
-__all__ = [
-    "GRADING",
-    "RELEASE",
-    "STRETCH_LIMIT",
-    "SUBINTERVALS",
-    "TRUST",
-    "TWELFTH",
-    "Clock",
-    "ContactKinematics",
-    "accumulate_displacement",
-    "accumulate_energy",
-    "accumulate_open_contact",
-    "begin_energy",
-    "begin_other_well",
-    "begin_statistics",
-    "clock_of",
-    "close_impact",
-    "contact_halvings",
-    "count_zero_crossings_in_step",
-    "first_contact_onset",
-    "flight_halvings",
-    "refine_onset",
-    "safe_interval",
-    "square_of_rate",
-    "square_of_signal",
-    "time_beyond",
-]
-
 
 class Clock(NamedTuple):
     """Time in ticks, the steps that are allowed, and when a run may end early."""

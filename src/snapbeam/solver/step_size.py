@@ -20,18 +20,6 @@ from snapbeam.solver.splitting import COMPOSITIONS
 from snapbeam.solver.structure import Structure, structure_of
 from snapbeam.util.validation import InputError, choice, positive
 
-__all__ = [
-    "SUBDIVISION",
-    "Clocked",
-    "Plan",
-    "choose_base_step",
-    "clocked",
-    "flight_step",
-    "most_steps",
-    "require_resolved",
-    "seconds_of",
-]
-
 _Array = NDArray[np.float64]
 _FEWEST = 30.0
 """Flight steps in a period of the first mode, at least."""

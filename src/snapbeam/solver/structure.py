@@ -19,9 +19,6 @@ from snapbeam.model.local_force import LocalForce
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
 
-__all__ = ["CircuitRow", "LocalForceRow", "StrikerBody", "Structure", "UnequalWells", "structure_of"]
-
-
 _Array = NDArray[np.float64]
 
 

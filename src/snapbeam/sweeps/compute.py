@@ -35,9 +35,6 @@ from snapbeam.util.validation import InputError, InputTypeError, flag, integer, 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CheckpointOptions", "SweepReport", "compute_sweep", "compute_table"]
-
-
 Note = Callable[[str], object]
 
 

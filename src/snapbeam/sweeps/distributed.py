@@ -25,21 +25,6 @@ from snapbeam.util.validation import InputError, integer, shown
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-__all__ = [
-    "ATTEMPTS",
-    "Cluster",
-    "ClusterWorkers",
-    "LocalThreads",
-    "TaskError",
-    "TaskResult",
-    "WorkerPool",
-    "Workers",
-    "open_client",
-    "parse_cluster",
-    "slurm_arguments",
-]
-
-
 # ----------------------------------------------------------------------------------------------------
 # The pool of workers of a cluster: changes, losses and replacement of local workers.
 

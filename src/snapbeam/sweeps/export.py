@@ -18,9 +18,6 @@ from snapbeam.util.status_codes import ResponseClass
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["class_coordinate", "to_dataset", "to_netcdf"]
-
-
 _CLASS_DIM = "class_code"
 _BLOCK = 65536
 """Points of a block; a block is at least one index of the first dimension."""

@@ -16,9 +16,6 @@ from snapbeam.util.input_files import decoded, input_bytes
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, InputTypeError, file_path, positive
 
-__all__ = ["MeasuredPoints", "read_measured_points"]
-
-
 _Array = NDArray[np.float64]
 
 # One of each pair is wanted; the last column of all may be left out.

@@ -29,17 +29,6 @@ if TYPE_CHECKING:
 
     from snapbeam.model.system import System
 
-__all__ = [
-    "Columns",
-    "Grid",
-    "PointList",
-    "Points",
-    "labels_of",
-    "points_of",
-    "require_memory",
-]
-
-
 Columns = dict[str, NDArray[Any]]
 """Values of points by dotted name: arrays of shape (points,)."""
 POINT = "point"

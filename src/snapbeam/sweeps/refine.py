@@ -18,9 +18,6 @@ from snapbeam.sweeps.tasks import ResultRows, ResultTable, Stage, StageRunner
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError
 
-__all__ = ["MAX_LEVELS", "RefinedRows", "refine", "refined_grid"]
-
-
 MAX_LEVELS = 10
 _BLOCK = 65536
 

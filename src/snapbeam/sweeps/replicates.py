@@ -14,9 +14,6 @@ from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.util.validation import InputError, flag, integer, positive
 
-__all__ = ["MEASURING_ERROR", "Replicates", "perturbed_start"]
-
-
 MEASURING_ERROR = 12e-6 / 12.0**0.5
 """Standard deviation of a position that is rounded to one pixel of the paper's camera (12 um), in m."""
 

@@ -38,17 +38,6 @@ from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, shown
 
-__all__ = [
-    "Progress",
-    "SweepSetup",
-    "diagnostics_of",
-    "require_every_structure",
-    "require_parameters",
-    "sweep_setup",
-    "variable_attributes",
-]
-
-
 # ----------------------------------------------------------------------------------------------------
 # Checks and diagnostics of a sweep before any run.
 

@@ -17,8 +17,6 @@ from snapbeam.util.validation import integer
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["sweep"]
-
 
 def sweep(
     system: System,

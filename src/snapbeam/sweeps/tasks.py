@@ -32,21 +32,6 @@ from snapbeam.util.provenance import (
 )
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 
-__all__ = [
-    "CLASSES",
-    "MemoryRunner",
-    "PointWork",
-    "Provenance",
-    "ResultRows",
-    "ResultTable",
-    "Stage",
-    "StageRunner",
-    "chunk_size",
-    "differences",
-    "provenance_of",
-]
-
-
 CLASSES = tuple(ResponseClass)
 """Response classes in the order of the columns that count replicates."""
 _COUNTS = tuple(f"runs_{kind.name.lower()}" for kind in CLASSES)

@@ -19,9 +19,6 @@ from snapbeam.uncertainty.probability import SamplingPlan, allocation_of, probab
 from snapbeam.uncertainty.quantiles import QuantileSearchSettings, quantile_threshold
 from snapbeam.util.validation import InputError, checked, within
 
-__all__ = ["LONG", "CostEstimate", "estimate_cost"]
-
-
 LONG = 600.0
 """Seconds from which a computation counts as long."""
 _RUN_BYTES = 700

@@ -14,9 +14,6 @@ from scipy import stats
 
 from snapbeam.util.validation import InputError, finite_array, integer, seed_of, within
 
-__all__ = ["DifferentialEvolution", "dominates", "front_of"]
-
-
 _Array = NDArray[np.float64]
 
 

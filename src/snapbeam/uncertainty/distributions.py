@@ -27,18 +27,6 @@ from snapbeam.util.validation import (
     shown,
 )
 
-__all__ = [
-    "KINDS",
-    "Distribution",
-    "Empirical",
-    "LogNormal",
-    "Normal",
-    "ParameterUncertainty",
-    "UniformRange",
-    "UniformTolerance",
-    "uncertainty_from_mapping",
-]
-
 HOLD_FIXED = ("physical", "normalised")
 _OWN = ("displacement", "phase", "hold_fixed", "seed", "correlation")
 

@@ -22,9 +22,6 @@ from snapbeam.util.validation import InputError, checked, finite, instance, show
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["gradient"]
-
-
 _Array = NDArray[np.float64]
 _DOUBTFUL = 1e-4
 """Relative error of a derivative that is reported."""

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 
     from snapbeam.sweeps.measured_points import MeasuredPoints
 
-__all__ = ["KNOWN_CLASSES", "PSEUDOCOUNT", "class_counts", "score_measurements"]
-
-
 KNOWN_CLASSES = (
     ResponseClass.INTRAWELL,
     ResponseClass.TRANSIENT_1,

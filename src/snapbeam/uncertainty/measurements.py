@@ -12,9 +12,6 @@ from typing import Any
 from snapbeam.util.input_files import read_toml
 from snapbeam.util.validation import InputError, InputTypeError, choice, file_path, positive, shown
 
-__all__ = ["HERTZ_TIME", "ContactTest", "Measurements", "load_measurements"]
-
-
 HERTZ_TIME = 2.943275  # contact time over d/v for a force k d^1.5: 2 int_0^1 dx/sqrt(1 - x^2.5)
 
 

@@ -31,18 +31,6 @@ from snapbeam.util.diagnostics import DiagnosticWarning
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, choice, shown, within
 
-__all__ = [
-    "INTERVALS",
-    "OUTCOMES",
-    "Event",
-    "Trials",
-    "interval_of",
-    "reached",
-    "require_held",
-    "trials_of",
-    "wilson",
-]
-
 Statistics = dict[str, NDArray[Any]]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
 _FIRST = (ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_1)

@@ -46,20 +46,6 @@ from snapbeam.util.validation import (
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "OWN",
-    "Constraint",
-    "DesignProblem",
-    "DesignQuantity",
-    "Estimate",
-    "Objective",
-    "OptimizerSettings",
-    "Worth",
-    "design_problem",
-    "optimize_design",
-    "quantity_of",
-]
-
 Values = dict[str, NDArray[Any]]
 _SURE = 0.99
 """Confidence level at which a design is discarded after a quarter of its runs."""

@@ -48,8 +48,6 @@ if TYPE_CHECKING:
 
     from snapbeam.sweeps.measured_points import MeasuredPoints
 
-__all__ = ["Forward", "Posterior", "Waveform", "class_likelihood", "estimate_posterior"]
-
 _STATES = ("straight", "lower_well", "upper_well")
 _TINY = 1e-13
 """Relative change of the drive whose response is measured."""

@@ -25,8 +25,6 @@ from snapbeam.util.validation import InputError, InputTypeError, checked, choice
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Counts", "SamplingPlan", "allocate", "allocation_of", "probability_map"]
-
 _Array = NDArray[np.float64]
 _Index = NDArray[np.int64]
 Ask = Callable[[_Index, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]

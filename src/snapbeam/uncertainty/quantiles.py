@@ -35,20 +35,6 @@ from snapbeam.util.validation import (
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "Crossing",
-    "QuantileSearchSettings",
-    "Runs",
-    "critical",
-    "crossing",
-    "isotonic",
-    "local_crossing",
-    "quantile_threshold",
-    "rises",
-    "search",
-    "spans",
-]
-
 _Array = NDArray[np.float64]
 _TABLE = {
     0.5: 0.28506,

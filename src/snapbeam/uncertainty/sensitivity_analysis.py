@@ -38,21 +38,6 @@ from snapbeam.util.validation import (
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "METHODS",
-    "Indices",
-    "LifetimeQoI",
-    "NotchQoI",
-    "QuantityOfInterest",
-    "Sobol",
-    "StatisticQoI",
-    "ThresholdQoI",
-    "quantity_of_interest",
-    "sensitivity",
-    "sobol_indices",
-    "sobol_indices_from_samples",
-]
-
 _GROUPS = 20
 _Numbers = NDArray[np.int64]
 _Array = NDArray[np.float64]

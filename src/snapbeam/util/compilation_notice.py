@@ -5,9 +5,6 @@ from __future__ import annotations
 import logging
 import sys
 
-__all__ = ["announce_compilation"]
-
-
 _LOG = logging.getLogger("snapbeam")
 
 

@@ -15,21 +15,6 @@ from typing import Any
 from snapbeam.util.validation import InputError, InputTypeError, choice, shown
 from snapbeam.util.work_rate import WorkRate
 
-__all__ = [
-    "Diagnostic",
-    "DiagnosticError",
-    "DiagnosticWarning",
-    "Severity",
-    "counting",
-    "diagnostics_of",
-    "doubtful",
-    "from_json",
-    "refuse",
-    "sharing",
-    "tell",
-    "to_json",
-]
-
 _INTERVAL = 0.2
 _Counts = Callable[[int, int], object]
 _Shares = Callable[[float], object]

@@ -10,8 +10,6 @@ from collections.abc import Iterable, Sequence
 from importlib import import_module
 from typing import Any
 
-__all__ = ["DatasetFigures", "html_table", "plotter"]
-
 
 def plotter(name: str) -> Any:
     """A function of :mod:`snapbeam.plot`."""

@@ -11,17 +11,6 @@ from typing import Any
 
 from snapbeam.util.validation import InputError, file_path
 
-__all__ = [
-    "LARGEST_INPUT",
-    "decoded",
-    "input_bytes",
-    "input_text",
-    "parsed_toml",
-    "read_toml",
-    "refuse_inflated",
-]
-
-
 LARGEST_INPUT = 64 * 2**20
 """Largest file of parameters or of a table, bytes."""
 LARGEST_CONTENT = 512 * 2**20

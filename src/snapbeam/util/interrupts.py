@@ -17,9 +17,6 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
 
-__all__ = ["WORDS", "during_command", "end", "held_back", "install", "raise_held"]
-
-
 WORDS = "interrupted; no file was left half written"
 _SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 _GRACE = 0.5

@@ -27,17 +27,6 @@ if TYPE_CHECKING:
     import h5netcdf
     import xarray as xr
 
-__all__ = [
-    "hdf5_stream",
-    "netcdf_file",
-    "read_netcdf",
-    "read_result",
-    "refuse_large",
-    "split_group",
-    "write_netcdf",
-]
-
-
 _MOST_TEXTS = 100_000
 
 

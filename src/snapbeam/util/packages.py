@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["needs"]
-
 
 def needs(what: str, package: str | None, extra: str) -> str:
     """Return the message for a missing package of an extra of the distribution.

@@ -6,9 +6,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["prefixed", "scale_of"]
-
-
 _PREFIXES = ("y", "z", "a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P", "E", "Z", "Y")
 
 

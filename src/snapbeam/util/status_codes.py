@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.util.validation import InputError, finite_array
 
-__all__ = ["ResponseClass", "RunStatus", "class_of", "classify", "wells_of"]
-
 
 class ResponseClass(IntEnum):
     """The kind of response of one run (section 4.2 of the paper).

@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["TABLE_SUFFIXES", "data_frame", "write_table"]
-
-
 TABLE_SUFFIXES = (".csv", ".mat")
 
 

@@ -11,9 +11,6 @@ from typing import Any
 
 from snapbeam.util.validation import InputError
 
-__all__ = ["conversion_factor", "number_in_unit"]
-
-
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _TEXT = re.compile(rf"\s*([-+]?{_NUMBER})(?:\s*/\s*({_NUMBER}))?\s*(\D.*?)?\s*", re.DOTALL)
 _ANGLE = "radian"

@@ -23,30 +23,6 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "InputError",
-    "InputTypeError",
-    "NamedTable",
-    "axis",
-    "callback",
-    "checked",
-    "choice",
-    "file_path",
-    "finite",
-    "finite_array",
-    "flag",
-    "instance",
-    "integer",
-    "interval",
-    "mapping",
-    "nonnegative",
-    "parsed_json",
-    "positive",
-    "seed_of",
-    "shown",
-    "within",
-]
-
 _F = TypeVar("_F", bound=Callable[..., Any])
 _ABSTRACT = {Sequence: "a sequence", Mapping: "a mapping", Iterable: "a sequence", Callable: "callable"}
 _LIBRARIES = {"xr": "xarray", "np": "numpy", "pd": "pandas"}

@@ -6,9 +6,6 @@ import sys
 import time
 from typing import Any
 
-__all__ = ["WorkRate", "compile_seconds"]
-
-
 _TIMERS: list[Any] = []
 
 

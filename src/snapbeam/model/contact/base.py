@@ -12,9 +12,6 @@ import numpy as np
 from snapbeam.model.quantity import check_fields, numbers_type
 from snapbeam.util.validation import InputError
 
-__all__ = ["LAWS", "ContactLaw", "LawProperties", "hertzian_time"]
-
-
 LAWS: dict[str, type[ContactLaw]] = {}
 """Every law by the name it has in parameter files."""
 _HERTZ_PHASE = 4.03026

@@ -10,8 +10,6 @@ from snapbeam.model.contact.base import ContactLaw, LawProperties
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.validation import InputError
 
-__all__ = ["ElasticPlasticContact"]
-
 
 @dataclass(frozen=True)
 class ElasticPlasticContact(ContactLaw):

@@ -10,9 +10,6 @@ from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.validation import InputError, InputTypeError, nonnegative, positive, shown, within
 
-__all__ = ["HertzContact"]
-
-
 # Duration of a Hertzian impact of a free mass over (greatest penetration)/(approach velocity):
 # 2 * integral of (1 - u^(5/2))^(-1/2) over (0, 1) = (4/5) B(2/5, 1/2) = 2.94328
 _DURATION = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)

@@ -12,8 +12,6 @@ from snapbeam.model.contact.loss import loss_number, preset_loss, restitution_of
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.validation import positive
 
-__all__ = ["HuntCrossley"]
-
 
 @dataclass(frozen=True)
 class HuntCrossley(ContactLaw):

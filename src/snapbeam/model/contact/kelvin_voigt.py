@@ -10,8 +10,6 @@ from snapbeam.model.contact.base import ContactLaw, LawProperties
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.validation import positive, within
 
-__all__ = ["KelvinVoigt"]
-
 
 @dataclass(frozen=True)
 class KelvinVoigt(ContactLaw):

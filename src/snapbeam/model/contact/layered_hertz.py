@@ -13,9 +13,6 @@ from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.validation import positive, within
 
-__all__ = ["LayeredHertz"]
-
-
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 
 

@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 from snapbeam.util.validation import choice, positive, within
 
-__all__ = ["PRESETS", "Preset", "loss_number", "preset_loss", "restitution_of_loss"]
-
 
 class Preset(NamedTuple):
     """A published shortcut from a coefficient of restitution to a loss number D = chi v."""

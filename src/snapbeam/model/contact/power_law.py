@@ -10,9 +10,6 @@ from snapbeam.model.contact.base import ContactLaw, hertzian_time
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.validation import checked, positive, within
 
-__all__ = ["PowerLaw"]
-
-
 _MICROMETRE = 1e-6
 
 

@@ -8,8 +8,6 @@ from typing import Any
 from snapbeam.model.contact.base import ContactLaw, LawProperties
 from snapbeam.model.quantity import RUN, quantity
 
-__all__ = ["Restitution"]
-
 
 @dataclass(frozen=True)
 class Restitution(ContactLaw):

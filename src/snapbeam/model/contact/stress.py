@@ -22,9 +22,6 @@ from snapbeam.util.validation import (
     shown,
 )
 
-__all__ = ["HertzStress", "bending_stress", "hertz_stress"]
-
-
 _Array = NDArray[np.float64]
 _YIELD = 1.60
 """Maximum pressure over the yield stress at which a sphere on a flat first yields, below the surface (nu = 0.3)."""

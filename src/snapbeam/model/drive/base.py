@@ -17,9 +17,6 @@ from snapbeam.util.validation import NamedTable
 if TYPE_CHECKING:
     from snapbeam.model.reduced_model import ReducedModel
 
-__all__ = ["DRIVES", "HORIZON", "SCALAR", "Drive", "Scale", "Timed", "scalar", "sincos", "smooth_rise"]
-
-
 _Array = NDArray[np.float64]
 _Scalar = TypeVar("_Scalar", bound=Callable[..., Any])
 

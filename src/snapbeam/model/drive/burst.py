@@ -14,9 +14,6 @@ from snapbeam.model.drive.base import Scale, Timed, scalar, sincos, smooth_rise
 from snapbeam.model.quantity import RUN, check_fields, quantity
 from snapbeam.util.validation import InputError
 
-__all__ = ["Burst"]
-
-
 _Array = NDArray[np.float64]
 _STEEPEST = 1.875
 """Maximum slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""

@@ -13,9 +13,6 @@ from numpy.typing import NDArray
 from snapbeam.model.drive.base import Scale, Timed, sincos
 from snapbeam.model.quantity import RUN, STRUCTURE, quantity
 
-__all__ = ["Chirp"]
-
-
 _Array = NDArray[np.float64]
 
 

@@ -13,9 +13,6 @@ from numpy.typing import NDArray
 from snapbeam.model.drive.base import Scale, Timed
 from snapbeam.model.quantity import RUN, quantity
 
-__all__ = ["ConstantVelocity"]
-
-
 _Array = NDArray[np.float64]
 
 

@@ -13,9 +13,6 @@ from numpy.typing import NDArray
 from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.drive.sine import Sine
 
-__all__ = ["FixedStop"]
-
-
 _Array = NDArray[np.float64]
 
 

@@ -14,9 +14,6 @@ from snapbeam.model.drive.base import Scale, Timed, smooth_rise
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
 from snapbeam.util.validation import InputError
 
-__all__ = ["LINES", "BandLimitedNoise", "seed_of_noise", "sums_of_sines"]
-
-
 _Array = NDArray[np.float64]
 LINES = 32
 """Sines that the noise is made of, one in each equal part of the band, at a random place in it."""

@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from snapbeam.model.reduced_model import ReducedModel
     from snapbeam.util.diagnostics import Diagnostic
 
-__all__ = ["SPECTRA", "RandomVibration", "break_points", "mean_square"]
-
-
 _Array = NDArray[np.float64]
 _Points = tuple[tuple[float, float], ...]
 

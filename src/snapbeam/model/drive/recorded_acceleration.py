@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from snapbeam.model.drive.random_vibration import RandomVibration
     from snapbeam.model.reduced_model import ReducedModel
 
-__all__ = ["RecordedAcceleration", "SampledAcceleration"]
-
-
 _Array = NDArray[np.float64]
 
 _LONGEST_DRIFT = 1.0

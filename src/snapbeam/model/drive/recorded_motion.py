@@ -18,9 +18,6 @@ from snapbeam.util.validation import InputError, finite_array, instance, shown
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["RecordedMotion"]
-
-
 _Array = NDArray[np.float64]
 _SPEED_MARGIN = 1.5
 """Upper bound of the ratio of the speed of the interpolating cubic to the recorded speed."""

@@ -13,9 +13,6 @@ from snapbeam.model.drive.base import Scale, Timed
 from snapbeam.model.quantity import check_fields
 from snapbeam.util.validation import InputError, choice, finite_array
 
-__all__ = ["DRIFT", "FileKeys", "Sampled", "refuse_drift", "require_unit", "straightened"]
-
-
 _Array = NDArray[np.float64]
 
 _KNOTS = 8.0

@@ -14,9 +14,6 @@ from snapbeam.model.drive.base import Scale, Timed
 from snapbeam.model.quantity import RUN, STRUCTURE, quantity
 from snapbeam.util.validation import nonnegative, positive
 
-__all__ = ["GRAVITY", "SHAPES", "Shock"]
-
-
 _Array = NDArray[np.float64]
 
 GRAVITY = 9.80665

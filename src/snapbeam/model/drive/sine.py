@@ -17,9 +17,6 @@ from snapbeam.util.diagnostics import Diagnostic
 if TYPE_CHECKING:
     from snapbeam.model.reduced_model import ReducedModel
 
-__all__ = ["AccelerationSine", "DisplacementSine", "Sine"]
-
-
 _Array = NDArray[np.float64]
 _LARGEST_RATIO = 20.0
 """Ratios from which on a number is probably given in Hz or mm/s."""

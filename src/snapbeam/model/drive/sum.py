@@ -13,9 +13,6 @@ from numpy.typing import NDArray
 from snapbeam.model.drive.base import DRIVES, Drive, Scale, Timed
 from snapbeam.util.validation import InputError, InputTypeError, shown
 
-__all__ = ["MOST_TERMS", "SumDrive"]
-
-
 _Array = NDArray[np.float64]
 _SEPARATOR = "__"
 _JOIN = "+"

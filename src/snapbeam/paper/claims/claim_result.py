@@ -7,21 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-__all__ = [
-    "FAIL",
-    "VERDICTS",
-    "Check",
-    "ClaimResult",
-    "Number",
-    "Quantity",
-    "above",
-    "below",
-    "found",
-    "measured",
-    "near",
-]
-
-
 VERDICTS = ("holds", "in part", "fails", "open")
 
 Number = float | int | tuple[float, ...] | tuple[tuple[float, ...], ...]

@@ -16,9 +16,6 @@ from importlib.resources import files
 
 from snapbeam.paper.claims.claim_result import ClaimResult, Number, Quantity
 
-__all__ = ["Entry", "Topic", "fill", "read_topic"]
-
-
 _PLACEHOLDER = re.compile(r"<([a-z][a-z0-9_]*)(\.u)?(?::([^<>]+)|\?([^<>|]*)\|([^<>|]*))?>")
 
 

@@ -17,9 +17,6 @@ from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.provenance import made_by
 from snapbeam.util.validation import choice
 
-__all__ = ["BEGINS", "Claim", "summary", "write_table"]
-
-
 BEGINS = {"claims.md": "**Of ", "claims.csv": "number,topic,says,paper,", "claims.json": ""}
 """The files of the table, and what the text of each begins with."""
 

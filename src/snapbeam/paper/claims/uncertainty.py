@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["chaos", "chaos_of_pairs", "combined", "mean_of", "median_of", "part", "resampled", "share"]
-
-
 _LEVEL = 1.96
 """Standard deviations of a half width: 95 %."""
 _DRAWS = 400

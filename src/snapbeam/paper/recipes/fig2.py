@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["compute", "draw"]
-
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
     """The two wells along the beam, in units of b."""

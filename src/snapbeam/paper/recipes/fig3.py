@@ -15,9 +15,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["compute", "draw"]
-
-
 FREQUENCY_RATIO, VELOCITY_AMPLITUDE = 1.21, 0.10
 """An intrawell run near the one of Fig. 5; the paper does not specify which it shows."""
 _WINDOW = 6  # cycles shown

@@ -33,9 +33,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["KINDS", "OPTIONS", "compute", "draw", "read_measured"]
-
-
 _Array = NDArray[np.float64]
 
 OPTIONS = ("measured",)

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["FREQUENCY_RATIO", "VELOCITY_AMPLITUDE", "compute", "draw", "snap_times"]
-
-
 _Array = NDArray[np.float64]
 
 FREQUENCY_RATIO, VELOCITY_AMPLITUDE = 1.21, 0.18

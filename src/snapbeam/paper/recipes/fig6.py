@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["OPTIONS", "compute", "draw", "frequency_maps", "read_measurements"]
-
-
 OPTIONS = ("measurements",)
 
 

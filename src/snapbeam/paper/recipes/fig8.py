@@ -34,9 +34,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["FREQUENCY_RATIOS", "OPTIONS", "compute", "draw", "draw_relative_map"]
-
-
 _Array = NDArray[np.float64]
 
 FREQUENCY_RATIOS = (0.05, 0.625, 1.625)

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["compute", "draw"]
-
-
 _COUNT = 10
 
 

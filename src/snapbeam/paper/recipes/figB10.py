@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["LEVELS", "compute", "draw", "maxima"]
-
-
 LEVELS = (0.005, 0.02)
 """Low and moderate drive; the paper does not give its own.  Neither snaps through."""
 _FOOT = -1.01

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["FREQUENCY_RATIO", "compute", "draw", "write_video"]
-
-
 FREQUENCY_RATIO = 1.625
 _SHOWN = (1, 2, 4, 8, 16, 32)
 

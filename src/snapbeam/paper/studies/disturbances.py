@@ -26,9 +26,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["EXCESS", "OFFSET", "VARIANTS", "compute", "draw"]
-
-
 _Array = NDArray[np.float64]
 
 EXCESS, OFFSET = 0.2, 1e-3

@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["PIEZO", "SPLIT", "compute", "draw", "power_above"]
-
-
 _Array = NDArray[np.float64]
 
 PIEZO = sb.PiezoelectricHarvester.from_material(

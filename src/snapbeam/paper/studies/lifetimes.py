@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ENDLESS", "LONGEST", "POINTS", "compute", "draw"]
-
-
 POINTS = {"frequency_ratio": (1.21, 1.625, 2.5, 3.5), "velocity_amplitude": (0.25, 0.3, 0.55, 0.6)}
 """Points at which 32 modes have many initial conditions."""
 ENDLESS = (1.625, 0.3)

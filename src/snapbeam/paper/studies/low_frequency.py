@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["compute", "draw"]
-
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
     """Classes over V/V_QS1 at each frequency, fine about 1."""

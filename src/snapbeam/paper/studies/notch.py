@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["BASE", "MEASURED", "VARIANTS", "WINDOW", "compute", "draw", "moved", "notches"]
-
-
 _Array = NDArray[np.float64]
 
 WINDOW = (1.0, 1.6)

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["WINDOW", "compute", "draw", "ridge"]
-
-
 _Array = NDArray[np.float64]
 
 WINDOW = (0.8, 2.2)

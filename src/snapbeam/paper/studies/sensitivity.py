@@ -25,9 +25,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["VARIANTS", "buckling_mode_damping", "compute", "draw", "tip_contact"]
-
-
 _Array = NDArray[np.float64]
 
 VARIANTS = {

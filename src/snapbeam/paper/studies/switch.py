@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["OMEGA", "cheapest", "compute", "draw", "fold_load"]
-
-
 _Array = NDArray[np.float64]
 
 OMEGA = 1.2

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["compute", "draw"]
-
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
     """For 1 and 32 modes, a map after 1000 and one after 3000 cycles."""

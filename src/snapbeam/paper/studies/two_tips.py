@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["LEVEL", "Pushed", "beam_of", "compute", "draw", "push", "second_level"]
-
-
 _Array = NDArray[np.float64]
 
 LEVEL = 3.0

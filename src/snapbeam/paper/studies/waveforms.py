@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["BIN_EDGES", "compute", "draw", "passages"]
-
-
 _Array = NDArray[np.float64]
 
 BIN_EDGES = np.linspace(0.0, 1.5, 31)

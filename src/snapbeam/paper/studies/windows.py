@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["CENTRE", "END", "FREQUENCY_RATIOS", "compute", "draw", "longest_window"]
-
-
 _Array = NDArray[np.float64]
 
 FREQUENCY_RATIOS = (0.625, 1.625)

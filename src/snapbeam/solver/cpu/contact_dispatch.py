@@ -10,8 +10,6 @@ from snapbeam.solver.compilation import INLINE_HERE
 from snapbeam.solver.cpu.events import accept_step
 from snapbeam.solver.cpu.restitution import accept_step_restitution
 
-__all__ = ["accept_step_by_law"]
-
 
 def accept_step_by_law(
     memory: Any,

@@ -28,9 +28,6 @@ from snapbeam.solver.statistics import Last, OutputStates, Recorded, empty_accum
 from snapbeam.solver.step_control import SUBINTERVALS
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = ["integrate_tangents", "integrate_with_output_states", "record", "run_ensemble", "usable_cores"]
-
-
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
 _CHUNK_STEPS = 3_000_000

@@ -84,8 +84,6 @@ from snapbeam.solver.terms.interface import (
 )
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = ["accept_step", "locate_peak_force", "sample_inside_step"]
-
 _PARTS = 24
 """Equal parts of a step, at whose ends the force is evaluated."""
 

@@ -11,8 +11,6 @@ from snapbeam.solver.contact_force import contact_energy, memory_after, with_mem
 from snapbeam.solver.excitation import Tip, tip_about_well
 from snapbeam.solver.step_control import ContactKinematics
 
-__all__ = ["law_at", "tip_at", "unload"]
-
 
 @inlined
 def _law(memory, indentation, law, q):

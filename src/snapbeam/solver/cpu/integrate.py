@@ -50,9 +50,6 @@ from snapbeam.solver.step_control import contact_halvings, flight_halvings, time
 from snapbeam.solver.terms.interface import has_crossed, update_forces
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = ["KernelOutput", "integrate_ensemble", "integrate_recorded", "propose_step"]
-
-
 _RUNNING = int(RunStatus.INTERRUPTED)
 _NO_STEP = Step(0, 0, 0.0, 0.0, False, 0, 0, 0, 0, 0, 0, 0)
 

@@ -22,9 +22,6 @@ from snapbeam.solver.structure import Structure
 from snapbeam.solver.terms import TERMS_AFTER_CONTACTS, TERMS_BEFORE_CONTACTS
 from snapbeam.solver.terms.interface import TermMemory
 
-__all__ = ["Memory", "Packed", "lay_out", "pack"]
-
-
 _Array = NDArray[np.float64]
 
 _LONGEST_DECAY = 4.0

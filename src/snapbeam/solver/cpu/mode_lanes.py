@@ -33,28 +33,6 @@ from snapbeam.solver.terms.interface import (
     enter_flow,
 )
 
-__all__ = [
-    "Layout",
-    "acceleration_rows",
-    "beam_energy",
-    "beam_power",
-    "beam_signals",
-    "flow_coefficients",
-    "flow_rows",
-    "kick_and_flow_rows",
-    "kick_row",
-    "kick_rows",
-    "modal_energies",
-    "modal_energy",
-    "propagate_free",
-    "signals",
-    "speed_bound_with_terms",
-    "tension_rows",
-    "tension_rows_twice",
-    "validity_horizon",
-]
-
-
 WORK_ROWS = 11
 """Working rows of a run: q, p, k at both ends of a step and of a trial step inside it, G q, and the acceleration of a kick."""
 

@@ -17,21 +17,6 @@ from snapbeam.solver.step_control import ContactKinematics
 from snapbeam.solver.terms import WORKS
 from snapbeam.solver.terms.interface import add_potential_energy, no_external_work, works_so_far, write_loss
 
-__all__ = [
-    "MARKS",
-    "REALS",
-    "VALUES",
-    "Outputs",
-    "has_room",
-    "record_contact",
-    "record_held",
-    "record_inside_step",
-    "record_instants",
-    "restore_state",
-    "save_state",
-]
-
-
 VALUES = 7 + len(WORKS)
 """Penetration, contact force, beam energy, contact energy, work, dissipation, loss in contact and works of the terms, of a
 sample; the energies lost in circuits follow."""

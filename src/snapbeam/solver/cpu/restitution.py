@@ -52,8 +52,6 @@ from snapbeam.solver.terms.interface import (
 )
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = ["accept_step_restitution", "carry"]
-
 _LOCATIONS = 24
 """Newton steps in which a hit is located, at most."""
 _NOISE = 1e-12

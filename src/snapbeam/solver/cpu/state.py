@@ -52,25 +52,6 @@ from snapbeam.solver.terms.interface import (
 )
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = [
-    "IntegratorState",
-    "KernelInput",
-    "Rows",
-    "RunConstants",
-    "Scratch",
-    "StepControl",
-    "Workspace",
-    "begin",
-    "change_energy_origin",
-    "change_origin",
-    "close_energy",
-    "finish",
-    "form_acceleration",
-    "restart_from_state",
-    "sample_energy",
-]
-
-
 _OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
 _TWO_PI = 2.0 * math.pi
 

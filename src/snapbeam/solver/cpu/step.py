@@ -65,17 +65,6 @@ from snapbeam.solver.terms.interface import (
     update_forces,
 )
 
-__all__ = [
-    "Step",
-    "StepIncrement",
-    "nothing_done",
-    "observe",
-    "prepare",
-    "take_step",
-    "take_two_steps",
-    "with_velocity_dependent",
-]
-
 
 class Step(NamedTuple):
     """One step to take: how long, from where to where, and whether in contact."""

@@ -20,9 +20,6 @@ from snapbeam.solver.excitation import tip_acceleration, tip_motion
 from snapbeam.solver.terms.circuit import NODES
 from snapbeam.solver.terms.interface import add_work, begin_kick, carry_state, has_state, no_external_work
 
-__all__ = ["PANELS", "constraint_force", "held_for", "hold"]
-
-
 PANELS = 8
 """Panels of a step: in each, the force is integrated by Simpson's rule and checked for a release."""
 

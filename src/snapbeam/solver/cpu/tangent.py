@@ -31,9 +31,6 @@ from snapbeam.solver.simd import WIDTH, dot, fma, load, store
 from snapbeam.solver.terms.interface import add_to_tension, update_forces
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = ["TANGENT_ROWS", "integrate_tangent"]
-
-
 _RUNNING = int(RunStatus.INTERRUPTED)
 TANGENT_ROWS = 8
 """Rows beside the tangents themselves: the state of the step that is gone through again, and room."""

@@ -27,9 +27,6 @@ from snapbeam.solver.step_control import (
 )
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = ["step_function"]
-
-
 _OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
 _DIVERGED, _STEP_LIMIT = int(RunStatus.DIVERGED), int(RunStatus.STEP_LIMIT)
 _TWO_PI = 2.0 * math.pi

@@ -30,17 +30,6 @@ from snapbeam.solver.statistics import OutputStates, Recorded, empty_accumulator
 from snapbeam.solver.step_control import SUBINTERVALS
 from snapbeam.util.validation import InputError
 
-__all__ = [
-    "Options",
-    "integrate_tangents",
-    "integrate_with_output_states",
-    "record",
-    "refusal",
-    "run_ensemble",
-    "simulated",
-]
-
-
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
 

@@ -26,9 +26,6 @@ from snapbeam.solver.ensemble import RUN
 from snapbeam.solver.statistics import empty_accumulators
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = ["DeviceInput", "DeviceState", "DeviceWorkspace", "integrate_kernel", "signature"]
-
-
 _RUNNING = int(RunStatus.INTERRUPTED)
 
 

@@ -13,27 +13,6 @@ from scipy.sparse.csgraph import connected_components
 
 from snapbeam.solver.ensemble import Ensemble
 
-__all__ = [
-    "FEWEST_THREADS",
-    "KEPT",
-    "MARKS",
-    "MOST_MODES",
-    "PARTS",
-    "RESIDENT_WARPS",
-    "SIMULATED",
-    "STRUCTURE",
-    "WARP",
-    "Block",
-    "DeviceStructure",
-    "device",
-    "device_structure",
-    "launch_bounds",
-    "shared",
-    "stride_of",
-    "sums",
-    "synchroniser",
-]
-
 SIMULATED = bool(config.ENABLE_CUDASIM)
 """True if the Numba simulator replaces a device."""
 PARTS = 4

@@ -27,9 +27,6 @@ from snapbeam.solver.step_control import (
 )
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = ["Fixed", "Held", "Standing", "energies_function", "run_functions"]
-
-
 _OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
 _TWO_PI = 2.0 * math.pi
 

@@ -29,8 +29,6 @@ from snapbeam.solver.splitting import COMPOSITIONS
 from snapbeam.solver.step import InnerProducts, Primitives, build_step, flow_mode, kick_mode, rotate_phase
 from snapbeam.solver.step_control import ContactKinematics
 
-__all__ = ["Functions", "Mode", "functions"]
-
 
 class Mode(NamedTuple):
     """Coefficients of the mode of a thread."""

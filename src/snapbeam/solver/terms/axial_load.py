@@ -16,8 +16,6 @@ from snapbeam.solver.excitation import part_motion
 from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, splat
 from snapbeam.solver.terms.interface import TermMemory
 
-__all__ = ["AxialLoad"]
-
 
 def _change(drive: Any, memory: Any, argument: float) -> float:
     """Axial load beyond the one that the beam was reduced under, N."""

@@ -17,8 +17,6 @@ from snapbeam.solver.simd import WIDTH
 from snapbeam.solver.terms.force_of_time import ForceOfTime, absolute_product
 from snapbeam.solver.terms.interface import TermMemory
 
-__all__ = ["BaseExcitationTerm"]
-
 
 def _acceleration(drive: Any, memory: Any, argument: float) -> float:
     """Acceleration of the base in space, m/s^2, positive upwards."""

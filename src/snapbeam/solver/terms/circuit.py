@@ -27,9 +27,6 @@ from snapbeam.solver.compilation import inlined
 from snapbeam.solver.simd import WIDTH, broadcast_load, dot, fma, lanes_sum, load, splat, vabs
 from snapbeam.solver.terms.interface import TermMemory
 
-__all__ = ["NODES", "WEIGHTS", "Circuit", "CircuitDamping", "ResistiveCircuit"]
-
-
 _RATE, _Y, _CARRIED, _LOSS, _STORED = range(5)
 """Numbers of a run: rate of loss; y at the last kick; part of a flow; energy lost in the step so far, and in the accepted
 one."""

@@ -13,8 +13,6 @@ from snapbeam.solver.simd import WIDTH
 from snapbeam.solver.terms.force_of_time import ForceOfTime, absolute_product
 from snapbeam.solver.terms.interface import TermMemory
 
-__all__ = ["ExternalForceTerm"]
-
 
 def _force(drive: Any, memory: Any, argument: float, number: int) -> float:
     """External force of a number, N."""

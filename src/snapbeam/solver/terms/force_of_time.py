@@ -10,8 +10,6 @@ from typing import NamedTuple
 from snapbeam.solver.compilation import inlined
 from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat
 
-__all__ = ["ForceOfTime", "absolute_product"]
-
 
 @inlined
 def absolute_product(memory, size, row, along):

@@ -36,44 +36,6 @@ from numpy.typing import NDArray
 from snapbeam.solver.compilation import INLINE_HERE, inlined
 from snapbeam.solver.step_control import ContactKinematics
 
-__all__ = [
-    "ExternalWork",
-    "TermMemory",
-    "acceleration_about_nearest_well",
-    "accumulate_loss",
-    "accumulate_work",
-    "add_acceleration",
-    "add_potential_energy",
-    "add_stored_loss",
-    "add_to_speed_bound",
-    "add_to_tension",
-    "add_work",
-    "after_flow",
-    "before_flow",
-    "begin_kick",
-    "begin_run",
-    "bounds_by_energy",
-    "carry_state",
-    "center_from_barrier",
-    "does_work",
-    "enter_flow",
-    "enter_well",
-    "has_crossed",
-    "has_state",
-    "kinematics_from_barrier",
-    "may_hide_onset",
-    "needs_tension_product",
-    "no_external_work",
-    "operation",
-    "relative_to_nearest_well",
-    "store_loss",
-    "total_work",
-    "update_forces",
-    "wells_differ",
-    "works_so_far",
-    "write_loss",
-]
-
 
 class TermMemory(NamedTuple):
     """Numbers of a term, by the names of its fields."""

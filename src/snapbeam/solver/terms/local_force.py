@@ -17,9 +17,6 @@ from snapbeam.solver.contact_force import scalar_function
 from snapbeam.solver.simd import WIDTH, broadcast_load, dot, fma, load
 from snapbeam.solver.terms.interface import TermMemory
 
-__all__ = ["DampedLocalForceTerm", "LocalDamping", "LocalForceTerm"]
-
-
 _ORIGIN, _PLACE, _FORCE, _DAMPING, _WORK = range(5)
 """Numbers of a run: u at the origin of q; u, F and D at the last kick; work of D in a kick."""
 

@@ -15,8 +15,6 @@ from snapbeam.solver.compilation import inlined
 from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, splat, store
 from snapbeam.solver.terms.interface import TermMemory
 
-__all__ = ["SecondWell"]
-
 
 class SecondWell(NamedTuple):
     """Places in memory and numbers of unequal wells."""

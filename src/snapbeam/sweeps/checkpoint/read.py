@@ -24,8 +24,6 @@ from snapbeam.util.validation import InputError, InputTypeError, file_path, show
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["read_checkpoint"]
-
 
 def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
     """Read the finished points of a sweep from its checkpoint, also while another process computes the sweep.

@@ -24,19 +24,6 @@ from snapbeam.util.files import lives
 from snapbeam.util.provenance import created_now
 from snapbeam.util.validation import InputError
 
-__all__ = [
-    "PARTIAL",
-    "CheckpointError",
-    "CheckpointLock",
-    "TaskLog",
-    "TaskRecord",
-    "append_line",
-    "durable_write",
-    "member",
-    "open_own",
-    "refuse_links",
-]
-
 PARTIAL = ".partial"
 """Suffix of a file that is being written."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")

@@ -58,29 +58,6 @@ from snapbeam.util.validation import InputError, file_path, integer, shown
 if TYPE_CHECKING:
     from zarr.core.buffer import Buffer
 
-__all__ = [
-    "BASE",
-    "FORMAT",
-    "Checkpoint",
-    "CheckpointRows",
-    "JoinedRows",
-    "RefinementLayer",
-    "axes_apart",
-    "checkpoint_folder",
-    "grown",
-    "is_growth",
-    "layers_of",
-    "open_tables",
-    "read_description",
-    "read_stored_config",
-    "read_stored_points",
-    "read_task",
-    "reading",
-    "refuse_foreign",
-    "refuse_other",
-    "snapped",
-]
-
 FORMAT = {"format": "snapbeam checkpoint", "format_version": 5}
 _KNOWN = {"map.json", "tasks.jsonl", "lock", "runs.zarr"}
 BASE = "base"

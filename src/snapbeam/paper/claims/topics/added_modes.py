@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ROWS"]
-
-
 _Array = NDArray[np.float64]
 _PLACE = (0.2, 0.32)
 """Locations about 0.25 to 0.3 of which the paper speaks."""

@@ -18,9 +18,6 @@ from snapbeam.paper.system import paper_model
 if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ROWS"]
-
-
 _Array = NDArray[np.float64]
 
 

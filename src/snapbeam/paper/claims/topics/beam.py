@@ -19,9 +19,6 @@ from snapbeam.paper.system import paper_model
 if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ROWS"]
-
-
 _Array = NDArray[np.float64]
 _MOST = 3000.0
 """Frequency up to which Fig. A.9 shows the modes, Hz."""

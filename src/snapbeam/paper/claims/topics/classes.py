@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ROWS", "is_kind", "share_of", "transient"]
-
-
 _Mask = NDArray[np.bool_]
 _CUTS = (1.0, 2.0, 3.0, 4.0)
 """V/Omega above which responses should have settled in the second well, over that of the dashed line of Fig. 7."""

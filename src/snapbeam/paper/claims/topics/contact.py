@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ROWS"]
-
-
 _RESTITUTION = 0.7  # any value above 0 gives the same trend
 _DRIVE = (1.21, 0.18)
 _TIP_RADIUS = 2.5e-3

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ROWS"]
-
 
 def _changed(classes: xr.Dataset, variant: str) -> NDArray[np.bool_]:
     response = classes.response_class

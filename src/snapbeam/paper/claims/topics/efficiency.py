@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ROWS"]
-
-
 _Array = NDArray[np.float64]
 _END, _CENTRE = 0.1, 0.48
 

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ROWS", "along", "grid_step", "relative_threshold"]
-
-
 _Array = NDArray[np.float64]
 _NEAR_END = 0.05
 """Locations closer to a clamp than this are left out: V_QS1 goes to zero there."""

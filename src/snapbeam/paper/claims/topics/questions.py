@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ROWS"]
-
 
 def _threshold_ratio(first: xr.Dataset, second: xr.Dataset) -> Quantity:
     """Mean threshold of the second map over that of the first, the frequencies resampled."""

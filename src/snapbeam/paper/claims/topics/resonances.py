@@ -18,9 +18,6 @@ from snapbeam.sweeps.threshold import interwell_threshold
 if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ROWS"]
-
-
 _BANDS = ((0.5, 2.3), (2.3, 4.1))
 """Omega between which the first and the second maximum are looked for."""
 _LOW, _MODERATE = 0, 1

@@ -15,9 +15,6 @@ from snapbeam.paper.system import paper_model, paper_run
 if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ROWS"]
-
-
 _Array = NDArray[np.float64]
 _VISIBLE = 0.005
 """Root mean square of a ripple, b, from which it is counted: 1.7 um, or the width of a line in Fig. 5."""

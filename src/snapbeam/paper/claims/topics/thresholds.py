@@ -16,9 +16,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["NOTCH_WINDOW", "ROWS", "curves", "notch_of"]
-
-
 _Array = NDArray[np.float64]
 NOTCH_WINDOW = (0.8, 2.2)
 _LOW, _HIGH = (2.0, 2.5), (3.5, 4.0)

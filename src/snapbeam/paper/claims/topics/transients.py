@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ROWS"]
-
-
 _NEAR = 0.15
 """Amplitudes within this share of the threshold are near it."""
 

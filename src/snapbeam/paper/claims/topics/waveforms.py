@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ROWS", "amplitudes"]
-
-
 _Array = NDArray[np.float64]
 _PERIODIC = 0.1
 """A run repeats itself if the cycles that are alike differ by less than this share of what it moves."""

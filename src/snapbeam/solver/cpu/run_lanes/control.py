@@ -68,19 +68,6 @@ from snapbeam.solver.step_control import (
     time_beyond,
 )
 
-__all__ = [
-    "About",
-    "accept_steps",
-    "detect_contact_events",
-    "detect_deepest_points",
-    "end_contact",
-    "inner_samples_of",
-    "load_flows",
-    "propose_step",
-    "refine_onsets",
-]
-
-
 _CUSTOM = -99.0
 """Key of flows that were made for a step of any length."""
 

@@ -43,9 +43,6 @@ from snapbeam.solver.simd import (
 from snapbeam.solver.step_control import accumulate_open_contact
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = ["integrate_run_lanes"]
-
-
 _OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
 _DIVERGED, _STEP_LIMIT = int(RunStatus.DIVERGED), int(RunStatus.STEP_LIMIT)
 

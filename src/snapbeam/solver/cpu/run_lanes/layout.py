@@ -12,8 +12,6 @@ from typing import Any
 from snapbeam.solver.simd import WIDTH
 from snapbeam.solver.splitting import TURNS
 
-__all__ = ["shape_of"]
-
 _named_tuple: Any = namedtuple
 
 

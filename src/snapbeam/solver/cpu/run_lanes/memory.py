@@ -16,9 +16,6 @@ from snapbeam.solver.registered_statistics import extras_of_table
 from snapbeam.solver.simd import WIDTH
 from snapbeam.solver.splitting import COMPOSITIONS, in_memory
 
-__all__ = ["FewMemory", "lay_out_few", "suits"]
-
-
 _Array = NDArray[np.float64]
 _MOST_TICKS = 2.0**52
 """Ticks that numbers of double precision count one by one."""

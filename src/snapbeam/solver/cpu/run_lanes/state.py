@@ -32,20 +32,6 @@ from snapbeam.solver.splitting import TURNS, Stages
 from snapbeam.solver.step_control import SUBINTERVALS, TWELFTH, ContactKinematics, begin_statistics
 from snapbeam.util.status_codes import RunStatus
 
-__all__ = [
-    "TWO_PI",
-    "LaneSettings",
-    "begin_run",
-    "change_energy_origin",
-    "close_energy",
-    "flows_over",
-    "observe_run",
-    "prepare",
-    "sample_energy",
-    "slot_of",
-]
-
-
 TWO_PI = 2.0 * math.pi
 _OK, _RUNNING = int(RunStatus.OK), int(RunStatus.INTERRUPTED)
 

@@ -43,26 +43,6 @@ from snapbeam.solver.simd import (
 from snapbeam.solver.splitting import TURNS
 from snapbeam.solver.step import InnerProducts, Primitives, build_step, flow_mode, kick_mode, rotate_phase
 
-__all__ = [
-    "TEXTS",
-    "Modes",
-    "beam_energies",
-    "beam_signals",
-    "bounds",
-    "cubic_errors",
-    "groups_of",
-    "load_prepared_step",
-    "made",
-    "modal_energies",
-    "modal_energy",
-    "modes_of",
-    "propagate_free",
-    "signals",
-    "take_step",
-    "tension",
-]
-
-
 _KNOWN: dict[str, Any] = {
     "__name__": __name__, "both": both, "hermite_overshoot_bound": hermite_overshoot_bound, "flow_mode": flow_mode, "fma": fma,
     "InnerProducts": InnerProducts, "kick_mode": kick_mode, "less": less, "load": load, "move": move,

@@ -14,9 +14,6 @@ from numba.extending import overload
 
 from snapbeam.solver.compilation import INLINE_HERE, inlined
 
-__all__ = ["APART", "Jump", "discontinuity_within", "jumps_of", "up_to_discontinuity"]
-
-
 _TWO_PI = 2.0 * math.pi
 _MARGIN = 2
 """Ticks on either side of a jump, between which one step goes across it."""

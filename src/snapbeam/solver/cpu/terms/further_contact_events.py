@@ -68,25 +68,6 @@ from snapbeam.solver.step_control import (
     safe_interval,
 )
 
-__all__ = [
-    "accumulate_further_contacts",
-    "accumulate_open_further_contacts",
-    "add_stored_contacts",
-    "any_touches",
-    "begin_further_contacts",
-    "close_further_contacts",
-    "corrections_of_onset",
-    "first_further_event",
-    "further_contacts_halvings",
-    "limit_safe_interval",
-    "observe_further_contacts",
-    "refine_further_onsets",
-    "restart_further_contacts",
-    "store_contact_states",
-    "store_further_contacts",
-    "update_further_contacts",
-]
-
 
 @called
 def _observe(memory, size, others, drive, argument, t, q):

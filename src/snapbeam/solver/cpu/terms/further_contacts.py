@@ -60,26 +60,6 @@ from snapbeam.solver.further_contacts import (
 )
 from snapbeam.solver.simd import WIDTH, broadcast_load, dot, fma, load, store
 
-__all__ = [
-    "FurtherContacts",
-    "accumulate_damped_contacts",
-    "add_damped_contacts",
-    "block",
-    "evaluate_contacts",
-    "kick_tangent_by_further_contacts",
-    "linearise_further_contacts",
-    "lower_surfaces",
-    "mirror_further_contacts",
-    "note_touching",
-    "penetration_of",
-    "read_indentations",
-    "unload_further",
-    "with_further_contact_energy",
-    "with_further_contact_gross_work",
-    "with_further_contact_loss",
-    "with_further_contact_work",
-]
-
 
 class FurtherContacts(NamedTuple):
     """Memory offsets of the strikers after the first."""

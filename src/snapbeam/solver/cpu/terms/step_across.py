@@ -26,9 +26,6 @@ from snapbeam.solver.terms.interface import (
     update_forces,
 )
 
-__all__ = ["in_succession", "mark_at_jump", "taken_across"]
-
-
 _NEAR = 0.5
 """Ticks: a jump so near behind the end of a step counts as within it."""
 

@@ -24,27 +24,6 @@ from snapbeam.solver.compilation import called, inlined
 from snapbeam.solver.simd import WIDTH, dot, fma, load, store
 from snapbeam.solver.terms.interface import operation
 
-__all__ = [
-    "DAMPING",
-    "ELASTIC",
-    "IMPULSE_IN_KICK",
-    "LOST_IN_KICK",
-    "VELOCITY",
-    "ContactDamping",
-    "VelocityBlock",
-    "acts",
-    "add_impulses",
-    "add_velocity_dependent",
-    "enter_contact",
-    "keep_velocities",
-    "numbers_of_block",
-    "open_first_contact",
-    "prepare_velocity_block",
-    "rest_in_kick",
-    "solve_velocity_block",
-]
-
-
 _FEWEST_PARTS, _MOST_PARTS = 4, 256
 _PARTS_PER_DECAY = 8.0
 """Parts of a kick, over the time in which the damping alone halts the motion along the rows."""
