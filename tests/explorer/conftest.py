@@ -196,7 +196,7 @@ class Tab:
 
     _TEXT = """([name, which]) => {
       const found = [];
-      for (const model of Bokeh.documents[0]._all_models.values()) {
+      for (const model of Bokeh.documents[0]?._all_models.values() ?? []) {  // none while the page is loaded again
         if (!(model.css_classes || []).includes(name)) { continue; }
         const view = Bokeh.index.find_one(model);
         if (!view) { continue; }

@@ -178,7 +178,7 @@ def test_a_file_that_goes_is_told_and_runs_go_on(tab, serve, small_map, tmp_path
     page = tab(serve("gone.nc", where=tmp_path).url)
     path.unlink()
     page.click(float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][4]))
-    assert "crossings" in page.head()
+    page.wait(lambda: "crossings" in page.head(), "the run")
 
 
 def test_a_checkpoint_fills_in_as_it_grows(tab, serve, system, tmp_path):

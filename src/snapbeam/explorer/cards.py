@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 import time
-import wave
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -17,6 +16,7 @@ import panel as pn
 from bokeh.models import PrintfTickFormatter
 from markupsafe import Markup, escape
 from numpy.typing import NDArray
+from scipy.io import wavfile
 
 from snapbeam import STATISTICS, InputError, Integration, ResponseClass, RunStatus, System, write_netcdf
 from snapbeam.explorer import jobs, maps, style
@@ -1289,9 +1289,7 @@ def write_sound(time: NDArray[np.float64], velocity: NDArray[np.float64], path: 
     even = np.arange(time[0], time[-1], 1.0 / _RATE)
     series = np.interp(even, time, velocity)
     loudest = float(np.abs(series).max(initial=0.0)) or 1.0
-    with wave.open(str(path), "wb") as file:
-        file.setparams((1, 2, _RATE, even.size, "NONE", ""))
-        file.writeframes(np.round(32767.0 / loudest * series).astype("<i2").tobytes())
+    wavfile.write(path, _RATE, np.round(32767.0 / loudest * series).astype(np.int16))
 
 
 def _uploaded_config(content: bytes) -> Config:
