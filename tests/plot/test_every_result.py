@@ -56,7 +56,9 @@ def test_a_map_is_drawn_by_what_it_is(synthetic_map) -> None:
     assert ax.get_ylabel().startswith("Velocity amplitude")
     other = table.snapbeam.plot("peak_force")
     assert len(other.figure.axes) == 2, "the map and its colour bar"
-    with pytest.raises(sb.InputError, match="of this map; choose one of response_class, peak_force"):
+    with pytest.raises(
+        sb.InputError, match=r"no figure of this file \(map\); choose one of response_class, peak_force"
+    ):
         table.snapbeam.plot("force")
 
 
@@ -84,7 +86,7 @@ def test_a_stored_run_draws_itself_in_a_program_that_imports_snapbeam_alone(tmp_
 def test_a_run_is_drawn_by_what_it_is(synthetic_run) -> None:
     _, ax = plt.subplots()
     assert synthetic_run.snapbeam.plot("spectrum", ax=ax) is ax
-    with pytest.raises(sb.InputError, match=r"of this run; choose one of run, spectrum$"):
+    with pytest.raises(sb.InputError, match=r"no figure of this file \(run\); choose one of run, spectrum$"):
         synthetic_run.snapbeam.plot("class")
 
 

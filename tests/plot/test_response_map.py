@@ -122,7 +122,7 @@ def test_what_is_no_map_of_two_axes(synthetic_map):
     with pytest.raises(InputError, match="this one has none"):
         plot_response_map(synthetic_map.isel(frequency_ratio=0, velocity_amplitude=0))
     deep = synthetic_map.drop_vars("location").expand_dims(location=[0.3, 0.4])
-    with pytest.raises(InputError, match=r"select one point of the others, as with dataset\.isel"):
+    with pytest.raises(InputError, match="select one value of location, by --at location=VALUE or"):
         plot_response_map(deep)
     assert plot_response_map(deep.isel(location=[1])).get_title("left").endswith("0.4")
 

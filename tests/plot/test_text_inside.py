@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
 from snapbeam.model import default_values
 from snapbeam.plot.dataset import figures_of
 from snapbeam.plot.style import COLUMN_WIDTHS, save_figure
@@ -107,10 +106,9 @@ def test_text_is_inside_the_canvas(result: str) -> None:
         plt.close(figure)
 
 
-STYLES = ("elsevier", "ieee", "talk")
-
-
-@pytest.fixture(params=STYLES)
+@pytest.fixture(
+    params=["ieee", *(pytest.param(name, marks=pytest.mark.slow) for name in ("elsevier", "talk"))]
+)
 def style(request):
     sb.plot.plot_style(request.param)
     yield request.param
@@ -145,44 +143,6 @@ def test_text_is_inside_the_canvas_in_each_style_and_the_files_are_small(
         text = (tmp_path / "figure.pdf").read_bytes()
         assert b"/FontFile2" in text and b"/Type3" not in text, name
         plt.close(figure)
-
-
-def paper_results() -> paper.Results:
-    """Maps of the size of a sketch, with every class, instead of computed ones."""
-    rng = np.random.default_rng(2)
-    results = paper.Results("quick")
-    v, location = np.linspace(0.05, 0.65, 13), np.linspace(0.06, 0.5, 8)
-    for modes in (1, 4):
-        attrs = SYSTEM_ATTRS | {"modes": modes, "cycles": 200}
-        kinds = rng.integers(0, 4, (20, 13)).astype(np.int8)
-        results._known.setdefault("fig6", {})[f"modes_{modes}"] = xr.Dataset(
-            {"response_class": (("frequency_ratio", "velocity_amplitude"), kinds)},
-            {"frequency_ratio": np.linspace(0.2, 4.0, 20), "velocity_amplitude": v, "location": 0.476}, attrs,
-        )  # fmt: skip
-    for ratio in (0.05, 0.625, 1.625):
-        for modes in (1, 4):
-            results._known.setdefault("fig8", {})[f"omega_{ratio:g}_modes_{modes}"] = xr.Dataset(
-                {"response_class": (("relative_amplitude", "location"), rng.integers(0, 4, (8, 8)).astype(np.int8))},
-                {"relative_amplitude": np.linspace(0.1, 2.0, 8), "location": location, "frequency_ratio": ratio},
-                {"modes": modes},
-            )  # fmt: skip
-    return results
-
-
-SYSTEM_ATTRS = {
-    "beam_length": 0.161,
-    "beam_thickness": 4e-4,
-    "length_scale": 3.35e-4,
-    "reference_frequency": 83.9,
-}
-
-
-@pytest.mark.parametrize("name", ["fig6", "fig8"])
-def test_figures_of_the_paper_in_each_style(name: str, style: str) -> None:
-    figure = getattr(paper, name)(results=paper_results())
-    assert 25.4 * figure.get_figwidth() == pytest.approx(COLUMN_WIDTHS["double"])
-    assert outside(figure) < 0.01
-    plt.close(figure)
 
 
 def test_text_of_the_schematic_is_inside_the_canvas() -> None:

@@ -166,8 +166,9 @@ def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
     named = [str(name) for name in response.dims]
     if len(named) != 2 or "point" in named:
         sizes = ", ".join(f"{name} {size}" for name, size in response.sizes.items()) or "none"
+        least = min(named, key=lambda name: response.sizes[name], default="")
         more = (
-            f"select one value of {named[-1]}, by --at {named[-1]}=VALUE or dataset.sel({named[-1]}=VALUE, method='nearest')"
+            f"select one value of {least}, by --at {least}=VALUE or dataset.sel({least}=VALUE, method='nearest')"
             if len(named) > 2
             else "select fewer values"
         )

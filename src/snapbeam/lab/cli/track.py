@@ -233,7 +233,7 @@ def _opened(
 def _first_look_at(
     path: Path, region: tuple[int, ...] | None, look: tuple[TrackingSettings, int, Path]
 ) -> Iterator[None]:
-    """If a recording cannot be opened or tracked, write its first look beside the output unless that is a figure."""
+    """Write the first look at a recording that cannot be opened or tracked beside the output, unless that is a figure."""
     from snapbeam.lab.camera import open_recording
     from snapbeam.util.validation import InputError
 
