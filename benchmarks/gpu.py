@@ -1,7 +1,7 @@
 """The CUDA engine on this machine's device: right, how fast, how it scales, and the map of Fig. 7B.
 
     python -m benchmarks.gpu                      everything, on a real device (about ten minutes)
-    python -m benchmarks.gpu --only map           one part of: conformance throughput scaling fig_7b
+    python -m benchmarks.gpu --only map           one part of: conformance throughput host scaling fig_7b
     NUMBA_ENABLE_CUDASIM=1 python -m benchmarks.gpu --smoke
                                                   a tiny version of every part, in Numba's simulator
 
@@ -199,6 +199,21 @@ def throughput(smoke: bool, add: Add) -> None:
             )  # fmt: skip
 
 
+def host(smoke: bool, add: Add) -> None:
+    """Processor time of one core for the runs of ``scaling``, a sample of them; needs no device."""
+    for modes in (1,) if smoke else (1, 2, 4, 8, 16, 32, 64, 128):
+        cpu_engine.run_ensemble(ensemble_of(modes, [4.0], [0.1], 1), threads=1)
+        ensemble = ensemble_of(modes, *sample(1 if smoke else 64, 3.0 if smoke else 0.1), 1 if smoke else 50)
+        began = time.process_time()
+        steps = float(measured(ensemble, cpu_engine.run_ensemble(ensemble, threads=1))["steps"].sum())
+        add(
+            "by_modes",
+            modes=modes,
+            runs=ensemble.size,
+            ns_per_step=1e9 * (time.process_time() - began) / steps,
+        )
+
+
 def scaling(smoke: bool, add: Add) -> None:
     """Time against the number of modes, and against the number of trajectories."""
     slowest = 3.0 if smoke else 0.1
@@ -246,19 +261,19 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("-o", "--output", type=Path, default=Path("gpu.json"))
     parser.add_argument("--smoke", action="store_true", help="a tiny version, for the simulator")
-    parser.add_argument("--only", choices=("conformance", "throughput", "scaling", "fig_7b"))
+    parser.add_argument("--only", choices=("conformance", "throughput", "host", "scaling", "fig_7b"))
     options = parser.parse_args(arguments)
     reason = cuda_engine.refusal(1)
-    if reason is not None:
+    if reason is not None and options.only != "host":
         print(f"no benchmark of the CUDA engine here: {reason}", file=sys.stderr)
         return 2
-    if cuda_engine.simulated() and not options.smoke:
+    if options.only != "host" and cuda_engine.simulated() and not options.smoke:
         print("in Numba's simulator only --smoke ends in reasonable time", file=sys.stderr)
         return 2
     if options.smoke:
         sys.setswitchinterval(1e-5)  # the simulator's threads wait for each other at every barrier
     warnings.simplefilter("ignore", NumbaPerformanceWarning)
-    results: dict[str, Any] = {"facts": device_facts()}
+    results: dict[str, Any] = {"facts": device_facts() if reason is None else {}}
     print(results["facts"])
     right = True
 
@@ -273,7 +288,7 @@ def main(arguments: list[str] | None = None) -> int:
         print("  " + "  ".join(text.rjust(max(width, 12)) for text, width in cells), flush=True)
         options.output.write_text(json.dumps(results, indent=2), encoding="utf-8")
 
-    for part in (conformance, throughput, scaling, fig_7b):
+    for part in (conformance, throughput, host, scaling, fig_7b):
         if options.only in (None, part.__name__):
             part(options.smoke, partial(add, part.__name__))
     return 0 if right else 1

@@ -73,6 +73,6 @@ def test_the_gpus_benchmark_runs_in_the_simulator(tmp_path):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     found = json.loads((tmp_path / "gpu.json").read_text(encoding="utf-8"))
-    assert {"facts", "conformance", "throughput", "scaling", "fig_7b"} <= found.keys()
+    assert {"facts", "conformance", "throughput", "host", "scaling", "fig_7b"} <= found.keys()
     assert found["conformance"]["first_cycle"][0]["error"] < 1e-6
     assert {row["engine"].split()[-1] for row in found["throughput"]["rows"]} == {"cores", "warps"}

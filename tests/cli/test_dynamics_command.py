@@ -26,6 +26,16 @@ CASES = {
 }
 
 
+@pytest.mark.parametrize(
+    "options", [["--velocity-amplitude", "0.15:0.2:4"], ["--sweep", "beam.thickness=3e-4:4e-4:2"]]
+)
+@pytest.mark.parametrize("verb", ["hysteresis", "bifurcation-diagram", "branch"])
+def test_a_range_beside_the_values_is_refused(verb: str, options: list[str], tmp_path) -> None:
+    """The parameter and its values are stated by options of their own; another range would not be used."""
+    result = CliRunner().invoke(app, ["dynamics", verb, *options, "-o", str(tmp_path / "out.nc")])
+    assert result.exit_code == 2 and not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("verb", CASES)
 def test_verbs_write_files_and_pictures(verb: str, tmp_path) -> None:
     options, variable = CASES[verb]

@@ -1230,7 +1230,7 @@ def _edges_of(plane: Plane, log: tuple[bool, bool]) -> tuple[_Array, _Array]:
 
 
 def _inside(edges: _Array, places: _Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Which of some places lie between the first and the last of *edges*, and in which cells."""
+    """Indices of the places between the first and the last of *edges*, and of the cells that contain them."""
     at = np.searchsorted(edges, places, side="right") - 1
     inside = np.flatnonzero((at >= 0) & (at < edges.size - 1))
     return inside, at[inside]

@@ -240,9 +240,9 @@ def class_chip(kind: ResponseClass) -> Markup:
 
 
 Post = Callable[[Callable[[], None]], None]
-"""Does something on the page's own thread."""
+"""Function that calls another on the thread of the page."""
 Later = Callable[[Callable[[], None], int], Any]
-"""Does it some milliseconds later."""
+"""Function that calls another there after some milliseconds."""
 NOTE = Markup('<p class="note">{}</p>')
 HEADING = Markup("<h2>{}</h2>")
 REFUSED = Markup('<p class="bad" role="alert">{}</p>')
@@ -252,7 +252,7 @@ FAINT = Markup('<span class="faint">{}</span>')
 
 
 def button(name: str, post: Post, work: Callable[[], None], **options: Any) -> Any:
-    """A button that does *work* on the page's own thread."""
+    """A button that calls *work* on the thread of the page."""
     made = pn.widgets.Button(name=name, **options)
     made.on_click(lambda _: post(work))
     return made

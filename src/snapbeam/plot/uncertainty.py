@@ -372,10 +372,6 @@ def _with_unit(value: float, unit: str, digits: int) -> str:
     return f"{value:.{digits}g}" if unit == "1" else prefixed(value, unit, digits)
 
 
-# ----------------------------------------------------------------------------------------------------
-# Gradients, posteriors and measured classes: a row or a point for each, with its interval.
-
-
 @checked
 def plot_gradient(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Draw the elasticities of a quantity, the result of :func:`snapbeam.uncertainty.gradient`, with their errors."""

@@ -27,7 +27,7 @@ _MADE = 0.01
 _ROUNDED = 1e-6
 """The same over the energies, for rounding."""
 _CANCELLED = 1e-12
-"""The same over the energy of the well, which energies are differences from."""
+"""The same over the potential energy of the well, for the rounding of differences from it."""
 _Array = NDArray[np.float64]
 
 

@@ -110,9 +110,9 @@ def track(
 
     The command finds the beam, the shaker and a sticker on it, fits their edges to a fraction of a pixel, and writes the
     displacements with standard errors and flags to a NetCDF file.  Frames without a valid edge are NaN and have a flag.
-    Diagnostics report doubtful results; with --strict they are errors.  Where tracking fails, or a scale is missing, the
-    command writes a first look, to the file of --picture or beside --output: a frame with the objects at the threshold
-    and the regions in which it finds a beam, whose options it prints.
+    Diagnostics report doubtful results; with --strict they are errors.  If tracking fails or a
+    scale is missing, the command writes a picture to the file of --picture, or beside --output: one frame with the objects
+    at the threshold and the regions in which a beam was found. It prints the options of each region.
 
     Example: snapbeam track test.cihx --pixel-size 12e-6 --buckling-level 0.335e-3 -o test.nc --picture
     frame.png --report quality.png
@@ -264,8 +264,8 @@ def _first_look_at(
             check_writable(target, "picture")
             save_figure(plot_first_look(recording, found, settings, min(frame, len(recording) - 1)), target)
         regions = "".join(f"\n  {one}" for one in found.options.values())
-        told = f"; a beam is found with{regions}" if regions else "; no beam is found in any part of it"
-        raise InputError(f"{error}; see the rows, columns and objects in {target}{told}") from error
+        outcome = f"; a beam is found with{regions}" if regions else "; no beam is found in any part of it"
+        raise InputError(f"{error}; see the rows, columns and objects in {target}{outcome}") from error
 
 
 def _picture(path: Path, recording: Recording) -> Any:

@@ -59,8 +59,8 @@ def first_look(recording: Recording, settings: TrackingSettings) -> FirstLook:
         threshold = settings.threshold
         if threshold is None and around < body < sign * otsu(inner):
             threshold = float(f"{sign * 0.5 * (around + body):.3g}")
-        told = _tried(frames[:, top:bottom, left:right], settings.changed(threshold=threshold), recording)
-        if told is None:
+        option = _tried(frames[:, top:bottom, left:right], settings.changed(threshold=threshold), recording)
+        if option is None:
             continue
         ends_of_rows, ends_of_columns = turn.back(
             np.array([top, bottom - 1.0]), np.array([left, right - 1.0])
@@ -71,7 +71,7 @@ def first_look(recording: Recording, settings: TrackingSettings) -> FirstLook:
             for end in (ends.min(), ends.max() + 1)
         )
         given = f" --threshold {threshold:g}" if threshold is not None else ""
-        found[first, last, left, right] = f"--region {first}:{last},{left}:{right}{given}{told}"
+        found[first, last, left, right] = f"--region {first}:{last},{left}:{right}{given}{option}"
     return FirstLook(level, bright, found)
 
 
@@ -87,7 +87,7 @@ def _levels(inner: NDArray[np.floating], solid: NDArray[np.bool_]) -> tuple[floa
 def _tried(frames: NDArray[np.floating], settings: TrackingSettings, recording: Recording) -> str | None:
     """Options with which the beam is found in turned frames of a region; None if it is not."""
     ways = {"": settings.shaker} if not settings.shaker else {"": True, " --no-shaker": False}
-    for told, shaker in ways.items():
+    for option, shaker in ways.items():
         try:
             survey(
                 frames,
@@ -98,5 +98,5 @@ def _tried(frames: NDArray[np.floating], settings: TrackingSettings, recording: 
             )
         except InputError:
             continue
-        return told
+        return option
     return None

@@ -862,7 +862,7 @@ def shaker_view(
 
 
 def _reaches_border(bands: BeamBands, middle: NDArray[np.intp]) -> bool:
-    """Return whether what stands apart below the beam goes on to the border without a gap."""
+    """Return True if the object below the beam reaches the border of the picture without a gap."""
     objects = bands.objects
     shown = (bands.alone & objects.follows)[:, middle]
     return bool(shown.any() and (objects.after_end[:, middle] == objects.height)[shown].mean() > 0.9)
