@@ -274,6 +274,44 @@ def test_an_overlay_shows_where_runs_part(synthetic_run):
     plt.close("all")
 
 
+def scaled(run, length):
+    """A run as of another buckling level, at the same displacement in m."""
+    share = run.attrs["length_scale"] / length
+    changed = run.assign({name: share * run[name] for name in ("displacement_at_striker",)})
+    return changed.assign_attrs(length_scale=length)
+
+
+def test_the_band_of_a_model_is_that_of_its_runs(synthetic_run):
+    """A fifth of the runs is off by more: 5 and 95 % of 41 equal distances, in b of the run that is compared."""
+    import matplotlib.pyplot as plt
+
+    off = np.linspace(-0.4, 0.4, 41)
+    runs = [
+        synthetic_run.assign(displacement_at_striker=synthetic_run["displacement_at_striker"] + each)
+        for each in off
+    ]
+    runs = [run.assign_attrs(length_scale=1e-3) for run in runs]
+    runs[3] = scaled(runs[3], 2e-3)
+    model = synthetic_run.assign_attrs(length_scale=1e-3)
+    found = compare_waveforms(synthetic_run, model, 100.0, ensemble=runs)
+    waves = found.waveforms
+    np.testing.assert_allclose(waves.simulated_high - waves.simulated_displacement, 0.36, atol=1e-9)
+    np.testing.assert_allclose(waves.simulated_low - waves.simulated_displacement, -0.36, atol=1e-9)
+    assert found.within == 1.0
+    late = compare_waveforms(parting(synthetic_run, 6.0), synthetic_run, 100.0, ensemble=runs)
+    assert late.within == pytest.approx(6.0 / float(waves.cycle[-1]), abs=0.1)
+    labels = [each.get_label() for each in plot_waveform_overlay(late).axes[0].collections]
+    assert "90 % of the model's runs" in labels
+    plt.close("all")
+    for some, words in (
+        (runs[:5], r"ensemble of 5 run\(s\): must have at least 20"),
+        ([*runs, runs[0].drop_vars("displacement_at_striker")], r"ensemble\[41\]"),
+        ([*runs, runs[0].isel(time=slice(0, 900))], r"ensemble\[41\]: must have the coordinate cycle up to"),
+    ):
+        with pytest.raises(InputError, match=words):
+            compare_waveforms(synthetic_run, synthetic_run, 100.0, ensemble=some)
+
+
 # --- the commands -------------------------------------------------------------------------------------
 
 

@@ -86,7 +86,9 @@ def test_a_stored_run_draws_itself_in_a_program_that_imports_snapbeam_alone(tmp_
 def test_a_run_is_drawn_by_what_it_is(synthetic_run) -> None:
     _, ax = plt.subplots()
     assert synthetic_run.snapbeam.plot("spectrum", ax=ax) is ax
-    with pytest.raises(sb.InputError, match=r"no figure of this file \(run\); choose one of run, spectrum$"):
+    with pytest.raises(
+        sb.InputError, match=r"no figure of this file \(run\); choose one of run, spectrum, spectrogram$"
+    ):
         synthetic_run.snapbeam.plot("class")
 
 

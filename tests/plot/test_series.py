@@ -41,7 +41,9 @@ def test_captions(run):
     assert caption(xr.Dataset()) == ""
 
 
-@pytest.mark.parametrize("kind", ["run", "modal_amplitudes", "energies", "spectrum", "phase_portrait"])
+@pytest.mark.parametrize(
+    "kind", ["run", "modal_amplitudes", "energies", "spectrum", "spectrogram", "phase_portrait"]
+)
 def test_every_plotter_takes_axes_and_returns_them(run, kind):
     plotter = getattr(plots, f"plot_{kind}")
     assert isinstance(plotter(run), Axes)
@@ -74,6 +76,39 @@ def test_spectrum_of_a_sine():
     assert line.get_ydata()[at] == pytest.approx(0.3, rel=0.02)
     with pytest.raises(InputError, match="at least 16 samples"):
         plots.plot_spectrum(run, variable="displacement", window=(0.0, 0.01))
+
+
+def test_spectrogram_of_a_sine_that_changes_its_frequency():
+    """The line is at 2 before the change and at 5 after it, and 20 dB lower."""
+    cycle = np.linspace(0.0, 80.0, 16001)
+    values = np.where(cycle < 40.0, np.sin(2 * np.pi * 2.0 * cycle), 0.1 * np.sin(2 * np.pi * 5.0 * cycle))
+    run = xr.Dataset(
+        {"displacement": ("time", 3.0 + values, {"units": "1"})},
+        {"time": ("time", cycle * 0.01, {"units": "s"}), "cycle": ("time", cycle, {"units": "1"})},
+    )
+    ax = plots.plot_spectrogram(run, variable="displacement", segment=4.0)
+    mesh = ax.collections[0]
+    level, corners = mesh.get_array(), mesh.get_coordinates()
+    at = 0.5 * (corners[0, 1:, 0] + corners[0, :-1, 0])
+    lines = 0.5 * (corners[1:, 0, 1] + corners[:-1, 0, 1])
+    assert at[0] == pytest.approx(2.0, abs=0.1) and at[-1] == pytest.approx(78.0, abs=1.1), (
+        "whole windows only"
+    )
+    for part, frequency, height in ((at < 37.0, 2.0, 0.0), (at > 43.0, 5.0, -20.0)):
+        np.testing.assert_allclose(lines[level[:, part].argmax(axis=0)], frequency, atol=0.13)
+        np.testing.assert_allclose(level[:, part].max(axis=0), height, atol=0.2)
+    for length in (0.01, 41.0):
+        with pytest.raises(
+            InputError, match=r"segment = .*: must be from 0.08 cycles, 16 samples, to 40 cycles"
+        ):
+            plots.plot_spectrogram(run, variable="displacement", segment=length)
+    for length in (0.08, 40.0):
+        plots.plot_spectrogram(run, variable="displacement", segment=length)
+    run["displacement"][100] = np.nan
+    for draw in (plots.plot_spectrum, plots.plot_spectrogram):
+        with pytest.raises(InputError, match="has 1 samples without a value"):
+            draw(run, variable="displacement")
+        draw(run, variable="displacement", window=(10.0, 60.0))
 
 
 def test_statistics_of_a_map(synthetic_map):

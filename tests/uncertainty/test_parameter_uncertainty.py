@@ -63,6 +63,25 @@ def test_correlation() -> None:
     assert scores.shape == (NUMBERS.size, 4)
 
 
+def test_sampled_systems_are_the_samples_of_their_numbers() -> None:
+    """Each has the values of its number, the same frequency in Hz, and a start of its own."""
+    system = small_system()
+    spread = sb.uncertainty.ParameterUncertainty(
+        of={"beam.buckling_level": sb.uncertainty.Normal(0.02, relative=True)}, displacement=1e-6, seed=5
+    )
+    drawn = sb.uncertainty.sample_systems(system, spread, 4)
+    level = system.get("beam.buckling_level") * (1.0 + 0.02 * spread.normals(np.arange(4))[:, 0])
+    np.testing.assert_allclose([each.get("beam.buckling_level") for each in drawn], level, rtol=1e-12)
+    hertz = [each.get("drive.frequency_ratio") * each.model.reference_frequency for each in (system, *drawn)]
+    np.testing.assert_allclose(hertz, hertz[0], rtol=1e-12)
+    starts = [each.start_state.amplitude for each in drawn]
+    assert len({tuple(each) for each in starts}) == 4
+    again = sb.uncertainty.sample_systems(system, spread, 2)
+    np.testing.assert_array_equal([each.start_state.amplitude for each in again], starts[:2])
+    with pytest.raises(InputError, match="count = 0"):
+        sb.uncertainty.sample_systems(system, spread, 0)
+
+
 def test_hz_and_metres_per_second_are_held() -> None:
     """A beam buckled further has a higher first frequency: the same shaker strikes it at another ratio."""
     system = small_system()

@@ -66,8 +66,27 @@ def test_a_matlab_file_has_every_array(tmp_path):
     np.testing.assert_array_equal(back["time"].ravel(), RUN["time"])
 
 
+def test_a_universal_file_has_a_record_of_each_variable_over_time(tmp_path):
+    """Even samples are kept; the contact samples of a run are interpolated, and the record says so."""
+    pyuff = pytest.importorskip("pyuff")
+    assert sb.write_table(RUN, tmp_path / "run.uff") == ["shape"]
+    file = pyuff.UFF(str(tmp_path / "run.uff"))
+    records = [file.read_sets(k) for k in range(4)]
+    assert [each["id1"] for each in records] == ["voltage", "power", "modal_amplitude_1", "modal_amplitude_2"]
+    np.testing.assert_array_equal(records[3]["data"], [1.0, 3.0, 5.0])
+    assert records[0]["ordinate_axis_units_lab"] == "V" and records[0]["id2"] == "NONE"
+    time = np.concatenate([np.arange(11) * 0.1, [0.505, 0.51]])
+    uneven = xr.Dataset({"gap": ("time", 2.0 * np.sort(time), {"units": "m"})}, {"time": np.sort(time)})
+    sb.write_table(uneven, tmp_path / "uneven.uff")
+    record = pyuff.UFF(str(tmp_path / "uneven.uff")).read_sets(0)
+    np.testing.assert_allclose(record["data"], 0.2 * np.arange(11))
+    assert record["id2"] == "interpolated from 13 uneven samples"
+    with pytest.raises(sb.InputError, match="must have a variable over time"):
+        sb.write_table(xr.Dataset({"a": ("x", [1.0, 2.0])}), tmp_path / "a.uff")
+
+
 def test_refusals(tmp_path):
-    with pytest.raises(sb.InputError, match=r"must end in \.csv or \.mat"):
+    with pytest.raises(sb.InputError, match=r"must end in \.csv or \.mat or \.uff"):
         sb.write_table(RUN, tmp_path / "run.xls")
     with pytest.raises(sb.InputError, match="a table needs rows"):
         sb.write_table(xr.Dataset({"a": 1.0}), tmp_path / "a.csv")

@@ -19,7 +19,7 @@ def info(
     export: Annotated[
         Path | None,
         typer.Option(
-            help="File to write the contents to: a table (.csv) or arrays for MATLAB (.mat).",
+            help="File to write the contents to: a table (.csv), arrays for MATLAB (.mat), or records over time (.uff).",
             rich_help_panel="Output",
             metavar="FILE",
         ),
@@ -62,6 +62,6 @@ def _export(dataset: xr.Dataset, path: Path) -> None:
 
     left_out = write_table(dataset, path)
     if left_out:
-        notes().print(f"not in the table, with other dimensions: {', '.join(left_out)}", markup=False)
+        notes().print(f"not in the file, with other dimensions: {', '.join(left_out)}", markup=False)
     add_json(files=[path], left_out=left_out)
     out().print(f"Written: {file_line(path)}")

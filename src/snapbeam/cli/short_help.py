@@ -50,7 +50,7 @@ class ShortHelpGroup(TyperGroup):
         lines = [self.get_usage(ctx), "", *_wrapped(self.help or ""), ""]
         lines += [f"  {name:<{column - 2}}{_clause(text, _width() - column)}" for name, text in about.items()]
         end = f"Options of a command: {ctx.command_path} COMMAND --help"
-        formatter.write("\n".join([*lines, "", end]))
+        formatter.write("\n".join([*lines, end]))
 
 
 def _width() -> int:

@@ -29,6 +29,7 @@ _HOMES = {
     "mode_shapes": "decay.model",
     "MeasuredResponse": "waveform_comparison",
     "measure_response": "waveform_comparison",
+    "frequency_response": "coherence",
     "FrameFlag": "tracking.settings",
     "TrackingSettings": "tracking.settings",
     "pixel_size_from_marks": "camera",

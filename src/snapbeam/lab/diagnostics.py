@@ -418,6 +418,27 @@ KINDS_RECORDING = table(
 
 
 # ----------------------------------------------------------------------------------------------------
+# A frequency response against the length of its record and the noise.
+
+
+KINDS_RESPONSE = table(
+    Kind(
+        "response.incoherent", WARNING,
+        "coherence of both signals, line by line",
+        "no more than {lines:.0f} neighbouring lines are coherent: the excitation is narrow, or the response is noise; excite "
+        "by random vibration, an impact or a sweep, or record longer",
+    ),
+    Kind(
+        "response.coarse", WARNING,
+        "half-power bandwidth of the highest peak, in lines",
+        "the peak at {frequency:.5g} Hz is {lines:.0f} line(s) wide: its height is too small and its damping too large; "
+        "choose a smaller resolution (--resolution), or record longer",
+        ("resolution",),
+    ),
+)  # fmt: skip
+
+
+# ----------------------------------------------------------------------------------------------------
 # A file of a time series against its own header.
 
 

@@ -22,6 +22,7 @@ from snapbeam.lab.signals import check_signal, even_sampling, si_unit
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.input_files import decoded, refuse_inflated
 from snapbeam.util.netcdf import hdf5_stream, refuse_large
+from snapbeam.util.tables import universal_record, write_universal
 from snapbeam.util.validation import InputError, positive
 
 if TYPE_CHECKING:
@@ -72,7 +73,6 @@ _SUFFIX_UNITS = {
     "_m_s": "m/s", "_mm_s": "mm/s", "_um_s": "um/s", "_mm": "mm", "_um": "um", "_ms": "ms", "_us": "us", "_m": "m",
     "_s": "s", "_v": "V", "_n": "N", "_hz": "Hz",
 }  # fmt: skip
-_UFF_TYPES = {"m": 8, "m/s": 11, "m/s^2": 12, "N": 13}
 _INTEGER_SCALE = {"int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "uint8": (128.0, 128.0)}
 
 
@@ -1320,21 +1320,8 @@ def _undo_rounding(step: float) -> float:
 
 def write_uff(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
     """Write a signal to a universal file (dataset 58)."""
-    import pyuff
-
-    values, time, rate = check_signal(signal)
-    unit = signal.attrs["units"]
-    entry = pyuff.prepare_58(
-        binary=1, id1=str(signal.name)[:80], func_type=1, rsp_node=1, rsp_dir=3, ref_node=0, ref_dir=0, data=values,
-        x=time, num_pts=values.size, abscissa_spacing=1, abscissa_min=float(time[0]), abscissa_inc=1.0 / rate,
-        abscissa_spec_data_type=17, abscissa_axis_units_lab="s", ordinate_spec_data_type=_UFF_TYPES.get(unit, 0),
-        ordinate_axis_units_lab=unit, orddenom_spec_data_type=0, z_axis_spec_data_type=0, return_full_dict=False,
-    )  # fmt: skip
-    entry["n_bytes"] = values.nbytes
-    path.unlink(missing_ok=True)
-    with warnings.catch_warnings():  # pyuff leaves a file object to the garbage collector
-        warnings.simplefilter("ignore", ResourceWarning)
-        pyuff.UFF(str(path)).write_sets([entry], mode="add")
+    values, time, _ = check_signal(signal)
+    write_universal(path, [universal_record(str(signal.name), signal.attrs["units"], time, values)])
 
 
 def _first(text: Any, otherwise: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -66,6 +67,8 @@ _Array = NDArray[np.float64]
 _APART = 0.1  # b, by which two beams must differ to have parted
 _SHIFTED = 0.15  # cycles by which a known start may be off
 _RATIO = 0.05  # share by which the shakers' amplitudes may differ
+_BAND = ("simulated_low", "simulated_high")
+_LEAST_RUNS = 20  # for quantiles of 5 and 95 %
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,10 @@ class WaveformComparison:
     ``shaker_rms_difference`` [b] that of the shaker; ``measured_rms`` and ``simulated_rms`` [b] are the beam's
     motion about its mean.  ``parted`` [cycles] is where the two beams first stay more than ``apart`` [b] from
     each other for half a cycle, NaN if they never do.  ``diagnostics`` contains the diagnostics.
+
+    With an ensemble, ``waveforms`` also has ``simulated_low`` and ``simulated_high``, the 5 % and the 95 % quantile of
+    its runs, and ``within`` is the share of the measured samples between them (NaN without an ensemble); a correct model
+    has 90 % there.
     """
 
     waveforms: xr.Dataset
@@ -96,6 +103,7 @@ class WaveformComparison:
     simulated_impacts: _Array
     diagnostics: tuple[Diagnostic, ...]
     at: str = "displacement_at_striker"
+    within: float = math.nan
 
 
 _PLACES = ("displacement_at_striker", "midspan_displacement")
@@ -145,6 +153,7 @@ def compare_waveforms(
     cycles: tuple[float, float] | None = None,
     measured_onsets: ArrayLike | None = None,
     simulated_onsets: ArrayLike | None = None,
+    ensemble: Sequence[xr.Dataset] = (),
 ) -> WaveformComparison:
     """Compare a measured run with a simulated one, aligned by the phase of the shaker.
 
@@ -166,6 +175,14 @@ def compare_waveforms(
         Part to compare, counted from the start; by default the common part.
     measured_onsets, simulated_onsets : array_like, optional
         Times of impacts [s], to be shown over cycles.
+    ensemble : sequence of xarray.Dataset, optional
+        At least 20 further runs of the same test, with parameters drawn from their uncertainty
+        (:func:`snapbeam.uncertainty.sample_systems`), for the band of errors of the model.
+
+    Raises
+    ------
+    InputError
+        If a run lacks a variable, the runs share fewer than 2 cycles, or the ensemble is too small or too short.
 
     Examples
     --------
@@ -241,6 +258,15 @@ def compare_waveforms(
         {name: ("cycle", value, {"units": "1"}) for name, value in columns.items()},
         {"cycle": ("cycle", grid, {"long_name": "cycles of excitation", "units": "1"})},
     )
+    within = math.nan
+    if len(ensemble):
+        low_high = _band(grid, ensemble, at, simulated.attrs.get("length_scale"))
+        waveforms = waveforms.assign(
+            {name: ("cycle", each, {"units": "1"}) for name, each in zip(_BAND, low_high, strict=True)}
+        )
+        seen_now = columns["measured_displacement"]
+        known = np.isfinite(seen_now)
+        within = float(np.mean(((seen_now >= low_high[0]) & (seen_now <= low_high[1]))[known]))
     one, two = columns["measured_displacement"], columns["simulated_displacement"]
     both = np.isfinite(one) & np.isfinite(two)
     if both.sum() < 16:
@@ -269,9 +295,28 @@ def compare_waveforms(
         apart=apart,
         diagnostics=tuple(diagnostics),
         at=at,
+        within=within,
         measured_impacts=_impacts(onsets[0], start or float(measured["time"][0]), rate, shift, low, high),
         simulated_impacts=_impacts(onsets[1], 0.0, model_rate, 0.0, low, high),
     )
+
+
+def _band(grid: _Array, ensemble: Sequence[xr.Dataset], at: str, length: float | None) -> _Array:
+    """Quantiles of an ensemble of simulated runs on a grid of cycles, over *length* [m], of shape (2, cycles)."""
+    if len(ensemble) < _LEAST_RUNS:
+        raise InputError(f"ensemble of {len(ensemble)} run(s): must have at least {_LEAST_RUNS}")
+    rows = []
+    for k, run in enumerate(ensemble):
+        try:
+            check_trajectory(run, require=(at,))
+        except InputError as error:
+            raise InputError(f"ensemble[{k}]: {error}") from error
+        if "cycle" not in run.coords or not run["cycle"].values[-1] >= grid[-1] - 1e-6:
+            raise InputError(f"ensemble[{k}]: must have the coordinate cycle up to {grid[-1]:.6g} cycles")
+        # each run is over the buckling level of its own beam
+        share = 1.0 if length is None else float(run.attrs.get("length_scale", length)) / float(length)
+        rows.append(share * _on(grid, np.asarray(run["cycle"].values, dtype=np.float64), run[at].values))
+    return np.asarray(np.quantile(np.array(rows), (0.05, 0.95), axis=0))
 
 
 def _diagnostics(

@@ -19,9 +19,11 @@ from .map import plot_points as plot_points
 from .map import plot_response_map as plot_response_map
 from .map import plot_statistic as plot_statistic
 from .run import plot_energies as plot_energies
+from .run import plot_frequency_response as plot_frequency_response
 from .run import plot_modal_amplitudes as plot_modal_amplitudes
 from .run import plot_phase_portrait as plot_phase_portrait
 from .run import plot_run as plot_run
+from .run import plot_spectrogram as plot_spectrogram
 from .run import plot_spectrum as plot_spectrum
 from .schematic import plot_system as plot_system
 from .style import CLASS_COLORS as CLASS_COLORS

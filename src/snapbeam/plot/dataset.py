@@ -24,6 +24,7 @@ _RUN: dict[str, tuple[_Draws, str]] = {
     "modal_amplitudes": (run.plot_modal_amplitudes, "modal_amplitude"),
     "energies": (run.plot_energies, "energy_beam"),
     "spectrum": (run.plot_spectrum, "midspan_displacement"),
+    "spectrogram": (run.plot_spectrogram, "midspan_displacement"),
     "phase_portrait": (run.plot_phase_portrait, "midspan_velocity"),
 }
 """The function that draws each figure of a run, and a variable that it needs."""
@@ -146,6 +147,9 @@ _KINDS = (
     _Kind("measured classes", {"most_likely"}, {"measurement"}, lambda _: {"probability": uncertainty.plot_scores}),
     _Kind("growth of a perturbation", {"separation"}, {"time"}, lambda _: {"separation": run.plot_perturbation}),
     _Kind("estimated density", {"psd_low", "psd"}, {"frequency"}, lambda _: {"psd": run.plot_spectrum}),
+    _Kind(
+        "frequency response", {"magnitude", "coherence"}, {"frequency"}, lambda _: {"magnitude": run.plot_frequency_response}
+    ),
     _Kind("homoclinic points", {"stable_arclength"}, {"point"}, lambda _: {"state": dynamics.plot_homoclinic}),
     _Kind("designs", {"constraints_satisfied"}, {"tried"}, _designs),
     _Kind("lifetimes", {"lifetime", "last_snap"}, set(), _lifetimes),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from cmcrameri import cm
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
@@ -14,10 +15,15 @@ from snapbeam.model.drive.shock import GRAVITY
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CENTER_COLOR,
+    COLUMN_WIDTHS,
     SHAKER_COLOR,
     caption,
+    color_bar,
     color_of,
     contains,
+    diagnostics_height,
+    draw_diagnostics,
+    extend_title,
     figure_style,
     fix_ticks,
     frame,
@@ -26,8 +32,9 @@ from snapbeam.plot.style import (
 )
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.simulation.run import Run
+from snapbeam.util.diagnostics import diagnostics_of
 from snapbeam.util.si_prefixes import prefixed, scale_of
-from snapbeam.util.validation import InputError, checked, choice, integer, interval
+from snapbeam.util.validation import InputError, checked, choice, integer, interval, positive
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -175,6 +182,27 @@ def plot_spectrum(
     """
     if not isinstance(run, Run) and "psd_low" in getattr(run, "data_vars", ()):
         return _plot_density(run, ax)
+    dataset, name, even, y = _even_samples(run, variable, window)
+    weight = np.hanning(even.size)
+    spectrum = 2.0 * np.abs(np.fft.rfft((y - y.mean()) * weight)) / weight.sum()
+    frequency = np.fft.rfftfreq(even.size, float(even[1] - even[0]))
+    unit = dataset[variable].attrs.get("units", "1")
+    with frame(ax, dataset, height=66.0) as ax:
+        ax.plot(frequency[1:], spectrum[1:], color=BEAM_COLOR, linewidth=0.6)
+        top = 12.0 if name == "cycle" else float(frequency[-1])
+        shown = spectrum[1:][frequency[1:] <= top]
+        ax.set(xlim=(0.0, top), yscale="log", ylim=(max(shown.max() * 1e-5, 1e-300), shown.max() * 2.0))
+        ax.set_xlabel(_FREQUENCY[name])
+        words = _words(dataset, variable)
+        ax.set_ylabel(words if unit == "1" else f"{words} ({unit})")
+    return ax
+
+
+_FREQUENCY = {"cycle": r"Frequency $f\,/\,f_\mathrm{excitation}$", "time": "Frequency (Hz)"}
+
+
+def _even_samples(run: Run | xr.Dataset, variable: str, window: Any) -> tuple[xr.Dataset, str, Any, Any]:
+    """The dataset of a run, the variable that it is drawn over, even samples of that, and of *variable* there."""
     dataset = dataset_of(run, variable)
     choice(
         "variable", variable, tuple(str(key) for key in dataset.data_vars if dataset[key].dims == ("time",))
@@ -187,21 +215,154 @@ def plot_spectrum(
         x, y = x[inside], y[inside]
     if x.size < 16:
         raise InputError(f"window = {window}: must hold at least 16 samples")
+    if not np.isfinite(y).all():
+        raise InputError(
+            f"variable = {variable!r}: has {np.count_nonzero(~np.isfinite(y))} samples without a value; choose a window "
+            "without them"
+        )
     even = np.linspace(x[0], x[-1], min(x.size, 1 << 17))
-    y = np.interp(even, x, y)
-    weight = np.hanning(even.size)
-    spectrum = 2.0 * np.abs(np.fft.rfft((y - y.mean()) * weight)) / weight.sum()
-    frequency = np.fft.rfftfreq(even.size, float(even[1] - even[0]))
-    unit = dataset[variable].attrs.get("units", "1")
+    return dataset, name, even, np.interp(even, x, y)
+
+
+def _words(dataset: xr.Dataset, variable: str) -> str:
+    """Long name of a variable, as the label of an axis."""
+    words = str(dataset[variable].attrs.get("long_name", variable)).replace(", over b", " over $b$")
+    return f"{words[:1].upper()}{words[1:]}"
+
+
+@checked
+def plot_spectrogram(
+    run: Run | xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    variable: str = "midspan_displacement",
+    window: Any = None,
+    segment: float | None = None,
+) -> Axes:
+    """Draw the amplitude spectrum of a run over time, from Hann windows that overlap by three quarters.
+
+    Parameters
+    ----------
+    run : Run or xarray.Dataset
+    variable : str
+        A variable over time, by name.
+    window : pair of float, optional
+        First and last cycle to take; everything by default.
+    segment : float, optional
+        Length of a Hann window in cycles (or in s, without cycles): lines are 1/segment apart.  By default a twelfth of
+        the run.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Levels in dB of the highest amplitude.
+
+    Raises
+    ------
+    InputError
+        If a segment holds fewer than 16 samples, or is longer than half the run.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> run = sb.simulate(system, sb.Integration(cycles=20))
+    >>> ax = sb.plot.plot_spectrogram(run, segment=4.0)
+    """
+    from scipy.signal import ShortTimeFFT
+    from scipy.signal.windows import hann
+
+    dataset, name, even, y = _even_samples(run, variable, window)
+    step = float(even[1] - even[0])
+    span = step * even.size
+    size = round((span / 12.0 if segment is None else positive("segment", segment)) / step)
+    if not 16 <= size <= even.size // 2:
+        unit = "cycles" if name == "cycle" else "s"
+        raise InputError(
+            f"segment = {size * step:.4g} {unit}: must be from {16 * step:.4g} {unit}, 16 samples, to {span / 2.0:.4g} {unit}, "
+            "half the run"
+        )
+    transform = ShortTimeFFT(hann(size, sym=False), max(size // 4, 1), 1.0 / step, scale_to="magnitude")
+    # only windows that lie within the record
+    first, last = transform.lower_border_end[1], transform.upper_border_begin(y.size)[1]
+    level = np.abs(transform.stft_detrend(y, "constant", p0=first, p1=last))
+    level = 20.0 * np.log10(np.maximum(level / level.max(), 1e-12)) if level.max() > 0.0 else level
+    rows = transform.f <= (max(12.0, transform.f[2]) if name == "cycle" else transform.f[-1])
     with frame(ax, dataset, height=66.0) as ax:
-        ax.plot(frequency[1:], spectrum[1:], color=BEAM_COLOR, linewidth=0.6)
-        top = 12.0 if name == "cycle" else float(frequency[-1])
-        shown = spectrum[1:][frequency[1:] <= top]
-        ax.set(xlim=(0.0, top), yscale="log", ylim=(max(shown.max() * 1e-5, 1e-300), shown.max() * 2.0))
-        ax.set_xlabel(r"Frequency $f\,/\,f_\mathrm{excitation}$" if name == "cycle" else "Frequency (Hz)")
-        words = str(dataset[variable].attrs.get("long_name", variable)).replace(", over b", " over $b$")
-        ax.set_ylabel(f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}")
+        mesh = ax.pcolormesh(
+            transform.t(y.size, p0=first, p1=last) + even[0], transform.f[rows], level[rows], vmin=-60.0, vmax=0.0,
+            cmap=cm.batlow, shading="nearest", rasterized=True,
+        )  # fmt: skip
+        color_bar(mesh, ax, "Amplitude (dB of the maximum)")
+        extend_title(ax, _words(dataset, variable))
+        ax.set(xlabel=across(dataset)[1], ylabel=_FREQUENCY[name], ylim=(0.0, transform.f[rows][-1]))
     return ax
+
+
+@checked
+def plot_frequency_response(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw a measured frequency response: magnitude and phase with two standard errors, and the coherence.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`snapbeam.lab.frequency_response`.
+    ax : matplotlib.axes.Axes, optional
+        Axes for the magnitude alone; by default a new figure shows everything.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Of the magnitude.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> from snapbeam import lab
+    >>> force = lab.make_signal(np.random.default_rng(0).standard_normal(20_000), "N", 2000.0)
+    >>> motion = lab.make_signal(0.002 * force.values, "m", 2000.0)
+    >>> ax = sb.plot.plot_frequency_response(lab.frequency_response(force, motion))
+    """
+    contains(dataset, "frequency response", "magnitude", "magnitude_se", "phase", "phase_se", "coherence")
+    f = dataset["frequency"].values
+    limit = float(dataset.attrs["coherence_limit"])
+    coherent = dataset["coherence"].values > limit
+    with figure_style():
+        if ax is None:
+            told = diagnostics_of(dataset)
+            figure = new_figure("single", 110.0 + diagnostics_height(told, COLUMN_WIDTHS["single"]))
+            draw_diagnostics(figure, told)
+            axes = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0))
+        else:
+            axes = np.array([ax])
+        for each, name in zip(axes, ("magnitude", "phase"), strict=False):
+            values, error = dataset[name].values, 2.0 * dataset[f"{name}_se"].values
+            low = np.maximum(values - error, 1e-3 * values) if name == "magnitude" else values - error
+            each.fill_between(
+                f, low, values + error, where=coherent, color=BEAM_COLOR, alpha=0.25, linewidth=0.0
+            )
+            style = (
+                {"linewidth": 0.8}
+                if name == "magnitude"
+                else {"linestyle": "", "marker": ".", "markersize": 1.5}
+            )
+            each.plot(f, values, color="0.75", **style)
+            each.plot(f, np.where(coherent, values, np.nan), color=BEAM_COLOR, **style)
+        axes[0].set(
+            yscale="log", ylabel=f"Magnitude ({dataset['magnitude'].attrs['units']})", xlim=(f[0], f[-1])
+        )
+        if axes.size > 1:
+            axes[1].set(ylabel="Phase (rad)", ylim=(-3.3, 3.3))
+            axes[2].plot(f, dataset["coherence"].values, color=BEAM_COLOR, linewidth=0.8)
+            axes[2].axhline(limit, color=SHAKER_COLOR, linewidth=0.8, dashes=(4, 2))
+            axes[2].set(ylabel="Coherence", ylim=(0.0, 1.05))
+        axes[-1].set_xlabel("Frequency (Hz)")
+        fix_ticks(*axes)
+    return axes[0]
 
 
 @checked

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-_KINDS = ("run", "modal_amplitudes", "energies", "spectrum", "phase_portrait")
+_KINDS = ("run", "modal_amplitudes", "energies", "spectrum", "spectrogram", "phase_portrait")
 
 
 def _described(system: System) -> list[tuple[str, str, str]]:
@@ -118,9 +118,10 @@ class Run:
         return data_frame(self.dataset)
 
     def plot(self, kind: str = "run", ax: Any = None, **options: Any) -> Any:
-        """Plot the run: ``"run"``, ``"modal_amplitudes"``, ``"energies"``, ``"spectrum"`` or ``"phase_portrait"``.
+        """Plot the run.
 
-        Options are those of the function ``plot_...`` of :mod:`snapbeam.plot`; returns the axes.
+        The kinds are ``"run"``, ``"modal_amplitudes"``, ``"energies"``, ``"spectrum"``, ``"spectrogram"`` and
+        ``"phase_portrait"``.  Options are those of the function ``plot_...`` of :mod:`snapbeam.plot`; returns the axes.
         """
         choice("kind", kind, _KINDS)
         return plotter(f"plot_{kind}")(self, ax=ax, **options)

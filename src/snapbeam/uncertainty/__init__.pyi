@@ -10,6 +10,7 @@ from .distributions import UniformRange as UniformRange
 from .distributions import UniformTolerance as UniformTolerance
 from .gradients import gradient as gradient
 from .measured_classes import score_measurements as score_measurements
+from .monte_carlo import sample_systems as sample_systems
 from .optimization import Constraint as Constraint
 from .optimization import Objective as Objective
 from .optimization import OptimizerSettings as OptimizerSettings

@@ -29,7 +29,7 @@ from snapbeam.sweeps.tasks import PointWork
 from snapbeam.uncertainty.distributions import Distribution, Normal, ParameterUncertainty, UniformTolerance
 from snapbeam.util.diagnostics import DiagnosticWarning
 from snapbeam.util.status_codes import ResponseClass, RunStatus
-from snapbeam.util.validation import InputError, InputTypeError, choice, shown, within
+from snapbeam.util.validation import InputError, InputTypeError, checked, choice, integer, shown, within
 
 Statistics = dict[str, NDArray[Any]]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
@@ -338,6 +338,53 @@ def trials_of(
         if system.parameters.get("contact.gap") is None:
             system = held_in_space(system)
     return Trials(system, integration.replace(early_termination=early), uncertainty, keeping, cluster)
+
+
+@checked
+def sample_systems(system: System, uncertainty: ParameterUncertainty, count: int) -> list[System]:
+    """Draw systems from the uncertainty of parameters, for runs with a time series.
+
+    Sample s is that of number s in every other function of the uncertainty.
+
+    Parameters
+    ----------
+    system : System
+        The nominal system.
+    uncertainty : ParameterUncertainty
+    count : int
+        Number of systems.
+
+    Returns
+    -------
+    list of System
+        For :func:`snapbeam.simulate`.
+
+    Raises
+    ------
+    InputError
+        If a sampled value is out of range, or a parameter has no single value in the system.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> thickness = sb.uncertainty.Normal(0.01, relative=True)
+    >>> uncertainty = sb.uncertainty.ParameterUncertainty(of={"beam.thickness": thickness})
+    >>> systems = sb.uncertainty.sample_systems(system, uncertainty, 20)
+    >>> runs = sb.simulate(systems, sb.Integration(cycles=2))
+    >>> len({run.summary.max_displacement for run in runs})
+    20
+    """
+    trials = trials_of(system, uncertainty, None)
+    numbers = np.arange(integer("count", count, 1), dtype=np.int64)
+    columns = trials.columns({}, numbers)
+    return [
+        trials.system.replace(**{name: values[k].item() for name, values in columns.items()})
+        for k in range(numbers.size)
+    ]
 
 
 def _has_no_unit(name: str) -> bool:

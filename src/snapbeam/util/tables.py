@@ -1,22 +1,29 @@
-"""Tables of a dataset: a pandas data frame, a text file of comma-separated values, a MATLAB file."""
+"""Tables of a dataset: a pandas data frame, a text file of comma-separated values, a MATLAB or universal file."""
 
 from __future__ import annotations
 
 import os
+import warnings
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from snapbeam.util.files import atomic_path, check_writable
+from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError, file_path, instance
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-TABLE_SUFFIXES = (".csv", ".mat")
+TABLE_SUFFIXES = (".csv", ".mat", ".uff")
+_UFF_UNITS = {"m": 8, "N": 9, "m/s": 11, "m/s^2": 12, "s": 17, "Hz": 18}
+"""Codes of physical quantities in a record of dataset 58."""
+_TIME_RESPONSE, _FREQUENCY_RESPONSE, _COHERENCE = 1, 4, 6
+"""Codes of functions in a record of dataset 58."""
 
 
 def data_frame(dataset: xr.Dataset, *, units: bool = False) -> pd.DataFrame:
@@ -87,22 +94,28 @@ def data_frame(dataset: xr.Dataset, *, units: bool = False) -> pd.DataFrame:
 
 
 def write_table(dataset: xr.Dataset, path: str | os.PathLike[str]) -> list[str]:
-    """Write a dataset as a table of comma-separated values (.csv), or all its arrays to a MATLAB file (.mat).
+    """Write a dataset as a table of comma-separated values (.csv), or its arrays to a MATLAB (.mat) or universal file (.uff).
 
     The first line of a ``.csv`` file contains names and units; numbers have all their digits.  A ``.mat`` file contains
-    every variable and coordinate under its name, with its dimensions.
+    every variable and coordinate under its name, with its dimensions.  A ``.uff`` file has a binary record (dataset 58)
+    of each variable over time or frequency; uneven samples are interpolated, which the record states.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         A run, its impacts, a map, or another result.
     path : path
-        Ends in ``.csv`` or ``.mat``; MATLAB reads them by ``readtable`` and ``load``.
+        Ends in ``.csv``, ``.mat`` (MATLAB reads them by ``readtable`` and ``load``) or ``.uff``.
 
     Returns
     -------
     list of str
         Names of the variables that the table does not contain, since their dimensions are other ones.
+
+    Raises
+    ------
+    InputError
+        If the path cannot be written, or the dataset has nothing for such a file.
 
     Examples
     --------
@@ -119,7 +132,12 @@ def write_table(dataset: xr.Dataset, path: str | os.PathLike[str]) -> list[str]:
     from snapbeam.util.datasets import xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
-    if file_path("path", path).suffix.lower() == ".mat":
+    if file_path("path", path).suffix.lower() == ".uff":
+        records, left_out = _universal_records(dataset)
+        with atomic_path(check_writable(path, "path", TABLE_SUFFIXES, f"{-1:6d}")) as temporary:
+            write_universal(temporary, records)
+        return left_out
+    if Path(path).suffix.lower() == ".mat":
         from scipy.io import savemat
 
         target = check_writable(path, "path", TABLE_SUFFIXES, "MATLAB 5.0 MAT-file")
@@ -137,3 +155,103 @@ def write_table(dataset: xr.Dataset, path: str | os.PathLike[str]) -> list[str]:
     with atomic_path(target) as temporary:
         frame.to_csv(temporary, index=False)
     return list(frame.attrs["left_out"])
+
+
+def universal_record(
+    name: str,
+    unit: str,
+    abscissa: NDArray[np.float64],
+    values: NDArray[Any],
+    words: str = "",
+    function: int = _TIME_RESPONSE,
+) -> dict[str, Any]:
+    """A binary record of dataset 58 of even samples over time or frequency.
+
+    Parameters
+    ----------
+    name : str
+    unit : str
+        Unit of the values, such as ``"m/s"`` or ``"m/N"``.
+    abscissa : array of shape (samples,)
+        Even times [s], or frequencies [Hz] of a frequency response or a coherence.
+    values : array of shape (samples,)
+        Real or complex numbers.
+    words : str
+        Second line of the record.
+    function : int
+        Code of the function; a response over time by default.
+    """
+    import pyuff
+
+    over = "s" if function == _TIME_RESPONSE else "Hz"
+    above, _, below = unit.partition("/") if unit not in _UFF_UNITS else (unit, "", "")
+    entry: dict[str, Any] = pyuff.prepare_58(
+        binary=1, id1=name[:80], id2=words[:80] or "NONE", func_type=function, rsp_node=1, rsp_dir=3, ref_node=0, ref_dir=0,
+        data=values, x=abscissa, num_pts=values.size, abscissa_spacing=1, abscissa_min=float(abscissa[0]),
+        abscissa_inc=float(abscissa[-1] - abscissa[0]) / (abscissa.size - 1), abscissa_spec_data_type=_UFF_UNITS[over],
+        abscissa_axis_units_lab=over, ordinate_spec_data_type=_UFF_UNITS.get(above, 0), ordinate_axis_units_lab=above,
+        orddenom_spec_data_type=_UFF_UNITS.get(below, 0), orddenom_axis_units_lab=below or "NONE", z_axis_spec_data_type=0,
+        return_full_dict=False,
+    )  # fmt: skip
+    entry["n_bytes"] = values.nbytes
+    return entry
+
+
+def write_universal(path: Path, records: list[dict[str, Any]]) -> None:
+    """Write records of :func:`universal_record` to a new universal file."""
+    import pyuff
+
+    path.unlink(missing_ok=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter(
+            "ignore", ResourceWarning
+        )  # pyuff leaves a file object to the garbage collector
+        pyuff.UFF(str(path)).write_sets(records, mode="add")
+
+
+def _universal_records(dataset: xr.Dataset) -> tuple[list[dict[str, Any]], list[str]]:
+    """Records of the variables over time or frequency, and the names of the others."""
+    try:
+        import pyuff  # noqa: F401
+    except ImportError as error:
+        raise InputError(needs("a universal file", error.name, "lab")) from error
+    records, left_out = [], []
+    names = [str(name) for name in dataset.data_vars]
+    if {"magnitude", "phase", "coherence"} <= set(names):
+        x, found = dataset["frequency"].values, dataset["magnitude"]
+        values = found.values * np.exp(1j * dataset["phase"].values)
+        words = f"{dataset.attrs['response']} over {dataset.attrs['excitation']}"
+        records = [
+            universal_record(words, found.attrs["units"], x, values, "", _FREQUENCY_RESPONSE),
+            universal_record(words, "1", x, dataset["coherence"].values, "", _COHERENCE),
+        ]
+        return records, [name for name in names if name not in ("magnitude", "phase", "coherence")]
+    for name in names:
+        variable = dataset[name]
+        if (
+            variable.dims[:1] != ("time",)
+            or variable.ndim > 2
+            or variable.dtype.kind not in "fiub"
+            or len(variable) < 2
+        ):
+            left_out.append(name)
+            continue
+        time, values = dataset["time"].values, variable.values.reshape(len(variable), -1).astype(np.float64)
+        labels = [name]
+        if variable.ndim == 2:
+            labels = [f"{name}_{label}" for label in dataset[variable.dims[1]].values]
+        even = np.linspace(time[0], time[-1], round((time[-1] - time[0]) / np.diff(time).max()) + 1)
+        words = ""
+        if even.size != time.size or np.abs(even - time).max() > 1e-6 * (even[1] - even[0]):
+            values = np.column_stack([np.interp(even, time, column) for column in values.T])
+            words = f"interpolated from {time.size} uneven samples"
+        unit = str(variable.attrs.get("units", "1"))
+        records += [
+            universal_record(label, unit, even, np.ascontiguousarray(column), words)
+            for label, column in zip(labels, values.T, strict=True)
+        ]
+    if not records:
+        raise InputError(
+            "dataset: must have a variable over time alone, or be a frequency response, for a universal file"
+        )
+    return records, left_out

@@ -23,6 +23,7 @@ KINDS: Mapping[str, Kind] = {
         kinds.KINDS_COMPARISON,
         kinds.KINDS_DECAY,
         kinds.KINDS_RECORDING,
+        kinds.KINDS_RESPONSE,
         kinds.KINDS_SIGNAL,
         tracking.KINDS,
         kinds.KINDS_VIBROMETER,

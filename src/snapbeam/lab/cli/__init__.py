@@ -4,6 +4,7 @@ COMMANDS = {
     "track": "snapbeam.lab.cli.track:track",
     "vibrometer": "snapbeam.lab.cli.vibrometer:vibrometer",
     "fit-decay": "snapbeam.lab.cli.fit_decay:fit_decay",
+    "frf": "snapbeam.lab.cli.frequency_response:frequency_response",
     "calibrate": "snapbeam.lab.cli.calibrate:calibrate",
     "compare": "snapbeam.lab.cli.compare:compare",
     "process-tests": "snapbeam.lab.cli.process_tests:process_tests",

@@ -162,6 +162,8 @@ def plot_waveform_comparison(
 def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float] | None = None) -> Figure:
     """Draw a simulated run over a measured one: beams, shakers, and their difference; where they part is marked.
 
+    With an ensemble, the band that contains 90 % of its runs is grey.
+
     Parameters
     ----------
     result : WaveformComparison
@@ -185,6 +187,11 @@ def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float
         for ax, name, word in pairs:
             if ax is top:
                 ax.axhline(0.0, color="0.8", linewidth=0.5)
+                if "simulated_low" in waveforms:
+                    ax.fill_between(
+                        cycle, waveforms["simulated_low"], waveforms["simulated_high"], color=SHAKER_COLOR, alpha=0.25,
+                        linewidth=0.0, label="90 % of the model's runs",
+                    )  # fmt: skip
             ax.plot(cycle, waveforms[f"measured_{name}"], color=BEAM_COLOR, label="measured")
             ax.plot(
                 cycle, waveforms[f"simulated_{name}"], color=SHAKER_COLOR, dashes=(4, 1.5), linewidth=0.8,
@@ -215,7 +222,12 @@ def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float
                 ax.axvline(result.parted, color="0.45", linewidth=0.8, dashes=(2, 2))
         parted = "they never part" if np.isnan(result.parted) else f"they part at cycle {result.parted:.1f}"
         top.set_title(
-            f"{parted}; RMS difference {result.rms_difference:.3f} $b$, correlation {result.correlation:.3f}",
+            f"{parted}; RMS difference {result.rms_difference:.3f} $b$, correlation {result.correlation:.3f}"
+            + (
+                ""
+                if np.isnan(result.within)
+                else f"; {100.0 * result.within:.0f} % of the samples in the band"
+            ),
             loc="left",
         )
         parts = [ax.get_legend_handles_labels() for ax in (top, bottom)]

@@ -1,0 +1,170 @@
+"""Frequency response and coherence of two measured signals, with their random errors."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.lab.diagnostics import KINDS_RESPONSE
+from snapbeam.lab.signals import SignalSamples, check_signal, stretches
+from snapbeam.util.diagnostics import Diagnostic, to_json
+from snapbeam.util.validation import InputError, checked, choice, positive
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_Array = NDArray[np.float64]
+_SEGMENTS = 31
+"""Segments, half of each overlapping the next, where no resolution is given: 16 independent ones."""
+_LEAST_SEGMENTS = 7
+_OVERLAP = 1.0 / 36.0
+"""Squared correlation of the spectra of two Hann windows that overlap by half."""
+_LINES = 4.0
+"""Lines in the half-power bandwidth of a peak below which its height is too small by more than 2 %."""
+_UNRELATED = 0.05
+"""Probability that the coherence of unrelated signals exceeds its limit."""
+_NEIGHBOURS = 6
+"""Neighbouring coherent lines that neither chance nor a single sine makes: a Hann window widens a sine to four."""
+
+
+@checked
+def frequency_response(
+    excitation: xr.DataArray,
+    response: xr.DataArray,
+    *,
+    resolution: float | None = None,
+    estimator: str = "h1",
+) -> xr.Dataset:
+    """Estimate the frequency response and the coherence of two signals by Welch's method.
+
+    With the densities S of Hann windows that overlap by half, H1 = S_xy/S_xx is unbiased by noise of the response, and
+    H2 = S_yy/S_yx by noise of the excitation.  The coherence is |S_xy|^2/(S_xx S_yy).  The relative standard error of
+    the magnitude, and that of the phase in rad, is sqrt((1 - coherence)/(2 n coherence)) with n independent segments
+    (J. S. Bendat and A. G. Piersol, *Random Data*, 4th ed., section 9.2).  The response of a nonlinear system is that
+    of its best linear approximation for this excitation.
+
+    Parameters
+    ----------
+    excitation, response : xarray.DataArray
+        Signals with the same sampling frequency and clock (see :func:`make_signal`); their common part is used.
+    resolution : float, optional
+        Distance of the lines [Hz]; by default that of 31 segments.
+    estimator : {"h1", "h2"}
+
+    Returns
+    -------
+    xarray.Dataset
+        ``magnitude`` and ``phase`` [rad] with standard errors ``magnitude_se`` and ``phase_se``, and ``coherence``, over
+        ``frequency`` [Hz].  The attribute ``coherence_limit`` is exceeded by unrelated signals at 5 % of the lines.
+
+    Raises
+    ------
+    InputError
+        If the signals have different sampling frequencies or clocks, or are too short for the resolution.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from snapbeam import lab
+    >>> force = lab.make_signal(np.random.default_rng(0).standard_normal(20_000), "N", 2000.0)
+    >>> motion = lab.make_signal(0.002 * force.values, "m", 2000.0)
+    >>> found = lab.frequency_response(force, motion, resolution=5.0)
+    >>> print(f"{found.magnitude.sel(frequency=100.0).item():.4f} {found.magnitude.attrs['units']}")
+    0.0020 m/N
+    """
+    from scipy.signal import csd
+
+    from snapbeam.util.datasets import xr
+
+    choice("estimator", estimator, ("h1", "h2"))
+    x, y = _common(check_signal(excitation, name="excitation"), check_signal(response, name="response"))
+    rate, size = x.sampling_frequency, x.values.size
+    if resolution is None:
+        length = 2 * size // (_SEGMENTS + 1)
+    else:
+        length = round(rate / positive("resolution", resolution, "Hz"))
+    count = 2 * size // max(length, 1) - 1
+    if length < 8 or count < _LEAST_SEGMENTS:
+        least = rate * (_LEAST_SEGMENTS + 1) / (2 * size)
+        raise InputError(
+            f"resolution = {rate / max(length, 1):.4g} Hz: must be from {least:.4g} to {rate / 8.0:.4g} Hz for "
+            f"{size / rate:.4g} s of both signals"
+        )
+    settings = {"fs": rate, "nperseg": length, "detrend": "constant"}
+    frequency, cross = csd(x.values, y.values, **settings)
+    power_x, power_y = (csd(each, each, **settings)[1].real for each in (x.values, y.values))
+    inside = (frequency > 0.0) & (power_x > 0.0) & (power_y > 0.0)
+    if not inside.any():
+        raise InputError("excitation or response: must not be constant")
+    frequency, cross, power_x, power_y = (each[inside] for each in (frequency, cross, power_x, power_y))
+    coherence = np.clip(np.abs(cross) ** 2 / (power_x * power_y), 0.0, 1.0)
+    ratio = cross / power_x if estimator == "h1" else power_y / np.where(cross == 0.0, np.inf, cross.conj())
+    averages = count / (1.0 + 2.0 * _OVERLAP * (count - 1) / count)
+    error = np.sqrt((1.0 - coherence) / (2.0 * averages * np.maximum(coherence, 1e-300)))
+    limit = 1.0 - _UNRELATED ** (1.0 / (averages - 1.0))
+    unit = f"{response.attrs['units']}/{excitation.attrs['units']}"
+    columns = {
+        "magnitude": (np.abs(ratio), unit, "magnitude of the frequency response"),
+        "magnitude_se": (np.abs(ratio) * error, unit, "standard error of the magnitude"),
+        "phase": (np.angle(ratio), "rad", "phase of the frequency response"),
+        # a phase without any relation is uniform
+        "phase_se": (np.minimum(error, math.pi / math.sqrt(3.0)), "rad", "standard error of the phase"),
+        "coherence": (coherence, "1", "coherence"),
+    }
+    found = xr.Dataset(
+        {name: ("frequency", values, {"units": u, "long_name": words}) for name, (values, u, words) in columns.items()},
+        {"frequency": ("frequency", frequency, {"units": "Hz", "long_name": "frequency"})},
+        {
+            "title": "frequency response", "estimator": estimator, "window": "hann", "segments": count,
+            "independent_segments": averages, "resolution": rate / length, "coherence_limit": limit,
+            "excitation": str(excitation.name), "response": str(response.name),
+        },
+    )  # fmt: skip
+    found.attrs["diagnostics"] = to_json(_diagnostics(found))
+    return found
+
+
+def _common(x: SignalSamples, y: SignalSamples) -> tuple[SignalSamples, SignalSamples]:
+    """The part of both signals in which each sample of one has one of the other at the same time."""
+    size = min(x.values.size, y.values.size)
+    if abs(x.sampling_frequency / y.sampling_frequency - 1.0) * size > 0.1:
+        raise InputError(
+            f"response: is sampled at {y.sampling_frequency:.6g} Hz, excitation at {x.sampling_frequency:.6g} Hz: both must "
+            "have the same sampling frequency"
+        )
+    lead = (y.time[0] - x.time[0]) * x.sampling_frequency
+    whole = round(lead)
+    if abs(lead - whole) > 0.01:
+        raise InputError(
+            f"response: begins {abs(lead - whole):.2f} of a sample between those of excitation: both must be sampled at the "
+            "same times"
+        )
+    first = (max(whole, 0), max(-whole, 0))
+    size = min(x.values.size - first[0], y.values.size - first[1])
+    if size < 2:
+        raise InputError("response: has no time in common with excitation")
+    parts = [
+        SignalSamples(each.values[at : at + size], each.time[at : at + size], x.sampling_frequency)
+        for each, at in zip((x, y), first, strict=True)
+    ]
+    return parts[0], parts[1]
+
+
+def _diagnostics(found: xr.Dataset) -> list[Diagnostic]:
+    """Findings about the coherence, and about the resolution of the highest peak."""
+    coherent = found["coherence"].values > found.attrs["coherence_limit"]
+    longest = max((last - first for first, last in stretches(coherent)), default=0)
+    if longest < _NEIGHBOURS:
+        return [KINDS_RESPONSE["incoherent"].found(lines=longest)]
+    size = np.where(coherent, found["magnitude"].values, 0.0)
+    top = int(np.argmax(size))
+    if 0 < top < size.size - 1:
+        high = size > size[top] / math.sqrt(2.0)
+        first, last = next(each for each in stretches(high) if each[0] <= top < each[1])
+        if first > 0 and last < size.size and last - first < _LINES:
+            peak = float(found["frequency"].values[top])
+            return [KINDS_RESPONSE["coarse"].found(frequency=peak, lines=last - first)]
+    return []
