@@ -5,6 +5,7 @@ import os
 
 import pytest
 import series_bench as bench
+import xarray as xr
 from typer.testing import CliRunner
 
 from snapbeam import InputError
@@ -53,7 +54,7 @@ def is_measured(row, truth):
     assert (row["diagnostics"], row["comment"]) == ("", "")
 
 
-@pytest.mark.parametrize("name", ["tests.png", "measurements.png"])
+@pytest.mark.parametrize("name", ["tests.png", "measurements.png", "tests.html"])
 def test_a_foreign_figure_is_kept_and_nothing_is_measured(tmp_path, name):
     output = tmp_path / "test_series"
     output.mkdir()
@@ -69,7 +70,8 @@ def test_a_good_test_and_a_spoiled_one(tmp_path):
     folder.mkdir()
     truth = bench.write_test(folder, "test05", 1.3, 0.06, seed=5)
     bench.write_test(folder, "test03", 0.9, 0.3, seed=3, spoiled="cut short")
-    done = command(folder, *OPTIONS)
+    options = ("--operator", "A. <Smith>", *OPTIONS)
+    done = command(folder, *options)
     assert done.exit_code == 0, done.output
     assert "2 tests, 1 spoiled" in done.output
     table = rows(folder / "test_series")
@@ -77,10 +79,16 @@ def test_a_good_test_and_a_spoiled_one(tmp_path):
     assert table["test03"]["status"] == "spoiled"
     assert REASONS["test03"] in table["test03"]["comment"]
     assert (folder / "test_series" / "tests.png").stat().st_size > 10_000
+    page = (folder / "test_series" / "tests.html").read_text(encoding="utf-8")
+    assert "<td>test05</td>" in page and "is truncated" in page and 'src="tests.png"' in page
+    assert "2 tests: 1 spoiled, 1 measured; operator: A. &lt;Smith&gt;; snapbeam" in page
+    run = xr.open_dataset(folder / "test_series" / "tests" / "test05.nc", engine="h5netcdf")
+    assert run.attrs["operator"] == "A. <Smith>" and run.attrs["recording_format"] == "Photron mraw"
+    assert run.attrs["recording_date"]
 
     # nothing has changed: nothing is measured again
     before = dates(folder / "test_series")
-    assert command(folder, *OPTIONS).exit_code == 0
+    assert command(folder, *options).exit_code == 0
     assert dates(folder / "test_series") == before
     # another setting changes every test
     again = command(folder, *OPTIONS[:-1], "21")

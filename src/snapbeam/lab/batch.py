@@ -5,14 +5,18 @@ from __future__ import annotations
 import csv
 import dataclasses
 import hashlib
+import html
 import json
 import math
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -31,7 +35,7 @@ from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.input_files import decoded, read_toml
 from snapbeam.util.netcdf import write_netcdf
 from snapbeam.util.status_codes import ResponseClass
-from snapbeam.util.validation import InputError, integer, positive, shown, within
+from snapbeam.util.validation import InputError, InputTypeError, integer, positive, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -217,12 +221,15 @@ class SeriesSettings:
         :func:`snapbeam.lab.read_signal`.
     cycles
         Number of cycles for the response class; the rule needs 20.
+    operator
+        Name of the person who measured, for the results.
     """
 
     camera: Mapping[str, Any] = field(default_factory=dict)
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
     signal: Mapping[str, Any] = field(default_factory=dict)
     cycles: int = 200
+    operator: str = ""
 
     def __post_init__(self) -> None:
         for name, known in (("camera", _CAMERA), ("signal", _SIGNAL)):
@@ -230,6 +237,8 @@ class SeriesSettings:
                 if key not in known:
                     raise InputError(f"{name} {key}: unknown; must be among {', '.join(known)}")
         object.__setattr__(self, "cycles", integer("cycles", self.cycles, LEAST_CYCLES))
+        if not isinstance(self.operator, str):
+            raise InputTypeError(f"operator = {shown(self.operator)}: must be text")
         if self.tracking.buckling_level is None:
             raise InputError(
                 "buckling_level (--buckling-level): must be given, in m, or no response can be told"
@@ -241,7 +250,7 @@ class SeriesSettings:
         """A number that changes with any setting and any of the files."""
         parts = [__version__]
         parts += [repr(sorted(one.items())) for one in (self.camera, vars(self.tracking), self.signal)]
-        parts.append(repr(self.cycles))
+        parts.append(repr((self.cycles, self.operator)))
         for file in files:
             for one in sorted(file.iterdir()) if file.is_dir() else [file, file.with_suffix(".mraw")]:
                 if one.exists():
@@ -275,15 +284,13 @@ def load_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -
     for name, given in changes.items():
         sections[name] |= {key: value for key, value in given.items() if value is not None}
     for key in sections["test_series"]:
-        if key != "cycles":
-            raise InputError(f"[test_series] {key}: unknown; must be cycles")
+        if key not in ("cycles", "operator"):
+            raise InputError(f"[test_series] {key}: unknown; must be cycles or operator")
     region = sections["camera"].get("region")
     if region is not None:
         sections["camera"]["region"] = tuple(region)
     tracking = TrackingSettings().changed(**sections["tracking"])
-    return SeriesSettings(
-        sections["camera"], tracking, sections["signal"], sections["test_series"].get("cycles", 200)
-    )
+    return SeriesSettings(sections["camera"], tracking, sections["signal"], **sections["test_series"])
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -389,6 +396,8 @@ def _measured(
         tracking = tracking.changed(location=test.location)
     with open_recording(test.recording, **settings.camera) as recording:
         tracked = track(recording, tracking)
+    if settings.operator:
+        tracked.attrs["operator"] = settings.operator
     write_netcdf(tracked, folder / f"{test.name}.nc")
     diagnostics += diagnostics_of(tracked)
     seen = measure_drive(shaker_signal(tracked), test.frequency)
@@ -537,11 +546,71 @@ def write_table(path: Path, results: list[TestResult]) -> None:
     with atomic_path(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
-        for result in results:
-            values = asdict(result)
-            values["diagnostics"] = " ".join(code for code, _, _ in result.diagnostics)
-            values["comment"] = result.reason
-            writer.writerow([_cell(values[name]) for name in COLUMNS])
+        writer.writerows(_row_of(result) for result in results)
+
+
+def _row_of(result: TestResult) -> list[str]:
+    """The cells of a test in the table."""
+    values = asdict(result)
+    values["diagnostics"] = " ".join(code for code, _, _ in result.diagnostics)
+    values["comment"] = result.reason
+    return [_cell(values[name]) for name in COLUMNS]
+
+
+PAGE_START = "<!DOCTYPE html>\n<!-- test series, written by snapbeam -->\n"
+"""First lines of a page, by which it is known."""
+_PAGE = """<html lang="en"><head><meta charset="utf-8"><title>{title}</title>
+<style>
+body {{ font-family: sans-serif; margin: 2em; }}
+table {{ border-collapse: collapse; font-size: 85%; }}
+td, th {{ border: 1px solid #ccc; padding: .3em .5em; text-align: left; }}
+th {{ position: sticky; top: 0; background: #eee; }}
+img {{ max-width: 100%; display: block; margin: 1em 0; }}
+</style></head><body>
+<h1>{title}</h1>
+<p>{words}</p>
+{pictures}
+{table}
+</body></html>
+"""
+
+
+def write_page(
+    path: Path, results: list[TestResult], settings: SeriesSettings, pictures: Iterable[Path]
+) -> Path:
+    """Write the table of tests as a page for a browser, with pictures beside it.
+
+    Parameters
+    ----------
+    path
+        The page; pictures are linked by their names.
+    results
+        One row each.
+    settings
+        For the operator.
+    pictures
+        Figures in the folder of the page.
+    """
+    import pandas as pd
+
+    table = pd.DataFrame([_row_of(result) for result in results], columns=COLUMNS)
+    counts = ", ".join(f"{count} {status}" for status, count in Counter(r.status for r in results).items())
+    words = [f"{len(results)} tests: {counts}", f"snapbeam {__version__}", f"{datetime.now():%Y-%m-%d %H:%M}"]
+    if settings.operator:
+        words.insert(1, f"operator: {settings.operator}")
+    images = [f'<img src="{quote(each.name)}" alt="{html.escape(each.stem)}">' for each in pictures]
+    with atomic_path(path) as temporary:
+        temporary.write_text(
+            PAGE_START
+            + _PAGE.format(
+                title=html.escape(f"Test series {path.resolve().parent.parent.name}"),
+                words=html.escape("; ".join(words)),
+                pictures="\n".join(images),
+                table=table.to_html(index=False, border=0),
+            ),
+            encoding="utf-8",
+        )
+    return path
 
 
 def check_table(path: Path) -> Path:

@@ -357,6 +357,7 @@ def take_header(source: FrameSource, header: CameraHeader) -> None:
         else f"Photron header of {header.image_suffix} images",
         "camera": header.camera,
         "comment": header.comment,
+        "date": header.recorded,
         "record_rate": header.timing.record_rate,
         "skip": header.timing.skip,
         "stored_bits": header.stored_bits,

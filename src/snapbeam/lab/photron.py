@@ -25,6 +25,8 @@ _MAX_HEADER_BYTES = 64 * 1024 * 1024
 
 # Name in a .cih file and path of tags in a .cihx file, for each field used here.
 NAMES: dict[str, tuple[tuple[str, ...], str]] = {
+    "date": (("Date",), "fileInfo/date"),
+    "time": (("Time",), "fileInfo/time"),
     "width": (("Image Width",), "imageDataInfo/resolution/width"),
     "height": (("Image Height",), "imageDataInfo/resolution/height"),
     "frame_count": (("Total Frame",), "frameInfo/totalFrame"),
@@ -266,6 +268,7 @@ class CameraHeader:
     ``effective_bits`` how many of them carry the image, on the ``effective_side`` of the stored number;
     ``raw_colors`` says that the pixels may lie under a mosaic of colour filters.  ``image_suffix`` is that of
     the numbered images that hold the pixels, empty for a .mraw file.
+    ``recorded`` is date and time of the recording as the header states them.
     """
 
     path: Path
@@ -283,6 +286,7 @@ class CameraHeader:
     start_frame: int
     camera: str
     comment: str
+    recorded: str
     diagnostics: tuple[Diagnostic, ...]
 
     @property
@@ -344,6 +348,7 @@ def read_header(path: str | Path) -> CameraHeader:
         start_frame=fields.integer("start", -(2**40), 2**40, default=0),
         camera=fields.text("camera", ""),
         comment=fields.text("comment", ""),
+        recorded=f"{fields.text('date', '')} {fields.text('time', '')}".strip(),
         diagnostics=(*timing.diagnostics, *_curve(fields)),
     )
     if stored == 12 and not header.image_suffix and header.width * header.height % 2:
@@ -509,12 +514,11 @@ def header_text(kind: str, values: Mapping[str, Any], pixel_size: float) -> byte
         **{key: values[key] for key in values if key != "exposure"},
     }
     if kind == ".cih":
-        lines = ["#Camera Information Header", f"Date : {values['date']}"]
+        lines = ["#Camera Information Header"]
         lines += [f"{names[0]} : {known[key]}" for key, (names, _) in NAMES.items() if names and key in known]
         lines.append("")
         return "\n".join(lines).encode("utf-8")
     root = ET.Element("cih")
-    _element(root, "fileInfo/date", values["date"])
     for key, (_, tags) in NAMES.items():
         if key in known and tags:
             _element(root, tags, known[key])

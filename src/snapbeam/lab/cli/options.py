@@ -56,6 +56,7 @@ Columns = Annotated[
         "NAME [UNIT],...",
     ),
 ]
+Operator = Annotated[str | None, option("Name of the person who measured, for the result.", OUTPUT, "NAME")]
 Strict = Annotated[bool, option("Treat warnings as errors: write no result.", OUTPUT, None, "--strict")]
 
 

@@ -1,4 +1,4 @@
-"""``snapbeam process-tests``: process all tests of a folder to a table, thumbnails and a comparison with a map."""
+"""``snapbeam process-tests``: process all tests of a folder to a table, a page and a comparison with a map."""
 
 from __future__ import annotations
 
@@ -55,6 +55,7 @@ def process_tests(
         Path | None,
         option("Folder of the results; FOLDER/test_series by default.", lab.OUTPUT, "FOLDER", "--output", "-o"),
     ] = None,
+    operator: lab.Operator = None,
     strict: lab.Strict = False,
 ) -> None:  # fmt: skip
     """Track, align and classify every test of a folder, and write a table.
@@ -66,7 +67,7 @@ def process_tests(
     Example: snapbeam process-tests tests/ --buckling-level 0.331e-3 --location 0.47619 --pixel-size 12e-6 --map
     map.nc
     """
-    from snapbeam.lab.batch import load_settings, run_test_series
+    from snapbeam.lab.batch import PAGE_START, load_settings, run_test_series, write_page
     from snapbeam.lab.waveform_comparison import TOO_SHORT
     from snapbeam.util.files import check_writable
 
@@ -79,14 +80,14 @@ def process_tests(
                 "side": side,
             },
             "signal": {"units": units, "sensitivity": sensitivity, "sampling_frequency": sampling_frequency},
-            "test_series": {"cycles": cycles},
+            "test_series": {"cycles": cycles, "operator": operator},
         },
     )  # fmt: skip
     target = folder / "test_series" if output is None else output
     console = out()
-    for name in ("tests.png", "measurements.png"):
+    for name, begin in (("tests.png", ""), ("measurements.png", ""), ("tests.html", PAGE_START)):
         if target.is_dir():
-            check_writable(target / name)
+            check_writable(target / name, begin=begin)
     results = run_test_series(folder, wanted, target, table=table, strict=strict, progress=_tell)
     spoiled = [result for result in results if result.status == "spoiled"]
     short = [result for result in results if result.status == TOO_SHORT]
@@ -105,6 +106,7 @@ def process_tests(
     ]
     if simulated is not None and len(spoiled) + len(short) < len(results):
         files.append(_on_map(target, simulated))
+    files.append(write_page(target / "tests.html", results, wanted, files[1:]))
     add_json(
         tests=[asdict(result) for result in results], spoiled=len(spoiled), too_short=len(short), files=files
     )

@@ -95,6 +95,7 @@ def track(
         option("Displacement of the beam at rest, m; the well facing the shaker by default.", _SCENE),
     ] = None,
     output: Annotated[Path, option("NetCDF file to write.", _OUTPUT, "FILE", "--output", "-o")] = Path("track.nc"),
+    operator: lab.Operator = None,
     picture: Annotated[
         Path | None, option("Figure of a frame with the fitted edges to write.", _OUTPUT, "FILE")
     ] = None,
@@ -167,6 +168,8 @@ def track(
                 files.append(save_figure(plot_tracking_quality(dataset), report))
         if strict:  # the pictures show what is wrong; the result is not written
             refuse(diagnostics_of(dataset), str(recording))
+        if operator is not None:
+            dataset.attrs["operator"] = operator
         write_netcdf(dataset, output)
         files.insert(0, output)
         if video is not None:

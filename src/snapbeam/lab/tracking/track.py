@@ -232,6 +232,8 @@ def _attributes(
         "location": settings.location,
         "diagnostics": to_json(diagnostics),
     }
+    stated = {name: value for name, value in recording.metadata.items() if value not in (None, "")}
+    attrs |= {f"recording_{name}": value for name, value in stated.items()}
     if settings.buckling_level is not None:
         attrs["buckling_level"] = settings.buckling_level
     if shaker is not None and shaker.sticker is not None:
