@@ -23,6 +23,8 @@ NEEDS = {
     "numbalsoda",
     "panel",
     "playwright",
+    "pyidi",
+    "trackpy",
 }
 """Packages that single benchmarks need, and a C++ compiler with Boost; without them that one is left out."""
 _IMPORT = """

@@ -56,7 +56,7 @@ ELSEWHERE = {
     "tutorial_waveform.md",
 }
 """Pages that other tests run: ``tests/solver/test_extending.py`` and ``test_tutorials.py``."""
-NEEDS_FILES = ('open_dataset("map.nc")', 'open_recording("test.cihx"')
+NEEDS_FILES = ('open_dataset("map.nc")', 'open_recording("test.cihx"', 'open_recording("wide.cihx"')
 """Beginnings of blocks that read a file which a command or a camera made."""
 SMALLER = {"modes=32": "modes=2", "4.0, 128)": "4.0, 3)", "0.65, 80)": "0.65, 3)"}
 """The map of the page on long maps, with fewer modes and points."""

@@ -37,6 +37,8 @@ _HOMES = {
     "tracking_quality": "tracking.track",
     "tracking_report": "tracking.track",
     "recorded_drive": "drive_alignment",
+    "full_field": "digital_image_correlation",
+    "modal_amplitudes": "digital_image_correlation",
     "Recording": "camera",
     "open_recording": "camera",
     "read_channels": "signal_files",

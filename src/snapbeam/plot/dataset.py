@@ -147,6 +147,7 @@ _KINDS = (
     _Kind("measured classes", {"most_likely"}, {"measurement"}, lambda _: {"probability": uncertainty.plot_scores}),
     _Kind("growth of a perturbation", {"separation"}, {"time"}, lambda _: {"separation": run.plot_perturbation}),
     _Kind("estimated density", {"psd_low", "psd"}, {"frequency"}, lambda _: {"psd": run.plot_spectrum}),
+    _Kind("displacement field", {"displacement", "displacement_se"}, {"time", "position"}, lambda _: {"displacement": run.plot_field}),
     _Kind(
         "frequency response", {"magnitude", "coherence"}, {"frequency"}, lambda _: {"magnitude": run.plot_frequency_response}
     ),

@@ -366,6 +366,23 @@ def plot_frequency_response(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
 
 
 @checked
+def plot_field(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the displacement along a beam over time, the result of :func:`snapbeam.lab.full_field`."""
+    contains(dataset, "displacement field", "displacement", "displacement_se", "position", "time")
+    values = dataset["displacement"].values
+    size, unit = scale_of(values[np.isfinite(values)], "m")
+    most = float(np.nanmax(np.abs(values))) / size or 1.0
+    with frame(ax, None, height=60.0) as ax:
+        mesh = ax.pcolormesh(
+            dataset["time"], 1e3 * dataset["position"], values.T / size, cmap=cm.vik, vmin=-most, vmax=most,
+            shading="nearest", rasterized=True,
+        )  # fmt: skip
+        color_bar(mesh, ax, f"Displacement ({unit})")
+        ax.set(xlabel="Time (s)", ylabel="Place along the beam (mm)")
+    return ax
+
+
+@checked
 def plot_perturbation(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Draw the growth of a small perturbation of a run, the result of :func:`snapbeam.perturbation_growth`."""
     contains(dataset, "perturbation", "separation")
