@@ -155,11 +155,14 @@ def _common(x: SignalSamples, y: SignalSamples) -> tuple[SignalSamples, SignalSa
 
 def _diagnostics(found: xr.Dataset) -> list[Diagnostic]:
     """Findings about the coherence, and about the resolution of the highest peak."""
-    coherent = found["coherence"].values > found.attrs["coherence_limit"]
-    longest = max((last - first for first, last in stretches(coherent)), default=0)
+    seen = stretches(found["coherence"].values > found.attrs["coherence_limit"])
+    longest = max((last - first for first, last in seen), default=0)
     if longest < _NEIGHBOURS:
         return [KINDS_RESPONSE["incoherent"].found(lines=longest)]
-    size = np.where(coherent, found["magnitude"].values, 0.0)
+    size = np.zeros(found.sizes["frequency"])
+    for first, last in seen:
+        if last - first >= _NEIGHBOURS:
+            size[first:last] = found["magnitude"].values[first:last]
     top = int(np.argmax(size))
     if 0 < top < size.size - 1:
         high = size > size[top] / math.sqrt(2.0)
