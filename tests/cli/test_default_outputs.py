@@ -96,6 +96,7 @@ def test_a_result_of_the_same_parameters_is_replaced(run):
     assert run(*MAP)[0] == 0
 
 
+@pytest.mark.slow
 def test_a_checkpoint_alone(run):
     """The parameters that are compared are those of the checkpoint: the command is the same for any."""
     assert run(*MAP, "--checkpoint", "part.store")[0] == 0

@@ -54,6 +54,7 @@ def test_the_well_that_normalises_is_named() -> None:
     assert "Omega = 1 is 100000.000 Hz, as given" in given
 
 
+@pytest.mark.slow
 def test_force_displacement_curve(tmp_path) -> None:
     arch = ("--axial-load", 0, "--midspan-amplitude", 1e-3, "--modes", 3)
     curve, figure = tmp_path / "curve.nc", tmp_path / "curve.png"
@@ -74,6 +75,7 @@ def test_force_displacement_curve(tmp_path) -> None:
     assert "--force-displacement" in refused.output
 
 
+@pytest.mark.slow
 def test_the_displacement_of_an_eccentric_force_is_named(tmp_path) -> None:
     """Off the centre w is not the displacement of the centre: text, dataset and figure say which it is."""
     import matplotlib.pyplot as plt

@@ -63,6 +63,7 @@ def without_own_laws():
     sys.modules.pop("law_of_a_test", None)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:the lowest mode about")
 def test_a_law_of_a_file_in_a_parameter_file(tmp_path, monkeypatch):
     """Equilibria and frequencies with an own linear spring are those with the one of the package."""

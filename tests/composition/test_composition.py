@@ -277,17 +277,15 @@ def points(composition: Composition, how: sb.Integration, run: sb.Run) -> list[s
 
 @pytest.mark.parametrize(
     "kind",
-    [pytest.param(kind, marks=[pytest.mark.slow] if kind % 2 else []) for kind in range(len(QUICK))],
+    [pytest.param(kind, marks=[pytest.mark.slow] if kind != 2 else []) for kind in range(len(QUICK))],
 )
 def test_twenty_systems_of_the_same_parts(kind: int) -> None:
     """The numbers of twenty seeds."""
     judge([checked(seed, QUICK[kind]) for seed in range(20)])
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [pytest.param(kind, marks=[pytest.mark.slow] if kind != 2 else []) for kind in range(len(QUICK))],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", range(len(QUICK)))
 def test_runs_of_the_same_parts_are_consistent(kind: int, tmp_path: Path) -> None:
     """Saved and loaded, advanced in pieces, swept."""
     assert inconsistent(0, tmp_path, QUICK[kind]) == []

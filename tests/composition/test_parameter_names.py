@@ -168,6 +168,7 @@ def test_an_option_of_the_striker_is_that_of_the_base_without_one(harvester) -> 
     assert refused.exit_code == 2 and "there is no striker to drive" in refused.output
 
 
+@pytest.mark.slow
 def test_an_axis_keeps_its_unit(harvester) -> None:
     """In the dataset beside the ratio, exactly as it was given."""
     system = sb.System.load(harvester)
@@ -197,6 +198,7 @@ def test_seeds_are_replicas() -> None:
         sb.uncertainty.ParameterUncertainty(of={"base_excitation.seed": sb.uncertainty.Normal(1.0)})
 
 
+@pytest.mark.slow
 def test_a_sweep_in_hz_states_no_single_frequency(harvester) -> None:
     """The file of values swept up and down has the axis, not the ratio of one run among its fixed parameters."""
     system = sb.System.load(harvester)

@@ -34,17 +34,9 @@ def ledger(run: sb.Run) -> float:
     return float(np.ptp((stored + taken - given).values)) / data.attrs["gross_work"]
 
 
-@pytest.mark.parametrize(
-    ("modes", "cycles"), [pytest.param(1, 4, marks=SLOW), (3, 3), pytest.param(8, 2, marks=SLOW)]
-)
-@pytest.mark.parametrize(
-    "stop",
-    [
-        pytest.param("none", marks=pytest.mark.slow),
-        "carried",
-        pytest.param("in space", marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("modes", "cycles"), [(1, 4), (3, 3), (8, 2)])
+@pytest.mark.parametrize("stop", ["none", "carried", "in space"])
 def test_against_an_independent_solution(modes, cycles, stop) -> None:
     ratio, strength, gap = 0.9, 0.25, 0.05 * LEVEL
     first = float(PaperBeam(modes).omega[0])
@@ -158,6 +150,7 @@ def test_mirrored_and_going_on() -> None:
     np.testing.assert_array_equal(step.amplitude, once.amplitude)
 
 
+@pytest.mark.slow
 def test_small_motions_follow_the_linear_response() -> None:
     """Gently shaken, the first mode rings at |H| = Omega^2 m_1/sqrt((1 - Omega^2)^2 + (2 zeta Omega)^2)."""
     beam, ratio, strength = model(8), 0.5, 1e-6

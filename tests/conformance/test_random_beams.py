@@ -107,6 +107,7 @@ def judge(tried: list[Drawn | None]) -> None:
     assert max(draw.frequencies for draw in draws) < 1e-11
 
 
+@pytest.mark.slow
 def test_some_beams() -> None:
     rng = np.random.default_rng(2026)
     judge([solved(rng) for _ in range(6)])

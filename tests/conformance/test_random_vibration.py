@@ -121,6 +121,7 @@ def exact_mean_square(points, frequency: float, damping: float) -> float:
     return sum(quad(part, a, b, epsrel=1e-10)[0] for a, b in itertools.pairwise(edges))
 
 
+@pytest.mark.slow
 def test_linear_oscillator_against_its_exact_mean_square() -> None:
     """The mean over 40 seeds lies within 4 of its standard errors, which are 4 %."""
     frequency, damping, seeds = 80.0, 0.05, 40

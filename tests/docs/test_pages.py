@@ -24,11 +24,9 @@ PAGES = sorted([*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md")])
 CODE = [
     "README.md",
     "contacts.md",
-    "finite_elements.md",
     "getting-started.md",
     "long_maps.md",
     "states.md",
-    "strikers.md",
     "sweeps.md",
     "index.md",
     "systems.md",
@@ -42,6 +40,8 @@ CODE = [
     pytest.param("lifetimes.md", marks=pytest.mark.slow),
     pytest.param("orbits.md", marks=pytest.mark.slow),
     pytest.param("questions.md", marks=pytest.mark.slow),
+    pytest.param("strikers.md", marks=pytest.mark.slow),
+    pytest.param("finite_elements.md", marks=pytest.mark.slow),
 ]
 """Pages whose Python blocks run in order in one namespace; those that take more than a few seconds are slow."""
 ELSEWHERE = {

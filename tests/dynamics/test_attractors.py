@@ -74,6 +74,7 @@ def test_labels_do_not_depend_on_order() -> None:
     assert one.shares.sum() == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_a_beam_between_two_wells() -> None:
     """A weak drive: tapping in the struck well, rest in the far one; basins in any number of threads."""
     system = system_of(1, 1.6, 0.03, 0.05)
@@ -121,6 +122,7 @@ def test_the_edge_of_a_map_is_its_saddle() -> None:
     np.testing.assert_allclose(edge.orbit.coordinates, 0.0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_the_edge_between_snapping_and_not() -> None:
     """One damped mode: the border runs to an unstable orbit near the hilltop."""
     system = system_of(1, 1.6, 0.03, 0.05)
@@ -135,6 +137,7 @@ DUFFING = ((-0.779054, 0.027417), (1.210091, 0.055295))
 """The two attractors of x'' + 0.15 x' - x + x^3 = 0.2 cos t at t = 0."""
 
 
+@pytest.mark.slow
 def test_the_double_well_has_two_attractors_and_a_slow_transient() -> None:
     """After 40 periods some states are not near an attractor yet; after 220 periods every state is."""
     states = np.random.default_rng(7).uniform(-2.0, 2.0, (120, 2))

@@ -23,6 +23,7 @@ def farthest(curve) -> np.ndarray:
     return height * ONE.length_scale / abs(ONE.midspan_shape[0])
 
 
+@pytest.mark.slow
 def test_one_mode_about_a_well_is_an_elliptic_integral() -> None:
     curve = sb.dynamics.backbone_curve(ONE, lowest_frequency_ratio=0.4)
     assert curve.attrs["end"] == "lowest_frequency_ratio"
@@ -34,6 +35,7 @@ def test_one_mode_about_a_well_is_an_elliptic_integral() -> None:
     np.testing.assert_allclose(curve.participation, 1.0, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_one_mode_across_both_wells() -> None:
     curve = sb.dynamics.backbone_curve(ONE, well="both", amplitude_limit=2.5)
     assert curve.attrs["end"] == "amplitude_limit"

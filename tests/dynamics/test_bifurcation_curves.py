@@ -159,13 +159,9 @@ def grazing_amplitude(ratio: np.ndarray) -> np.ndarray:
     return np.sqrt((1.0 - ratio**2) ** 2 + (2.0 * DAMPING * ratio) ** 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("law", "points"),
-    [
-        (sb.HertzContact(1e9), 3),
-        pytest.param(sb.HertzContact(1e9), 200, marks=pytest.mark.slow),
-        pytest.param(sb.Restitution(0.8), 200, marks=pytest.mark.slow),
-    ],
+    ("law", "points"), [(sb.HertzContact(1e9), 3), (sb.HertzContact(1e9), 200), (sb.Restitution(0.8), 200)]
 )
 def test_the_grazing_curve_of_an_oscillator_before_a_stop(law: sb.ContactLaw, points: int) -> None:
     """It is the resonance curve, to 1e-9, under any law of contact, through the resonance itself."""

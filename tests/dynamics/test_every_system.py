@@ -94,6 +94,7 @@ def check_volume(system: sb.System) -> bool:
     return True
 
 
+@pytest.mark.slow
 def test_volumes_shrink_by_the_losses_of_beam_body_and_circuits() -> None:
     assert check_volume(system_of(**WHOLE))
 
@@ -103,6 +104,7 @@ def test_volumes_of_a_hundred_random_systems() -> None:
     assert sum(check_volume(random_system(seed)) for seed in range(100)) >= 90
 
 
+@pytest.mark.slow
 def test_coordinates_hold_the_whole_state() -> None:
     system = system_of(**WHOLE)
     flow = Stroboscope(system, PRECISE)
@@ -130,6 +132,7 @@ def test_orbit_of_a_system_with_all_parts() -> None:
     assert back == pytest.approx(orbit.coordinates, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_all_exponents_add_up_to_the_losses() -> None:
     system = system_of(**WHOLE)
     flow = Stroboscope(system, PRECISE)

@@ -113,6 +113,7 @@ def test_a_manifold_that_ends_early_is_no_proof_that_none_cross(monkeypatch: pyt
         sb.dynamics.homoclinic_tangency(saddle, "a", (0.95, 1.05))
 
 
+@pytest.mark.slow
 def test_newtons_law_has_no_inverse() -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.05)
     shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.005)

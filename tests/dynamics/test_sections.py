@@ -77,6 +77,7 @@ def test_sweeps_meet_the_branch() -> None:
     np.testing.assert_allclose(ds["impacts_per_period"], 1.0, atol=0.02)
 
 
+@pytest.mark.slow
 def test_sweeps_show_hysteresis_and_starts_what_they_miss() -> None:
     """Snapped through on the way up, the beam stays in the far well on the way down."""
     system = system_of(1, 1.6, 0.03, 0.05)

@@ -149,6 +149,7 @@ def test_unknown_name_is_refused():
         load("no_such_problem")
 
 
+@pytest.mark.slow
 def test_runner_of_the_readme_runs():
     text = (FOLDER / "README.md").read_text(encoding="utf-8")
     code = text.split("```python\n", 1)[1].split("```", 1)[0]

@@ -66,6 +66,7 @@ def fast(per_cycle, seed, lost=()):
     return beam + noise[0], 100.0 + 10.0 * np.sin(1.3 * turn + third) + noise[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("per_cycle", [15, 25, 60])
 def test_the_turning_points_of_a_fast_motion_are_no_lost_frames(per_cycle):
     """A cubic over ten frames is too stiff there; a lost frame is found all the same."""

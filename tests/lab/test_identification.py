@@ -138,6 +138,7 @@ def test_standard_errors_hold_for_coloured_noise():
     assert np.mean(np.abs(found) < 2.0) >= 0.84 and np.std(found) > 0.5
 
 
+@pytest.mark.slow
 def test_several_modes():
     time = np.arange(4000) / RATE
     truth = ((80.0, 0.005, 1.0), (159.3, 0.004, 0.4), (380.4, 0.003, 0.2))
@@ -301,6 +302,7 @@ def test_dropouts_and_noise_leave_the_class_open():
         measure_response(run_of([-1] * 40), 100.0, start=1e3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "change"),
     [
@@ -319,6 +321,7 @@ def test_a_rectified_decay_and_a_fade_out_are_told(code, change):
         assert abs(fit.modes[0].damping_ratio - ZETA) < 5.0 * fit.modes[0].damping_ratio_se
 
 
+@pytest.mark.slow
 def test_a_decay_on_a_drifting_zero_is_not_taken_for_a_rectified_one():
     decay = noisy(chirp(0.1, 1.0), 6)
     drift = 0.15 * np.exp(-decay["time"].values / 0.3)

@@ -66,6 +66,7 @@ def test_standard_errors_of_the_sine_fit_cover_the_truth():
     assert (spread > 0.85).all() and (spread < 1.15).all()
 
 
+@pytest.mark.slow
 def test_a_frequency_that_is_pulled_has_the_error_of_its_mean():
     time = np.arange(18_000) / 2e4
     noise = 5e-4 * np.random.default_rng(0).standard_normal(time.size)

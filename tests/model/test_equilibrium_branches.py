@@ -86,6 +86,7 @@ def test_a_limit_point_is_the_snap_through_force() -> None:
     np.testing.assert_allclose(np.sort(own), np.sort(limits), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_no_equilibrium_in_the_range() -> None:
     """Beyond pull-in over the whole range."""
     plate = sb.ReducedModel.from_matrices([[1e-9]], [[2.0]], contact_shape=[1.0], length_scale=3e-6)
@@ -96,6 +97,7 @@ def test_no_equilibrium_in_the_range() -> None:
         sb.model.equilibrium_branches(system, "force.voltage", (8.0, 9.0))
 
 
+@pytest.mark.slow
 def test_a_parameter_that_changes_the_modes() -> None:
     """The centre of a longer beam is at its own buckling level, though its modes have another norm."""
     system = sb.System(sb.ReducedModel.from_beam(BEAM, modes=2))

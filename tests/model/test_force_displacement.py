@@ -26,6 +26,7 @@ def arch(rise: float, modes: int = 3, beam: sb.Beam = BEAM, **more: float) -> sb
     return sb.ReducedModel.from_beam(beam, modes=modes, imperfection=shape)
 
 
+@pytest.mark.slow
 def test_three_modes_of_qiu_lang_and_slocum() -> None:
     """Their F1 (first mode), F2 and F3 (second and third mode branch off), F L^3/(E I h) over d/h downwards."""
     ratio = 6.0
@@ -113,6 +114,7 @@ def test_many_modes_against_the_beam_equation() -> None:
     assert errors[1] < 0.5 * errors[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rise", "location"), [(6.0, 0.5), (6.0, 0.41), (9.0, 0.3)])
 def test_no_branch_is_missed(rise: float, location: float) -> None:
     """At any force the curve passes every equilibrium of the independent secular equation, and no other."""
@@ -192,7 +194,9 @@ def test_finite_elements_with_springs() -> None:
     assert curve.attrs["snap_through_kind"] == modal.attrs["snap_through_kind"] == "limit"
 
 
-@pytest.mark.parametrize("modes", [1, 3, 8])
+@pytest.mark.parametrize(
+    "modes", [1, pytest.param(3, marks=pytest.mark.slow), pytest.param(8, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("law", ["spring", "magnet", "electrode"])
 def test_local_forces_where_the_force_acts_add_to_it(modes: int, law: str) -> None:
     """F(w) of the system is that of the beam less the local force at w, at the same amplitudes."""
@@ -229,6 +233,7 @@ def test_local_forces_where_the_force_acts_add_to_it(modes: int, law: str) -> No
     assert np.isfinite(forces).all()
 
 
+@pytest.mark.slow
 def test_local_forces_anywhere() -> None:
     """A spring and its force elsewhere: every point against a minimum or a root that SciPy finds from nearby."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=6)
@@ -256,6 +261,7 @@ def test_local_forces_anywhere() -> None:
         assert away.min() < 1e-2 * np.abs(model.well_amplitude).max()
 
 
+@pytest.mark.slow
 def test_antisymmetric_wells() -> None:
     """A stiff spring at the centre of a beam beyond its second critical load leaves two antisymmetric wells."""
     beam = sb.Beam(
@@ -286,6 +292,7 @@ def test_a_branch_that_was_not_followed_to_its_end_is_told(monkeypatch) -> None:
     assert curve.attrs["incomplete_branches"] == 1
 
 
+@pytest.mark.slow
 def test_wells_and_refusals() -> None:
     perfect = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
     lower, upper = (sb.force_displacement(perfect, 0.5, well=name) for name in ("lower", "upper"))

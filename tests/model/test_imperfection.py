@@ -195,6 +195,7 @@ def test_bound_behind_early_termination(modes) -> None:
     assert none[0] == pytest.approx(float(least_energy_at(plain, 0.3, 0.4 * LEVEL)), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_measured_wells_are_explained() -> None:
     """The paper's own beam: 81.3 and 80.5 Hz."""
     for kind in ("midspan_amplitude", "point_load", "uniform_load"):

@@ -32,7 +32,7 @@ def system_of(sections: dict, modes: int | str, **more) -> sb.System:
 @pytest.mark.parametrize("modes", [2, 3, 4, 8, 16])
 @pytest.mark.parametrize(
     ("sections", "more"),
-    [(ARCH, {}), (PLATE, {}), (ARCH, {"force": SPRING})],
+    [(ARCH, {}), (PLATE, {}), pytest.param(ARCH, {"force": SPRING}, marks=pytest.mark.slow)],
     ids=["arch", "plate", "spring"],
 )
 def test_the_estimate_bounds_the_error_of_frequencies(sections, more, modes) -> None:
@@ -44,6 +44,7 @@ def test_the_estimate_bounds_the_error_of_frequencies(sections, more, modes) -> 
     assert error <= modal_error(system) <= 1.4 * error + 1e-6
 
 
+@pytest.mark.slow
 def test_the_estimate_of_a_snap_through_force() -> None:
     """2 and 4 modes of an arch have the same force; the estimate of 2 modes is not 0."""
     forces = {n: float(force_displacement(system_of(ARCH, n), 0.5).snap_through_force) for n in (2, 4, 16)}

@@ -37,6 +37,7 @@ def test_a_spring_at_the_centre_of_one_mode():
     assert len(stiff.equilibria) == 1 and stiff.wells[0].amplitude == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_pull_in_at_a_third_of_the_gap():
     """A linear spring under a/(g - u)^2: two equilibria below a = 4 k g^3/27, none above, u = g/3 there."""
     k, gap = 2.0, 3e-6
@@ -274,6 +275,7 @@ def test_a_force_that_leaves_one_well_has_a_diagnostic():
     assert not [each for each in shifted.diagnostics() if each.code == "other-wells"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("modes", [1, 4])
 @pytest.mark.parametrize("rise", [0.0, pytest.param(2e-6, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("side", [pytest.param("below", marks=pytest.mark.slow), "above"])

@@ -87,6 +87,7 @@ def test_points_lie_where_they_were_measured(tmp_path, results):
     assert to_hex(found[0].get_facecolor()[0]).upper() == CLASS_COLORS[0]
 
 
+@pytest.mark.slow
 def test_location_maps_reach_twice_the_static_threshold(results):
     for ds in results["fig8"].values():
         ratio = float(ds.frequency_ratio)

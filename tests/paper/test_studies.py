@@ -32,7 +32,7 @@ STUDIES = (
     "low_frequency",
     "resonance",
     pytest.param("waveforms", marks=pytest.mark.slow),
-    "transients",
+    pytest.param("transients", marks=pytest.mark.slow),
     "windows",
     pytest.param("disturbances", marks=pytest.mark.slow),
     pytest.param("sensitivity", marks=pytest.mark.slow),

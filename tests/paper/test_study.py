@@ -16,6 +16,7 @@ def test_shares_agree_with_the_stored_maps() -> None:
         assert abs(apart) < 3.0, (modes, figure, cycles)
 
 
+@pytest.mark.slow
 def test_the_four_points_come_again() -> None:
     """Each within its own interval and that of some 210 runs measured before; all runs ended in the far well."""
     points = study.stored("lifetimes")["points"]

@@ -48,6 +48,7 @@ def paper_results() -> paper.Results:
     return results
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["fig6", "fig8"])
 def test_figures_of_the_paper_in_each_style(name: str, style: str) -> None:
     figure = getattr(paper, name)(results=paper_results())

@@ -8,6 +8,7 @@ import pytest
 import snapbeam as sb
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:harvester")
 @pytest.mark.filterwarnings("ignore:.*lowest mode about")
 def test_a_shock_with_a_harvester():

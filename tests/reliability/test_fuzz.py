@@ -61,6 +61,7 @@ CHECKS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("check", list(CHECKS))
 def test_every_check_refuses_or_returns(check):
     """Whatever is given: a value as promised, or a refusal that names the parameter."""

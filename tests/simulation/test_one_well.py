@@ -24,6 +24,7 @@ def arch(**changes) -> sb.System:
     return sb.System(model, base_excitation=base).replace(**changes)
 
 
+@pytest.mark.slow
 def test_an_arch_snaps_and_returns():
     """The class follows from the extreme of the centre against half of the mirror image of the rest, of each run."""
     system = arch()
@@ -42,6 +43,7 @@ def test_an_arch_snaps_and_returns():
     assert run.summary.response_class == found["response_class"].values[-1]
 
 
+@pytest.mark.slow
 def test_a_crossing_of_the_flat_shape_is_no_snap_through():
     """Thrown just past flat and back, the centre crosses zero, but its shape is not inverted."""
     system = arch(**{"base_excitation.acceleration_g": 0.0})

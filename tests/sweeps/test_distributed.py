@@ -151,6 +151,7 @@ def test_workers_that_cannot_compute_at_all(tmp_path, small, client):
         computed(tmp_path / "store", work, stage, client)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_runs_already(tmp_path, small, whole, client):
     """The address of a scheduler, through the public function; refined as well."""
     address = client.scheduler.address

@@ -31,6 +31,7 @@ def test_frequencies_of_a_beam_scale_exactly() -> None:
     assert found.attrs["value"] == first_frequency(system_of())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quantity", ["peak_force", "impulse", "energy_dissipated", "max_displacement"])
 def test_derivatives_of_runs_are_those_of_two_runs(quantity: str) -> None:
     names = ["drive.velocity_amplitude", "contact.stiffness", "beam.young_modulus"]
@@ -47,6 +48,7 @@ def test_derivatives_of_runs_are_those_of_two_runs(quantity: str) -> None:
         assert derivative == pytest.approx((ends[0] - ends[1]) / (2.0 * step * value), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_grazing_impact_is_reported() -> None:
     def impacts(velocity: float) -> int:
         return int(sb.simulate(system_of(velocity), PRECISE).summary.impacts)

@@ -105,6 +105,7 @@ def test_map_of_a_beam() -> None:
     assert two["hits"].equals(ds["hits"])
 
 
+@pytest.mark.slow
 def test_a_map_is_resumed_after_being_killed(tmp_path) -> None:
     """Killed after every point in turn: nothing is computed twice, and what comes out is what an unbroken map gives."""
     runs = sb.uncertainty.SamplingPlan(half_width=0.15, initial_runs=16, max_runs=64)

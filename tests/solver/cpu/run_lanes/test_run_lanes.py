@@ -112,6 +112,7 @@ def test_a_striker_with_mass(monkeypatch):
         assert found["max_displacement"][i] == pytest.approx(float(w.max()), abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_striker_whose_suspension_is_nearly_critically_damped(monkeypatch):
     mass, stiffness = 0.02, 700.0
     critical = 2.0 * np.sqrt(stiffness * mass)
@@ -120,7 +121,9 @@ def test_a_striker_whose_suspension_is_nearly_critically_damped(monkeypatch):
     assert found["impacts"].sum() > 0
 
 
-@pytest.mark.parametrize("damping_ratio", [0.0, 0.02, 0.3, 0.7, 0.95])
+@pytest.mark.parametrize(
+    "damping_ratio", [0.02, *(pytest.param(each, marks=pytest.mark.slow) for each in (0.0, 0.3, 0.7, 0.95))]
+)
 def test_cubics_through_the_ends_of_a_step_are_as_near_as_their_bound(damping_ratio):
     """Of an oscillator under an acceleration that changes linearly, for steps from a hundredth of a period to half of one."""
     generator, written = np.random.default_rng(7), {
@@ -209,6 +212,7 @@ def test_what_it_does_not_serve_goes_to_the_other_layout():
         unregister_statistic("twice")
 
 
+@pytest.mark.slow
 def test_small_work_is_not_worth_another_kernel(monkeypatch):
     made = ensemble(2, cycles=2)
     packed = pack(made.structure, made.high_omega)
