@@ -284,10 +284,17 @@ KINDS_DECAY = table(
     ),
     Kind(
         "decay.frequency_drift", WARNING,
-        "the phase cycle by cycle, against the changes that softening makes",
+        "the phase cycle by cycle, against softening and a stop that the beam touches",
         "the frequency changes by {share_percent:+.2f} % over the decay in a way that its amplitude does not: the "
         "temperature, or a clamp that creeps; the frequency is that of the start, and the change is in its standard "
         "error",
+    ),
+    Kind(
+        "decay.touches", WARNING,
+        "amplitude and phase cycle by cycle, against softening, drag, dry friction and a creeping frequency",
+        "above {level_percent:.2g} % of the first amplitude the beam touches a stop on one side, as a shaker not yet drawn "
+        "back (both the frequency and the damping are higher there): the decay is taken from {until:.6g} s where enough "
+        "is left after it, else the difference is in the standard errors",
     ),
     Kind(
         "decay.window", WARNING,
