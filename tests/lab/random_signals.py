@@ -175,7 +175,8 @@ def sensor_signal(rng, kind):
     if kind in ("notch", "notch of 60 Hz"):
         freq = (50.0 if kind == "notch" else 60.0) * rng.uniform(0.9, 1.1)
     if kind == "lost in step":
-        freq = rate / rng.integers(70, 500)
+        parts = int(rng.integers(1, 4))
+        freq = rate / (parts * int(rng.integers(70, 500) / parts))
     onset, start_up = rng.uniform(0.1, 0.3), float(np.exp(rng.uniform(np.log(0.003), np.log(0.03))))
     length = onset + max(80.0 / freq, 10.0 * start_up)
     time = np.arange(int(length * rate)) / rate
@@ -223,7 +224,7 @@ def sensor_signal(rng, kind):
     elif kind == "notch of 60 Hz":
         values = lfilter(*iirnotch(60.0, rng.uniform(3.0, 10.0), rate), values)
     elif kind == "hysteresis":
-        values = played(values, rng.uniform(0.01, 0.08) * amplitude)
+        values = played(clean, rng.uniform(0.01, 0.08) * amplitude) + values - clean
     elif kind == "AC coupling":
         values = lfilter(*butter(1, freq * rng.uniform(0.1, 0.4), "high", fs=rate), values)
     elif kind == "amplitude drifts":
@@ -233,7 +234,7 @@ def sensor_signal(rng, kind):
         values = np.delete(values, np.arange(every, values.size, every))
         truth["onset"] = None
     elif kind == "lost in step":
-        every = round(rate / freq) // int(rng.choice([1, 2, 3]))
+        every = round(rate / freq / parts)
         values = np.delete(values, np.arange(int(rng.integers(every)), values.size, every))
         truth["onset"] = None
     elif kind == "clock drifts":

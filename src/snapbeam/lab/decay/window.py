@@ -192,6 +192,7 @@ def one_sided(samples: SignalSamples, frequency: float) -> bool:
 
 
 _EXPLAINED = 2.0  # times the noise that the likeliest may leave; more is left by two modes that beat
+_BETTER = 4.0  # times as much that the others must leave then
 _MATTERS = 1e-4  # of the frequency, over the record
 _SECOND = 2.0  # times the square of the softening that its next order may be, to a standard deviation
 _LEVELS = np.geomspace(0.06, 0.65, 22)  # of the first amplitude at which a stop may stand
@@ -265,8 +266,9 @@ def courses(cycles: Cycles, frequency: float) -> list[Hypothesis]:
             numbers = {"until": float(cycles.time[min(last + 1, t.size - 1)]), "level_percent": 100.0 * level}
             free = float(abs(slows[1] / none[1][1] - 1.0)), float(abs(found[1] / none[0][1] - 1.0))
             told.append(Hypothesis("touches", sum(plain) - damps - misfit, 3, *free, numbers))
-    unit = (sum(plain) - max(one.gain for one in told)) / (2.0 * t.size)
-    if unit > _EXPLAINED**2:
+    rest = sum(plain) - np.array([one.gain for one in told])
+    unit = float(rest.min()) / (2.0 * t.size)
+    if unit > _EXPLAINED**2 and rest[:3].min() < _BETTER * rest.min():
         return []
     return sorted((one._replace(gain=one.gain / max(unit, 1.0)) for one in told), key=lambda one: -one.score)
 
@@ -456,7 +458,7 @@ def _on_course(
         return steadied(samples, share), Doubt(abs(share)), [told_so]
     # a softening that a creep explains as well
     pair = [one for one in told if one.numbers.get("shares", 0) in (1, 2)]
-    if len(pair) < 2 or known or pair[0].score < 0.0:
+    if len(pair) < 2 or known:
         return samples, Doubt(), []
     behind = told[0].gain - next(one.gain for one in pair if one.kind)
     apart = abs(pair[0].numbers["start"] - pair[1].numbers["start"])
