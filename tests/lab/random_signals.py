@@ -21,13 +21,36 @@ DRIVE_DEFECTS = (
 )  # fmt: skip
 SENSOR_DEFECTS = (
     "slew limit", "crossover", "notch", "AC coupling", "amplitude drifts", "beat", "samples lost", "unit by ten",
-    "rate twice", "displacement as velocity",
+    "rate twice", "displacement as velocity", "slow slew", "notch of 60 Hz", "AC coupling near", "lost in step",
+    "hysteresis", "jitter", "clock drifts", "gain switched", "folded line", "few bits", "sign flipped", "interpolated",
 )  # fmt: skip
 DECAY_DEFECTS = (
     "clipped", "clipped before the noise", "drift", "close modes", "quadratic damping", "dry friction", "second hit",
     "hum", "dropout", "release within", "more modes", "asked off",
 )  # fmt: skip
-MODE_DEFECTS = ("frequency creeps", "shaker touches")
+MODE_DEFECTS = (
+    "frequency creeps", "shaker touches", "gain switched", "sign flipped", "few bits", "AC coupling near", "jitter",
+    "folded line", "interpolated",
+)  # fmt: skip
+CAUSES = {
+    "dropout": "dropout dropout_in_start disturbed", "hold": "dropout dropout_in_start", "spikes": "dropout",
+    "clipped": "clipped clipped_throughout", "clipped on one side": "clipped",
+    "clipped before the noise": "clipped clipped_throughout saturated", "begins in motion": "no_rest",
+    "gentle start": "slow_start unsteady", "amplitude wanders": "unsteady beat drifts second_line",
+    "interrupted": "interrupted dropout", "wrong frequency set": "frequency", "slew limit": "slew",
+    "slow slew": "slew", "crossover": "crossover", "notch": "notch", "notch of 60 Hz": "notch",
+    "AC coupling": "high_pass", "AC coupling near": "high_pass", "amplitude drifts": "drifts",
+    "beat": "beat second_line unsteady", "samples lost": "samples_lost", "lost in step": "samples_lost",
+    "unit by ten": "amplitude beyond_shakers", "rate twice": "frequency not_there",
+    "displacement as velocity": "amplitude beyond_shakers", "hysteresis": "hysteresis", "jitter": "jitter",
+    "clock drifts": "clock_drifts", "gain switched": "gain disturbed", "folded line": "hum second_line",
+    "few bits": "few_bits", "sign flipped": "sign disturbed", "interpolated": "interpolated",
+    "close modes": "close_modes misfit", "quadratic damping": "damping_law misfit",
+    "dry friction": "damping_law misfit", "second hit": "disturbed faint", "hum": "hum", "drift": "drift",
+    "release within": "release", "asked off": "off_asked", "frequency creeps": "frequency_drift",
+    "shaker touches": "touches",
+}  # fmt: skip
+"""Codes of the diagnostics that name the cause of a defect."""
 
 
 @dataclass
@@ -113,16 +136,58 @@ def tracking(values, step):
     return out
 
 
+def played(values, width):
+    """The output of a gear with a play of *width* on either side of zero."""
+    out, at = np.empty_like(values), values[0]
+    for k, value in enumerate(values.tolist()):
+        at = min(max(at, value - width), value + width)
+        out[k] = at
+    return out
+
+
+def common_defect(rng, kind, values, at, freq, size, rate):
+    """A record with an error of its converter or its handling, from sample *at* on; *size* is that of the motion."""
+    time = np.arange(values.size) / rate
+    if kind == "gain switched":
+        values = values * np.where(time < time[at], 1.0, rng.choice([0.1, 0.5, 0.9, 1.08, 2.0, 10.0]))
+    elif kind == "sign flipped":
+        values = values * np.where(time < time[at], 1.0, -1.0)
+    elif kind == "few bits":
+        step = size * 2.0 ** -rng.uniform(0.5, 4.0)
+        values = np.round(values / step) * step
+    elif kind == "folded line":
+        line = rng.uniform(0.0, 0.5 * rate)
+        values = values + rng.uniform(0.02, 0.2) * size * np.cos(
+            2.0 * np.pi * line * time + rng.uniform(-3.0, 3.0)
+        )
+    elif kind == "interpolated":
+        coarse = np.arange(0.0, time[-1], 1.0 / (freq * rng.uniform(5.0, 15.0)))
+        values = np.interp(time, coarse, np.interp(coarse, time, values))
+    elif kind == "AC coupling near":
+        values = lfilter(*butter(1, freq * rng.uniform(0.4, 1.5), "high", fs=rate), values)
+    return values
+
+
 def sensor_signal(rng, kind):
     """A record through electronics with one thing wrong, or a hard but good one ("hard"); the noise is the laser's."""
     rate, amplitude = 20_000.0, 0.03
     freq = float(np.exp(rng.uniform(np.log(30.0), np.log(300.0))))
-    if kind == "notch":
-        freq = 50.0 * rng.uniform(0.9, 1.1)
+    if kind in ("notch", "notch of 60 Hz"):
+        freq = (50.0 if kind == "notch" else 60.0) * rng.uniform(0.9, 1.1)
+    if kind == "lost in step":
+        parts = int(rng.integers(1, 4))
+        freq = rate / (parts * int(rng.integers(70, 500) / parts))
     onset, start_up = rng.uniform(0.1, 0.3), float(np.exp(rng.uniform(np.log(0.003), np.log(0.03))))
     length = onset + max(80.0 / freq, 10.0 * start_up)
     time = np.arange(int(length * rate)) / rate
-    since = np.maximum(time - onset, 0.0)
+    taken = time + (rng.uniform(0.02, 0.15) / (2.0 * np.pi * freq) * rng.standard_normal(time.size)) * (
+        kind == "jitter"
+    )
+    since = np.maximum(taken - onset, 0.0)
+    if kind == "clock drifts":
+        since = since * (
+            1.0 + rng.choice([-1.0, 1.0]) * float(np.exp(rng.uniform(-7.6, -4.6))) * since / since[-1]
+        )
     turn = 2.0 * np.pi * freq * since + rng.uniform(-3.0, 3.0)
     second, third = rng.uniform(0.0, 0.03), rng.choice([0.0, rng.uniform(0.0, 0.02)])
     if kind == "hard":
@@ -147,12 +212,19 @@ def sensor_signal(rng, kind):
     options = known if rng.random() < 0.5 else {}
     if kind == "slew limit":
         share = float(np.exp(rng.uniform(np.log(0.7), np.log(0.97))))
+    elif kind == "slow slew":
+        share = rng.uniform(0.97, 0.995)
+    if kind in ("slew limit", "slow slew"):
         values = tracking(values, share * amplitude * 2.0 * np.pi * freq / rate)
     elif kind == "crossover":
         dead = rng.uniform(0.02, 0.1) * amplitude
         values = np.sign(values) * np.maximum(np.abs(values) - dead, 0.0)
     elif kind == "notch":
         values = lfilter(*iirnotch(50.0, rng.uniform(3.0, 10.0), rate), values)
+    elif kind == "notch of 60 Hz":
+        values = lfilter(*iirnotch(60.0, rng.uniform(3.0, 10.0), rate), values)
+    elif kind == "hysteresis":
+        values = played(clean, rng.uniform(0.01, 0.08) * amplitude) + values - clean
     elif kind == "AC coupling":
         values = lfilter(*butter(1, freq * rng.uniform(0.1, 0.4), "high", fs=rate), values)
     elif kind == "amplitude drifts":
@@ -161,6 +233,12 @@ def sensor_signal(rng, kind):
         every = int(rng.integers(20, 200))
         values = np.delete(values, np.arange(every, values.size, every))
         truth["onset"] = None
+    elif kind == "lost in step":
+        every = round(rate / freq / parts)
+        values = np.delete(values, np.arange(int(rng.integers(every)), values.size, every))
+        truth["onset"] = None
+    elif kind == "clock drifts":
+        del truth["frequency"]  # there is no one frequency
     elif kind == "unit by ten":
         values = values * float(rng.choice([0.1, 10.0, 0.001]))
     elif kind == "rate twice":
@@ -168,6 +246,8 @@ def sensor_signal(rng, kind):
         truth["onset"] = None
     elif kind == "displacement as velocity":
         values = 50.0 * np.cumsum(values - values.mean()) / rate * 2.0 * np.pi
+    at = int(rate * (onset + rng.uniform(0.4, 0.8) * (length - onset)))
+    values = common_defect(rng, kind, values, min(at, values.size - 1), freq, amplitude, rate)
     if kind in ("unit by ten", "rate twice", "displacement as velocity"):
         options = known  # the record alone cannot tell
     truth = {name: value for name, value in truth.items() if value is not None}
@@ -253,6 +333,9 @@ def decay_signal(rng, kind):
         values = fall * np.cos(omega * (time + 0.5 * creep * time**2 / length) + phase)
     elif kind == "shaker touches":
         values = touching_decay(rng, freq, zeta, time)
+    elif kind == "jitter":
+        taken = time + rng.uniform(0.02, 0.15) / omega * rng.standard_normal(time.size)
+        values = np.interp(taken, time, values)
     level = rng.uniform(0.45, 0.8)
     if kind == "clipped before the noise":
         values = np.clip(values, -level, level)
@@ -261,6 +344,7 @@ def decay_signal(rng, kind):
         values = np.clip(values, -level, level)
     elif kind == "dropout":
         values[at : at + int(rate * rng.uniform(0.004, 0.02))] = 0.0
+    values = common_defect(rng, kind, values, at, freq, 1.0, rate)
     units = str(rng.choice(["m", "m/s"]))
     return make_signal(values, units, rate, name="decay"), truth, options
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+import random_signals
 import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -327,3 +328,33 @@ def test_a_decay_on_a_drifting_zero_is_not_taken_for_a_rectified_one():
     drift = 0.15 * np.exp(-decay["time"].values / 0.3)
     fit = identify_decay(make_signal(decay.values + drift, "m", RATE))
     assert "decay.one_sided" not in [one.code for one in fit.diagnostics]
+
+
+def judged_of(kind, k):
+    """The outcome of a random decay with one thing wrong."""
+    return random_signals.judged_decay(np.random.default_rng((7, random_signals.hash_of(kind), k)), kind)
+
+
+@pytest.mark.parametrize(
+    ("kind", "code"), [("shaker touches", "touches"), ("frequency creeps", "frequency_drift")]
+)
+def test_a_course_is_told_from_its_alternatives(kind, code):
+    outcomes = [judged_of(kind, k) for k in range(8)]
+    assert sum(f"decay.{code}" in one.codes for one in outcomes) >= 5
+    assert all(one.ratio < 5.0 or one.flagged for one in outcomes)
+
+
+def test_neither_softening_nor_two_laws_are_a_stop_or_a_creep():
+    for kind in ("", "quadratic damping", "dry friction"):
+        for k in range(6):
+            assert not {"decay.touches", "decay.frequency_drift"} & set(judged_of(kind, k).codes)
+
+
+def test_a_law_that_is_not_told_is_in_the_standard_error():
+    t = np.arange(1550) / 5000.0
+    fall = np.exp(-0.0083 * 2.0 * np.pi * 185.0 * t)
+    wave = fall / (1.0 + 0.9 * (1.0 - fall)) * np.cos(2.0 * np.pi * 185.0 * t)
+    for seed in range(4):
+        noise = 0.09 * np.random.default_rng(seed).standard_normal(t.size)
+        mode = identify_decay(make_signal(wave + noise, "m", 5000.0)).modes[0]
+        assert abs(mode.damping_ratio - 0.0083) < 5.0 * mode.damping_ratio_se

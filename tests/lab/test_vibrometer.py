@@ -8,7 +8,7 @@ import random_signals
 import scipy.signal
 
 from snapbeam.lab.drive_alignment import align, recorded_drive
-from snapbeam.lab.sensor_errors import beyond_shakers, find_low_pass
+from snapbeam.lab.sensor_errors import beyond_shakers
 from snapbeam.lab.signals import SignalSamples, make_signal
 from snapbeam.lab.sine_fit import fit_sine, spectral_peak
 from snapbeam.lab.vibrometer import displacement_from_velocity, measure_drive
@@ -273,20 +273,50 @@ def test_the_amplitude_behind_a_filter_and_a_saturated_amplifier_is_covered():
         assert abs(steady.amplitude - V) < 2.0 * steady.amplitude_se
 
 
-def test_integrated_noise_is_no_filter_and_noise_that_rises_first_no_crash():
-    rate, rng = 2e4, np.random.default_rng(3)
-    quiet = 0
-    for _ in range(40):
+def told_of_noise(noise):
+    """Diagnostics of a record of the shaker with this noise, by code."""
+    values = shaker(np.arange(noise.size) / 2e4)[1] + 3e-4 * noise / noise.std()
+    signal = make_signal(values, "m/s", 2e4, name="velocity")
+    return {one.code[11:]: one for one in measure_drive(signal, 100.0).diagnostics}
+
+
+def test_integrated_noise_is_no_filter():
+    rng = np.random.default_rng(3)
+    for _ in range(3):
         drifting = np.cumsum(rng.standard_normal(12_000))
-        quiet += find_low_pass(drifting - np.linspace(drifting[0], drifting[-1], 12_000), rate, 100.0) is None
-    assert quiet >= 38
-    rising = scipy.signal.lfilter(
-        *scipy.signal.butter(2, [800.0, 1600.0], "band", fs=rate), rng.standard_normal(12_000)
-    )
-    found = find_low_pass(rising + 0.03 * rng.standard_normal(12_000), rate, 100.0)
-    assert found is None or found.corner > 800.0
-    first = scipy.signal.lfilter(*scipy.signal.butter(1, 300.0, fs=rate), rng.standard_normal(12_000))
-    assert find_low_pass(first, rate, 100.0).corner == pytest.approx(300.0, rel=0.4)
+        told = told_of_noise(drifting - np.linspace(drifting[0], drifting[-1], 12_000))
+        assert not {"low_pass", "high_pass", "notch"} & set(told)
+
+
+def test_noise_behind_a_filter_of_first_order_tells_its_corner():
+    noise = np.random.default_rng(3).standard_normal(20_000)
+    told = told_of_noise(scipy.signal.lfilter(*scipy.signal.butter(1, 300.0, fs=2e4), noise))
+    assert told["low_pass"].numbers["corner"] == pytest.approx(300.0, rel=0.6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "least"),
+    [
+        ("notch", 2),
+        ("AC coupling", 2),
+        ("slew limit", 2),
+        ("hysteresis", 1),
+        ("jitter", 1),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (("clock drifts", 1), ("gain switched", 2), ("few bits", 2), ("sign flipped", 2),
+                         ("interpolated", 2), ("lost in step", 2))
+        ),
+    ],
+)  # fmt: skip
+def test_an_error_of_electronics_is_told_by_its_name(kind, least):
+    outcomes = [
+        random_signals.judged_drive(np.random.default_rng((9, random_signals.hash_of(kind), k)), kind)
+        for k in range(2)
+    ]
+    names = random_signals.CAUSES[kind].split()
+    assert sum(any(f"vibrometer.{name}" in one.codes for name in names) for one in outcomes) >= least
+    assert all(one.flagged or one.ratio < 5.0 for one in outcomes)
 
 
 def test_a_third_harmonic_of_the_shaker_itself_is_no_saturation():

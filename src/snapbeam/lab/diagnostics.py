@@ -284,10 +284,17 @@ KINDS_DECAY = table(
     ),
     Kind(
         "decay.frequency_drift", WARNING,
-        "the phase cycle by cycle, against the changes that softening makes",
+        "the phase cycle by cycle, against softening and a stop that the beam touches",
         "the frequency changes by {share_percent:+.2f} % over the decay in a way that its amplitude does not: the "
         "temperature, or a clamp that creeps; the frequency is that of the start, and the change is in its standard "
         "error",
+    ),
+    Kind(
+        "decay.touches", WARNING,
+        "amplitude and phase cycle by cycle, against softening, drag, dry friction and a creeping frequency",
+        "above {level_percent:.2g} % of the first amplitude the beam touches a stop on one side, as a shaker not yet drawn "
+        "back (both the frequency and the damping are higher there): the decay is taken from {until:.6g} s where enough "
+        "is left after it, else the difference is in the standard errors",
     ),
     Kind(
         "decay.window", WARNING,
@@ -535,7 +542,7 @@ KINDS_VIBROMETER = table(
     ),
     Kind(
         "vibrometer.low_pass", WARNING,
-        "noise of the sensor, octave by octave",
+        "spectrum of the noise and start of the motion, against coloured noise, low-pass, high-pass and notch filters",
         "the noise falls steeply from {corner:.3g} Hz on, as behind a low-pass filter: at the drive's frequency it takes "
         "up to {loss_percent:.2g} % of the amplitude, and delays the start by up to {delay_ms:.2g} ms, which is in the "
         "standard errors; switch the filter off, or set it above {wanted:.3g} Hz",
@@ -548,34 +555,34 @@ KINDS_VIBROMETER = table(
     ),
     Kind(
         "vibrometer.saturated", WARNING,
-        "odd harmonics, against a shaker's own third, saturation, a limited slew rate and a dead zone",
+        "odd harmonics, against a shaker's own third, saturation, a limited slew rate, a dead zone and play",
         "the tops are pressed flat as by an amplifier near its limit (third harmonic {third_percent:.2g} %): the amplitude "
         "may be {loss_percent:.2g} % too small, which is in its standard error; choose a larger range",
     ),
     Kind(
         "vibrometer.slew", WARNING,
-        "odd harmonics, against a shaker's own third, saturation, a limited slew rate and a dead zone",
+        "odd harmonics, against a shaker's own third, saturation, a limited slew rate, a dead zone and play",
         "the flanks are straight as of electronics with a limited slew rate (third harmonic {third_percent:.2g} %): the "
         "amplitude may be {loss_percent:.2g} % too small, which is in its standard error; choose a larger range, or a "
         "decoder for faster motion",
     ),
     Kind(
         "vibrometer.crossover", WARNING,
-        "odd harmonics, against a shaker's own third, saturation, a limited slew rate and a dead zone",
+        "odd harmonics, against a shaker's own third, saturation, a limited slew rate, a dead zone and play",
         "small values are suppressed as by an amplifier with a dead zone about zero (third harmonic "
         "{third_percent:.2g} %): the amplitude may be {loss_percent:.2g} % too small, which is in its standard error; "
         "look at the power supply of the amplifier, or record without it",
     ),
     Kind(
         "vibrometer.high_pass", WARNING,
-        "spectrum of the noise about the drive, against coloured noise, low-pass, high-pass and notch filters",
+        "spectrum of the noise and start of the motion, against coloured noise, low-pass, high-pass and notch filters",
         "the noise falls below {corner:.3g} Hz as behind a high-pass filter (AC coupling): at the drive's frequency it may "
         "take {loss_percent:.2g} % of the amplitude, which is in its standard error; switch to DC coupling, or to a "
         "corner below {limit:.2g} Hz",
     ),
     Kind(
         "vibrometer.notch", WARNING,
-        "spectrum of the noise about the drive, against coloured noise, low-pass, high-pass and notch filters",
+        "spectrum of the noise and start of the motion, against coloured noise, low-pass, high-pass and notch filters",
         "the noise has a hole at {centre:g} Hz as behind a notch filter: at the drive's frequency it may take "
         "{loss_percent:.2g} % of the amplitude, which is in its standard error; switch the filter off",
     ),
@@ -587,16 +594,59 @@ KINDS_VIBROMETER = table(
     ),
     Kind(
         "vibrometer.drifts", WARNING,
-        "amplitude and phase cycle by cycle, against constant ones, a drift and two close lines",
+        "amplitude and phase cycle by cycle, against constant ones, drifts of either and two close lines",
         "the amplitude drifts by {change_percent:.2g} % over the steady part (temperature of shaker or amplifier): half of "
         "that is in its standard error; let the shaker warm up, or cut the record",
     ),
     Kind(
         "vibrometer.beat", WARNING,
-        "amplitude and phase cycle by cycle, against constant ones, a drift and two close lines",
+        "amplitude and phase cycle by cycle, against constant ones, drifts of either and two close lines",
         "the amplitude changes by {change_percent:.2g} % and the phase bends by {bend:.2g} rad over the steady part, as "
         "where two lines beat that lie closer than one over the length of the record: which is in the standard errors; "
         "record longer",
+    ),
+    Kind(
+        "vibrometer.clock_drifts", WARNING,
+        "amplitude and phase cycle by cycle, against constant ones, drifts of either and two close lines",
+        "the frequency changes by {share_percent:.2g} % over the steady part at a constant amplitude (the generator, or the "
+        "clock of the record): half of that is in its standard error; let both warm up, or record with one clock",
+    ),
+    Kind(
+        "vibrometer.gain", ERROR,
+        "amplitude and phase of four cycles on either side of each cycle, against a start-up",
+        "at {at:.6g} s the amplitude changes {ratio:.3g} times from one constant to another (a range that was switched): "
+        "which of them is right is not in the record, and the difference is in the standard error; cut the record there "
+        "or record again with one range",
+    ),
+    Kind(
+        "vibrometer.sign", ERROR,
+        "amplitude and phase of four cycles on either side of each cycle, against a start-up",
+        "at {at:.6g} s the sign of the signal changes: which of them is right is not in the record; cut the record there",
+    ),
+    Kind(
+        "vibrometer.hysteresis", WARNING,
+        "odd harmonics, against a shaker's own third, saturation, a limited slew rate, a dead zone and play",
+        "the signal stays behind at every turning point as with play or hysteresis (third harmonic {third_percent:.2g} %): "
+        "the amplitude may be {loss_percent:.2g} % too small, which is in its standard error; look at the mount of the "
+        "sensor and its amplifier",
+    ),
+    Kind(
+        "vibrometer.jitter", WARNING,
+        "noise where the motion is fast, against noise where it is slow",
+        "the noise is strongest where the motion is fastest, as with a sampling clock that jitters by {jitter_us:.3g} us: "
+        "it takes {loss_percent:.2g} % of the amplitude, which is in its standard error; use the clock of the converter",
+    ),
+    Kind(
+        "vibrometer.few_bits", WARNING,
+        "distinct values of the record",
+        "the record has {levels:.0f} levels only, {steps:.2g} of them to the amplitude: their rounding is in the standard "
+        "error; choose a smaller range",
+    ),
+    Kind(
+        "vibrometer.interpolated", WARNING,
+        "samples that lie exactly on the line through their neighbours",
+        "the samples were put in between others, {each:.2g} of them to a cycle: straight lines or steps take "
+        "{loss_percent:.2g} % of the amplitude, which is in its standard error; take the samples as they were recorded",
     ),
     Kind(
         "vibrometer.one_sided", ERROR,

@@ -5,11 +5,12 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.signal import butter, lfilter
 from scipy.stats import chi2
 
 from snapbeam.lab.decay.poles import Line
@@ -23,74 +24,7 @@ _Array = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------------------------------------
-# Noise that is not white: a low-pass filter in the chain, and noise that drifts.
-
-
-_LINES = 32  # lines of a spectrum in a band, at least
-_STEEP = 10.0  # dB over two octaves; 1/f noise falls by 6, a filter of first order and integrated noise by 12
-_STEEPER = 16.0  # dB over two octaves that only a filter of second order takes
-_FLAT = 3.5  # dB an octave that noise before a filter of first order may fall; integrated noise falls by 6
-_FAR = 10.0  # times the drive's frequency; a filter above that changes the amplitude by less than 0.5 %
-
-
-class LowPass(NamedTuple):
-    """A low-pass filter seen in the noise: its ``corner`` [Hz] and its ``order``, at least."""
-
-    corner: float
-    order: int
-
-    def loss(self, frequency: float) -> float:
-        """Share of the amplitude at *frequency* [Hz] that the filter takes away."""
-        return 1.0 - 1.0 / math.sqrt(1.0 + (frequency / self.corner) ** (2 * self.order))
-
-    @property
-    def delay(self) -> float:
-        """Delay [s] of what passes."""
-        return self.order / (2.0 * math.pi * self.corner)
-
-
-def find_low_pass(residual: _Array, rate: float, frequency: float) -> LowPass | None:
-    """A low-pass filter that is near enough to change the amplitude, or None.
-
-    The noise of a laser, an amplifier or a converter is white or falls slowly with the frequency.  A filter behind
-    it makes it fall steeply.  Noise that was integrated falls as behind a filter of first order, but at all
-    frequencies: such a filter is told only where the noise below it is flat.
-
-    Parameters
-    ----------
-    residual
-        What the sine leaves of the steady motion.
-    rate
-        Samples per second [Hz].
-    frequency
-        Frequency of the drive [Hz].
-    """
-    n = residual.size
-    power = np.abs(np.fft.rfft(residual * np.hanning(n))) ** 2
-    freq = np.fft.rfftfreq(n, 1.0 / rate)
-    centres, levels = [], []
-    low = min(0.5 * frequency, _LINES * rate / n)
-    while 2.0 * low < 0.4 * rate:
-        band = (freq >= low) & (freq < 2.0 * low)
-        if band.sum() >= _LINES:
-            centres.append(math.sqrt(2.0) * low)
-            levels.append(10.0 * math.log10(max(float(np.median(power[band])), 1e-300)))
-        low *= 2.0
-    falls = np.array(levels)
-    steep = np.flatnonzero(falls[:-2] - falls[2:] > _STEEP)
-    if not steep.size:
-        return None
-    start = int(steep[0])
-    if (falls[:-2] - falls[2:]).max() < _STEEPER and (
-        start == 0 or (falls[0] - falls[start]) / start > _FLAT
-    ):
-        return None  # as white noise that was integrated
-    top = int(np.argmax(falls[: start + 1]))
-    steepest = float((falls[:-1] - falls[1:]).max())
-    k = top + int(np.flatnonzero(falls[top:] < falls[top] - 3.0)[0])
-    share = (falls[k - 1] - (falls[top] - 3.0)) / (falls[k - 1] - falls[k])
-    corner = centres[k - 1] * (centres[k] / centres[k - 1]) ** share
-    return LowPass(corner, max(1, round(steepest / 6.0) - 1)) if corner < _FAR * frequency else None
+# Noise that is not white.
 
 
 def noise_colour(quiet: _Array, rate: float, frequency: float) -> float:
@@ -175,16 +109,25 @@ def with_loss(fit: SineFit, share: float, shift: float = 0.0) -> SineFit:
 
 FALSE_ALARM_RATE = 1e-3
 """Rate of false alarms of one detector on one record, for normal noise."""
+_LINES = 32  # lines of a spectrum, at least
 _MATTERS = 0.004  # of the amplitude that an error must take, or move it by, to be of concern
+_SHIFTS = 5e-4  # of the frequency
+_AHEAD = 10.0  # chi-square by which an error must better what is none
 _CURVE_ERROR = 0.05  # of its harmonics by which a curve may differ from a family's
 _CHANGES = 0.02  # of the amplitude, or rad, by which a steady motion may change
 _EXPLAINS = 0.75  # of the odd harmonics that a curve must explain
+_BILINEAR = np.array([[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]])
+_START = 20.0  # cycles of the start that a filter shapes
+_CONSTANT = 4  # cycles on either side of a jump
 _TAIL = 4.0  # cycles after the start-up whose transient is no noise
 _MAINS = (50.0, 60.0, 100.0, 120.0)
 
 
 class Record(NamedTuple):
-    """A record as detectors see it: its steady part, the sine fitted to it and what that leaves, and its cycles."""
+    """A record as detectors see it: its steady part, the sine fitted to it and what that leaves, and its cycles.
+
+    ``early`` are the cycles before its start, ``moving`` the record from there on.
+    """
 
     fit: SineFit
     part: SignalSamples
@@ -192,6 +135,9 @@ class Record(NamedTuple):
     lines: tuple[float, ...]
     times: _Array
     cycles: NDArray[np.complex128]
+    early: NDArray[np.complex128]
+    moving: SignalSamples
+    clipped: bool
 
 
 class Hypothesis(NamedTuple):
@@ -213,19 +159,97 @@ class Hypothesis(NamedTuple):
         """Chi-square beyond what noise explains at the stated rate of false alarms."""
         return self.gain - float(chi2.isf(FALSE_ALARM_RATE, self.freedom))
 
+    @property
+    def matters(self) -> bool:
+        """True if it is an error that is to be told, and not only in the standard errors."""
+        return bool(self.kind) and (self.loss > _MATTERS or self.shift > _SHIFTS)
+
 
 def find_errors(record: Record) -> list[Hypothesis]:
-    """The best explanation of each detector, where it is an error that matters and not explained by chance.
+    """The best explanation of each detector, where it is not explained by chance; of a clipped record its converter's.
 
-    What another error leaves is no noise, so clocks and filters are judged where there is none.
+    What an error leaves is no noise and no clean course, so later groups of detectors are asked where the ones before
+    found nothing that matters.
     """
+    slow = np.asarray(
+        np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, record.left.size), 3), dtype=np.float64
+    )
+    record = record._replace(
+        left=record.left - slow @ solve(slow, record.left)
+    )  # a zero that drifts is no noise
     told: list[Hypothesis] = []
-    for detector in (_curves, _courses, _clocks, _filters):
-        if detector in (_clocks, _filters) and told:
+    for group in ((_converters, _jumps), (_curves, _courses), (_clocks, _jitter), (_filters,)):
+        if any(one.kind for one in told) or (record.clipped and group[0] is not _converters):
             break
-        best = max(detector(record), key=lambda one: one.score, default=None)
-        if best is not None and best.kind and best.score > 0.0 and max(best.loss, best.shift) > _MATTERS:
-            told.append(best)
+        for detector in group:
+            found = detector(record)
+            best = max(found, key=lambda one: one.score, default=None)
+            if best is None or not max(best.loss, best.shift) > 0.0:
+                continue
+            usual = max((one.score for one in found if not one.kind), default=0.0)
+            if best.score > (usual + _AHEAD if best.kind and usual > 0.0 else 0.0):
+                told.append(best)
+    return told
+
+
+def _converters(record: Record) -> list[Hypothesis]:
+    """Few levels, and samples put in between: no analogue noise has equal steps or three samples on a line."""
+    values, amplitude = record.part.values, record.fit.amplitude
+    levels = np.unique(np.round(values / (1e-6 * amplitude)))
+    steps = amplitude / (1e-6 * amplitude * float(np.median(np.diff(levels)))) if levels.size > 1 else 0.0
+    if levels.size < 0.02 * values.size and steps > 0.0:
+        numbers = {"levels": float(levels.size), "steps": steps}
+        return [Hypothesis("few_bits", math.inf, 1, 0.25 * steps**-1.5, numbers=numbers)]
+    tiny = 1e-9 * amplitude
+    for order in (1, 2):
+        bent = np.abs(np.diff(values, order)) > tiny
+        share = float(bent.mean()) / order
+        if (np.lib.stride_tricks.sliding_window_view(bent, 3).all(1)).any():
+            continue  # as flanks of a limited slew rate between round tops
+        each = share * record.part.sampling_frequency / record.fit.frequency
+        if share < 0.5 / order and each > 2.0:
+            lost = 1.0 - float(np.sinc(1.0 / each)) ** order
+            numbers = {"each": each, "loss_percent": 100.0 * lost}
+            return [Hypothesis("interpolated", math.inf, 1, lost / (1.0 - lost), numbers=numbers)]
+    return []
+
+
+def _jumps(record: Record) -> list[Hypothesis]:
+    """Gain or sign switched: the amplitude is constant over cycles before one of them, and another constant after it."""
+    course = np.concatenate([record.early, record.cycles])
+    if course.size < 4 * _CONSTANT:
+        return []
+    late = np.diff(record.cycles[record.cycles.size // 2 :], 2)
+    # the fit may turn a little faster than its parts
+    turns = float(np.median(np.angle(course[1:] * np.conj(course[:-1]))[record.early.size :]))
+    course = course * np.exp(-1j * turns * np.arange(course.size))
+    sd = float(np.median(np.abs(late))) / math.sqrt(6.0 * math.log(4.0)) + 1e-6 * record.fit.amplitude
+    parts = np.lib.stride_tricks.sliding_window_view(course, _CONSTANT)
+    mean, spread = (
+        parts.mean(1),
+        np.ptp(np.abs(parts), axis=1) + np.ptp(np.unwrap(np.angle(parts)), axis=1) * np.abs(parts.mean(1)),
+    )
+    before, after = mean[: -_CONSTANT - 1], mean[_CONSTANT + 1 :]
+    jump = np.abs(after - before)
+    constant = np.maximum(spread[: -_CONSTANT - 1], spread[_CONSTANT + 1 :]) < 0.15 * jump + 6.0 * sd
+    size = np.minimum(np.abs(before), np.abs(after)), np.maximum(np.abs(before), np.abs(after))
+    turned = np.abs(np.angle(after / np.where(before == 0.0, 1.0, before)))
+    kinds = {"gain": turned < 0.2, "sign": (turned > np.pi - 0.2) & (size[0] > 0.5 * size[1])}
+    seen = (
+        constant
+        & (size[0] > np.maximum(8.0 * sd, 0.03 * size[1]))
+        & (jump > np.maximum(12.0 * sd, 0.05 * size[1]))
+    )
+    told = []
+    for kind, alike in kinds.items():
+        at = np.flatnonzero(seen & alike)
+        if at.size:
+            k = int(at[np.argmax(jump[at])])
+            off = [abs(abs(one) / record.fit.amplitude - 1.0) for one in (before[k], after[k])]
+            time = float(record.times[0] + (k + _CONSTANT - record.early.size) / record.fit.frequency)
+            numbers = {"at": time, "ratio": float(abs(after[k]) / abs(before[k]))}
+            gain = 0.5 * _CONSTANT * float(jump[k]) ** 2 / sd**2
+            told.append(Hypothesis(kind, gain, 3, max(*off, 0.01), numbers=numbers))
     return told
 
 
@@ -242,10 +266,17 @@ def _families() -> dict[str, tuple[_Array, NDArray[np.complex128]]]:
     for k in range(1440):
         at = at + np.clip(wave[k % 720] - at, -share * turn[1], share * turn[1])
         lagging[k] = at
+    width = np.geomspace(2e-3, 0.15, 60)
+    played = np.empty((1440, width.size))
+    at = np.zeros(width.size)
+    for k in range(1440):
+        at = np.clip(at, wave[k % 720] - width, wave[k % 720] + width)
+        played[k] = at
     curves = {
         "saturated": np.hstack([np.tanh(drive * wave) / drive, np.arctan(drive * wave) / drive]),
         "crossover": np.sign(wave) * np.maximum(np.abs(wave) - dead, 0.0),
         "slew": lagging[720:],
+        "hysteresis": played[720:],
     }
     found = {}
     for kind, values in curves.items():
@@ -263,24 +294,88 @@ def _curves(record: Record) -> list[Hypothesis]:
         return []
     turned = fit.harmonic_phase[at] - (at + 1) * fit.harmonic_phase[0]
     seen = fit.harmonic_amplitude[at] / fit.amplitude * np.exp(1j * turned)
-    noise = fit.noise_rms * math.sqrt(2.0 / fit.samples) / fit.amplitude
-    variance = noise**2 + (_CURVE_ERROR * float(np.linalg.norm(seen))) ** 2
-    total = float((np.abs(seen) ** 2).sum()) / variance
+    noise = _noise_at(record, fit.frequency * np.asarray(at + 1, dtype=np.float64)) / fit.amplitude
     third = 100.0 * abs(seen[0])
-    told = [Hypothesis("", abs(seen[0]) ** 2 / variance, 2)]
-    for kind, (loss, templates) in _families().items():
-        left = (np.abs(seen[:, None] - templates[: at.size]) ** 2).sum(0) / variance
-        best = int(np.argmin(left))
-        lost = float(loss[best] / (1.0 - loss[best]))
-        numbers = {"third_percent": third, "loss_percent": 100.0 * lost}
-        explained = total - float(left[best])
-        if explained > _EXPLAINS * total:
-            told.append(Hypothesis(kind, explained, 1, lost, numbers=numbers))
+    own = abs(seen[0]) ** 2 / (float(noise[0]) ** 2 + (_CURVE_ERROR * float(np.linalg.norm(seen))) ** 2)
+    told = [Hypothesis("", own, 2)]
+    # the third harmonic is that of the curve, or the shaker has one of its own
+    for skipped, freedom in ((0, 1), (1, 5)):
+        part = seen[skipped:]
+        variance = noise[skipped:] ** 2 + (_CURVE_ERROR * float(np.linalg.norm(part))) ** 2
+        total = float((np.abs(part) ** 2 / variance).sum())
+        for kind, (loss, templates) in _families().items():
+            left = (np.abs(part[:, None] - templates[skipped : at.size]) ** 2 / variance[:, None]).sum(0)
+            best = int(np.argmin(left))
+            lost = float(loss[best] / (1.0 - loss[best]))
+            numbers = {"third_percent": third, "loss_percent": 100.0 * lost}
+            explained = total - float(left[best])
+            if explained > _EXPLAINS * total:
+                told.append(Hypothesis(kind, explained + own * skipped, freedom, lost, numbers=numbers))
     return told
 
 
+def _noise_at(record: Record, frequencies: _Array) -> _Array:
+    """Standard error of an amplitude at each frequency [Hz], from the residual about it."""
+    n, rate = record.left.size, record.part.sampling_frequency
+    power = np.abs(np.fft.rfft(record.left)) ** 2
+    away = np.abs(np.arange(power.size) - (frequencies * n / rate)[:, None])
+    near = (away > 2.0) & (away < 25.0)
+    return np.asarray(np.sqrt(2.0 * (near * power).sum(1) / near.sum(1)) * math.sqrt(2.0) / n)
+
+
+class _Filter(NamedTuple):
+    """A filter of the electronics: numerator and denominator in i f/f_0, and f_0 [Hz]."""
+
+    kind: str
+    above: tuple[float, ...]
+    below: tuple[float, ...]
+    centre: float
+
+    def response(self, frequency: ArrayLike) -> NDArray[np.complex128]:
+        """Complex response at frequencies [Hz]."""
+        turn = 1j * np.asarray(frequency) / self.centre
+        return np.asarray(np.polyval(self.above, turn) / np.polyval(self.below, turn))
+
+
+def _candidates(drive: float) -> Iterator[_Filter]:
+    """Filters that may lie in the chain: high-pass of first order, low-pass of the first four, notch at mains."""
+    for corner in np.geomspace(0.02, 2.0, 24) * drive:
+        yield _Filter("high_pass", (1.0, 0.0), (1.0, 1.0), float(corner))
+    for order in (1, 2, 4):
+        below = butter(order, 1.0, analog=True)[1]
+        for corner in np.geomspace(0.5, 10.0, 16) * drive:
+            yield _Filter("low_pass", (1.0,), tuple(below), float(corner))
+    for centre in _MAINS:
+        for quality in np.geomspace(1.0, 30.0, 24) if 0.6 < drive / centre < 1.6 else ():
+            yield _Filter("notch", (1.0, 0.0, 1.0), (1.0, 1.0 / quality, 1.0), centre)
+
+
 def _filters(record: Record) -> list[Hypothesis]:
-    """Filters behind the source of the noise, by the shape of its spectrum about the drive (Whittle's likelihood)."""
+    """Filters, by the spectrum of the noise about the drive and by what they make of the start of the motion."""
+    drive = record.fit.frequency
+    noise = _noise_misfit(record)
+    plain = noise(None)
+    candidates = list(_candidates(drive))
+    start = _start_gains(record, candidates)
+    told = [Hypothesis("", 0.0, 1)]
+    for one, gain in zip(candidates, start, strict=True):
+        kept = max(float(abs(one.response(drive))), 1e-3)
+        order = len(one.below) - 1
+        numbers = {
+            "corner": one.centre,
+            "centre": one.centre,
+            "loss_percent": 100.0 * (1.0 - kept),
+            "limit": 0.05 * drive,
+            "wanted": 20.0 * drive,
+            "delay_ms": 1e3 * order / (2.0 * math.pi * one.centre),
+        }
+        gain += plain - noise(one)
+        told.append(Hypothesis(one.kind, gain, 2, 1.0 / kept - 1.0, numbers=numbers))
+    return told
+
+
+def _noise_misfit(record: Record) -> Callable[[_Filter | None], float]:
+    """Twice the negative logarithm of Whittle's likelihood of the noise behind a response, least over its colours."""
     rate, drive = record.part.sampling_frequency, record.fit.frequency
     left = record.left[min(round(_TAIL * rate / drive), record.left.size // 4) :]
     n = left.size
@@ -290,56 +385,82 @@ def _filters(record: Record) -> list[Hypothesis]:
     for line in (*record.lines, *(drive * np.arange(1, 13))):
         used &= np.abs(freq - line) > 1.5 * rate / n
     freq, power = freq[used], power[used]
-    if freq.size < 2 * _LINES or not power.min() > 0.0:
-        return []
+    if freq.size < 2 * _LINES or not power.min() > 1e-18 * n * record.fit.amplitude**2:
+        return lambda one: 0.0  # a computed signal has no noise that a filter shapes
     # neighbours that differ in frequency by less than 1 % are averaged
     edges = np.unique(
         np.searchsorted(freq, freq[0] * 1.01 ** np.arange(math.log(freq[-1] / freq[0]) / 0.00996))
     )
     count = np.diff(np.append(edges, freq.size))
     freq, power = np.add.reduceat(freq, edges) / count, np.add.reduceat(power, edges) / count
+    slope, white = np.meshgrid(np.linspace(-2.0, 2.0, 9), [0.0, 0.1, 1.0, 10.0])
+    colours = (freq / drive) ** -slope.reshape(-1, 1) + white.reshape(-1, 1)
+    slope, knee = np.meshgrid([0.5, 1.0], np.geomspace(0.03, 3.0, 9))
+    bent = ((freq / drive) ** 2 + knee.reshape(-1, 1) ** 2) ** (-0.5 * slope.reshape(-1, 1))
+    colours = np.vstack([colours, bent])
+    falling = colours[:, 0] >= colours[:, -1]
 
-    def misfit(response: _Array) -> float:
-        """Twice the negative logarithm of the likelihood behind *response*, least over colours of the noise."""
-        shape = colours * response
+    def misfit(one: _Filter | None) -> float:
+        kept = 1.0 if one is None else np.maximum(np.abs(one.response(freq)) ** 2, 1e-4)
+        # noise that rises and is filtered again would explain any hill
+        shape = (colours[falling] if one is not None and one.kind == "low_pass" else colours) * kept
         level = (count * power / shape).sum(-1) / count.sum()
         return 2.0 * float(np.min(count.sum() * np.log(level) + (count * np.log(shape)).sum(-1)))
 
-    slope, white = np.meshgrid(np.linspace(-2.0, 2.0, 9), [0.0, 0.1, 1.0, 10.0])
-    colours = (freq / drive) ** -slope.reshape(-1, 1) + white.reshape(-1, 1)
-    plain = misfit(np.ones_like(freq))
-    told = [Hypothesis("", 0.0, 1)]
-    for kind, corners in (
-        ("high_pass", np.geomspace(0.02, 2.0, 24) * drive),
-        ("low_pass", np.geomspace(0.5, 10.0, 16) * drive),
-    ):
-        for corner in corners:
-            sign = 2.0 if kind == "high_pass" else -2.0
-            loss = 1.0 - 1.0 / math.sqrt(1.0 + (drive / corner) ** -sign)
-            kept = 1.0 / (1.0 + (freq / corner) ** -sign)
-            numbers = {"corner": corner, "loss_percent": 100.0 * loss, "limit": 0.05 * drive}
-            told.append(
-                Hypothesis(
-                    kind if sign > 0.0 else "", plain - misfit(kept), 2, loss / (1.0 - loss), numbers=numbers
-                )
+    return misfit
+
+
+def _start_gains(record: Record, filters: list[_Filter]) -> list[float]:
+    """Chi-square that filters explain of the first cycles, as a shaker's exponential start-up behind each.
+
+    A low-pass makes a start alike to a gentle one, so it is not judged by it.
+    """
+    fit, moving = record.fit, record.moving
+    every = max(int(moving.sampling_frequency / (40.0 * fit.frequency)), 1)
+    count = min(int(_START * moving.sampling_frequency / fit.frequency), moving.values.size)
+    time = moving.time[:count:every] - moving.time[0]
+    if not record.early.size or time.size < 200:
+        return [0.0] * len(filters)
+    aim = moving.values[:count:every] - fit.offset
+    turn = np.exp(2j * math.pi * fit.frequency * time)
+    waves = [turn * np.exp(-time * rate) for rate in (0.0, 8.0, 40.0, 200.0)] + [
+        turn**2,
+        turn**3,
+    ]
+    columns = np.column_stack([part for wave in waves for part in (wave.real, wave.imag)])
+    rate, slow = moving.sampling_frequency / every, np.column_stack([np.ones_like(time), time])
+
+    def left(one: _Filter | None) -> float:
+        passed = columns
+        if one is not None:
+            speed = rate / (math.pi * one.centre)
+            above, below = (
+                np.pad(side, (3 - len(side), 0)) * np.array([speed**2, speed, 1.0]) @ _BILINEAR
+                for side in (one.above, one.below)
             )
-    for centre in _MAINS:
-        for quality in (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0):
-            off = quality * (freq / centre - centre / freq)
-            own = quality * (drive / centre - centre / drive)
-            loss = 1.0 - abs(own) / math.hypot(1.0, own)
-            numbers = {"centre": centre, "loss_percent": 100.0 * loss}
-            kept = np.maximum(off**2 / (1.0 + off**2), 1e-4)
-            told.append(
-                Hypothesis("notch", plain - misfit(kept), 2, loss / max(1.0 - loss, 1e-3), numbers=numbers)
-            )
-    return told
+            passed = lfilter(above, below, columns, axis=0)
+        design = np.hstack([passed, slow])
+        rest = (aim - design @ solve(design, aim, 1e-10))[2:]
+        return float(rest @ rest)
+
+    plain = left(None)
+    rests = np.array([plain if one.kind == "low_pass" else left(one) for one in filters])
+    # what no filter explains is no noise
+    unit = max(fit.noise_rms**2, 1e-12 * fit.amplitude**2, float(rests.min()) / time.size)
+    gains: _Array = (plain - rests) / unit
+    # noise that drifts looks as the tail behind a high-pass
+    slow_noise = noise_colour(record.left, record.part.sampling_frequency, fit.frequency) ** 2
+    scale = [slow_noise if one.kind == "high_pass" else 1.0 for one in filters]
+    return np.asarray(gains / scale).tolist()
 
 
 def _clocks(record: Record) -> list[Hypothesis]:
     """Samples lost at even distances: the phase rises evenly and jumps by whole samples."""
     fit, n = record.fit, record.left.size
     turn = 2.0 * np.pi * fit.frequency * record.part.time + fit.phase
+    stepped = _in_step(record)
+    if stepped and max(stepped, key=lambda one: one.score).kind:
+        return stepped
     phase = -2.0 * record.left * np.sin(turn) / fit.amplitude
     sample = 2.0 * np.pi * fit.frequency / record.part.sampling_frequency
     power = np.abs(np.fft.rfft(phase * np.hanning(n))) ** 2 * (8.0 / 3.0)
@@ -347,7 +468,7 @@ def _clocks(record: Record) -> list[Hypothesis]:
     at = int(np.argmax(power))
     noise = max(float(np.median(power)) / math.log(2.0), 1e-300)
     if power[at] < math.log(n / FALSE_ALARM_RATE) * noise:
-        return []
+        return stepped
     told = [Hypothesis("", 2.0 * power[at] / noise, 3)]
     about = n / at
     for multiple in (1, 2, 3):
@@ -369,6 +490,62 @@ def _clocks(record: Record) -> list[Hypothesis]:
     return told
 
 
+def _in_step(record: Record) -> list[Hypothesis]:
+    """Samples lost in step with the drive: the mean cycle jumps by as many samples, between all of its harmonics."""
+    fit, rate = record.fit, record.part.sampling_frequency
+    size = round(rate / fit.frequency)
+    if abs(rate / fit.frequency - size) * fit.cycles > 0.5:
+        return []
+    rows = record.left.size // size
+    mean = record.left[: rows * size].reshape(rows, size).mean(0)
+    time = record.part.time[:size]
+    turn = 2.0 * np.pi * (fit.frequency * time) * np.arange(1, fit.harmonic_amplitude.size + 1)[:, None]
+    slope = -(fit.harmonic_amplitude * np.sin(turn + fit.harmonic_phase[:, None]).T).T
+    fast = (slope * np.arange(1, slope.shape[0] + 1)[:, None]).sum(0) * 2.0 * np.pi / size
+    own = sines(time, fit.frequency * np.arange(1, slope.shape[0] + 1))
+    variance = fit.noise_rms**2 / rows
+    told = [Hypothesis("", 0.0, 1)]
+    for parts in (1, 2, 3, 4, 5):
+        # (n + parts j/size) samples have gone by; their share that the fit took as a frequency is left out
+        saw = np.mod(np.arange(size) * parts / size, 1.0) - 0.5
+        waves = np.column_stack([-np.roll(saw, k) * fast for k in range(math.ceil(size / parts))])
+        waves -= own @ np.linalg.lstsq(own, waves, rcond=None)[0]
+        strength = (waves * waves).sum(0)
+        height = waves.T @ mean / strength
+        gain = height**2 * strength / variance
+        best = int(np.argmax(gain))
+        if abs(height[best] - 1.0) < 0.25:
+            numbers = {"lost": 1.0, "every": size / parts + 1.0, "share_percent": 100.0 * parts / size}
+            shift = parts / (size + parts)
+            told.append(Hypothesis("samples_lost", float(gain[best]), 5, shift, shift, numbers))
+        else:
+            told.append(Hypothesis("", float(gain[best]), 5))
+    return told
+
+
+def _jitter(record: Record) -> list[Hypothesis]:
+    """Jitter of the sampling clock: noise that is strongest where the motion is fastest, at twice its frequency."""
+    fit, n = record.fit, record.left.size
+    turn = 2.0 * np.pi * fit.frequency * record.part.time + fit.phase
+    power = record.left**2 - float((record.left**2).mean())
+    lines = [2.0 * fit.frequency + k * fit.frequency * 0.5 / max(fit.cycles, 1.0) for k in range(8, 40)]
+    about = np.abs(np.exp(-2j * np.pi * np.outer(lines, record.part.time)) @ power) ** 2
+    seen = complex(np.exp(-2j * turn) @ power)
+    noise = max(float(np.mean(about)), 1e-300)
+    jitter = -4.0 * seen.real / n / fit.amplitude**2
+    if jitter <= 0.0:
+        return []
+    loss = 0.5 * jitter
+    numbers = {
+        "jitter_us": 1e6 * math.sqrt(jitter) / (2.0 * math.pi * fit.frequency),
+        "loss_percent": 100.0 * loss,
+    }
+    return [
+        Hypothesis("jitter", 2.0 * seen.real**2 / noise, 1, loss, numbers=numbers),
+        Hypothesis("", 2.0 * seen.imag**2 / noise, 1),
+    ]
+
+
 def _courses(record: Record) -> list[Hypothesis]:
     """Amplitude and phase over the steady part: constant, drifting, or bent as by a line too close to be parted."""
     inside = (record.times > record.fit.start) & (record.times < record.fit.stop)
@@ -387,20 +564,23 @@ def _courses(record: Record) -> list[Hypothesis]:
     found[0][0] = found[1][0] = found[1][1] = 0.0
     change, bend = (float(np.ptp(basis @ coefficients)) for coefficients in found)
     line = float(np.ptp(basis[:, :2] @ found[0][:2]))
-    if max(change, bend) < _CHANGES:
-        return []
+    kinds = ("drifts", "beat", "clock_drifts") if max(change, bend) > _CHANGES else ("", "", "")
     span = float(t[-1] - t[0]) * record.fit.frequency
     numbers = {"change_percent": 100.0 * change, "bend": bend}
+    turned = 6.0 * float(np.abs(found[1][2:4]).sum()) / (2.0 * np.pi * span)
     slow, close = float(gain[0][1:3].sum()), float(gain[0][1:].sum() + gain[1][2:].sum())
     return [
-        Hypothesis("drifts", slow if line > 0.8 * change else 0.0, 2, 0.5 * change, numbers=numbers),
+        Hypothesis(kinds[0], slow if line > 0.8 * change else 0.0, 2, 0.5 * change, numbers=numbers),
         Hypothesis(
-            "beat",
-            close if bend > _CHANGES else 0.0,
+            kinds[1],
+            close if bend > _CHANGES and change > 0.1 * bend else 0.0,
             9,
             0.5 * change,
             math.hypot(change, bend) / (2.0 * np.pi * span),
             numbers,
+        ),
+        Hypothesis(
+            kinds[2], float(gain[1][2:4].sum()), 2, 0.0, turned, numbers | {"share_percent": 200.0 * turned}
         ),
     ]
 

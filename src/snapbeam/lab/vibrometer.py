@@ -19,13 +19,11 @@ from snapbeam.lab.diagnostics import KINDS_VIBROMETER
 from snapbeam.lab.least_squares import covariance, phasors, sines, solve
 from snapbeam.lab.sensor_errors import (
     Hypothesis,
-    LowPass,
     Record,
     beside_acceleration,
     beyond_shakers,
     find_crosstalk,
     find_errors,
-    find_low_pass,
     noise_colour,
     one_sided,
     with_loss,
@@ -686,23 +684,17 @@ def measure_drive(
         moving = _slice(samples, first, last)
         settled_part = _slice(moving, moving.values.size // 3, None)
         rough = robust_fit(settled_part, rough.frequency, 3)
-    left = settled_part.values - rough.waveform(settled_part.time)
-    low_pass = None
-    if (
-        float(np.std(left)) > _NOISE_FLOOR * rough.amplitude
-    ):  # a computed signal has no noise that a filter shapes
-        low_pass = find_low_pass(left, samples.sampling_frequency, rough.frequency)
     rest_end = _rest_end(samples, first, rough)
     crosstalk = find_crosstalk(samples, rest_end, rough)
     onset, uncertainty = find_onset(
         without_lines(samples, [crosstalk]) if crosstalk is not None else samples, first, rough
     )
-    if low_pass is not None:
-        uncertainty = math.hypot(uncertainty, low_pass.delay)
     start = float(samples.time[0]) if onset is None else onset
     period = 1.0 / rough.frequency
     stop = float(moving.time[-1]) + 1.0 / samples.sampling_frequency
-    times, cycles = _cycle_phasors(samples, rough, start, stop)
+    before = 0 if onset is None or crosstalk is not None else int((start - samples.time[0]) * rough.frequency)
+    times, cycles = _cycle_phasors(samples, rough, start - before * period, stop)
+    early, times, cycles = cycles[:before], times[before:], cycles[before:]
     noise = rough.noise_rms * math.sqrt(2.0 / (period * samples.sampling_frequency))
     tol = max(tol, 4.0 * noise / rough.amplitude)
     settled, stray = settled_cycles(cycles, tol)
@@ -719,13 +711,22 @@ def measure_drive(
     left = part.values - steady.waveform(part.time)
     left[~sound_samples(left.size, flaws)] = 0.0
     others = tuple(line.frequency for line in (*lines.hum, *lines.beside))
-    errors = [] if clipping.found else find_errors(Record(steady, part, left, others, times, cycles))
-    if any(one.kind in ("samples_lost", "beat") for one in errors):
+    whole = _slice(samples, *np.searchsorted(samples.time, (start, stop)).tolist())
+    record = Record(steady, part, left, others, times, cycles, early, whole, clipping.found)
+    errors = find_errors(record)
+    kinds = {one.kind for one in errors if one.matters}
+    if kinds & {"samples_lost", "beat", "interpolated", "gain", "sign", "few_bits"}:
         lines = DriveLines(lines.hum, ())  # which make the lines beside
+    if "few_bits" in kinds:
+        clipping = Clipping(-math.inf, math.inf, 0.0, 0.0)  # whose levels are hit again and again
     for one in errors:
         steady = with_loss(steady, one.loss, one.shift)
-    if low_pass is not None:
-        steady = with_loss(steady, low_pass.loss(steady.frequency))
+        if one.kind == "low_pass":
+            uncertainty = math.hypot(uncertainty, 1e-3 * one.numbers["delay_ms"])
+        elif one.kind == "interpolated":
+            uncertainty = math.hypot(uncertainty, period / one.numbers["each"])
+        elif one.kind in ("gain", "sign"):
+            uncertainty = math.hypot(uncertainty, start - float(samples.time[0]))
     if crosstalk is not None:
         steady = beside_lines(steady, DriveLines((), (crosstalk,)))
     mean_moves = one_sided(samples, rest_end, first, last, rough)
@@ -739,14 +740,15 @@ def measure_drive(
             overshoot=peak if peak > tol else 0.0, first_cycle_ratio=float(amplitudes[0] / steady.amplitude),
             tolerance=tol,
         )  # fmt: skip
-        broken = _broken_start(samples, onset, onset + settled * period, steady, clipping)
+        if "few_bits" not in kinds:
+            broken = _broken_start(samples, onset, onset + settled * period, steady, clipping)
     diagnostics = [
         *diagnostics_of(signal),
         *_flaw_diagnostics(samples, everywhere, broken, clipping),
         *_doubts(steady, limit, wander, stray, frequency, stated),
         *_start_diagnostics(startup, period),
         *_line_diagnostics(lines, steady),
-        *_sensor_diagnostics(steady, low_pass, crosstalk, errors, mean_moves),
+        *_sensor_diagnostics(steady, crosstalk, errors, mean_moves),
         *_not_there(samples, steady, frequency),
         *beyond_shakers(steady, str(signal.attrs["units"])),
         *_against(acceleration, steady, str(signal.attrs["units"])),
@@ -849,20 +851,15 @@ def _rest_end(samples: SignalSamples, first: int, rough: SineFit) -> int:
 
 def _sensor_diagnostics(
     steady: SineFit,
-    low_pass: LowPass | None,
     crosstalk: Line | None,
     errors: list[Hypothesis],
     mean_moves: float,
 ) -> list[Diagnostic]:
     told = []
-    if low_pass is not None:
-        loss, wanted = 100.0 * low_pass.loss(steady.frequency), 20.0 * steady.frequency
-        numbers = {"corner": low_pass.corner, "loss_percent": loss, "delay_ms": 1e3 * low_pass.delay}
-        told.append(KINDS_VIBROMETER["low_pass"].found(None, "", **numbers, wanted=wanted))
     if crosstalk is not None:
         share = 100.0 * crosstalk.amplitude / steady.amplitude
         told.append(KINDS_VIBROMETER["crosstalk"].found(share_percent=share))
-    told += [KINDS_VIBROMETER[one.kind].found(None, "", **one.numbers) for one in errors]
+    told += [KINDS_VIBROMETER[one.kind].found(None, "", **one.numbers) for one in errors if one.matters]
     if mean_moves > 0.0:
         told.append(KINDS_VIBROMETER["one_sided"].found(share=mean_moves))
     return told

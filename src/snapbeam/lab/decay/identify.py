@@ -122,7 +122,7 @@ def identify_decay(
     samples = check_signal(signal)
     if exponential_window is not None:
         samples = undone(samples, positive("exponential_window", exponential_window, "s"))
-    decay = prepared(samples, start, stop)
+    decay = prepared(samples, start, stop, buckling_level is not None)
     centres = find_centres(decay, count, asked)
     told = list(centres.told)
     known = _known_softening(buckling_level, units, centres.wanted[0])
@@ -154,7 +154,7 @@ def identify_decay(
             if falls.even
             else KINDS_DECAY["fade"].found(factor=falls.factor, added_percent=added)
         )
-    wanted = widened(wanted, decay.drift, falls.rate if falls is not None else 0.0)
+    wanted = widened(wanted, decay.doubt, falls.rate if falls is not None else 0.0)
     free = [mode.natural_frequency for mode in wanted]
     lines = [0.0, *free, *(2.0 * f for f in free)]
     near = white_variance(result.residual, samples.sampling_frequency, free[0], lines, 3 * len(free))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -27,6 +28,7 @@ from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.validation import InputError
 
 _MISFIT = 1.7  # times the noise that a fit may leave near the first mode
+_CANCEL = 1.0  # of the range of a record that the amplitude of a mode may reach; more is cancelled by another
 _MANY = 12_000  # samples from which a record is thinned before it is fitted
 
 
@@ -132,17 +134,30 @@ def _group_fit(
     """Modes fitted together; where they leave more than noise, a second law of damping or a close mode."""
     start = float(samples.time[0])
     guesses, cycles = _guesses(samples, centres, own, units, soften)
-    told: list[Diagnostic] = []
     apart = [pole for pole in beside if _apart(samples, pole, guesses)]
+    made: tuple[FitResult, float, float, list[Diagnostic]] | None = None
+    for some in ([], apart) if apart else ([],):
+        if some and made is not None and made[0].modes[0].law != "viscous" and made[1] < _MISFIT:
+            apart = []
+            break  # a law of damping explains what looked like modes
+        result = fit_decay(
+            samples, [*guesses, *(_of_pole(pole) for pole in some)], units, soften=soften, known=known
+        )
+        largest = max(mode.amplitude for mode in result.modes)
+        if made is not None and largest > _CANCEL * float(np.ptp(samples.values)):
+            apart = []
+            break
+        alone = _own_cycles(samples, result, cycles)
+        rate = 2.0 * math.pi * result.modes[0].natural_frequency * result.modes[0].damping_ratio
+        law, doubt = find_law(alone, start, rate)
+        left = misfit_of(samples, result.residual, result.modes).ratio
+        told: list[Diagnostic] = []
+        if law is not None:
+            result, left, told = _with_law(samples, result, left, units, soften, known, law)
+        made = result, left, doubt, told
+    assert made is not None
+    result, left, doubt, told = made
     guesses = [*guesses, *(_of_pole(pole) for pole in apart)]
-    result = fit_decay(samples, guesses, units, soften=soften, known=known)
-    alone = _own_cycles(samples, result, cycles)
-    law = find_law(
-        alone, start, 2.0 * math.pi * result.modes[0].natural_frequency * result.modes[0].damping_ratio
-    )
-    left = misfit_of(samples, result.residual, result.modes).ratio
-    if law is not None:
-        result, left, told = _with_law(samples, result, left, units, soften, known, law)
     if left > _MISFIT and len(guesses) < 8:
         near = [pole for pole in beside if pole not in apart]
         better, diagram = _with_close_mode(samples, result, near, units, diagram)
@@ -151,6 +166,10 @@ def _group_fit(
             first = better.modes[0].natural_frequency
             second = min((mode.natural_frequency for mode in better.modes[1:]), key=lambda f: abs(f - first))
             told = [KINDS_DECAY["close_modes"].found(first=first, second=second)]
+    if result.modes[0].law == "viscous":
+        first_mode = result.modes[0]
+        error = math.hypot(first_mode.damping_ratio_se, doubt * first_mode.damping_ratio)
+        result.modes[0] = dataclasses.replace(first_mode, damping_ratio_se=error)
     return result, _own_cycles(samples, result, cycles), told, diagram
 
 

@@ -330,6 +330,8 @@ def backbone(cycles: Cycles, parts: int = 12) -> tuple[_Array, _Array, _Array]:
 
 LAWS = ("viscous", "dry", "quadratic")
 _CERTAIN = 30.0  # chi-square by which a second law must better the fit
+_MOST = 0.45  # of the viscous rate that laws which are not told may put in doubt; more is no damping
+_ODDS = 6.0  # chi-square at which a second law is as likely as none: its parameter, and that it is rare
 _MATTERS = 0.03  # change of the viscous rate from which it matters
 
 
@@ -356,8 +358,16 @@ def envelope(law: str, time: _Array, decay_rate: float, strength: float) -> _Arr
     return np.asarray(fall)
 
 
-def find_law(cycles: Cycles, start: float, decay_rate: float) -> DampingLaw | None:
+def likely(gain: float, odds: float = _ODDS) -> float:
+    """Probability of an explanation that betters the usual one by so much chi-square, even at *odds*."""
+    return 1.0 / (1.0 + math.exp(min(0.5 * (odds - gain), 700.0)))
+
+
+def find_law(cycles: Cycles, start: float, decay_rate: float) -> tuple[DampingLaw | None, float]:
     """The second law of damping that the amplitude of each cycle shows; None if viscous damping says it all.
+
+    With it comes the share of the viscous rate that laws which are not told put in doubt: its change under each, by the
+    root of the probability of that law.
 
     Parameters
     ----------
@@ -370,7 +380,7 @@ def find_law(cycles: Cycles, start: float, decay_rate: float) -> DampingLaw | No
     """
     t = cycles.time - start
     if t.size < 10:
-        return None
+        return None, 0.0
     first = float(cycles.amplitude[0]) * math.exp(decay_rate * float(t[0]))
     noise = max(cycles.noise, 1e-6 * first)
 
@@ -390,11 +400,12 @@ def find_law(cycles: Cycles, start: float, decay_rate: float) -> DampingLaw | No
     rate = max(decay_rate, 1e-6)
     plain, chi, _ = fitted("viscous", [math.log(first), math.log(rate)])
     best: DampingLaw | None = None
-    least = chi
+    least, doubt = chi, 0.0
     for law in LAWS[1:]:
         p, better, spread = fitted(law, [math.log(first), math.log(0.7 * rate), 0.5])
         unit = max(1.0, better / max(t.size - 3, 1))
         changed = abs(math.exp(p[1] - plain[1]) - 1.0)
+        doubt = max(doubt, math.sqrt(likely((chi - better) / unit)) * changed)
         if (
             better < least
             and (chi - better) / unit > _CERTAIN
@@ -410,7 +421,7 @@ def find_law(cycles: Cycles, start: float, decay_rate: float) -> DampingLaw | No
                 value,
                 value * float(spread[1]) * math.sqrt(unit),
             )
-    return best
+    return best, min(doubt, _MOST) if best is None else 0.0
 
 
 # ----------------------------------------------------------------------------------------------------

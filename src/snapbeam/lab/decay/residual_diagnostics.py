@@ -12,6 +12,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from snapbeam.lab.decay.fit import FitResult
 from snapbeam.lab.decay.model import Cycles, ModeEstimate, envelope
+from snapbeam.lab.decay.window import Doubt
 from snapbeam.lab.diagnostics import KINDS_DECAY
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.util.diagnostics import Diagnostic
@@ -163,21 +164,23 @@ def sampled_diagnostics(modes: tuple[ModeEstimate, ...], sampling_frequency: flo
     ]
 
 
-def widened(modes: tuple[ModeEstimate, ...], drift: float, added: float) -> tuple[ModeEstimate, ...]:
-    """Modes whose errors hold a *drift* of the frequency, a share of it, and a rate [1/s] *added* by a window."""
-    if drift == 0.0 and added == 0.0:
-        return modes
+def widened(modes: tuple[ModeEstimate, ...], doubt: Doubt, added: float) -> tuple[ModeEstimate, ...]:
+    """Modes whose errors hold a *doubt*, and a rate [1/s] *added* by a window."""
     first = modes[0].amplitude ** 2
     return tuple(
         dataclasses.replace(
             mode,
-            natural_frequency_se=math.hypot(mode.natural_frequency_se, drift * mode.natural_frequency),
+            natural_frequency_se=math.hypot(
+                mode.natural_frequency_se, doubt.frequency * mode.natural_frequency
+            ),
             damping_ratio_se=math.hypot(
                 mode.damping_ratio_se,
                 added / (2.0 * math.pi * mode.natural_frequency),
-                drift * mode.damping_ratio,
+                max(doubt) * mode.damping_ratio,
             ),
-            softening_se=math.hypot(mode.softening_se, drift / first if mode.softening_se > 0.0 else 0.0),
+            softening_se=math.hypot(
+                mode.softening_se, doubt.frequency / first if mode.softening_se > 0.0 else 0.0
+            ),
         )
         for mode in modes
     )

@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.optimize import isotonic_regression
 
-from snapbeam.lab.decay.model import Cycles, hilbert_cycles, noise_level, regress
+from snapbeam.lab.decay.model import Cycles, hilbert_cycles, likely, noise_level, regress
 from snapbeam.lab.decay.poles import (
     Line,
     Pole,
@@ -24,12 +24,15 @@ from snapbeam.lab.decay.poles import (
     without_lines,
 )
 from snapbeam.lab.diagnostics import KINDS_DECAY
+from snapbeam.lab.sensor_errors import Hypothesis
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import stuck_runs
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.validation import InputError, finite
 
 # ----------------------------------------------------------------------------------------------------
+_Array = NDArray[np.float64]
+
 # Which part of a record is a free decay: from the release on, below the ceiling, until something disturbs it.
 
 
@@ -41,6 +44,13 @@ class Ceiling(NamedTuple):
     """Tops cut off up to the sample *until*."""
 
     until: int
+
+
+class Doubt(NamedTuple):
+    """Share by which the frequency and the damping ratio are in doubt."""
+
+    frequency: float = 0.0
+    damping: float = 0.0
 
 
 class AmplitudeJump(NamedTuple):
@@ -177,21 +187,32 @@ def one_sided(samples: SignalSamples, frequency: float) -> bool:
 
 
 # ----------------------------------------------------------------------------------------------------
-# A natural frequency that changes with time, as with temperature, told from one that changes with amplitude.
+# Hypotheses about the course of amplitude and phase: a mode that softens and is damped by one of three laws, a frequency
+# that changes with time as with temperature, a stop that the beam touches while its amplitude is large.
 
 
-_CERTAIN = 5.0  # standard errors
-_EXPLAINED = 2.0  # times the noise that a drift may leave
+_EXPLAINED = 2.0  # times the noise that the likeliest may leave; more is left by two modes that beat
+_BETTER = 4.0  # times as much that the others must leave then
 _MATTERS = 1e-4  # of the frequency, over the record
 _SECOND = 2.0  # times the square of the softening that its next order may be, to a standard deviation
+_LEVELS = np.geomspace(0.06, 0.65, 22)  # of the first amplitude at which a stop may stand
+_TOLD = 16.0  # chi-square by which an explanation must better all others to be told
 
 
-def frequency_drift(cycles: Cycles, frequency: float) -> float:
-    """Relative change of a frequency over a decay with time alone; 0 if it is within its error.
+def touching(ratio: _Array) -> _Array:
+    """Describing function of a stop on one side, of stiffness and damping alike, by amplitude over its distance."""
+    angle = np.arccos(1.0 / np.maximum(ratio, 1.0))
+    return np.asarray((angle - np.sin(angle) * np.cos(angle)) / math.pi)
+
+
+def courses(cycles: Cycles, frequency: float) -> list[Hypothesis]:
+    """Hypotheses about amplitude and phase of a decay, the likeliest first; none for less than 14 cycles.
 
     The phase of the cycles is a line, the integrals of a^2 and a^4 (softening, a the amplitude of the cycles as it is;
-    the second is held to the size that goes with the first) and, where the frequency drifts at a steady rate, t^2: a
-    drift goes on where little amplitude is left.
+    the second is held to the size that goes with the first) and, where the frequency creeps at a steady rate, t^2.
+    The logarithm of the amplitude is a line, and the integral of a (drag) or 1/a (friction).  A stop adds to both
+    the integral of its describing function.  ``loss`` is the change of the decay rate, and ``shift`` that of the frequency
+    over the record, relative to those of the straight lines.
 
     Parameters
     ----------
@@ -201,31 +222,55 @@ def frequency_drift(cycles: Cycles, frequency: float) -> float:
         Of the mode [Hz].
     """
     t = cycles.time - cycles.time[0]
-    if t.size < 24:
-        return 0.0
-    square = (cycles.amplitude / cycles.amplitude.max()) ** 2
+    if t.size < 14:
+        return []
+    a = cycles.amplitude / cycles.amplitude.max()
     x = t / t[-1]
-    first, second = (cumulative_trapezoid(square**power, x, initial=0.0) for power in (1, 2))
     weight = cycles.amplitude / max(cycles.noise, 1e-9 * float(cycles.amplitude.max()))
     turns = 2.0 * math.pi * frequency * float(t[-1])
-    basis = np.column_stack([np.ones_like(x), x, first, second, x * x]) * weight[:, None]
-    scale = np.linalg.norm(basis, axis=0)
-    softens = 0.0
-    for _ in range(2):  # q s^2, q of some 0.7, is known only after s is
-        held = np.zeros(5)
-        held[3] = 1.0 / max(_SECOND * softens**2 * turns, 1e-6)
-        rows = np.vstack([basis, np.diag(held)[3:4]]) / scale
-        aims = np.append(cycles.phase * weight, 0.0)
-        found = np.linalg.lstsq(rows, aims, rcond=1e-12)[0] / scale
-        softens = float(found[2]) / turns
-    left = (cycles.phase - np.column_stack([np.ones_like(x), x, first, second, x * x]) @ found) * weight
-    inverse = np.linalg.pinv(rows.T @ rows, rcond=1e-12)
-    unit = math.sqrt(float(left @ left) / max(t.size - 5, 1))
-    if unit > _EXPLAINED:  # two modes that beat, a jump: no drift is all that is the matter
-        return 0.0
-    error = max(unit, 1.0) * math.sqrt(float(inverse[-1, -1])) / float(scale[-1])
-    share = 2.0 * float(found[-1]) / turns
-    return share if abs(found[-1]) > _CERTAIN * error and abs(share) > _MATTERS else 0.0
+    line, creep = [np.ones_like(x), x], [x * x]
+    soft, drag, friction = (
+        [cumulative_trapezoid(a**power, x, initial=0.0) for power in powers]
+        for powers in ((2, 4), (1,), (-1,))
+    )
+
+    def left(aim: _Array, columns: list[_Array]) -> tuple[float, _Array]:
+        """Chi-square that columns leave, and their coefficients; the last of four that soften is held small."""
+        basis = np.column_stack([*line, *columns]) * weight[:, None]
+        scale = np.linalg.norm(basis, axis=0)
+        held = np.zeros((1, scale.size))
+        found = np.zeros(scale.size)
+        for _ in range(2 if columns[:2] == soft else 1):  # q s^2, q of some 0.7, is known only after s is
+            if columns[:2] == soft:
+                held[0, 3] = 1.0 / max(_SECOND * (found[2] / turns) ** 2 * turns, 1e-6)
+            rows, aims = np.vstack([basis, held]) / scale, np.append(aim * weight, 0.0)
+            found = np.linalg.lstsq(rows, aims, rcond=1e-12)[0]
+            misfit, found = float(((aims - rows @ found) ** 2).sum()), found / scale
+        return misfit, found
+
+    fall = np.log(a)
+    plain, none = zip(*(left(aim, []) for aim in (cycles.phase, fall)), strict=True)
+    law = min(left(fall, columns)[0] + cost for columns, cost in (([], 0.0), (drag, 6.0), (friction, 6.0)))
+    told = []
+    for kind, columns in (("", soft), ("frequency_drift", creep), ("frequency_drift", [*soft, *creep])):
+        misfit, found = left(cycles.phase, columns)
+        numbers = {"start": float(found[1]) / turns, "shares": len(columns)}
+        share = 2.0 * float(found[-1]) / turns if kind else 0.0
+        told.append(Hypothesis(kind, sum(plain) - law - misfit, len(columns), 0.0, share, numbers))
+    for level in _LEVELS[_LEVELS > 1.5 * a[-1]]:
+        stop = [cumulative_trapezoid(touching(a / level), x, initial=0.0)]
+        damps, slows = left(fall, stop)
+        misfit, found = left(cycles.phase, stop)
+        if found[2] > 0.0 > slows[2]:
+            last = np.flatnonzero(a > 0.9 * level)[-1]
+            numbers = {"until": float(cycles.time[min(last + 1, t.size - 1)]), "level_percent": 100.0 * level}
+            free = float(abs(slows[1] / none[1][1] - 1.0)), float(abs(found[1] / none[0][1] - 1.0))
+            told.append(Hypothesis("touches", sum(plain) - damps - misfit, 3, *free, numbers))
+    rest = sum(plain) - np.array([one.gain for one in told])
+    unit = float(rest.min()) / (2.0 * t.size)
+    if unit > _EXPLAINED**2 and rest[:3].min() < _BETTER * rest.min():
+        return []
+    return sorted((one._replace(gain=one.gain / max(unit, 1.0)) for one in told), key=lambda one: -one.score)
 
 
 def steadied(samples: SignalSamples, share: float) -> SignalSamples:
@@ -243,7 +288,6 @@ def steadied(samples: SignalSamples, share: float) -> SignalSamples:
 # ----------------------------------------------------------------------------------------------------
 
 
-_Array = NDArray[np.float64]
 _LEAST_CYCLES = 8.0
 
 
@@ -251,13 +295,13 @@ _LEAST_CYCLES = 8.0
 class Decay:
     """The free part of a record, cleaned; what was taken out of it, and what was found on the way.
 
-    ``drift`` is the share by which the frequency changes with time over it; ``samples`` are without.
+    ``doubt`` is what a stop or a creeping frequency, which ``samples`` are without, leave in doubt.
     """
 
     samples: SignalSamples
     lines: tuple[Line, ...]
     diagnostics: tuple[Diagnostic, ...]
-    drift: float
+    doubt: Doubt
 
 
 def dominant(samples: SignalSamples, low: float = 0.0, high: float | None = None) -> float:
@@ -290,7 +334,7 @@ def dominant(samples: SignalSamples, low: float = 0.0, high: float | None = None
     return float(freq[at])
 
 
-def prepared(samples: SignalSamples, start: float | None, stop: float | None) -> Decay:
+def prepared(samples: SignalSamples, start: float | None, stop: float | None, known: bool = False) -> Decay:
     """Cut a record to its free decay and take out what does not belong to it.
 
     Parameters
@@ -299,6 +343,8 @@ def prepared(samples: SignalSamples, start: float | None, stop: float | None) ->
         The record.
     start, stop
         Part [s] of the free decay, as far as the user gives it.
+    known
+        True if its softening is known beforehand.
 
     Raises
     ------
@@ -339,10 +385,8 @@ def prepared(samples: SignalSamples, start: float | None, stop: float | None) ->
         )
         frequency = dominant(clean)
     clean, told = _undisturbed(clean, frequency)
-    clean, share = _steady(clean, frequency)
-    if share:
-        told.append(KINDS_DECAY["frequency_drift"].found(share_percent=100.0 * share))
-    return Decay(clean, tuple(lines), (*diagnostics, *told), share)
+    clean, doubt, more = _on_course(clean, frequency, known)
+    return Decay(clean, tuple(lines), (*diagnostics, *told, *more), doubt)
 
 
 def _cut(samples: SignalSamples, start: float | None, stop: float | None) -> SignalSamples:
@@ -389,17 +433,38 @@ def _decay_rate(samples: SignalSamples, frequency: float) -> float:
     return max(2.0 * math.pi * mode.natural_frequency * mode.damping_ratio, 0.0)
 
 
-def _steady(samples: SignalSamples, frequency: float) -> tuple[SignalSamples, float]:
-    """The decay on a clock that drifts as its frequency does, and by what share that is; 0 where it does not."""
+def _on_course(
+    samples: SignalSamples, frequency: float, known: bool
+) -> tuple[SignalSamples, Doubt, list[Diagnostic]]:
+    """The decay without what a stop or a creeping frequency does to it, and the doubt that is left."""
     try:
         cycles = hilbert_cycles(samples, frequency, noise_level(samples))
     except InputError:
-        return samples, 0.0
-    within = frequency_drift(cycles, frequency)
-    if not within:
-        return samples, 0.0
-    share = within * float((samples.time[-1] - samples.time[0]) / (cycles.time[-1] - cycles.time[0]))
-    return steadied(samples, share), share
+        return samples, Doubt(), []
+    told = courses(cycles, frequency)
+    ahead = told[0].score - max(0.0, *(one.score for one in told if not one.kind)) if told else 0.0
+    if ahead > _TOLD and told[0].kind == "touches":
+        numbers = told[0].numbers
+        kept = _sliced(samples, int(np.searchsorted(samples.time, numbers["until"])), None)
+        diagnostic = KINDS_DECAY["touches"].found(None, "", **numbers)
+        if np.count_nonzero(cycles.time > numbers["until"]) < 1.5 * _LEAST_CYCLES:
+            return samples, Doubt(told[0].shift, told[0].loss), [diagnostic]
+        again, doubt, more = _on_course(kept, frequency, known)
+        return again, doubt, [diagnostic, *(one for one in more if one.code != diagnostic.code)]
+    within = told[0].shift if told else 0.0
+    if ahead > _TOLD and told[0].kind and abs(within) > _MATTERS:
+        share = within * float((samples.time[-1] - samples.time[0]) / (cycles.time[-1] - cycles.time[0]))
+        told_so = KINDS_DECAY["frequency_drift"].found(share_percent=100.0 * share)
+        return steadied(samples, share), Doubt(abs(share)), [told_so]
+    # a softening that a creep explains as well
+    pair = [one for one in told if one.numbers.get("shares", 0) in (1, 2)]
+    if len(pair) < 2 or known:
+        return samples, Doubt(), []
+    behind = told[0].gain - next(one.gain for one in pair if one.kind)
+    apart = abs(pair[0].numbers["start"] - pair[1].numbers["start"])
+    softens = all(one.numbers["start"] > 1.0 for one in pair if not one.kind)
+    apart *= math.sqrt(likely(-behind, 2.0)) if softens else 1.0
+    return samples, Doubt(apart), []
 
 
 def _undisturbed(samples: SignalSamples, frequency: float) -> tuple[SignalSamples, list[Diagnostic]]:
