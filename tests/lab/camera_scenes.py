@@ -15,11 +15,16 @@ from snapbeam.lab.tracking.settings import Orientation
 ERRORS = (
     "white bar at the edge", "curved edge", "striker seldom seen", "one repeated frame",
     "every tenth lost", "every seventh a copy", "frames lost now and then", "rest in motion", "pixel size in inches",
-    "pixel size ten percent off", "image lag",
+    "pixel size ten percent off", "image lag", "pixel size ten times off", "gauge out of plane",
 )  # fmt: skip
 UNTOLD = ("sticker near a black tip",)
 """A sticker within some four pixels of a tip that is not seen may be taken for the tip without a message."""
-FAIR = ("gauge", "noise of rows", "fixed rows", "uneven light", "dark rod", "lossless")
+SCALES = {
+    "pixel size in inches": (25.4, 1.0 / 25.4), "pixel size ten percent off": (1.1, 1.0 / 1.1),
+    "pixel size ten times off": (10.0, 0.1), "gauge out of plane": (1.015, 0.985), "gauge": (1.0,),
+    "three rulers": (1.0,),
+}  # fmt: skip
+FAIR = ("gauge", "three rulers", "noise of rows", "fixed rows", "uneven light", "dark rod", "lossless")
 
 
 def _rows(recording, frames):
@@ -109,12 +114,14 @@ def prepared(kind, rng):
         scene.rest_frames, scene.skip = 0, int(rng.integers(25, 60))
         first = int(rng.integers(0, 20))
         scene.settings["rest_frames"] = int(rng.integers(1, 4)) if rng.random() < 0.6 else (first, first + 2)
-    elif kind in ("pixel size in inches", "pixel size ten percent off", "gauge"):
+    elif kind in SCALES:
         scene.settings["beam_thickness"] = 0.4e-3 * (1.0 + 0.01 * rng.standard_normal())
-        if kind == "pixel size in inches":
-            scale = float(rng.choice([25.4, 1.0 / 25.4]))
-        elif kind == "pixel size ten percent off":
-            scale = float(rng.choice([1.1, 1.0 / 1.1]))
+        scale = float(rng.choice(SCALES[kind])) if len(SCALES[kind]) > 1 else 1.0
+        if kind in ("gauge out of plane", "three rulers", "pixel size ten times off"):
+            scene.settings["tip_diameter"] = scene.stage["shaker_width"] * (
+                1.0 + 0.01 * rng.standard_normal()
+            )
+            scene.cycles = rng.uniform(6.0, 10.0)
     elif kind == "uneven light":
         scene.camera["light"] = (rng.uniform(0.3, 0.6), rng.uniform(-0.5, 0.5))
     elif kind == "dark rod" and not dark:
@@ -143,7 +150,9 @@ def measured(kind, rng, folder, **asked):
     scene, scale = prepared(kind, rng)
     camera, stage = SyntheticCamera(**scene.camera), SyntheticStage(**scene.stage)
     sign = 1.0 if stage.side in ("below", "left") else -1.0
-    time, beam, shaker = motion(rng, camera.pixel_size, camera.frame_rate)
+    time, beam, shaker = motion(rng, camera.pixel_size, camera.frame_rate, scene.cycles)
+    if scene.cycles:
+        scene.settings["drive_amplitude"] = 0.5 * np.ptp(shaker) * (1.0 + 0.002 * rng.standard_normal())
     first = int(scene.skip * 40)
     recording = render_recording(
         time[first:] - time[first], sign * beam[first:], sign * shaker[first:], camera=camera, stage=stage,

@@ -149,8 +149,8 @@ EXPECTED = {
     "every seventh a copy": "camera.frames_repeated",
     "frames lost now and then": "camera.frames_lost",
     "rest in motion": "camera.rest_moves",
-    "pixel size in inches": "camera.thickness",
-    "pixel size ten percent off": "camera.thickness",
+    "pixel size in inches": "camera.rulers",
+    "pixel size ten percent off": "camera.rulers",
     "image lag": "camera.lag",
 }
 
@@ -169,4 +169,4 @@ def test_a_pixel_size_ten_percent_off_beside_a_gauge_and_impossible_motions_are_
     rng = np.random.default_rng((31, 4, sum(map(ord, "pixel size ten percent off"))))
     tracked, _ = camera_scenes.measured("pixel size ten percent off", rng, tmp_path, buckling_level=20e-6)
     codes = [one.code for one in diagnostics_of(tracked)]
-    assert "camera.thickness" in codes and "camera.beyond" in codes
+    assert "camera.rulers" in codes and "camera.beyond" in codes

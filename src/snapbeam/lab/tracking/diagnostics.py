@@ -9,6 +9,7 @@ import numpy as np
 from snapbeam.lab.diagnostics import Kind, table
 from snapbeam.lab.tracking.frame_order import FrameOrder
 from snapbeam.lab.tracking.measure import Rest, Touch, TrackedRows
+from snapbeam.lab.tracking.rulers import Ruler, compare_rulers, option_name, seen_rulers
 from snapbeam.lab.tracking.settings import (
     BeamView,
     EdgeShape,
@@ -37,11 +38,17 @@ KINDS = table(
         "left out as no beam",
     ),
     Kind(
-        "camera.thickness", ERROR,
-        "thickness found in the picture, against that measured with a gauge",
-        "the beam found is {found_mm:.3f} mm thick, beam_thickness (--beam-thickness) says {known_mm:.3f} mm: "
-        "another object (narrow region, --region), or a wrong pixel_size (--pixel-size)",
-        ("beam_thickness", "pixel_size", "region"),
+        "camera.rulers", WARNING,
+        "pixel sizes by the thickness of the beam, the diameter of the striker and the amplitude of the drive, against "
+        "each other, the one given, and factors of mistaken units",
+        "{told}",
+        ("beam_thickness", "tip_diameter", "drive_amplitude", "pixel_size", "region"),
+    ),
+    Kind(
+        "camera.ruler_unseen", INFO,
+        "sides of the striker's rod, and steady cycles of the striker",
+        "{told} was given and is not seen in the recording: the pixel size is not checked with it",
+        ("tip_diameter", "drive_amplitude"),
     ),
     Kind(
         "camera.scale", ERROR,
@@ -258,8 +265,6 @@ KINDS = table(
     ),
 )  # fmt: skip
 
-_OFF = 0.05  # share by which the thickness may be off the known one
-_OFF_PX = 0.3  # and pixels
 _WELLS = 3.0  # buckling levels; a beam that snaps through does not go further
 _FASTEST = (30.0, 3.0)  # m/s of beam and shaker
 _CLOSE = 3.0  # px of gap that is no contact, of a tip that merges with the beam
@@ -277,7 +282,8 @@ class SeenMotion:
 
     ``penetration`` [px] of the tip into the beam, NaN where unknown, and that while they ``touch``; ``scale``
     [mm/px]; ``drift`` [px] of the camera, the largest; ``fields`` of interlaced video; ``order`` of the
-    frames; ``trail``, the share of the frame before that a frame still shows.
+    frames; ``trail``, the share of the frame before that a frame still shows; ``open_share``, the exposure over the
+    time between frames.
     """
 
     rows: TrackedRows
@@ -289,6 +295,7 @@ class SeenMotion:
     fields: VideoFields
     order: FrameOrder
     trail: float
+    open_share: float
 
 
 def tracking_diagnostics(
@@ -298,7 +305,8 @@ def tracking_diagnostics(
 
     *offset_mm* is the error of the rest position, *rate* that of the frames [Hz].
     """
-    told = [*_of_the_beam(scene, seen, settings), *_of_the_rest(seen, settings, offset_mm)]
+    told = [*_of_the_beam(scene, seen), *_of_the_scale(scene, seen, settings)]
+    told += [*_of_the_rest(seen, settings, offset_mm)]
     told += [*_of_the_motion(seen, settings, rate), *_of_the_order(seen.order, rate)]
     if seen.trail > 0.0:
         told.append(KINDS["lag"].found(share_percent=100.0 * seen.trail))
@@ -346,7 +354,7 @@ def never_touching(penetration: np.ndarray, rows: TrackedRows) -> float:
     return closest if closest > least else 0.0
 
 
-def _of_the_beam(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> list[Diagnostic]:
+def _of_the_beam(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
     told = []
     beam = scene.beam
     if beam.fixtures:
@@ -359,10 +367,16 @@ def _of_the_beam(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> 
     found = beam.thickness * seen.scale
     if not 0.005 <= found <= 30.0:
         told.append(KINDS["scale"].found(found_mm=found))
-    if settings.beam_thickness is not None:
-        known = settings.beam_thickness * 1e3
-        if abs(found / known - 1.0) > _OFF + _OFF_PX * seen.scale / known:
-            told.append(KINDS["thickness"].found(found_mm=found, known_mm=known))
+    return told
+
+
+def _of_the_scale(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> list[Diagnostic]:
+    rulers, unseen = seen_rulers(scene, seen.rows.shaker, settings, seen.open_share)
+    told = [KINDS["ruler_unseen"].found(told=option_name(name)) for name in unseen]
+    found = compare_rulers([Ruler("pixel_size", 1e-3 * seen.scale, 0.0), *rulers])
+    if found is not None:
+        severity, words, numbers = found
+        told.append(KINDS["rulers"].found(severity, words, **numbers))
     return told
 
 

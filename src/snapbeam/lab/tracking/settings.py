@@ -33,6 +33,9 @@ from snapbeam.util.validation import (
 # below it and rows count downwards.
 
 
+RULERS = {"beam_thickness": 0.01, "tip_diameter": 0.01, "drive_amplitude": 0.002}
+"""Lengths that check the pixel size, and their relative standard errors where none is given."""
+
 SIDES = ("below", "above", "left", "right")
 HALF = 6  # half height of the fit windows, pixels
 HOT = 0.25  # share of saturated pixels, beyond the usual, from which an edge is not trusted
@@ -102,8 +105,11 @@ class TrackingSettings:
         Frames in which the beam is at rest: their number at the start, or (first, one past the last), negative
         numbers counted from the end.  Unless given, the first half of those before it first departs from their
         mean by three standard errors.
-    beam_thickness
-        Thickness of the beam as measured with a gauge [m], to check the tracked thickness and the pixel size.
+    beam_thickness, tip_diameter, drive_amplitude
+        Lengths that the recording shows too, to check the pixel size: thickness of the beam and diameter of the
+        shaker's rod behind its tip by gauge, and amplitude of the shaker's steady displacement by vibrometer [m].
+    beam_thickness_error, tip_diameter_error, drive_amplitude_error
+        Their standard errors [m]; 1 % of the gauged ones and 0.2 % of the amplitude unless given.
     side
         Side of the beam on which the shaker is: "below", "above", "left" or "right".  Up (or right) is
         positive.
@@ -143,6 +149,11 @@ class TrackingSettings:
     rest_displacement: float | None = None
     rest_frames: int | tuple[int, int] | None = None
     beam_thickness: float | None = None
+    beam_thickness_error: float | None = None
+    tip_diameter: float | None = None
+    tip_diameter_error: float | None = None
+    drive_amplitude: float | None = None
+    drive_amplitude_error: float | None = None
     side: str = "below"
     objects: str = "auto"
     threshold: float | None = None
@@ -157,7 +168,9 @@ class TrackingSettings:
     fixed_marks: Sequence[tuple[int, int, int, int]] = ()
 
     def __post_init__(self) -> None:
-        for name, unit in (("buckling_level", "m"), ("beam_thickness", "m"), ("blur_limit", "px")):
+        lengths = tuple(f"{name}{more}" for name in RULERS for more in ("", "_error"))
+        for name in ("buckling_level", "blur_limit", *lengths):
+            unit = "px" if name == "blur_limit" else "m"
             self._keep(name, lambda value, name=name, unit=unit: positive(name, value, unit))
         for name in ("rest_displacement", "threshold"):
             self._keep(name, lambda value, name=name: finite(name, value))
@@ -336,6 +349,7 @@ class ShakerView:
     of the tip at the contact counted from it and ``tip_error`` its standard error; ``tip_source`` says in
     words where that is known from; ``isolated`` that the sticker was all that could be seen of the shaker;
     ``certain`` that the tip is no sticker, by its distance or since its body has no gap down to the border.
+    ``width`` [px] is that of the rod behind the tip, and its standard error; NaN where it is not seen.
     """
 
     rod: tuple[int, int]
@@ -346,6 +360,7 @@ class ShakerView:
     tip_source: str
     isolated: bool
     certain: bool
+    width: tuple[float, float]
 
     @property
     def mark(self) -> str:

@@ -781,6 +781,8 @@ def find_apex(outline: TipOutline, rod: tuple[int, int], contact_column: float) 
 # The shaker in a sample of frames: the columns it covers, its sticker and its tip.
 
 
+_ROWS = 12  # in which the sides of the rod must be seen
+_SIDE = 0.04  # px; error of two sides that no scatter shows
 _CLEAR = 4.0  # rows from the beam within which a mark that stands alone may be the tip itself
 
 
@@ -837,7 +839,8 @@ def shaker_view(
     outline = _outline(view, frames, bands, rod, beam, reference, learn=not isolated)
     column = view.contact_column
     certain = _reaches_border(bands, middle) if sticker is None else wanted.tip_distance is not None
-    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain)
+    width = (math.nan, math.nan) if isolated else rod_width(frames, rod, view.edge_width)
+    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain, width)
     if sticker is not None and wanted.tip_distance is not None:
         offset = -(wanted.tip_distance + 0.5 * sticker.thickness)
         return dataclasses.replace(
@@ -859,6 +862,32 @@ def shaker_view(
         "so it cannot be followed; set region (--region) or threshold (--threshold), or track the beam alone "
         "with shaker=False (--no-shaker)"
     )
+
+
+def rod_width(frames: NDArray[np.floating], rod: tuple[int, int], blur: float) -> tuple[float, float]:
+    """Columns between the sides of the rod behind its tip and their standard error; NaN where they are not seen.
+
+    The rod moves along its sides, so these are sharp in the mean over the sample.  Rows count that show as much
+    contrast as most of the lower half do: neither sticker nor tip.
+    """
+    mean = frames[:, frames.shape[1] // 2 :].mean(0, dtype=np.float64)
+    sides = []
+    for column, sign in ((rod[0], 1.0), (rod[1], -1.0)):
+        first = column - HALF
+        if first < 0 or column + HALF >= mean.shape[1]:
+            return math.nan, math.nan
+        windows = mean[:, first : column + HALF + 1]
+        step = float(np.median(windows[:, -2:].mean(1) - windows[:, :2].mean(1))) * sign
+        fit = fit_edges(windows, blur, sign=math.copysign(sign, sign * step))
+        good = fit.contrast > 0.8 * float(np.percentile(fit.contrast, 75.0))
+        sides.append(np.where(good, column + fit.position, np.nan))
+    found = sides[1] - sides[0]
+    found = found[np.isfinite(found)]
+    found = found[np.abs(found - np.median(found)) < 1.0] if found.size else found
+    if found.size < _ROWS:
+        return math.nan, math.nan
+    scatter = float(np.std(found)) / math.sqrt(found.size / 3.0)
+    return float(np.mean(found)), math.hypot(scatter, _SIDE)
 
 
 def _reaches_border(bands: BeamBands, middle: NDArray[np.intp]) -> bool:

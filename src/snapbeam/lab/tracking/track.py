@@ -74,8 +74,8 @@ def tracked_dataset(
     *drift* [px] is the largest shift of the camera that was taken out, *fields* what is seen of interlaced video.
     """
     trail = 0.0
+    opened = 1.0 if recording.exposure is None else recording.exposure * recording.frame_rate
     if not (fields.shift or fields.apart or scene.noise.lag):
-        opened = 1.0 if recording.exposure is None else recording.exposure * recording.frame_rate
         trail = image_lag(rows.row, rows.width, opened)
     rows = _as_filtered(rows, scene.noise, fields, trail)
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
@@ -112,7 +112,7 @@ def tracked_dataset(
     offset = _offset_error(rows.row, rest)
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
-    seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields, order, trail)
+    seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields, order, trail, opened)
     diagnostics = (
         *recording.diagnostics,
         *tracking_diagnostics(scene, seen, settings, scale * offset, recording.frame_rate),
