@@ -163,11 +163,12 @@ def wanderings(rows: Floats, lost: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def distortion(
-    thickness: Floats, residual: Floats, width: Floats, usual_width: float
+    thickness: Floats, residual: Floats, width: Floats, usual_width: float, row_error: float
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Deviation of the beam thickness from the usual value [px], and the distorted frames.
 
-    A frame is distorted if that exceeds five robust standard deviations and 0.06 px, if the mean over 32 frames about
+    A frame is distorted if that exceeds five robust standard deviations, 0.06 px and the noise of rows
+    (*row_error* [px] of one edge), if the mean over 32 frames about
     it is as far off (faint light that lasts), or if its edges are no steps: fits that leave three times as much as
     usual without being blurred.
     """
@@ -178,8 +179,9 @@ def distortion(
         usual = float(np.median(thickness[known]))
         spread = 1.4826 * float(np.median(np.abs(thickness[known] - usual)))
         miss[known] = np.abs(thickness[known] - usual)
-        odd = miss > max(_FAR * spread, 0.06)
-        faint = _lasting(thickness[known] - usual)
+        both = _FAR * math.sqrt(2.0) * row_error
+        odd = miss > max(_FAR * spread, 0.06, both)
+        faint = _lasting(thickness[known] - usual, max(_FAINT, both))
         miss[known] = np.maximum(miss[known], faint)
         odd[known] |= faint > 0.0
     sound = np.isfinite(residual)
@@ -190,8 +192,8 @@ def distortion(
     return miss, odd
 
 
-def _lasting(miss: Floats) -> Floats:
-    """Mean deviation of the thickness over the stretch around each frame, if it is significant; otherwise 0.
+def _lasting(miss: Floats, least: float) -> Floats:
+    """Mean deviation of the thickness over the stretch around each frame, if it is significant and beyond *least*; otherwise 0.
 
     What chance does is told by the steps from frame to frame: light that lasts over a good part of the recording
     widens the scatter of all frames together, but not these.
@@ -201,7 +203,7 @@ def _lasting(miss: Floats) -> Floats:
         return out
     noise = 1.4826 * float(np.median(np.abs(np.diff(miss)))) / math.sqrt(2.0)
     mean = np.convolve(miss, np.full(_STRETCH, 1.0 / _STRETCH), "valid")
-    for first in np.flatnonzero(np.abs(mean) > max(_FAR * noise / math.sqrt(_STRETCH), _FAINT)):
+    for first in np.flatnonzero(np.abs(mean) > max(_FAR * noise / math.sqrt(_STRETCH), least)):
         inside = slice(int(first), int(first) + _STRETCH)
         out[inside] = np.maximum(out[inside], abs(mean[first]))
     return out
@@ -685,7 +687,11 @@ class Follower:
         found = _with_missing(found, numbers)
         flags, row, shaker = found["flags"], found["row"], found["shaker"]
         miss, odd = distortion(
-            found["thickness"], found["residual"], found["width"], self.scene.beam.edge_width
+            found["thickness"],
+            found["residual"],
+            found["width"],
+            self.scene.beam.edge_width,
+            self.scene.row_errors[0],
         )
         odd &= np.isfinite(row)
         flags[odd] |= np.uint16(FrameFlag.DISTORTED)

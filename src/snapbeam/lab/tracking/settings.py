@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.lab.tracking.edges import Floats
+from snapbeam.lab.tracking.edges import Floats, edge_noise
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -404,12 +404,16 @@ class NoiseShape:
     """Correlations of the noise of pixels.
 
     ``in_time`` with the same pixel in the next frame, ``along`` the beam with the next pixel, and ``across`` the
-    beam; 0 where the noise is that of a sensor or too small to decide.
+    beam; 0 where the noise is that of a sensor or too small to decide.  ``rows`` is the standard deviation of what
+    all pixels of a row along the beam have in common, in grey levels, and ``fixed_rows`` of the part of it that is
+    the same in every frame.
     """
 
     in_time: float
     along: float
     across: float
+    rows: float
+    fixed_rows: float
 
     @property
     def lag(self) -> float:
@@ -456,6 +460,15 @@ class Scene:
     shape: EdgeShape
     noise: NoiseShape
     striker_in_view: bool
+
+    @property
+    def row_errors(self) -> tuple[float, float]:
+        """Standard error [px] of an edge by what all pixels of a row have in common, and by the fixed part of it."""
+        rows = (self.noise.rows, self.noise.fixed_rows)
+        first, second = (
+            edge_noise(self.beam.edge_width, one, self.beam.contrast) if one else 0.0 for one in rows
+        )
+        return first, second
 
     @property
     def placed_error(self) -> float:

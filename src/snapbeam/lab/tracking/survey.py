@@ -558,6 +558,8 @@ _APART = 4  # frames after which no noise is left of one in the other
 _LEAST_NOISE = 1500  # even pixels
 _ROUNDED = 0.6  # grey levels; less noise than this is rounded away
 _EVEN = 6.0  # standard deviations by which even pixels may differ from their neighbours
+_COLUMNS = 12  # of even pixels that tell the mean of a row, and rows
+_SURE_ROWS = 6.0  # standard errors of the noise of rows
 _CERTAIN_NOISE = 0.2  # correlation that is no chance, and more than a sensor's own
 
 
@@ -573,7 +575,7 @@ def noise_shape(head: NDArray[np.floating]) -> NoiseShape:
     head
         Turned frames that follow each other, (n, height, width).
     """
-    none = NoiseShape(0.0, 0.0, 0.0)
+    none = NoiseShape(0.0, 0.0, 0.0, 0.0, 0.0)
     if head.shape[0] < _APART + 3:
         return none
     mean = head.mean(0)
@@ -585,15 +587,42 @@ def noise_shape(head: NDArray[np.floating]) -> NoiseShape:
     even &= np.ptp(head, axis=0) > 0.0
     if np.count_nonzero(even) < _LEAST_NOISE:
         return none
+    rows = row_noise(head, even)
+    fixed = min(row_noise(mean[None], even), rows)
     far = float(np.median([np.var(one[even]) for one in apart]))
     if far < 2.0 * _ROUNDED**2:
-        return none
+        return dataclasses.replace(none, rows=rows, fixed_rows=fixed)
     near = [_noise_of(after, before, mean) for before, after in itertools.pairwise(head)]
     in_time = 1.0 - float(np.median([np.var(one[even]) for one in near])) / far
-    along, across = (_alike(apart, even, axis) / far for axis in (1, 0))
-    return NoiseShape(
-        *(min(value, 0.9) if value > _CERTAIN_NOISE else 0.0 for value in (in_time, along, across))
+    across = _alike(apart, even, 0) / far
+    count = np.maximum(even.sum(1, keepdims=True), 1)
+    own = [one - np.where(even, one, 0.0).sum(1, keepdims=True) / count for one in apart]
+    along = _alike(own, even, 1) / float(np.median([np.var(one[even]) for one in own]))
+    in_time, along, across = (
+        min(value, 0.9) if value > _CERTAIN_NOISE else 0.0 for value in (in_time, along, across)
     )
+    return NoiseShape(in_time, along, across, rows, fixed)
+
+
+def row_noise(frames: NDArray[np.floating], even: NDArray[np.bool_]) -> float:
+    """Standard deviation of what the pixels of a row along the beam have in common, fixed or new in every frame.
+
+    From second differences across rows of the means over the *even* pixels of each, less what the noise of single
+    pixels leaves of these; 0 where it is no more than that.
+    """
+    whole = even[2:] & even[1:-1] & even[:-2]
+    count = whole.sum(1)
+    used = count >= _COLUMNS
+    if np.count_nonzero(used) < _COLUMNS:
+        return 0.0
+    bends = np.where(whole, frames[:, 2:] - 2.0 * frames[:, 1:-1] + frames[:, :-2], 0.0)[:, used].astype(
+        np.float64
+    )
+    mean = bends.sum(-1) / count[used]
+    single = ((bends**2).sum(-1) / count[used] - mean**2) / count[used]
+    more = float(np.mean(mean**2 - single))
+    chance = math.sqrt(2.0 / mean.size) * float(np.mean(single))
+    return math.sqrt(more / 6.0) if more > _SURE_ROWS * chance else 0.0
 
 
 def _alike(apart: list[Floats], even: NDArray[np.bool_], axis: int) -> float:

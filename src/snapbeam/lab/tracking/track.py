@@ -36,7 +36,6 @@ from snapbeam.lab.tracking.measure import (
 )
 from snapbeam.lab.tracking.settings import (
     FrameFlag,
-    NoiseShape,
     Orientation,
     Scene,
     TrackingSettings,
@@ -77,7 +76,7 @@ def tracked_dataset(
     opened = 1.0 if recording.exposure is None else recording.exposure * recording.frame_rate
     if not (fields.shift or fields.apart or scene.noise.lag):
         trail = image_lag(rows.row, rows.width, opened)
-    rows = _as_filtered(rows, scene.noise, fields, trail)
+    rows = _as_filtered(rows, scene, fields, trail)
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
     if not rest.indices.size:
         located = int(np.isfinite(rows.row).sum())
@@ -109,7 +108,7 @@ def tracked_dataset(
     tip = rows.shaker + (shaker.tip_offset if shaker is not None else np.nan)
     shaker_mm = settings.rest * 1e3 - turn.sign * scale * (tip - beam.thickness - rest.row)
     closing_mm = turn.sign * (shaker_mm - beam_mm)
-    offset = _offset_error(rows.row, rest)
+    offset = math.hypot(_offset_error(rows.row, rest), scene.row_errors[1])
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
     seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields, order, trail, opened)
@@ -167,19 +166,22 @@ def tracked_dataset(
     return dataset
 
 
-def _as_filtered(rows: TrackedRows, noise: NoiseShape, fields: VideoFields, trail: float) -> TrackedRows:
-    """The rows with errors of pictures that were averaged over frames, smoothed or interlaced, where that is seen.
+def _as_filtered(rows: TrackedRows, scene: Scene, fields: VideoFields, trail: float) -> TrackedRows:
+    """The rows with errors of pictures that were averaged over frames, smoothed or interlaced, or whose rows have noise.
 
     *trail* is the share of the frame before that a frame still shows.
     """
+    noise = scene.noise
     lag = noise.lag + fields.lag + trail
 
     def widened(row: Floats, error: Floats) -> Floats:
         step = np.abs(np.diff(row, prepend=np.nan, append=np.nan))
         most = np.nan_to_num(np.fmax(step[1:], step[:-1]))
-        return np.hypot(np.hypot(noise.factor * error, lag * most), fields.shift)
+        return np.hypot(
+            np.hypot(noise.factor * error, lag * most), math.hypot(fields.shift, scene.row_errors[0])
+        )
 
-    if lag == 0.0 and noise.factor == 1.0 and fields.shift == 0.0:
+    if lag == 0.0 and noise.factor == 1.0 and fields.shift == 0.0 and scene.noise.rows == 0.0:
         return rows
     return dataclasses.replace(
         rows, error=widened(rows.row, rows.error), shaker_error=widened(rows.shaker, rows.shaker_error)
