@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 import random_scenes
 from random_scenes import LEVEL, good_scene, motion
+from scipy.ndimage import rotate
 
 from snapbeam.lab import Defects, SyntheticCamera, SyntheticStage, open_recording, render_recording, track
 from snapbeam.lab.camera import write_photron
@@ -16,6 +18,7 @@ ERRORS = (
     "white bar at the edge", "curved edge", "striker seldom seen", "one repeated frame",
     "every tenth lost", "every seventh a copy", "frames lost now and then", "rest in motion", "pixel size in inches",
     "pixel size ten percent off", "image lag", "pixel size ten times off", "gauge out of plane",
+    "lamp pulse", "rotated camera", "swinging sticker", "tapered beam", "dropped bits", "rod at the border",
 )  # fmt: skip
 UNTOLD = ("sticker near a black tip",)
 """A sticker within some four pixels of a tip that is not seen may be taken for the tip without a message."""
@@ -86,6 +89,41 @@ def changed(kind, frames, recording, rng):
         for k in range(1, count):
             frames[k] = (1.0 - share) * frames[k] + share * frames[k - 1]
         frames += grain
+    elif kind == "rotated camera":
+        angle = float(rng.choice([-1.0, 1.0])) * rng.uniform(2.0, 5.0)
+        frames = np.stack([rotate(one, angle, reshape=False, order=3, mode="nearest") for one in frames])
+        frames += noise * rng.standard_normal(frames.shape)
+    elif kind == "swinging sticker":
+        size, half = recording.camera.pixel_size, 0.5 * stage.shaker_width / recording.camera.pixel_size
+        rows = np.arange(height)
+        rod = np.flatnonzero(np.abs(np.arange(width) - (width - 1) / 2.0) < half)
+        swing = rng.uniform(0.5, 2.0) * np.sin(2.0 * np.pi * np.arange(count) / rng.uniform(8.0, 30.0))
+        swing[:rest] = 0.0
+        _, tip = _rows(recording, frames)
+        for k in range(count):
+            first = tip[k] + 0.5 * stage.marker_distance / size
+            share = np.clip((rows - first) / (0.4 * stage.marker_distance / size), 0.0, 1.0)
+            for c in rod:
+                frames[k, :, c] = np.interp(rows - swing[k] * share, rows, frames[k, :, c])
+    elif kind == "tapered beam":
+        near, _ = _rows(recording, frames)
+        rows, taper = np.arange(height), float(rng.choice([-1.0, 1.0])) * rng.uniform(0.01, 0.03)
+        for k in range(count):  # the near edge leans, the far one does not, nor the rod
+            share = np.clip(
+                (rows - near[k] + 0.6 * stage.beam_thickness / recording.camera.pixel_size) / 4.0, 0, 1
+            )
+            for c in range(width):
+                x = c - (width - 1) / 2.0
+                if abs(x) * recording.camera.pixel_size > 0.5 * stage.shaker_width:
+                    frames[k, :, c] = np.interp(rows - taper * x * share, rows, frames[k, :, c])
+        frames = frames[:, :, : -int(rng.integers(8, 12))]
+    elif kind == "dropped bits":
+        step = 2.0 ** np.floor(np.log2(full * abs(stage.beam - stage.background) / rng.uniform(6.0, 12.0)))
+        frames = np.floor(np.clip(frames, 0, full) / step) * step
+    elif kind == "rod at the border":
+        half = 0.5 * stage.shaker_width / recording.camera.pixel_size
+        cut = int((width - 1) / 2.0 + rng.uniform(-0.2, 0.5) * half)
+        frames = frames[:, :, :cut]
     elif kind == "noise of rows":
         frames += rng.uniform(0.003, 0.008) * full * rng.standard_normal((count, height, 1))
     elif kind == "fixed rows":
@@ -122,6 +160,15 @@ def prepared(kind, rng):
                 1.0 + 0.01 * rng.standard_normal()
             )
             scene.cycles = rng.uniform(6.0, 10.0)
+    elif kind == "lamp pulse":
+        scene.camera["exposure"] = 0.9 / scene.camera["frame_rate"]
+    elif kind == "swinging sticker":
+        scene.stage |= {
+            "shaker_width": rng.uniform(0.5e-3, 0.8e-3),
+            "tip_radius": 2.5e-3,
+            "marker_thickness": 0.25e-3,
+        }
+        scene.stage["marker_distance"] = 0.35e-3
     elif kind == "uneven light":
         scene.camera["light"] = (rng.uniform(0.3, 0.6), rng.uniform(-0.5, 0.5))
     elif kind == "dark rod" and not dark:
@@ -159,7 +206,18 @@ def measured(kind, rng, folder, **asked):
         defects=Defects(**scene.defects), rest_frames=scene.rest_frames, rng=int(rng.integers(2**31)),
     )  # fmt: skip
     turn = Orientation(stage.side, camera.shape)
-    frames = turn.turn(np.stack(list(recording)).astype(np.float64)).copy()
+    shown = recording
+    if kind == "lamp pulse":  # the light of the last tenth of an exposure of 0.9 frames
+        late = (
+            np.interp(time + 0.81 / camera.frame_rate, time, beam),
+            np.interp(time + 0.81 / camera.frame_rate, time, shaker),
+        )
+        shown = render_recording(
+            time, *(sign * one for one in late), camera=dataclasses.replace(camera, exposure=0.09 / camera.frame_rate),
+            stage=stage, defects=Defects(**scene.defects), rest_frames=scene.rest_frames, rng=1,
+            zero_row=recording.truth.attrs["zero_row"],
+        )  # fmt: skip
+    frames = turn.turn(np.stack(list(shown)[: len(recording)]).astype(np.float64)).copy()
     frames = changed(kind, frames, recording, rng)
     if stage.side in ("above", "left"):
         frames = frames[:, ::-1]

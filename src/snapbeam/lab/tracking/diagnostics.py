@@ -41,14 +41,15 @@ KINDS = table(
         "camera.rulers", WARNING,
         "pixel sizes by the thickness of the beam, the diameter of the striker and the amplitude of the drive, against "
         "each other, the one given, and factors of mistaken units",
-        "{told}",
-        ("beam_thickness", "tip_diameter", "drive_amplitude", "pixel_size", "region"),
+        "{told}; check these and the planes they were taken in, pixel_size (--pixel-size), beam_thickness "
+        "(--beam-thickness), tip_diameter (--tip-diameter), drive_amplitude (--drive-amplitude), and what was tracked "
+        "(region, --region)",
+        ("pixel_size", "beam_thickness", "tip_diameter", "drive_amplitude", "region"),
     ),
     Kind(
         "camera.ruler_unseen", INFO,
         "sides of the striker's rod, and steady cycles of the striker",
         "{told} was given and is not seen in the recording: the pixel size is not checked with it",
-        ("tip_diameter", "drive_amplitude"),
     ),
     Kind(
         "camera.scale", ERROR,

@@ -193,7 +193,10 @@ def distortion(
 
 
 def _lasting(miss: Floats, least: float) -> Floats:
-    """Mean deviation of the thickness over the stretch around each frame, if it is significant and beyond *least*; otherwise 0.
+    """Mean deviation of the thickness over the stretch around each frame, if it is significant and beyond *least*.
+
+    Otherwise 0.  It is the larger of those from the median and from the half of the stretches that are most alike,
+    for light on many frames moves the median.
 
     What chance does is told by the steps from frame to frame: light that lasts over a good part of the recording
     widens the scatter of all frames together, but not these.
@@ -203,9 +206,12 @@ def _lasting(miss: Floats, least: float) -> Floats:
         return out
     noise = 1.4826 * float(np.median(np.abs(np.diff(miss)))) / math.sqrt(2.0)
     mean = np.convolve(miss, np.full(_STRETCH, 1.0 / _STRETCH), "valid")
-    for first in np.flatnonzero(np.abs(mean) > max(_FAR * noise / math.sqrt(_STRETCH), least)):
+    ordered, half = np.sort(mean), mean.size // 2
+    at = int(np.argmin(ordered[half:] - ordered[: ordered.size - half]))
+    mean = np.maximum(np.abs(mean), np.abs(mean - float(np.median(ordered[at : at + half + 1]))))
+    for first in np.flatnonzero(mean > max(_FAR * noise / math.sqrt(_STRETCH), least)):
         inside = slice(int(first), int(first) + _STRETCH)
-        out[inside] = np.maximum(out[inside], abs(mean[first]))
+        out[inside] = np.maximum(out[inside], mean[first])
     return out
 
 
@@ -256,8 +262,9 @@ def find_rest(row: Floats, error: Floats, shaker: Floats, given: tuple[int, int]
         return Rest(known, math.nan, math.nan, False, math.nan)
     noise = max(float(np.median(error[known])), _STEADY)
     values = row[known]
-    before = np.cumsum(values)[:-1] / np.arange(1, known.size)
-    gone = np.abs(values[1:] - before) > 3.0 * noise + 1e-6
+    averaged = np.arange(1, known.size)
+    before = np.cumsum(values)[:-1] / averaged
+    gone = np.abs(values[1:] - before) > 3.0 * noise * np.sqrt(1.0 + 1.0 / averaged) + 1e-6
     # one frame in some hundred strays by chance; two in a row do not
     away = gone & np.append(gone[1:], True)
     quiet = int(away.argmax()) + 1 if away.any() else known.size

@@ -107,8 +107,6 @@ def compare_rulers(rulers: Sequence[Ruler]) -> tuple[Severity, str, dict[str, fl
     near = min(_FACTORS, key=lambda factor: abs(abs(math.log(ratio)) - math.log(factor)))
     unit = abs(abs(math.log(ratio)) - math.log(near)) < max(_SURE * error, _EXPLAINED)
     words += f", a factor {_FACTORS[near]}" if unit else f", a factor of {ratio:.4g}"
-    if not unit:
-        words += ": a gauge in another plane than the motion, a mistaken length, or another object taken for it (region, --region)"
     numbers = {"ratio": ratio, "error": ratio * error}
     numbers |= {
         f"pixel_size_um_by_{one.name}".replace("_by_pixel_size", ""): 1e6 * one.size for one in rulers

@@ -195,14 +195,21 @@ _GAMMAS = np.exp(np.linspace(math.log(0.25), math.log(4.0), 81))
 
 
 def edge_shape(
-    windows: Floats, fit: EdgeFit, good: NDArray[np.bool_], width: float, sign: float, clipped: float
+    windows: Floats,
+    centre: Floats,
+    fit: EdgeFit,
+    good: NDArray[np.bool_],
+    width: float,
+    sign: float,
+    clipped: float,
 ) -> EdgeShape:
     """Judge the mean edge of many windows.
 
     Parameters
     ----------
-    windows, fit
-        Grey levels (..., rows) and what :func:`fit_edges` made of them with *width* and *sign*.
+    windows, centre, fit
+        Grey levels (frames, columns, rows), rows of their middles, and what :func:`fit_edges` made of them with
+        *width* and *sign*.
     good
         Which windows to use.
     width, sign
@@ -221,7 +228,9 @@ def edge_shape(
     model = edge_profile(offset, width)
     level = (data * sign).mean(-1) - contrast * model.mean(-1)
     share = (data * sign - level[:, None]) / contrast[:, None]
-    x, y, error = _binned(offset, share)
+    places = np.stack(np.nonzero(good))
+    groups = (places[0], places[1], np.floor(centre[good] - centre[good].min()).astype(np.intp))
+    x, y, error = _binned(offset, share, groups)
     if x.size < 24 or clipped > CLIPPED:
         return unknown
     misfit = float(np.sqrt(np.mean((y - edge_profile(x, width)) ** 2)))
@@ -287,17 +296,28 @@ def _asymmetry(x: Floats, light: Floats, error: Floats) -> tuple[float, float]:
     return float(found.fun), float(found.x)
 
 
-def _binned(offset: Floats, share: Floats) -> tuple[Floats, Floats, Floats]:
-    """Mean offset, mean share and its standard error in steps of a fraction of a pixel."""
+def _binned(
+    offset: Floats, share: Floats, groups: tuple[NDArray[np.intp], ...]
+) -> tuple[Floats, Floats, Floats]:
+    """Mean offset, mean share and its standard error in steps of a fraction of a pixel.
+
+    Windows of one frame, one column or one row may be off together, by uneven light, speckle or noise of rows: the
+    error is the largest of those with the windows of a group as one.
+    """
     index = np.floor((offset + _REACH) / _STEP).astype(int)
     inside = (index >= 0) & (index < int(2 * _REACH / _STEP))
+    owners = [np.broadcast_to(one[:, None], index.shape)[inside] for one in groups]
     index, x, y = index[inside], offset[inside], share[inside]
     count = np.bincount(index)
     full = count >= 8
     total = np.maximum(count, 1)
     mean_x, mean = np.bincount(index, x) / total, np.bincount(index, y) / total
-    variance = np.bincount(index, y * y) / total - mean**2
-    error = np.sqrt(np.maximum(variance, 0.0) / total)
+    off = y - mean[index]
+    error = np.sqrt(np.bincount(index, off**2)) / total
+    for owner in owners:
+        step = int(owner.max()) + 1
+        together = np.bincount(index * step + owner, off, minlength=count.size * step).reshape(-1, step)
+        error = np.maximum(error, np.sqrt((together**2).sum(1)) / total)
     return mean_x[full], mean[full], error[full]
 
 
@@ -431,7 +451,7 @@ def beam_view(
         blur
     ).any():  # an edge that speeds up within the exposure is bent whatever the camera's curve
         steady = usable & (blur <= _STEADY * np.nanpercentile(blur, 25.0))[:, None]
-    return view, edge_shape(windows[1], fits[1], steady, width, rough.sign, clipped)
+    return view, edge_shape(windows[1], np.rint(far), fits[1], steady, width, rough.sign, clipped)
 
 
 def _hot(
