@@ -152,11 +152,12 @@ EXPECTED = {
     "pixel size in inches": "camera.rulers",
     "pixel size ten percent off": "camera.rulers",
     "image lag": "camera.lag",
+    "swinging sticker": "camera.sticker_loose",
 }
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", [*EXPECTED, "white bar at the edge", "gauge", ""])
+@pytest.mark.parametrize("kind", [*EXPECTED, "white bar at the edge", "tapered beam", "gauge", ""])
 def test_a_rendered_scene_is_told_or_right(kind, tmp_path):
     outcome = camera_scenes.judged(kind, np.random.default_rng((31, 1, sum(map(ord, kind)))), tmp_path)
     if kind in EXPECTED:

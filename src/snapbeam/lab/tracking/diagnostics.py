@@ -142,6 +142,13 @@ KINDS = table(
         ("tip_distance", "marker"),
     ),
     Kind(
+        "camera.sticker_loose", WARNING,
+        "the way from the sticker to the tip frame by frame, where both are seen, against their noise",
+        "the sticker moves against the tip by {swing_px:.2f} px (standard deviation), which is in the shaker's standard "
+        "errors: it is loose, or another object; fix it, or follow the tip with marker=False (--no-marker)",
+        ("marker",),
+    ),
+    Kind(
         "camera.never_touches", WARNING,
         "the gap between tip and beam over the recording, while the beam moves",
         "the beam moves though what is taken for the tip never comes nearer to it than {gap_px:.1f} px: it may "
@@ -495,6 +502,8 @@ def _of_the_tip(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
         # the sticker's own upper edge over the beam
         nearest = float(np.nanmin(gap)) - shaker.tip_offset - 0.5 * shaker.sticker.thickness
         told.append(KINDS["sticker_alone"].found(height_px=shaker.sticker.thickness, gap_px=nearest))
+    if shaker.loose > 0.0:
+        told.append(KINDS["sticker_loose"].found(swing_px=shaker.loose))
     closest = never_touching(seen.penetration, seen.rows)
     if closest > 0.0:
         told.append(KINDS["no_contact" if shaker.certain else "never_touches"].found(gap_px=closest))

@@ -349,7 +349,8 @@ class ShakerView:
     of the tip at the contact counted from it and ``tip_error`` its standard error; ``tip_source`` says in
     words where that is known from; ``isolated`` that the sticker was all that could be seen of the shaker;
     ``certain`` that the tip is no sticker, by its distance or since its body has no gap down to the border.
-    ``width`` [px] is that of the rod behind the tip, and its standard error; NaN where it is not seen.
+    ``width`` [px] is that of the rod behind the tip, and its standard error; NaN where it is not seen.  ``loose``
+    [px] is by how much the sticker moves against the tip, standard deviation.
     """
 
     rod: tuple[int, int]
@@ -361,6 +362,7 @@ class ShakerView:
     isolated: bool
     certain: bool
     width: tuple[float, float]
+    loose: float
 
     @property
     def mark(self) -> str:

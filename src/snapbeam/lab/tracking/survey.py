@@ -23,6 +23,7 @@ from snapbeam.lab.tracking.edges import (
     width_calibration,
 )
 from snapbeam.lab.tracking.measure import (
+    MIN_FLANK,
     MIN_GAP,
     BeamRows,
     measure_beam,
@@ -325,6 +326,8 @@ def _binned(
 # The beam in a sample of frames: its levels, its thickness, the blur of its edges and where to measure it.
 
 
+_LEANS = 6.0  # standard errors by which the thickness must change along the beam
+_SURFACE = 0.02  # px
 _STEADY = 1.1  # blur of a frame over the usual one up to which its edges show the camera's own
 
 
@@ -428,10 +431,16 @@ def beam_view(
         contrast = float(np.median(fits[1].contrast[usable]))
         thickness = float(np.median((edges[0] - edges[1])[usable]))
         by_column = masked_median((edges[0] - edges[1]).T, usable.T)
-        by_column = by_column[np.isfinite(by_column)]
+        known = np.isfinite(by_column)
+        by_column, across = by_column[known], columns[known] - rough.contact_column
         # the surface is uneven on the scale of three pixels: neighbouring columns count as one
         independent = max(min(by_column.size, float(np.ptp(columns)) / 3.0), 1.0)
         error = float(np.std(by_column)) / math.sqrt(independent)
+        (lean, level), cover = np.polyfit(across, by_column, 1, cov="unscaled")
+        left = float(np.std(by_column - lean * across))
+        if abs(lean) * math.sqrt(independent / by_column.size) > _LEANS * left * math.sqrt(cover[0, 0]):
+            thickness = float(level)
+            error = max(left, _SURFACE) * math.sqrt(cover[1, 1] * by_column.size / independent)
     clipped = max(
         _hot(frames, rows, columns, good, rough.saturated) for rows in (0.5 * (far + near), far - half)
     )
@@ -832,6 +841,8 @@ def find_apex(outline: TipOutline, rod: tuple[int, int], contact_column: float) 
 
 _ROWS = 12  # in which the sides of the rod must be seen
 _SIDE = 0.04  # px; error of two sides that no scatter shows
+_TIPS = 12  # frames in which tip and sticker must be seen apart
+_LOOSE = 0.1  # px
 _CLEAR = 4.0  # rows from the beam within which a mark that stands alone may be the tip itself
 
 
@@ -885,11 +896,11 @@ def shaker_view(
         size = sticker_thickness(view, sticker, frames, near)
         sticker = dataclasses.replace(sticker, thickness=size)
         reference = sticker_rows(view, sticker, frames, near).row
-    outline = _outline(view, frames, bands, rod, beam, reference, learn=not isolated)
+    outline, loose = _outline(view, frames, bands, rod, beam, reference, learn=not isolated)
     column = view.contact_column
     certain = _reaches_border(bands, middle) if sticker is None else wanted.tip_distance is not None
     width = (math.nan, math.nan) if isolated else rod_width(frames, rod, view.edge_width)
-    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain, width)
+    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain, width, loose)
     if sticker is not None and wanted.tip_distance is not None:
         offset = -(wanted.tip_distance + 0.5 * sticker.thickness)
         return dataclasses.replace(
@@ -992,12 +1003,15 @@ def _outline(
     reference: Floats,
     *,
     learn: bool,
-) -> TipOutline:
-    """The tip's outline where it stands clear of the beam, counted from the sticker if there is one."""
+) -> tuple[TipOutline, float]:
+    """The tip's outline where it stands clear of the beam, counted from the sticker if there is one.
+
+    Also the standard deviation [px] by which the sticker moves against the tip; 0 if it is no more than noise.
+    """
     columns = spread_columns(rod[0] + 1, rod[1] - 2, 48)
     if not learn:
         nothing: Floats = np.empty(0)
-        return TipOutline(np.empty(0, dtype=np.intp), nothing, nothing)
+        return TipOutline(np.empty(0, dtype=np.intp), nothing, nothing), 0.0
     objects = bands.objects
     near = beam.row + view.thickness
     edge = near[:, None] + beam.slope[:, None] * (columns - view.contact_column)
@@ -1012,7 +1026,19 @@ def _outline(
         rows, good, _ = tip_edges(view, frames, columns, tip, edge, tip - edge >= MIN_GAP, light)
         outline, counted = tip_outline(rows, good, reference)
     known = (counted >= max(3, 0.05 * frames.shape[0])) & np.isfinite(light)
-    return TipOutline(columns[known], outline[known], light[known])
+    loose = 0.0
+    seen = good & known & np.isfinite(reference)[:, None]
+    count = seen.sum(1)
+    whole = count >= 2 * MIN_FLANK
+    if np.count_nonzero(whole) >= _TIPS:
+        away = np.where(seen, rows - reference[:, None] - outline, 0.0)[whole]
+        mean = away.sum(1) / count[whole]
+        within = float(
+            np.mean(((away - np.where(seen[whole], mean[:, None], 0.0)) ** 2).sum(1) / count[whole] ** 2)
+        )
+        spread = float(np.std(mean))
+        loose = spread if spread > max(_LOOSE, 4.0 * math.sqrt(within)) else 0.0
+    return TipOutline(columns[known], outline[known], light[known]), loose
 
 
 def _offset_at_rest(beam: BeamRows, near: Floats, reference: Floats, head: int) -> float:

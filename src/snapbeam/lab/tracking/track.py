@@ -120,7 +120,8 @@ def tracked_dataset(
     placed = scene.placed_error
     bent = math.hypot(2.0 * scene.shape.shift, contact_shift(touch, placed), placed)
     apart = 0.0 if shaker is None or shaker.certain else never_touching(penetration, rows)
-    bent = math.hypot(bent, apart, rounding_shift(scene.beam), 2.0 * rows.hollow)
+    loose = 0.0 if shaker is None else shaker.loose
+    bent = math.hypot(bent, apart, loose, rounding_shift(scene.beam), 2.0 * rows.hollow)
     # an edge that is no blurred step is found a little off, by where in its pixel it lies
     share = float(np.interp(beam.edge_width, *_PIXEL_PHASE))
     misfit = share * float(np.nan_to_num(scene.shape.misfit))
