@@ -157,7 +157,9 @@ EXPECTED = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", [*EXPECTED, "white bar at the edge", "tapered beam", "gauge", ""])
+@pytest.mark.parametrize(
+    "kind", [*EXPECTED, "white bar at the edge", "tapered beam", "rotated camera", "gauge", ""]
+)
 def test_a_rendered_scene_is_told_or_right(kind, tmp_path):
     outcome = camera_scenes.judged(kind, np.random.default_rng((31, 1, sum(map(ord, kind)))), tmp_path)
     if kind in EXPECTED:

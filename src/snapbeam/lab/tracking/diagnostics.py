@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -140,6 +141,11 @@ KINDS = table(
         "{gap_px:.0f} px: taken for a sticker on a dark shaker whose tip touches the beam in the first frames; "
         "give tip_distance (--tip-distance), or marker=False (--no-marker) if the band is the tip",
         ("tip_distance", "marker"),
+    ),
+    Kind(
+        "camera.turned", INFO,
+        "the sides of the striker's rod and the slope of the beam, against rows and columns",
+        "beam and striker lean by {angle:.1f} degrees alike: the camera is turned; taken out",
     ),
     Kind(
         "camera.sticker_loose", WARNING,
@@ -381,7 +387,7 @@ def _of_the_beam(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
 def _of_the_scale(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> list[Diagnostic]:
     rulers, unseen = seen_rulers(scene, seen.rows.shaker, settings, seen.open_share)
     told = [KINDS["ruler_unseen"].found(told=option_name(name)) for name in unseen]
-    found = compare_rulers([Ruler("pixel_size", 1e-3 * seen.scale, 0.0), *rulers])
+    found = compare_rulers([Ruler("pixel_size", 1e-3 * seen.scale / scene.straight, 0.0), *rulers])
     if found is not None:
         severity, words, numbers = found
         told.append(KINDS["rulers"].found(severity, words, **numbers))
@@ -502,6 +508,8 @@ def _of_the_tip(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
         # the sticker's own upper edge over the beam
         nearest = float(np.nanmin(gap)) - shaker.tip_offset - 0.5 * shaker.sticker.thickness
         told.append(KINDS["sticker_alone"].found(height_px=shaker.sticker.thickness, gap_px=nearest))
+    if shaker.turn:
+        told.append(KINDS["turned"].found(angle=math.degrees(math.atan(shaker.turn))))
     if shaker.loose > 0.0:
         told.append(KINDS["sticker_loose"].found(swing_px=shaker.loose))
     closest = never_touching(seen.penetration, seen.rows)

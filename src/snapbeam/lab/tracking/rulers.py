@@ -58,7 +58,7 @@ def seen_rulers(
             continue
         seen, error = math.nan, math.nan
         if name == "beam_thickness":
-            seen = scene.beam.thickness
+            seen = scene.beam.thickness * scene.straight
             error = math.hypot(scene.beam.thickness_error, _EDGE, 2.0 * scene.shape.shift)
         elif name == "tip_diameter" and scene.shaker is not None:
             seen, error = scene.shaker.width
@@ -66,7 +66,7 @@ def seen_rulers(
             steady = steady_striker(shaker)
             if steady is not None:
                 fit = steady[1]
-                seen = fit.amplitude / float(np.sinc(fit.frequency * open_share))
+                seen = fit.amplitude * scene.straight / float(np.sinc(fit.frequency * open_share))
                 error = math.hypot(fit.amplitude_se, _AMPLITUDE)
         if not math.isfinite(seen):
             unseen.append(name)

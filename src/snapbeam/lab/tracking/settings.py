@@ -350,7 +350,8 @@ class ShakerView:
     words where that is known from; ``isolated`` that the sticker was all that could be seen of the shaker;
     ``certain`` that the tip is no sticker, by its distance or since its body has no gap down to the border.
     ``width`` [px] is that of the rod behind the tip, and its standard error; NaN where it is not seen.  ``loose``
-    [px] is by how much the sticker moves against the tip, standard deviation.
+    [px] is by how much the sticker moves against the tip, standard deviation.  ``turn`` is the tangent of the angle
+    by which the camera is turned against rod and beam.
     """
 
     rod: tuple[int, int]
@@ -363,6 +364,7 @@ class ShakerView:
     certain: bool
     width: tuple[float, float]
     loose: float
+    turn: float
 
     @property
     def mark(self) -> str:
@@ -462,6 +464,11 @@ class Scene:
     shape: EdgeShape
     noise: NoiseShape
     striker_in_view: bool
+
+    @property
+    def straight(self) -> float:
+        """Length across the beam over that along the rows of a picture that is turned."""
+        return 1.0 if self.shaker is None else 1.0 / math.sqrt(1.0 + self.shaker.turn**2)
 
     @property
     def row_errors(self) -> tuple[float, float]:

@@ -843,6 +843,9 @@ _ROWS = 12  # in which the sides of the rod must be seen
 _SIDE = 0.04  # px; error of two sides that no scatter shows
 _TIPS = 12  # frames in which tip and sticker must be seen apart
 _LOOSE = 0.1  # px
+_TURNED = 0.009  # rows a column by which a camera must be turned
+_SQUARE = 0.04  # by which a beam may lean against its striker
+_STEEP = 3.0  # rows a column by which the outline of a tip may fall
 _CLEAR = 4.0  # rows from the beam within which a mark that stands alone may be the tip itself
 
 
@@ -899,14 +902,17 @@ def shaker_view(
     outline, loose = _outline(view, frames, bands, rod, beam, reference, learn=not isolated)
     column = view.contact_column
     certain = _reaches_border(bands, middle) if sticker is None else wanted.tip_distance is not None
-    width = (math.nan, math.nan) if isolated else rod_width(frames, rod, view.edge_width)
-    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain, width, loose)
+    sides = Rod(math.nan, math.nan, 0.0) if isolated else rod_sides(frames, rod, view.edge_width)
+    turned = abs(sides.lean) > _TURNED and abs(sides.lean + float(np.nanmedian(beam.slope))) < _SQUARE
+    turn = -sides.lean if turned else 0.0
+    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain, sides[:2], loose, turn)
     if sticker is not None and wanted.tip_distance is not None:
         offset = -(wanted.tip_distance + 0.5 * sticker.thickness)
         return dataclasses.replace(
             shown, tip_offset=offset, tip_source="distance to the sticker as given"
         ), column
-    apex = None if isolated else find_apex(outline, rod, column)
+    upright = dataclasses.replace(outline, profile=outline.profile - turn * (outline.columns - column))
+    apex = None if isolated else find_apex(upright, rod, column)
     if apex is not None:
         column += 0.0 if wanted.fixed_column else apex.column
         source = "tip seen apart from the beam"
@@ -924,30 +930,47 @@ def shaker_view(
     )
 
 
-def rod_width(frames: NDArray[np.floating], rod: tuple[int, int], blur: float) -> tuple[float, float]:
-    """Columns between the sides of the rod behind its tip and their standard error; NaN where they are not seen.
+class Rod(NamedTuple):
+    """The shaker's rod behind its tip: width [px] across it, its standard error, and columns by which a row leans.
 
-    The rod moves along its sides, so these are sharp in the mean over the sample.  Rows count that show as much
-    contrast as most of the lower half do: neither sticker nor tip.
+    NaN and 0 where its sides are not seen.
     """
+
+    width: float
+    error: float
+    lean: float
+
+
+def rod_sides(frames: NDArray[np.floating], rod: tuple[int, int], blur: float) -> Rod:
+    """The rod by its sides, along which it moves, so that they are sharp in the mean over the sample.
+
+    Rows of the lower half count that show as much contrast as most do: neither sticker nor tip.
+    """
+    unknown = Rod(math.nan, math.nan, 0.0)
     mean = frames[:, frames.shape[1] // 2 :].mean(0, dtype=np.float64)
+    low, high = rod[0] - HALF, rod[1] + HALF
+    if low < 0 or high > mean.shape[1]:
+        return unknown
+    outside = 0.5 * (mean[:, low : low + 3].mean(1) + mean[:, high - 3 : high].mean(1))
+    step = mean[:, rod_middle(rod, 0.2)].mean(1) - outside
+    sign = float(np.sign(np.median(step)))
+    rows = np.flatnonzero(step * sign > 0.8 * float(np.percentile(step * sign, 75.0)))
+    solid = (mean[rows, low:high] - outside[rows, None]) * sign > 0.5 * step[rows, None] * sign
+    first, last = low + solid.argmax(1) - 0.5, high - solid[:, ::-1].argmax(1) - 0.5
     sides = []
-    for column, sign in ((rod[0], 1.0), (rod[1], -1.0)):
-        first = column - HALF
-        if first < 0 or column + HALF >= mean.shape[1]:
-            return math.nan, math.nan
-        windows = mean[:, first : column + HALF + 1]
-        step = float(np.median(windows[:, -2:].mean(1) - windows[:, :2].mean(1))) * sign
-        fit = fit_edges(windows, blur, sign=math.copysign(sign, sign * step))
-        good = fit.contrast > 0.8 * float(np.percentile(fit.contrast, 75.0))
-        sides.append(np.where(good, column + fit.position, np.nan))
-    found = sides[1] - sides[0]
-    found = found[np.isfinite(found)]
-    found = found[np.abs(found - np.median(found)) < 1.0] if found.size else found
-    if found.size < _ROWS:
-        return math.nan, math.nan
-    scatter = float(np.std(found)) / math.sqrt(found.size / 3.0)
-    return float(np.mean(found)), math.hypot(scatter, _SIDE)
+    for guess, rising in ((first, sign), (last, -sign)):
+        windows, inside = gather(mean.T[None], guess[None], rows, HALF)
+        fit = fit_edges(windows[0], blur, sign=rising)
+        sides.append(np.where(inside[0], np.rint(guess) + fit.position, np.nan))
+    found, middle = sides[1] - sides[0], 0.5 * (sides[0] + sides[1])
+    known = np.isfinite(found)
+    known &= np.abs(found - np.median(found[known])) < 1.0 if known.any() else known
+    if np.count_nonzero(known) < _ROWS:
+        return unknown
+    lean = float(np.polyfit(rows[known], middle[known], 1)[0])
+    across = 1.0 / math.sqrt(1.0 + lean * lean)
+    scatter = float(np.std(found[known])) / math.sqrt(np.count_nonzero(known) / 3.0)
+    return Rod(across * float(np.mean(found[known])), math.hypot(scatter, _SIDE), lean)
 
 
 def _reaches_border(bands: BeamBands, middle: NDArray[np.intp]) -> bool:
@@ -1026,6 +1049,11 @@ def _outline(
         rows, good, _ = tip_edges(view, frames, columns, tip, edge, tip - edge >= MIN_GAP, light)
         outline, counted = tip_outline(rows, good, reference)
     known = (counted >= max(3, 0.05 * frames.shape[0])) & np.isfinite(light)
+    at = np.flatnonzero(known)
+    smooth = np.abs(np.diff(outline[at])) < _STEEP * np.diff(columns[at])
+    first, last = longest_stretch(smooth)  # beyond a step it is not the tip
+    known[:] = False
+    known[at[first : last + 1]] = True
     loose = 0.0
     seen = good & known & np.isfinite(reference)[:, None]
     count = seen.sum(1)

@@ -93,7 +93,7 @@ def tracked_dataset(
             )
         )
     turn = Orientation(settings.side, recording.shape)
-    scale = recording.pixel_size * 1e3
+    scale = recording.pixel_size * 1e3 * scene.straight
     beam, shaker = scene.beam, scene.shaker
     order = FrameOrder((), (), ())
     if not (fields.shift or fields.apart or scene.noise.lag):
