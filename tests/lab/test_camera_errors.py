@@ -10,7 +10,7 @@ import pytest
 from snapbeam.lab import open_recording
 from snapbeam.lab.tracking.diagnostics import never_touching
 from snapbeam.lab.tracking.frame_order import find_order
-from snapbeam.lab.tracking.measure import find_rest, image_lag
+from snapbeam.lab.tracking.measure import exposure_blur, find_rest
 from snapbeam.lab.tracking.survey import border_bar
 from snapbeam.util.diagnostics import diagnostics_of
 
@@ -93,8 +93,18 @@ def test_image_lag_is_told_by_the_blur_of_fast_frames():
     for share, told in ((0.0, False), (0.15, True), (0.3, True)):
         more = step**2 * (0.5**2 / 12.0 + share * (1.0 - share))
         width = np.sqrt(1.0 + more) + 0.01 * rng.standard_normal(beam.size)
-        assert (image_lag(beam, width, 0.5) > 0.0) == told
-    assert image_lag(beam, width, 0.5) == pytest.approx(0.3, abs=0.08)
+        assert (exposure_blur(beam, width, 0.5)[0] > 0.0) == told
+    assert exposure_blur(beam, width, 0.5)[0] == pytest.approx(0.3, abs=0.08)
+
+
+def test_light_shorter_than_the_exposure_is_told_by_the_blur_of_fast_frames():
+    beam = motion(noise=0.0)[0]
+    rng = np.random.default_rng(2)
+    for share, stated, told in ((0.9, 0.9, 0.0), (0.1, 0.9, 0.45), (0.1, None, 0.0), (0.1, 0.1, 0.0)):
+        width = np.sqrt(1.0 + np.gradient(beam) ** 2 * share**2 / 12.0) + 0.005 * rng.standard_normal(
+            beam.size
+        )
+        assert exposure_blur(beam, width, stated) == (0.0, told)
 
 
 def test_a_bar_along_the_border_is_told_from_the_background():

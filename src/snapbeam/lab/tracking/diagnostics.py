@@ -109,6 +109,13 @@ KINDS = table(
         "standard errors; more light and a shorter exposure, or give the frames as they were taken",
     ),
     Kind(
+        "camera.pulse", WARNING,
+        "how the blur of the edge grows with its speed, against what the exposure explains",
+        "edges in motion are sharper than the exposure explains: the lamp pulses, or the exposure of the file is wrong; "
+        "positions are of an instant up to {frames:.2f} frames from the middle of the exposure, which is in their standard "
+        "errors; use steady light, or give the frames as they were taken",
+    ),
+    Kind(
         "camera.smoothed", WARNING,
         "noise of pixels, against that of their neighbours",
         "noise of neighbouring pixels is alike (correlation {correlation:.2f}): pictures were enlarged, smoothed, "
@@ -296,8 +303,8 @@ class SeenMotion:
 
     ``penetration`` [px] of the tip into the beam, NaN where unknown, and that while they ``touch``; ``scale``
     [mm/px]; ``drift`` [px] of the camera, the largest; ``fields`` of interlaced video; ``order`` of the
-    frames; ``trail``, the share of the frame before that a frame still shows; ``open_share``, the exposure over the
-    time between frames.
+    frames; ``trail``, the share of the frame before that a frame still shows; ``pulse``, the frames by which its
+    instant within the exposure is open; ``open_share``, the exposure over the time between frames, 0 if not known.
     """
 
     rows: TrackedRows
@@ -309,6 +316,7 @@ class SeenMotion:
     fields: VideoFields
     order: FrameOrder
     trail: float
+    pulse: float
     open_share: float
 
 
@@ -324,6 +332,8 @@ def tracking_diagnostics(
     told += [*_of_the_motion(seen, settings, rate), *_of_the_order(seen.order, rate)]
     if seen.trail > 0.0:
         told.append(KINDS["lag"].found(share_percent=100.0 * seen.trail))
+    if seen.pulse > 0.0:
+        told.append(KINDS["pulse"].found(frames=seen.pulse))
     if seen.rows.hollow > 0.0:
         told.append(KINDS["curved"].found(hollow_px=seen.rows.hollow))
     told += _of_the_edges(scene.shape, settings)

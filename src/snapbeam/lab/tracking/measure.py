@@ -868,18 +868,19 @@ _LAG = (
 )
 
 
-def image_lag(row: Floats, width: Floats, exposure: float) -> float:
-    """Share of the light of the frame before that a frame still shows; 0 where none is told.
+def exposure_blur(row: Floats, width: Floats, exposure: float | None) -> tuple[float, float]:
+    """Share of the frame before that a frame still shows, and frames by which its instant is open; 0 where none is told.
 
     Motion at a speed v a frame adds v^2 s^2/12 to the square of an edge's blur, s the exposure over the time between
-    frames; a share a of the frame before adds v^2 a (1 - a).
+    frames; a share a of the frame before adds v^2 a (1 - a).  Less than that is
+    added by light that is shorter than the exposure, at an instant that is not known.
 
     Parameters
     ----------
     row, width
         Of the beam's edge, over the frames [px].
     exposure
-        Over the time between frames; 1 where it is not known.
+        Over the time between frames; None where it is not known.
     """
     speed = np.full(row.size, np.nan)
     speed[1:-1] = 0.5 * (row[2:] - row[:-2])
@@ -888,13 +889,15 @@ def image_lag(row: Floats, width: Floats, exposure: float) -> float:
     with np.errstate(invalid="ignore"):
         used = np.isfinite(width) & (bend < 0.3 * np.abs(speed) + _MOVES)  # not where the beam is struck
     if np.count_nonzero(used & (np.abs(np.nan_to_num(speed)) > 3.0 * _MOVES)) < _LEAST:
-        return 0.0
+        return 0.0, 0.0
     x, y = speed[used] ** 2, width[used] ** 2
     (slope, _), cover = np.polyfit(x, y, 1, cov=True)
-    more = float(slope) - min(exposure, 1.0) ** 2 / 12.0
-    if more < max(_LAG, _SURE_LAG * math.sqrt(float(cover[0, 0]))):
-        return 0.0
-    return 0.5 - math.sqrt(max(0.25 - more, 0.0))
+    opened = 1.0 if exposure is None else min(exposure, 1.0)
+    more = float(slope) - opened**2 / 12.0
+    certain = max(_LAG, _SURE_LAG * math.sqrt(float(cover[0, 0])))
+    if more > certain:
+        return 0.5 - math.sqrt(max(0.25 - more, 0.0)), 0.0
+    return 0.0, (0.5 * opened if exposure is not None and -more > certain else 0.0)
 
 
 def alternation(row: Floats) -> float:

@@ -27,9 +27,9 @@ from snapbeam.lab.tracking.measure import (
     Rest,
     TrackedRows,
     alternation,
+    exposure_blur,
     fields_apart,
     find_rest,
-    image_lag,
     measure_beam,
     measure_shaker,
     touching,
@@ -72,11 +72,11 @@ def tracked_dataset(
 
     *drift* [px] is the largest shift of the camera that was taken out, *fields* what is seen of interlaced video.
     """
-    trail = 0.0
-    opened = 1.0 if recording.exposure is None else recording.exposure * recording.frame_rate
+    trail = pulse = 0.0
+    opened = None if recording.exposure is None else recording.exposure * recording.frame_rate
     if not (fields.shift or fields.apart or scene.noise.lag):
-        trail = image_lag(rows.row, rows.width, opened)
-    rows = _as_filtered(rows, scene, fields, trail)
+        trail, pulse = exposure_blur(rows.row, rows.width, opened)
+    rows = _as_filtered(rows, scene, fields, trail + pulse)
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
     if not rest.indices.size:
         located = int(np.isfinite(rows.row).sum())
@@ -111,7 +111,9 @@ def tracked_dataset(
     offset = math.hypot(_offset_error(rows.row, rest), scene.row_errors[1])
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
-    seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields, order, trail, opened)
+    seen = SeenMotion(
+        rows, rest, penetration, touch, scale, drift, fields, order, trail, pulse, opened or 0.0
+    )
     diagnostics = (
         *recording.diagnostics,
         *tracking_diagnostics(scene, seen, settings, scale * offset, recording.frame_rate),
@@ -167,13 +169,13 @@ def tracked_dataset(
     return dataset
 
 
-def _as_filtered(rows: TrackedRows, scene: Scene, fields: VideoFields, trail: float) -> TrackedRows:
+def _as_filtered(rows: TrackedRows, scene: Scene, fields: VideoFields, late: float) -> TrackedRows:
     """The rows with errors of pictures that were averaged over frames, smoothed or interlaced, or whose rows have noise.
 
-    *trail* is the share of the frame before that a frame still shows.
+    *late* is by how many frames a position may be of another instant.
     """
     noise = scene.noise
-    lag = noise.lag + fields.lag + trail
+    lag = noise.lag + fields.lag + late
 
     def widened(row: Floats, error: Floats) -> Floats:
         step = np.abs(np.diff(row, prepend=np.nan, append=np.nan))
