@@ -163,6 +163,7 @@ EXPECTED = {
     "pixel size ten percent off": "camera.rulers",
     "image lag": "camera.lag",
     "swinging sticker": "camera.sticker_loose",
+    "rod at the border": "camera.rod_cut",
 }
 
 

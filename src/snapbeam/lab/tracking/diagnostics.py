@@ -155,6 +155,13 @@ KINDS = table(
         "beam and striker lean by {angle:.1f} degrees alike: the camera is turned; taken out",
     ),
     Kind(
+        "camera.rod_cut", WARNING,
+        "columns of the striker, against the border of the region",
+        "the border of the region cuts the striker, so where its tip touches is not seen: its position may be off by as "
+        "much as its tip is round; widen region (--region) or give contact_column (--contact-column)",
+        ("region", "contact_column"),
+    ),
+    Kind(
         "camera.sticker_loose", WARNING,
         "the way from the sticker to the tip frame by frame, where both are seen, against their noise",
         "the sticker moves against the tip by {swing_px:.2f} px (standard deviation), which is in the shaker's standard "
@@ -520,6 +527,8 @@ def _of_the_tip(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
         told.append(KINDS["sticker_alone"].found(height_px=shaker.sticker.thickness, gap_px=nearest))
     if shaker.turn:
         told.append(KINDS["turned"].found(angle=math.degrees(math.atan(shaker.turn))))
+    if shaker.cut:
+        told.append(KINDS["rod_cut"].found())
     if shaker.loose > 0.0:
         told.append(KINDS["sticker_loose"].found(swing_px=shaker.loose))
     closest = never_touching(seen.penetration, seen.rows)

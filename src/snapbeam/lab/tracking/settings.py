@@ -351,7 +351,8 @@ class ShakerView:
     ``certain`` that the tip is no sticker, by its distance or since its body has no gap down to the border.
     ``width`` [px] is that of the rod behind the tip, and its standard error; NaN where it is not seen.  ``loose``
     [px] is by how much the sticker moves against the tip, standard deviation.  ``turn`` is the tangent of the angle
-    by which the camera is turned against rod and beam.
+    by which the camera is turned against rod and beam.  ``cut`` says that one border of the picture cuts the rod, so
+    that its middle is not seen.
     """
 
     rod: tuple[int, int]
@@ -365,6 +366,7 @@ class ShakerView:
     width: tuple[float, float]
     loose: float
     turn: float
+    cut: bool
 
     @property
     def mark(self) -> str:

@@ -905,7 +905,8 @@ def shaker_view(
     sides = Rod(math.nan, math.nan, 0.0) if isolated else rod_sides(frames, rod, view.edge_width)
     turned = abs(sides.lean) > _TURNED and abs(sides.lean + float(np.nanmedian(beam.slope))) < _SQUARE
     turn = -sides.lean if turned else 0.0
-    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain, sides[:2], loose, turn)
+    cut = not wanted.fixed_column and (rod[0] < 2) != (rod[1] > frames.shape[2] - 2)
+    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain, sides[:2], loose, turn, cut)
     if sticker is not None and wanted.tip_distance is not None:
         offset = -(wanted.tip_distance + 0.5 * sticker.thickness)
         return dataclasses.replace(
