@@ -228,8 +228,10 @@ def pooled(error: Floats) -> Floats:
         return np.where(error < usual, usual, error)
 
 
-def unexplained_blur(row: Floats, width: Floats, usual: float) -> Floats:
+def unexplained_blur(row: Floats, width: Floats, usual: float, limit: float) -> Floats:
     """Excess of the edge width over lens and motion blur [px], over the frames; otherwise 0.
+
+    Beyond *limit*, where edges are too wide for their windows, that over the lens alone.
 
     An exposure is no longer than a frame, so motion smears an edge over no more than the step from frame to
     frame, with a standard deviation of that over the root of 12.
@@ -238,7 +240,8 @@ def unexplained_blur(row: Floats, width: Floats, usual: float) -> Floats:
     with np.errstate(invalid="ignore"):
         fastest = np.fmax(np.append(step, np.nan), np.append(np.nan, step))
         explained = np.hypot(usual, fastest / np.sqrt(12.0))
-        return np.where(width > _WIDER * explained + 0.2, width - explained, 0.0)
+        excess = np.where(width > _WIDER * explained + 0.2, width - explained, 0.0)
+        return np.where(width > limit, width - usual, excess)
 
 
 def find_rest(row: Floats, error: Floats, shaker: Floats, given: tuple[int, int] | None) -> Rest:
@@ -655,8 +658,6 @@ class Follower:
                 wide = beam.width > self.blur_limit
             if self.scene.shaker.sticker is None:  # the beam's light cannot be taken out of such windows
                 row[wide] = np.nan
-            else:
-                error = np.where(wide, np.hypot(error, 0.2 * (beam.width - view.edge_width)), error)
             gone = ~np.isfinite(row) & ~lost & ~wide
             flags[gone & tip.merged] |= np.uint16(FrameFlag.MERGED)
             other = [
@@ -673,9 +674,7 @@ class Follower:
         self._parts.append(
             {
                 "row": np.where(lost, np.nan, beam.row) - shift,
-                "error": np.where(
-                    lost, np.nan, np.hypot(_with_blur(beam, view.edge_width, self.blur_limit), shift_error)
-                ),
+                "error": np.where(lost, np.nan, np.hypot(beam.error, shift_error)),
                 "slope": np.where(lost, np.nan, beam.slope),
                 "hollow": np.where(lost, np.nan, beam.hollow),
                 "width": beam.width,
@@ -702,7 +701,7 @@ class Follower:
         )
         odd &= np.isfinite(row)
         flags[odd] |= np.uint16(FrameFlag.DISTORTED)
-        blur = unexplained_blur(row, found["width"], self.scene.beam.edge_width)
+        blur = unexplained_blur(row, found["width"], self.scene.beam.edge_width, self.blur_limit)
         error = np.hypot(
             pooled(found["error"]), np.where(odd, np.fmax(miss, _SMEARED * blur), _SMEARED * blur)
         )
@@ -751,13 +750,6 @@ def _lasting_hollow(hollow: Floats) -> float:
     known = hollow[np.isfinite(hollow)]
     middle = float(np.median(known)) if known.size else 0.0
     return abs(middle) if abs(middle) > _HOLLOW else 0.0
-
-
-def _with_blur(beam: BeamRows, usual: float, limit: float) -> Floats:
-    """Standard errors of the beam's row, widened in frames whose edges are too wide for their windows."""
-    with np.errstate(invalid="ignore"):
-        wide = beam.width > limit
-    return np.where(wide, np.hypot(beam.error, _SMEARED * (beam.width - usual)), beam.error)
 
 
 def _assign(

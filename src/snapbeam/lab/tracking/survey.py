@@ -1065,7 +1065,8 @@ def _outline(
         within = float(
             np.mean(((away - np.where(seen[whole], mean[:, None], 0.0)) ** 2).sum(1) / count[whole] ** 2)
         )
-        spread = float(np.std(mean))
+        # the smaller of both: a few blurred frames are no motion
+        spread = min(float(np.std(mean)), 1.4826 * float(np.median(np.abs(mean - np.median(mean)))))
         loose = spread if spread > max(_LOOSE, 4.0 * math.sqrt(within)) else 0.0
     return TipOutline(columns[known], outline[known], light[known]), loose
 
