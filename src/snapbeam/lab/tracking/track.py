@@ -97,12 +97,13 @@ def tracked_dataset(
     beam, shaker = scene.beam, scene.shaker
     order = FrameOrder((), (), ())
     if not (fields.shift or fields.apart or scene.noise.lag):
-        clock = tuple(drive_clock(rows.shaker))
+        steady = np.nan if shaker is not None and shaker.loose else 1.0  # a sticker that swings is no clock
+        clock = tuple(drive_clock(steady * rows.shaker))
         if all(kind != "scattered" for kind, _ in clock):  # frames at uneven times look like lost ones
             blurred = (rows.flags & int(FrameFlag.BLUR)) != 0  # which pulls the rows
-            order = find_order(*(np.where(blurred, np.nan, one) for one in (rows.row, rows.shaker)))
+            order = find_order(*(np.where(blurred, np.nan, one) for one in (rows.row, steady * rows.shaker)))
             rows = without_repeats(rows, order)
-            clock = tuple(drive_clock(rows.shaker))
+            clock = tuple(drive_clock(steady * rows.shaker))
         order = order._replace(clock=clock)
     beam_mm = settings.rest * 1e3 - turn.sign * scale * (rows.row - rest.row)
     tip = rows.shaker + (shaker.tip_offset if shaker is not None else np.nan)
