@@ -109,6 +109,18 @@ def test_a_good_scene_whose_columns_agreed_by_chance(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("k", "kind"),
+    [(179, "lossless"), (27, "noise of rows"), (87, "noise of rows"), (171, "noise of rows"),
+     (53, "fixed rows"), (137, "fixed rows"), (185, "fixed rows")],
+)  # fmt: skip
+def test_good_scenes_that_were_flagged_once(k, kind, tmp_path):
+    """A beam struck between frames was a lost frame; noise of whole rows was no error, smoothed, distorted or no rest."""
+    outcome = MAKERS["camera"][1](kind, np.random.default_rng((260, k)), tmp_path)
+    assert not outcome.flagged and outcome.ratio < SURE
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["scene", "drive", "decay"])
 def test_hundreds(what, tmp_path):
     good, spoiled = HUNDREDS[what]
