@@ -19,12 +19,21 @@ import random_signals
 SURE = 5.0
 SEED = 22
 FALSE = 0.02
-HUNDREDS = {"scene": (200, 200), "camera": (120, 120), "drive": (200, 200), "decay": (200, 200)}
+HUNDREDS = {
+    "scene": (200, 200),
+    "camera": (120, 120),
+    "drive": (200, 200),
+    "sensor": (100, 220),
+    "decay": (200, 200),
+    "mode": (100, 90),
+}
 WORDS = {
     "scene": "scenes",
     "camera": "scenes with errors of the series of frames",
     "drive": "vibrometer records",
+    "sensor": "vibrometer records with errors of sensor or electronics",
     "decay": "free decays",
+    "mode": "free decays with errors of sensor or support",
 }
 FILE = Path(__file__).parents[2] / "docs" / "data" / "random_defects.md"
 HEAD = (
@@ -40,7 +49,9 @@ MAKERS = {
     ),
     "camera": (camera_scenes.ERRORS, camera_scenes.judged),
     "drive": (random_signals.DRIVE_DEFECTS, lambda kind, rng, folder: random_signals.judged_drive(rng, kind)),
+    "sensor": (random_signals.SENSOR_DEFECTS, lambda kind, rng, folder: random_signals.judged_drive(rng, kind)),
     "decay": (random_signals.DECAY_DEFECTS, lambda kind, rng, folder: random_signals.judged_decay(rng, kind)),
+    "mode": (random_signals.MODE_DEFECTS, lambda kind, rng, folder: random_signals.judged_decay(rng, kind)),
 }
 
 
