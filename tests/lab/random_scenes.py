@@ -248,7 +248,8 @@ def measured(scene, folder, rng):
 
 def _reordered(recording, kind, rng):
     """A recording with its frames in another order, or of a camera that was knocked."""
-    k = int(rng.integers(60, len(recording) - 40))
+    half = len(recording) // 2
+    k = int(rng.integers(min(60, half), max(len(recording) - 40, half + 1)))
     k += int(np.argmax(np.abs(np.diff(recording.truth["shaker_displacement_mm"].values[k : k + 30]))))
     as_taken, shift = recording.frame, int(rng.integers(1, 5))
 
