@@ -41,10 +41,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# ----------------------------------------------------------------------------------------------------
-# Which files of a folder are one test: paired by their names, or by a table.
-
-
 _HEADERS = (".cih", ".cihx")
 _SIGNALS = tuple(suffix for suffix in READERS if suffix not in (".h5", ".hdf5", ".npy", ".nc"))
 _WORDS = (
@@ -52,6 +48,30 @@ _WORDS = (
     r"(?![a-z])"
 )
 _COLUMNS = ("test", "recording", "vibrometer", "frequency_hz", "velocity_m_s", "location", "comment")
+_CAMERA = ("frame_rate", "pixel_size", "region")
+_SIGNAL = ("channel", "units", "sensitivity", "sampling_frequency", "columns")
+_NAN = math.nan
+COLUMNS = (
+    "test", "recording", "vibrometer", "status", "frequency_hz", "frequency_se_hz", "velocity_m_s", "velocity_se_m_s",
+    "location", "response_class", "zero_crossings", "cycles", "snr_db", "measured_share", "delay_s", "polarity", "gain",
+    "diagnostics", "comment",
+)  # fmt: skip
+PAGE_START = "<!DOCTYPE html>\n<!-- test series, written by snapbeam -->\n"
+"""First lines of a page, by which it is known."""
+_PAGE = """<html lang="en"><head><meta charset="utf-8"><title>{title}</title>
+<style>
+body {{ font-family: sans-serif; margin: 2em; }}
+table {{ border-collapse: collapse; font-size: 85%; }}
+td, th {{ border: 1px solid #ccc; padding: .3em .5em; text-align: left; }}
+th {{ position: sticky; top: 0; background: #eee; }}
+img {{ max-width: 100%; display: block; margin: 1em 0; }}
+</style></head><body>
+<h1>{title}</h1>
+<p>{words}</p>
+{pictures}
+{table}
+</body></html>
+"""
 
 
 @dataclass(frozen=True)
@@ -198,14 +218,6 @@ def _number(cell: str | None, mark: str, where: str, column: str) -> float | Non
         raise InputError(f"{where}: {column} = {shown(cell)}: must be a number") from None
 
 
-# ----------------------------------------------------------------------------------------------------
-# What all tests of a test series have in common, from a TOML file or by name.
-
-
-_CAMERA = ("frame_rate", "pixel_size", "region")
-_SIGNAL = ("channel", "units", "sensitivity", "sampling_frequency", "columns")
-
-
 @dataclass(frozen=True)
 class SeriesSettings:
     """Settings of every test.
@@ -291,13 +303,6 @@ def load_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -
         sections["camera"]["region"] = tuple(region)
     tracking = TrackingSettings().changed(**sections["tracking"])
     return SeriesSettings(sections["camera"], tracking, sections["signal"], **sections["test_series"])
-
-
-# ----------------------------------------------------------------------------------------------------
-# One test of a test series: tracked, aligned with its vibrometer, classed; what went wrong said, never raised.
-
-
-_NAN = math.nan
 
 
 @dataclass(frozen=True)
@@ -457,16 +462,6 @@ def _start(seen: DriveMeasurement, drive: DriveMeasurement, alignment: Alignment
     return None if seen.startup is None else seen.startup.onset
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-COLUMNS = (
-    "test", "recording", "vibrometer", "status", "frequency_hz", "frequency_se_hz", "velocity_m_s", "velocity_se_m_s",
-    "location", "response_class", "zero_crossings", "cycles", "snr_db", "measured_share", "delay_s", "polarity", "gain",
-    "diagnostics", "comment",
-)  # fmt: skip
-
-
 def run_test_series(
     folder: Path,
     settings: SeriesSettings,
@@ -555,24 +550,6 @@ def _row_of(result: TestResult) -> list[str]:
     values["diagnostics"] = " ".join(code for code, _, _ in result.diagnostics)
     values["comment"] = result.reason
     return [_cell(values[name]) for name in COLUMNS]
-
-
-PAGE_START = "<!DOCTYPE html>\n<!-- test series, written by snapbeam -->\n"
-"""First lines of a page, by which it is known."""
-_PAGE = """<html lang="en"><head><meta charset="utf-8"><title>{title}</title>
-<style>
-body {{ font-family: sans-serif; margin: 2em; }}
-table {{ border-collapse: collapse; font-size: 85%; }}
-td, th {{ border: 1px solid #ccc; padding: .3em .5em; text-align: left; }}
-th {{ position: sticky; top: 0; background: #eee; }}
-img {{ max-width: 100%; display: block; margin: 1em 0; }}
-</style></head><body>
-<h1>{title}</h1>
-<p>{words}</p>
-{pictures}
-{table}
-</body></html>
-"""
 
 
 def write_page(

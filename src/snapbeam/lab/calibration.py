@@ -32,11 +32,30 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# ----------------------------------------------------------------------------------------------------
-# What makes two measured wells unequal.
-
-
 _UNITS = {"midspan_amplitude": "m", "point_load": "N", "uniform_load": "N/m"}
+_Array = NDArray[np.float64]
+STARTS = (1.0, 0.75, 1.33, 0.55, 1.8)
+"""Buckling levels to start from, over the given one."""
+HIGHER = (1.05, 1.15, 1.3)
+"""Buckling levels that are tried beyond the one found, over it."""
+UNDETERMINED = 1e-5
+"""Minimum singular value of the relative sensitivities that counts as a response, over the maximum."""
+_CROSSING = 0.05  # share within which the first two frequencies may be in the other order
+ASSUMED = 0.005
+"""Standard error of a frequency for which none is given, as a share of it."""
+_LINKED = 0.95  # correlation from which two parameters are said to be linked
+_VAGUE = 0.05  # relative standard error from which a parameter is said to be hardly known
+_SHOWN = {
+    "thickness": (1e3, "mm"),
+    "buckling_level": (1e3, "mm"),
+    "length": (1e3, "mm"),
+    "young_modulus": (1e-9, "GPa"),
+    "density": (1.0, "kg/m^3"),
+}
+FITTED = ("thickness", "young_modulus", "density", "length", "buckling_level")
+_HERTZ_POWER = -0.2
+_LEAST_SPAN = 2.0  # factor by which speeds must differ for the power to be told
+_COARSE = 6.0  # frames
 
 
 def uneven_beam(beam: Beam, measured: Measurements, kind: str, modes: int) -> ReducedModel:
@@ -91,18 +110,6 @@ def boundary_section(beam: Beam) -> dict[str, Any]:
 
 def _same(value: Any, other: Any) -> bool:
     return value is other or (isinstance(value, (int, float, str)) and value == other)
-
-
-# ----------------------------------------------------------------------------------------------------
-# Least squares of a calibration: its minimum, its sensitivities, and what the data respond to.
-
-
-STARTS = (1.0, 0.75, 1.33, 0.55, 1.8)
-"""Buckling levels to start from, over the given one."""
-HIGHER = (1.05, 1.15, 1.3)
-"""Buckling levels that are tried beyond the one found, over it."""
-UNDETERMINED = 1e-5
-"""Minimum singular value of the relative sensitivities that counts as a response, over the maximum."""
 
 
 def sensitivity(frequencies: Callable[[_Array], _Array], logs: _Array, errors: _Array) -> _Array:
@@ -160,13 +167,6 @@ def directions(jacobian: _Array) -> _Array:
     return np.asarray(rows[told].T)
 
 
-# ----------------------------------------------------------------------------------------------------
-# Which of the modes about a well is meant: symmetric and antisymmetric ones change places at b/r = 6.2.
-
-
-_CROSSING = 0.05  # share within which the first two frequencies may be in the other order
-
-
 def shape_diagnostics(beam: Beam, measured: Measurements, modes: int) -> list[Diagnostic]:
     """Diagnostics for an uncertain order of the modes about a well, if only the frequencies identify them."""
     told = [measured.lower_well_shape, measured.upper_well_shape]
@@ -213,24 +213,6 @@ def either_well(beam: Beam, measured: Measurements, modes: int) -> tuple[float, 
         except RuntimeError:  # no level gives that frequency
             return ()
     return tuple(levels)
-
-
-# ----------------------------------------------------------------------------------------------------
-# What a calibration says in words: remarks on what was found, diagnostics on what to beware of.
-
-
-ASSUMED = 0.005
-"""Standard error of a frequency for which none is given, as a share of it."""
-
-_LINKED = 0.95  # correlation from which two parameters are said to be linked
-_VAGUE = 0.05  # relative standard error from which a parameter is said to be hardly known
-_SHOWN = {
-    "thickness": (1e3, "mm"),
-    "buckling_level": (1e3, "mm"),
-    "length": (1e3, "mm"),
-    "young_modulus": (1e-9, "GPa"),
-    "density": (1.0, "kg/m^3"),
-}
 
 
 def _listed(names: tuple[str, ...]) -> str:
@@ -359,13 +341,6 @@ def doubts(result: Calibration, measured: Measurements) -> list[Diagnostic]:
     if len(ratios) > 1 and max(ratios) > 1.3 * min(ratios):
         told.append(KINDS_CALIBRATION["damping_differs"].found(low=min(ratios), high=max(ratios)))
     return told
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_Array = NDArray[np.float64]
-FITTED = ("thickness", "young_modulus", "density", "length", "buckling_level")
 
 
 @dataclass(frozen=True)
@@ -740,7 +715,6 @@ def _mean(
     return mean, float(1.0 / np.sqrt(weight.sum())) * max(1.0, spread)
 
 
-# ----------------------------------------------------------------------------------------------------
 # Contact stiffness from tracked impacts: their durations over the speeds at which tip and body close.
 #
 # For a force k d^1.5 between two bodies of effective mass m that close at v (Hertz), the contact lasts
@@ -749,11 +723,6 @@ def _mean(
 #
 # The power of v checks that the impacts are such collisions; on a limp beam, which bends while it is in touch,
 # they are not, and then there is no stiffness to tell.
-
-
-_HERTZ_POWER = -0.2
-_LEAST_SPAN = 2.0  # factor by which speeds must differ for the power to be told
-_COARSE = 6.0  # frames
 
 
 @dataclass(frozen=True)

@@ -207,7 +207,7 @@ def _diagnostics(told: _Told) -> list[Diagnostic]:
 def _window(signal: xr.DataArray, start: float, stop: float) -> SignalSamples:
     samples = check_signal(signal)
     inside = (samples.time >= start) & (samples.time < stop)
-    return SignalSamples(samples.values[inside], samples.time[inside], samples.sampling_frequency)
+    return samples.part(inside)
 
 
 def _candidates(
@@ -279,10 +279,6 @@ def _refine(
     shift = (turn + math.pi) % (2.0 * math.pi) - math.pi
     se = math.hypot(one.phase_se, two.phase_se) / (2.0 * math.pi * common)
     return delay + shift / (2.0 * math.pi * common), se
-
-
-# ----------------------------------------------------------------------------------------------------
-# A measured drive made ready for the model: drift-free, band-limited, resampled without adding energy.
 
 
 def recorded_drive(

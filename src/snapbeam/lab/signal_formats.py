@@ -77,6 +77,8 @@ _INTEGER_SCALE = {"int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "uint8": (12
 
 
 # One channel as it comes out of a file, and what a reader is told beside the path.
+_FORTRAN = re.compile(rb"(\.\d*)[Dd]([-+]\d\d)")
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
 class Told(NamedTuple):
@@ -1228,9 +1230,6 @@ def write_tdms(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
 # Universal files, dataset 58, ASCII or binary.
 
 
-_FORTRAN = re.compile(rb"(\.\d*)[Dd]([-+]\d\d)")
-
-
 def read_uff(path: Path, told: Told) -> list[Channel]:
     """Return the channels of a universal file (dataset 58)."""
     import pyuff
@@ -1280,9 +1279,6 @@ def read_uff(path: Path, told: Told) -> list[Channel]:
     if not channels:
         raise InputError("holds no whole time response in a dataset 58")
     return numbered(channels)
-
-
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
 def _bodies(content: bytes) -> list[list[str]]:

@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# ----------------------------------------------------------------------------------------------------
-# Units of measured signals: into SI, and the sensitivities of sensors.
-
-
 _PREFIX = {"": 1.0, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9}
 _WITH_PREFIX = ("m", "m/s", "m/s^2", "N", "V", "s", "Hz", "Pa")
 _GRAVITY = 9.80665  # m/s^2, standard acceleration of free fall
@@ -51,6 +47,10 @@ KNOWN_UNITS = (
     "m, m/s, m/s^2, N, V, s, Hz or Pa with a prefix k, c, m, u or n, g, in, in/s, in/s^2, or FS (fraction of full "
     "scale)"
 )
+_LONG_NAMES = {
+    "m": "displacement", "m/s": "velocity", "m/s^2": "acceleration", "N": "force", "V": "voltage", "Pa": "pressure",
+}  # fmt: skip
+MINIMUM_SAMPLES = 16
 
 
 def si_unit(name: str, unit: str) -> tuple[float, str]:
@@ -112,21 +112,21 @@ def parse_sensitivity(name: str, text: str) -> tuple[float, str, str]:
     return factor / (number * volts), unit, "V"
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-_LONG_NAMES = {
-    "m": "displacement", "m/s": "velocity", "m/s^2": "acceleration", "N": "force", "V": "voltage", "Pa": "pressure",
-}  # fmt: skip
-MINIMUM_SAMPLES = 16
-
-
 class SignalSamples(NamedTuple):
     """The numbers of a signal: ``values`` and ``time`` [s] of shape (samples,), the sampling rate [Hz]."""
 
     values: NDArray[np.float64]
     time: NDArray[np.float64]
     sampling_frequency: float
+
+    @property
+    def duration(self) -> float:
+        """Samples over the sampling rate [s]."""
+        return self.values.size / self.sampling_frequency
+
+    def part(self, which: slice | NDArray[np.bool_]) -> SignalSamples:
+        """The samples of a slice or a mask."""
+        return SignalSamples(self.values[which], self.time[which], self.sampling_frequency)
 
 
 def even_sampling(name: str, time: ArrayLike) -> tuple[float, float]:

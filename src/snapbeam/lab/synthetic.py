@@ -45,11 +45,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# ----------------------------------------------------------------------------------------------------
-# The picture of a few edges, summed over an exposure: compiled loops for the synthetic camera.
-
-
 TABLE_ENTRIES_PER_PIXEL = 256  # table entries per pixel
+CELLS_PER_PIXEL = 4  # cells to a pixel, each way
+FRAME_LISTS = ("glare_frames", "blurred_frames", "repeated_frames", "blank_frames", "hidden_frames")
+_FINE = 8  # rows of light drawn for a row of pixels
 
 
 def step_table(blur: float) -> NDArray[np.float64]:
@@ -120,10 +119,6 @@ def _expose(
 
 
 expose = keep_code(_expose, numba.__version__)
-
-
-# ----------------------------------------------------------------------------------------------------
-# The synthetic laboratory's camera and scene, in sizes a person would measure.
 
 
 @dataclass(frozen=True)
@@ -239,10 +234,6 @@ class SyntheticStage:
             raise InputError(f"beam = {self.beam!r}: must differ from background = {self.background!r}")
 
 
-# ----------------------------------------------------------------------------------------------------
-# The scene drawn as ideal edges blurred by a Gaussian: the edge model that the tracker fits.
-
-
 class Outline:
     """The scene's shapes in turned pixels, columns counted from the contact at ``centre``."""
 
@@ -316,15 +307,11 @@ class GaussianPicture:
         return light
 
 
-# ----------------------------------------------------------------------------------------------------
 # The scene drawn as areas seen through a lens out of focus: an edge model that is not the tracker's.
 #
 # Every shape covers an exact share of each cell of a grid four times finer than the pixels, averaged over the
 # exposure; the cells are spread over the lens's disk of confusion and summed into pixels.  Nothing here knows
 # of error functions, so a tracker that fits them is not tested against itself.
-
-
-CELLS_PER_PIXEL = 4  # cells to a pixel, each way
 
 
 @numba.njit
@@ -451,13 +438,6 @@ class AreaPicture:
         return pixels
 
 
-# ----------------------------------------------------------------------------------------------------
-# What goes wrong in front of a camera and in it, to be drawn into a synthetic recording.
-
-
-FRAME_LISTS = ("glare_frames", "blurred_frames", "repeated_frames", "blank_frames", "hidden_frames")
-
-
 @dataclass(frozen=True)
 class Fixture:
     """A bar that crosses the picture and never moves.
@@ -542,13 +522,6 @@ class Defects:
         return chosen
 
 
-# ----------------------------------------------------------------------------------------------------
-# From light to grey levels: a fixed bar in view, exposure, the camera's curve, noise and bits.
-
-
-_FINE = 8  # rows of light drawn for a row of pixels
-
-
 def with_fixture(
     light: NDArray[np.float32], fixture: Fixture, shift: float, blur: float
 ) -> NDArray[np.float32]:
@@ -586,9 +559,6 @@ def read_out(
     full = 2**camera.bit_depth - 1
     grey: NDArray[np.uint16] = np.rint(level * full).astype(np.uint16)
     return grey
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 class SyntheticRecording:
@@ -882,10 +852,6 @@ def _fitting_row(camera: SyntheticCamera, stage: SyntheticStage, beam: Floats, s
             f"taller region, larger pixels than {size * 1e6:g} um, or give zero_row"
         )
     return (height - 1) / 2.0 + 0.5 * (above - below)
-
-
-# ----------------------------------------------------------------------------------------------------
-# From a simulated run to what a laboratory would have recorded of it: frames, and a vibrometer's signal.
 
 
 def render_run(

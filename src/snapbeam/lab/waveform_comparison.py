@@ -30,9 +30,18 @@ from snapbeam.util.validation import (
 if TYPE_CHECKING:
     import xarray as xr
 
-
-# ----------------------------------------------------------------------------------------------------
-# When the excitation of a measured run starts, read from its own shaker.
+_Array = NDArray[np.float64]
+_APART = 0.1  # b, by which two beams must differ to have parted
+_SHIFTED = 0.15  # cycles by which a known start may be off
+_RATIO = 0.05  # share by which the shakers' amplitudes may differ
+_BAND = ("simulated_low", "simulated_high")
+_LEAST_RUNS = 20  # for quantiles of 5 and 95 %
+_PLACES = ("displacement_at_striker", "midspan_displacement")
+_HYSTERESIS = 5.0  # in standard deviations of the noise
+TOO_SHORT = "too short"
+"""First words of the reason that too few cycles were recorded; the status of such a test."""
+LEAST_CYCLES = 20  # the rule of more than n/5 crossings in n cycles means nothing below n = 5
+_WHOLE = 0.98  # share of the wanted cycles that counts as all of them
 
 
 def start_of_shaker(run: xr.Dataset, frequency: float) -> float | None:
@@ -58,17 +67,6 @@ def start_of_shaker(run: xr.Dataset, frequency: float) -> float | None:
     except InputError:
         return None
     return None if startup is None else startup.onset
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_Array = NDArray[np.float64]
-_APART = 0.1  # b, by which two beams must differ to have parted
-_SHIFTED = 0.15  # cycles by which a known start may be off
-_RATIO = 0.05  # share by which the shakers' amplitudes may differ
-_BAND = ("simulated_low", "simulated_high")
-_LEAST_RUNS = 20  # for quantiles of 5 and 95 %
 
 
 @dataclass(frozen=True)
@@ -104,9 +102,6 @@ class WaveformComparison:
     diagnostics: tuple[Diagnostic, ...]
     at: str = "displacement_at_striker"
     within: float = math.nan
-
-
-_PLACES = ("displacement_at_striker", "midspan_displacement")
 
 
 def run_of_signal(signal: xr.DataArray, length: float, at: str = "midspan_displacement") -> xr.Dataset:
@@ -425,19 +420,11 @@ def _impacts(onsets: _Array, start: float, rate: float, shift: float, low: float
     return at[(at >= low) & (at <= high)]
 
 
-# ----------------------------------------------------------------------------------------------------
 # Response class of a measured run, by the rules used for simulations, or why it cannot be told.
 #
 # A measured displacement is noisy and may be short or have dropouts.  A crossing of zero counts only when the
 # displacement has gone beyond a hysteresis on the other side, several times the noise; what dropouts could hide
 # and what a record too short cannot show leave the class unknown, with the reason.
-
-
-_HYSTERESIS = 5.0  # in standard deviations of the noise
-TOO_SHORT = "too short"
-"""First words of the reason that too few cycles were recorded; the status of such a test."""
-LEAST_CYCLES = 20  # the rule of more than n/5 crossings in n cycles means nothing below n = 5
-_WHOLE = 0.98  # share of the wanted cycles that counts as all of them
 
 
 @dataclass(frozen=True)

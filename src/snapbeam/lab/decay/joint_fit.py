@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
@@ -22,6 +21,7 @@ from snapbeam.lab.decay.poles import Pole, Stabilisation, find_poles, thinned, w
 from snapbeam.lab.decay.residual_diagnostics import misfit_of
 from snapbeam.lab.decay.window import CLOSE, ENERGY, Centres, Decay
 from snapbeam.lab.diagnostics import KINDS_DECAY
+from snapbeam.lab.least_squares import widened
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import fit_sine
 from snapbeam.util.diagnostics import Diagnostic
@@ -41,11 +41,7 @@ def _thinned(samples: SignalSamples, highest: float) -> SignalSamples:
 
 
 def fit_modes(
-    decay: Decay,
-    centres: Centres,
-    units: str,
-    soften: bool,
-    known: tuple[float, float] | None,
+    decay: Decay, centres: Centres, units: str, soften: bool, known: tuple[float, float] | None
 ) -> tuple[SignalSamples, FitResult, Cycles, list[Diagnostic], Stabilisation | None]:
     """The modes fitted, those that lie close together and, in a short record, all of them, at once.
 
@@ -101,7 +97,7 @@ def _lines_again(
     """The fit once more, lines that do not decay fitted to what the modes left; as it was without such lines."""
     if not decay.lines:
         return samples, result, cycles, False
-    rest = SignalSamples(result.residual, samples.time, samples.sampling_frequency)
+    rest = samples._replace(values=result.residual)
     for line in decay.lines:
         if line.frequency > 0.45 * samples.sampling_frequency:
             continue
@@ -110,13 +106,13 @@ def _lines_again(
         except InputError:
             continue
         wave = left.amplitude * np.cos(2.0 * math.pi * left.frequency * rest.time + left.phase)
-        rest = SignalSamples(rest.values - wave, rest.time, rest.sampling_frequency)
+        rest = rest._replace(values=rest.values - wave)
     change = rest.values - result.residual
-    better = SignalSamples(samples.values + change, samples.time, samples.sampling_frequency)
+    better = samples._replace(values=samples.values + change)
     law = None
     if result.modes[0].law != "viscous":
         mode = result.modes[0]
-        law = DampingLaw(mode.law, mode.law_strength, mode.law_strength_se, 0.0, 0.0)
+        law = DampingLaw(mode.law, mode.law_strength, mode.law_strength_se)
     again = fit_decay(better, result.modes, units, soften=soften, known=known, law=law)
     return better, again, cycles, True
 
@@ -140,9 +136,8 @@ def _group_fit(
         if some and made is not None and made[0].modes[0].law != "viscous" and made[1] < _MISFIT:
             apart = []
             break  # a law of damping explains what looked like modes
-        result = fit_decay(
-            samples, [*guesses, *(_of_pole(pole) for pole in some)], units, soften=soften, known=known
-        )
+        start_from = [*guesses, *(_of_pole(pole) for pole in some)]
+        result = fit_decay(samples, start_from, units, soften=soften, known=known)
         largest = max(mode.amplitude for mode in result.modes)
         if made is not None and largest > _CANCEL * float(np.ptp(samples.values)):
             apart = []
@@ -167,20 +162,15 @@ def _group_fit(
             second = min((mode.natural_frequency for mode in better.modes[1:]), key=lambda f: abs(f - first))
             told = [KINDS_DECAY["close_modes"].found(first=first, second=second)]
     if result.modes[0].law == "viscous":
-        first_mode = result.modes[0]
-        error = math.hypot(first_mode.damping_ratio_se, doubt * first_mode.damping_ratio)
-        result.modes[0] = dataclasses.replace(first_mode, damping_ratio_se=error)
+        result.modes[0] = widened(result.modes[0], damping_ratio=(doubt * result.modes[0].damping_ratio,))
     return result, _own_cycles(samples, result, cycles), told, diagram
 
 
 def _apart(samples: SignalSamples, pole: Pole, modes: list[ModeEstimate]) -> bool:
     """Return whether a pole is too far from all modes to be a side pole of a softening mode."""
-    span = samples.values.size / samples.sampling_frequency
-    return all(
-        abs(pole.frequency - mode.natural_frequency)
-        > max(8.0 / span, 2.0 * mode.damping_ratio * mode.natural_frequency, 0.06 * mode.natural_frequency)
-        for mode in modes
-    )
+    widths = ((mode.natural_frequency, max(2.0 * mode.damping_ratio, 0.06)) for mode in modes)
+    least = 8.0 / samples.duration
+    return all(abs(pole.frequency - f) > max(least, width * f) for f, width in widths)
 
 
 def _with_law(
@@ -202,10 +192,8 @@ def _with_law(
     told_apart = first.law_strength > 3.0 * first.law_strength_se
     if not told_apart or other.noise_rms >= 0.999 * result.noise_rms or rest >= max(0.8 * left, _MISFIT):
         return result, left, []
-    diagnostic = KINDS_DECAY["damping_law"].found(
-        told=first.law, strength=first.law_strength, error=first.law_strength_se
-    )
-    return other, rest, [diagnostic]
+    strength, error = first.law_strength, first.law_strength_se
+    return other, rest, [KINDS_DECAY["damping_law"].found(told=first.law, strength=strength, error=error)]
 
 
 def _of_pole(pole: Pole) -> ModeEstimate:
@@ -234,9 +222,7 @@ def _guesses(
         kept = kept or cycles
         found.append(estimate)
         if len(centres) > 1:
-            rest = SignalSamples(
-                explain(samples, found, units, soften).residual, samples.time, samples.sampling_frequency
-            )
+            rest = samples._replace(values=explain(samples, found, units, soften).residual)
     assert kept is not None
     return found, kept
 
@@ -262,31 +248,22 @@ def _own_cycles(samples: SignalSamples, result: FitResult, otherwise: Cycles) ->
     if len(result.modes) == 1:
         return otherwise
     try:
-        alone = SignalSamples(result.alone, samples.time, samples.sampling_frequency)
+        alone = samples._replace(values=result.alone)
         return hilbert_cycles(alone, first.natural_frequency, noise_level(samples))
     except InputError:
         return otherwise
 
 
 def _with_close_mode(
-    samples: SignalSamples,
-    result: FitResult,
-    near: list[Pole],
-    units: str,
-    diagram: Stabilisation | None,
+    samples: SignalSamples, result: FitResult, near: list[Pole], units: str, diagram: Stabilisation | None
 ) -> tuple[FitResult | None, Stabilisation | None]:
     """The fit with one mode more, close to the first, if the pencil sees one and it explains what is left."""
     first = result.modes[0].natural_frequency
     if len(near) < 2:
         poles, fresh = find_poles(samples, noise_level(samples))
         diagram = diagram or fresh
-        near = [
-            pole
-            for pole in poles
-            if pole.energy > ENERGY
-            and abs(pole.frequency / first - 1.0) < CLOSE
-            and pole.damping_ratio > -1e-3
-        ]
+        near = [one for one in poles if one.energy > ENERGY and one.damping_ratio > -1e-3]
+        near = [one for one in near if abs(one.frequency / first - 1.0) < CLOSE]
     if len(near) < 2:
         return None, diagram
     others = [mode for mode in result.modes[1:] if abs(mode.natural_frequency / first - 1.0) > CLOSE]

@@ -100,10 +100,6 @@ def _mark_disagreeing(ax: Axes, dataset: xr.Dataset, result: MapComparison) -> N
     )  # fmt: skip
 
 
-# ----------------------------------------------------------------------------------------------------
-# Measured beside simulated waveforms with their spectra (Fig. 4 of the paper), and one laid over the other.
-
-
 def plot_waveform_comparison(
     result: WaveformComparison, window: tuple[float, float] | None = None, multiples: float = 8.0
 ) -> Figure:
@@ -180,10 +176,7 @@ def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float
         figure = new_figure("double", 105.0 + diagnostics_height(told, COLUMN_WIDTHS["double"], 3))
         draw_diagnostics(figure, told, 3)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0))
-        pairs = (
-            (top, "displacement", _PLACES[result.at]),
-            (middle, "shaker", "shaker"),
-        )
+        pairs = ((top, "displacement", _PLACES[result.at]), (middle, "shaker", "shaker"))
         for ax, name, word in pairs:
             if ax is top:
                 ax.axhline(0.0, color="0.8", linewidth=0.5)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from snapbeam.lab.decay.model import envelope as law_envelope
 from snapbeam.lab.decay.model import noise_level
 from snapbeam.lab.decay.poles import find_poles
-from snapbeam.lab.signals import SignalSamples, check_signal
+from snapbeam.lab.signals import check_signal
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CENTER_COLOR,
@@ -108,7 +108,7 @@ def plot_stabilisation(signal: xr.DataArray, fit: DecayFit) -> Figure:
     """
     samples = check_signal(signal)
     part = (samples.time >= fit.start) & (samples.time <= fit.stop)
-    cut = SignalSamples(samples.values[part], samples.time[part], samples.sampling_frequency)
+    cut = samples.part(part)
     poles = fit.poles if fit.poles is not None else find_poles(cut, noise_level(cut))[1]
     n = cut.values.size
     window = np.cos(0.5 * np.pi * np.arange(n) / n) ** 2
@@ -136,14 +136,7 @@ def plot_stabilisation(signal: xr.DataArray, fit: DecayFit) -> Figure:
             mew=0.4,
             label="new",
         )
-        ax.plot(
-            poles.frequency[stable],
-            poles.order[stable],
-            "o",
-            ms=3,
-            color=SHAKER_COLOR,
-            label="stable",
-        )
+        ax.plot(poles.frequency[stable], poles.order[stable], "o", ms=3, color=SHAKER_COLOR, label="stable")
         for k, mode in enumerate(fit.modes):
             ax.axvline(
                 mode.natural_frequency,
