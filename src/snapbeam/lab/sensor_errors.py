@@ -142,6 +142,12 @@ class Hypothesis(NamedTuple):
         return bool(self.kind) and (self.loss > _MATTERS or self.shift > _SHIFTS)
 
 
+def best_of(found: list[Hypothesis]) -> tuple[Hypothesis | None, float]:
+    """The best hypothesis, and the score of the best of those by which nothing is wrong, at least 0."""
+    usual = max([0.0, *(one.score for one in found if not one.kind)])
+    return max(found, key=lambda one: one.score, default=None), usual
+
+
 def find_errors(record: Record) -> list[Hypothesis]:
     """The best explanation of each detector, where it is not explained by chance; of a clipped record its converter's.
 
@@ -158,11 +164,9 @@ def find_errors(record: Record) -> list[Hypothesis]:
         if any(one.kind for one in told) or (record.clipped and group[0] is not _converters):
             break
         for detector in group:
-            found = detector(record)
-            best = max(found, key=lambda one: one.score, default=None)
+            best, usual = best_of(detector(record))
             if best is None or not max(best.loss, best.shift) > 0.0:
                 continue
-            usual = max((one.score for one in found if not one.kind), default=0.0)
             if best.score > (usual + _AHEAD if best.kind and usual > 0.0 else 0.0):
                 told.append(best)
     return told

@@ -40,20 +40,25 @@ class FitResult(NamedTuple):
     noise_rms: float
 
 
+class FitSettings(NamedTuple):
+    """Unit of the signal, which tells displacement from velocity, and whether frequencies may depend on amplitude.
+
+    ``known`` are the softening kappa of the first mode and its standard deviation, known beforehand.
+    """
+
+    units: str
+    soften: bool
+    known: tuple[float, float] | None
+
+
 def fit_decay(
-    samples: SignalSamples,
-    guesses: list[ModeEstimate],
-    units: str,
-    *,
-    soften: bool = True,
-    known: tuple[float, float] | None = None,
-    law: DampingLaw | None = None,
+    samples: SignalSamples, guesses: list[ModeEstimate], settings: FitSettings, law: DampingLaw | None = None
 ) -> FitResult:
     """Fit decaying modes to a signal, starting from *guesses* (the first is the one that softens most).
 
-    *units* tell displacement from velocity; *known* are the softening kappa of the first mode and its standard deviation,
-    known beforehand; *law* is a second one by which the first mode is damped, whose strength is fitted too.
+    *law* is a second one by which the first mode is damped; its strength is fitted too.
     """
+    units, soften, known = settings
     try:
         import lmfit
     except ImportError as missing:

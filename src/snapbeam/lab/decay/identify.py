@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.lab.decay.fit import FitResult, explain, noise_near
+from snapbeam.lab.decay.fit import FitResult, FitSettings, explain, noise_near
 from snapbeam.lab.decay.joint_fit import fit_modes, mode_by_cycles
 from snapbeam.lab.decay.model import Cycles, DecayFit, ModeEstimate, backbone, noise_level, regress
 from snapbeam.lab.decay.poles import without_poles
@@ -120,15 +120,15 @@ def identify_decay(
     decay = prepared(samples, start, stop, buckling_level is not None)
     centres = find_centres(decay, count, asked)
     told = list(centres.told)
-    known = _known_softening(buckling_level, units, centres.wanted[0])
+    settings = FitSettings(units, soften, _known_softening(buckling_level, units, centres.wanted[0]))
     diagram = centres.diagram
     if method == "fit":
-        samples, result, cycles, more, diagram = fit_modes(decay, centres, units, soften, known)
+        samples, result, cycles, more, diagram = fit_modes(decay, centres, settings)
         told += more
         if diagram is None and unexplained(result.residual, samples.sampling_frequency):
             # other modes are in the record: once more with them known
             centres = find_centres(decay, 1, [result.modes[0].natural_frequency])
-            samples, result, cycles, told, diagram = fit_modes(decay, centres, units, soften, known)
+            samples, result, cycles, told, diagram = fit_modes(decay, centres, settings)
     else:
         samples = without_poles(decay.samples, centres.far, centres.own)
         result, cycles = _by_cycles(samples, centres.wanted, units, soften, method)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from snapbeam.lab.decay.fit import FitResult, explain, fit_decay
+from snapbeam.lab.decay.fit import FitResult, FitSettings, explain, fit_decay
 from snapbeam.lab.decay.model import (
     Cycles,
     DampingLaw,
@@ -17,7 +17,15 @@ from snapbeam.lab.decay.model import (
     peak_cycles,
     regress,
 )
-from snapbeam.lab.decay.poles import Pole, Stabilisation, find_poles, thinned, without_poles
+from snapbeam.lab.decay.poles import (
+    Line,
+    Pole,
+    Stabilisation,
+    find_poles,
+    thinned,
+    without_lines,
+    without_poles,
+)
 from snapbeam.lab.decay.residual_diagnostics import misfit_of
 from snapbeam.lab.decay.window import CLOSE, ENERGY, Centres, Decay
 from snapbeam.lab.diagnostics import KINDS_DECAY
@@ -32,16 +40,8 @@ _CANCEL = 1.0  # of the range of a record that the amplitude of a mode may reach
 _MANY = 12_000  # samples from which a record is thinned before it is fitted
 
 
-def _thinned(samples: SignalSamples, highest: float) -> SignalSamples:
-    """A long record at fourteen samples or more to the shortest period."""
-    factor = int(samples.sampling_frequency / (14.0 * highest))
-    if samples.values.size < _MANY or factor < 2:
-        return samples
-    return thinned(samples, max(min(factor, samples.values.size // 3000), 1))
-
-
 def fit_modes(
-    decay: Decay, centres: Centres, units: str, soften: bool, known: tuple[float, float] | None
+    decay: Decay, centres: Centres, settings: FitSettings
 ) -> tuple[SignalSamples, FitResult, Cycles, list[Diagnostic], Stabilisation | None]:
     """The modes fitted, those that lie close together and, in a short record, all of them, at once.
 
@@ -61,10 +61,13 @@ def fit_modes(
         beside = [pole for pole in centres.near if any(abs(pole.frequency / f - 1.0) < CLOSE for f in group)]
         away = [pole for pole in centres.near if pole not in beside]
         part = without_poles(clean, [*others, *away] if len(groups) > 1 else away, [*mine, *beside])
-        part = _thinned(part, max([*group, *(pole.frequency for pole in beside)]))
-        result, cycles, more, diagram = _group_fit(part, group, mine, beside, units, soften, known, diagram)
-        part, result, cycles, again = _lines_again(decay, part, result, cycles, units, soften, known)
-        told += [one for one in more if not again or one.code != KINDS_DECAY["misfit"].code]
+        # a long record at fourteen samples or more to the shortest period
+        factor = int(part.sampling_frequency / (14.0 * max([*group, *(pole.frequency for pole in beside)])))
+        if part.values.size >= _MANY and factor >= 2:
+            part = thinned(part, max(min(factor, part.values.size // 3000), 1))
+        result, cycles, more, diagram = _group_fit(part, group, mine, beside, settings, diagram)
+        part, result = _lines_again(decay, part, result, settings)
+        told += more
         found |= dict(zip(group, result.modes, strict=False))
         first = first or (part, result, cycles)
     assert first is not None
@@ -86,17 +89,11 @@ def _groups(frequencies: list[float]) -> list[list[float]]:
 
 
 def _lines_again(
-    decay: Decay,
-    samples: SignalSamples,
-    result: FitResult,
-    cycles: Cycles,
-    units: str,
-    soften: bool,
-    known: tuple[float, float] | None,
-) -> tuple[SignalSamples, FitResult, Cycles, bool]:
+    decay: Decay, samples: SignalSamples, result: FitResult, settings: FitSettings
+) -> tuple[SignalSamples, FitResult]:
     """The fit once more, lines that do not decay fitted to what the modes left; as it was without such lines."""
     if not decay.lines:
-        return samples, result, cycles, False
+        return samples, result
     rest = samples._replace(values=result.residual)
     for line in decay.lines:
         if line.frequency > 0.45 * samples.sampling_frequency:
@@ -105,16 +102,11 @@ def _lines_again(
             left = fit_sine(rest, line.frequency, 1, fixed=True)
         except InputError:
             continue
-        wave = left.amplitude * np.cos(2.0 * math.pi * left.frequency * rest.time + left.phase)
-        rest = rest._replace(values=rest.values - wave)
+        rest = without_lines(rest, [Line(left.frequency, left.amplitude, left.phase)])
     change = rest.values - result.residual
-    better = samples._replace(values=samples.values + change)
-    law = None
-    if result.modes[0].law != "viscous":
-        mode = result.modes[0]
-        law = DampingLaw(mode.law, mode.law_strength, mode.law_strength_se)
-    again = fit_decay(better, result.modes, units, soften=soften, known=known, law=law)
-    return better, again, cycles, True
+    better, mode = samples._replace(values=samples.values + change), result.modes[0]
+    law = None if mode.law == "viscous" else DampingLaw(mode.law, mode.law_strength, mode.law_strength_se)
+    return better, fit_decay(better, result.modes, settings, law)
 
 
 def _group_fit(
@@ -122,14 +114,12 @@ def _group_fit(
     centres: list[float],
     own: list[Pole],
     beside: list[Pole],
-    units: str,
-    soften: bool,
-    known: tuple[float, float] | None,
+    settings: FitSettings,
     diagram: Stabilisation | None,
 ) -> tuple[FitResult, Cycles, list[Diagnostic], Stabilisation | None]:
     """Modes fitted together; where they leave more than noise, a second law of damping or a close mode."""
     start = float(samples.time[0])
-    guesses, cycles = _guesses(samples, centres, own, units, soften)
+    guesses, cycles = _guesses(samples, centres, own, settings.units, settings.soften)
     apart = [pole for pole in beside if _apart(samples, pole, guesses)]
     made: tuple[FitResult, float, float, list[Diagnostic]] | None = None
     for some in ([], apart) if apart else ([],):
@@ -137,7 +127,7 @@ def _group_fit(
             apart = []
             break  # a law of damping explains what looked like modes
         start_from = [*guesses, *(_of_pole(pole) for pole in some)]
-        result = fit_decay(samples, start_from, units, soften=soften, known=known)
+        result = fit_decay(samples, start_from, settings)
         largest = max(mode.amplitude for mode in result.modes)
         if made is not None and largest > _CANCEL * float(np.ptp(samples.values)):
             apart = []
@@ -148,14 +138,14 @@ def _group_fit(
         left = misfit_of(samples, result.residual, result.modes).ratio
         told: list[Diagnostic] = []
         if law is not None:
-            result, left, told = _with_law(samples, result, left, units, soften, known, law)
+            result, left, told = _with_law(samples, result, left, settings, law)
         made = result, left, doubt, told
     assert made is not None
     result, left, doubt, told = made
     guesses = [*guesses, *(_of_pole(pole) for pole in apart)]
     if left > _MISFIT and len(guesses) < 8:
         near = [pole for pole in beside if pole not in apart]
-        better, diagram = _with_close_mode(samples, result, near, units, diagram)
+        better, diagram = _with_close_mode(samples, result, near, settings, diagram)
         if better is not None:
             result = better
             first = better.modes[0].natural_frequency
@@ -174,17 +164,11 @@ def _apart(samples: SignalSamples, pole: Pole, modes: list[ModeEstimate]) -> boo
 
 
 def _with_law(
-    samples: SignalSamples,
-    result: FitResult,
-    left: float,
-    units: str,
-    soften: bool,
-    known: tuple[float, float] | None,
-    law: DampingLaw,
+    samples: SignalSamples, result: FitResult, left: float, settings: FitSettings, law: DampingLaw
 ) -> tuple[FitResult, float, list[Diagnostic]]:
     """The fit with a second law of damping where that is told apart and leaves less; else as it was."""
     try:
-        other = fit_decay(samples, result.modes, units, soften=soften, known=known, law=law)
+        other = fit_decay(samples, result.modes, settings, law)
     except InputError:
         return result, left, []
     first = other.modes[0]
@@ -255,7 +239,11 @@ def _own_cycles(samples: SignalSamples, result: FitResult, otherwise: Cycles) ->
 
 
 def _with_close_mode(
-    samples: SignalSamples, result: FitResult, near: list[Pole], units: str, diagram: Stabilisation | None
+    samples: SignalSamples,
+    result: FitResult,
+    near: list[Pole],
+    settings: FitSettings,
+    diagram: Stabilisation | None,
 ) -> tuple[FitResult | None, Stabilisation | None]:
     """The fit with one mode more, close to the first, if the pencil sees one and it explains what is left."""
     first = result.modes[0].natural_frequency
@@ -269,7 +257,7 @@ def _with_close_mode(
     others = [mode for mode in result.modes[1:] if abs(mode.natural_frequency / first - 1.0) > CLOSE]
     pair = [_of_pole(pole) for pole in near[:2]]
     try:
-        better = fit_decay(samples, [pair[0], *others, pair[1]], units, soften=False)
+        better = fit_decay(samples, [pair[0], *others, pair[1]], FitSettings(settings.units, False, None))
     except InputError:
         return None, diagram
     return (better if better.noise_rms < 0.9 * result.noise_rms else None), diagram

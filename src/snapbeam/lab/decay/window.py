@@ -24,7 +24,7 @@ from snapbeam.lab.decay.poles import (
     without_lines,
 )
 from snapbeam.lab.diagnostics import KINDS_DECAY
-from snapbeam.lab.sensor_errors import Hypothesis
+from snapbeam.lab.sensor_errors import Hypothesis, best_of
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import falling_window, highest_peak, stuck_runs
 from snapbeam.util.diagnostics import Diagnostic
@@ -182,7 +182,7 @@ def touching(ratio: _Array) -> _Array:
 
 
 def courses(cycles: Cycles, frequency: float) -> list[Hypothesis]:
-    """Hypotheses about amplitude and phase of a decay, the likeliest first; none for less than 14 cycles.
+    """Hypotheses about amplitude and phase of a decay; none for less than 14 cycles.
 
     The phase of the cycles is a line, the integrals of a^2 and a^4 (softening, a the amplitude of the cycles as it is;
     the second is held to the size that goes with the first) and, where the frequency creeps at a steady rate, t^2.
@@ -239,7 +239,7 @@ def courses(cycles: Cycles, frequency: float) -> list[Hypothesis]:
     unit = float(rest.min()) / (2.0 * t.size)
     if unit > _EXPLAINED**2 and rest[:3].min() < _BETTER * rest.min():
         return []
-    return sorted((one._replace(gain=one.gain / max(unit, 1.0)) for one in told), key=lambda one: -one.score)
+    return [one._replace(gain=one.gain / max(unit, 1.0)) for one in told]
 
 
 def steadied(samples: SignalSamples, share: float) -> SignalSamples:
@@ -353,14 +353,10 @@ def _cycles(samples: SignalSamples, frequency: float) -> Cycles | None:
 
 def _decay_rate(samples: SignalSamples, frequency: float) -> float:
     """Approximate decay rate [1/s] of the strongest mode; 0 if unknown."""
-    cycles = _cycles(samples, frequency)
     try:
-        mode = (
-            None if cycles is None else regress(cycles, float(samples.time[0]), "1", "hilbert", soften=False)
-        )
+        cycles = hilbert_cycles(samples, frequency, noise_level(samples))
+        mode = regress(cycles, float(samples.time[0]), "1", "hilbert", soften=False)
     except InputError:
-        mode = None
-    if mode is None:
         return 0.0
     return max(2.0 * math.pi * mode.natural_frequency * mode.damping_ratio, 0.0)
 
@@ -371,27 +367,27 @@ def _on_course(
     """The decay without what a stop or a creeping frequency does to it, and the doubt that is left."""
     cycles = _cycles(samples, frequency)
     told = [] if cycles is None else courses(cycles, frequency)
-    if cycles is None or not told:
+    best, usual = best_of(told)
+    if cycles is None or best is None:
         return samples, Doubt(), []
-    ahead = told[0].score - max(0.0, *(one.score for one in told if not one.kind))
-    if ahead > _TOLD and told[0].kind == "touches":
-        numbers = told[0].numbers
+    certain = best.score - usual > _TOLD
+    if certain and best.kind == "touches":
+        numbers = best.numbers
         kept = samples.part(slice(int(np.searchsorted(samples.time, numbers["until"])), None))
         diagnostic = KINDS_DECAY["touches"].found(None, "", **numbers)
         if np.count_nonzero(cycles.time > numbers["until"]) < 1.5 * _LEAST_CYCLES:
-            return samples, Doubt(told[0].shift, told[0].loss), [diagnostic]
+            return samples, Doubt(best.shift, best.loss), [diagnostic]
         again, doubt, more = _on_course(kept, frequency, known)
         return again, doubt, [diagnostic, *(one for one in more if one.code != diagnostic.code)]
-    within = told[0].shift
-    if ahead > _TOLD and told[0].kind and abs(within) > _MATTERS:
-        share = within * float((samples.time[-1] - samples.time[0]) / (cycles.time[-1] - cycles.time[0]))
+    if certain and best.kind and abs(best.shift) > _MATTERS:
+        share = best.shift * float((samples.time[-1] - samples.time[0]) / (cycles.time[-1] - cycles.time[0]))
         told_so = KINDS_DECAY["frequency_drift"].found(share_percent=100.0 * share)
         return steadied(samples, share), Doubt(abs(share)), [told_so]
     # a softening that a creep explains as well
     pair = [one for one in told if one.numbers.get("shares", 0) in (1, 2)]
     if len(pair) < 2 or known:
         return samples, Doubt(), []
-    behind = told[0].gain - next(one.gain for one in pair if one.kind)
+    behind = best.gain - next(one.gain for one in pair if one.kind)
     apart = abs(pair[0].numbers["start"] - pair[1].numbers["start"])
     softens = all(one.numbers["start"] > 1.0 for one in pair if not one.kind)
     apart *= math.sqrt(likely(-behind, 2.0)) if softens else 1.0
