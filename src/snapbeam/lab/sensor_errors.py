@@ -35,6 +35,7 @@ _CHANGES = 0.02  # of the amplitude, or rad, by which a steady motion may change
 _EXPLAINS = 0.75  # of the odd harmonics that a curve must explain
 _BILINEAR = np.array([[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]])
 _START = 20.0  # cycles of the start that a filter shapes
+_START_LIMIT = 40.0  # chi-square by which a start, which no model describes to the noise, speaks against a filter
 _CONSTANT = 4  # cycles on either side of a jump
 _TAIL = 4.0  # cycles after the start-up whose transient is no noise
 _MAINS = (50.0, 60.0, 100.0, 120.0)
@@ -161,14 +162,23 @@ def find_errors(record: Record) -> list[Hypothesis]:
     record = record._replace(left=record.left - slow @ solve(slow, record.left))
     told: list[Hypothesis] = []
     for group in ((_converters, _jumps), (_curves, _courses), (_clocks, _jitter), (_filters,)):
-        if any(one.kind for one in told) or (record.clipped and group[0] is not _converters):
+        if any(one.matters for one in told) or (record.clipped and group[0] is not _converters):
             break
         for detector in group:
-            best, usual = best_of(detector(record))
-            if best is None or not max(best.loss, best.shift) > 0.0:
+            found = detector(record)
+            best, usual = best_of(found)
+            if best is None:
                 continue
-            if best.score > (usual + _AHEAD if best.kind and usual > 0.0 else 0.0):
+            if max(best.loss, best.shift) > 0.0 and best.score > (
+                usual + _AHEAD if best.kind and usual > 0.0 else 0.0
+            ):
                 told.append(best)
+                continue
+            # an error that explains nearly as much is not told, but may be there
+            near = [one for one in found if one.score > max(best.score - _AHEAD, 0.0)]
+            loss, shift = (max((getattr(one, name) for one in near), default=0.0) for name in ("loss", "shift"))
+            if max(loss, shift) > 0.0:
+                told.append(Hypothesis("", best.score, 1, loss, shift))
     return told
 
 
@@ -339,7 +349,7 @@ def _filters(record: Record) -> list[Hypothesis]:
             "wanted": 20.0 * drive,
             "delay_ms": 1e3 * order / (2.0 * math.pi * one.centre),
         }
-        gain += plain - noise(one)
+        gain = max(gain, -_START_LIMIT) + plain - noise(one)
         told.append(Hypothesis(one.kind, gain, 2, 1.0 / kept - 1.0, numbers=numbers))
     return told
 
