@@ -10,6 +10,7 @@ from blas_kernel import blas_kernel
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.update(blas_kernel())
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers share the cores
 
 import numpy as np
 import pytest

@@ -119,6 +119,7 @@ def test_coordinates_hold_the_whole_state() -> None:
     assert flow.advance(once.states).states == pytest.approx(twice.states, abs=1e-11)
 
 
+@pytest.mark.slow
 def test_orbit_of_a_system_with_all_parts() -> None:
     flow = Stroboscope(system_of(**WHOLE), PRECISE)
     orbit = sb.dynamics.periodic_orbit(flow, flow.advance(flow.coordinates(), 200).states[0])

@@ -58,6 +58,7 @@ def exact(over: float) -> float:
     return 4.0 * math.asin(math.sqrt(0.5 * over / SWING)) - held
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [(-0.95, 0.0), (-0.95, 0.3), (0.0, 0.2), (-0.8, -0.4)])
 def test_the_clearance_of_a_motion_that_does_not_repeat(start: tuple[float, float]) -> None:
     """The first swing of a damped oscillator towards the stop, in closed form; the ends of the run are no turning points."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 import random_scenes
 from random_scenes import LEVEL, good_scene, motion
+from scipy.ndimage import rotate
 
 from snapbeam.lab import Defects, SyntheticCamera, SyntheticStage, open_recording, render_recording, track
 from snapbeam.lab.camera import write_photron
@@ -15,11 +17,17 @@ from snapbeam.lab.tracking.settings import Orientation
 ERRORS = (
     "white bar at the edge", "curved edge", "striker seldom seen", "one repeated frame",
     "every tenth lost", "every seventh a copy", "frames lost now and then", "rest in motion", "pixel size in inches",
-    "pixel size ten percent off", "image lag",
+    "pixel size ten percent off", "image lag", "pixel size ten times off", "gauge out of plane",
+    "lamp pulse", "rotated camera", "swinging sticker", "tapered beam", "dropped bits", "rod at the border",
 )  # fmt: skip
 UNTOLD = ("sticker near a black tip",)
 """A sticker within some four pixels of a tip that is not seen may be taken for the tip without a message."""
-FAIR = ("gauge", "noise of rows", "fixed rows", "uneven light", "dark rod", "lossless")
+SCALES = {
+    "pixel size in inches": (25.4, 1.0 / 25.4), "pixel size ten percent off": (1.1, 1.0 / 1.1),
+    "pixel size ten times off": (10.0, 0.1), "gauge out of plane": (1.015, 0.985), "gauge": (1.0,),
+    "three rulers": (1.0,),
+}  # fmt: skip
+FAIR = ("gauge", "three rulers", "noise of rows", "fixed rows", "uneven light", "dark rod", "lossless")
 
 
 def _rows(recording, frames):
@@ -81,6 +89,41 @@ def changed(kind, frames, recording, rng):
         for k in range(1, count):
             frames[k] = (1.0 - share) * frames[k] + share * frames[k - 1]
         frames += grain
+    elif kind == "rotated camera":
+        angle = float(rng.choice([-1.0, 1.0])) * rng.uniform(2.0, 5.0)
+        frames = np.stack([rotate(one, angle, reshape=False, order=3, mode="nearest") for one in frames])
+        frames += noise * rng.standard_normal(frames.shape)
+    elif kind == "swinging sticker":
+        size, half = recording.camera.pixel_size, 0.5 * stage.shaker_width / recording.camera.pixel_size
+        rows = np.arange(height)
+        rod = np.flatnonzero(np.abs(np.arange(width) - (width - 1) / 2.0) < half)
+        swing = rng.uniform(0.5, 2.0) * np.sin(2.0 * np.pi * np.arange(count) / rng.uniform(8.0, 30.0))
+        swing[:rest] = 0.0
+        _, tip = _rows(recording, frames)
+        for k in range(count):
+            first = tip[k] + 0.5 * stage.marker_distance / size
+            share = np.clip((rows - first) / (0.4 * stage.marker_distance / size), 0.0, 1.0)
+            for c in rod:
+                frames[k, :, c] = np.interp(rows - swing[k] * share, rows, frames[k, :, c])
+    elif kind == "tapered beam":
+        near, _ = _rows(recording, frames)
+        rows, taper = np.arange(height), float(rng.choice([-1.0, 1.0])) * rng.uniform(0.01, 0.03)
+        for k in range(count):  # the near edge leans, the far one does not, nor the rod
+            share = np.clip(
+                (rows - near[k] + 0.6 * stage.beam_thickness / recording.camera.pixel_size) / 4.0, 0, 1
+            )
+            for c in range(width):
+                x = c - (width - 1) / 2.0
+                if abs(x) * recording.camera.pixel_size > 0.5 * stage.shaker_width:
+                    frames[k, :, c] = np.interp(rows - taper * x * share, rows, frames[k, :, c])
+        frames = frames[:, :, : -int(rng.integers(8, 12))]
+    elif kind == "dropped bits":
+        step = 2.0 ** np.floor(np.log2(full * abs(stage.beam - stage.background) / rng.uniform(6.0, 12.0)))
+        frames = np.floor(np.clip(frames, 0, full) / step) * step
+    elif kind == "rod at the border":
+        half = 0.5 * stage.shaker_width / recording.camera.pixel_size
+        cut = int((width - 1) / 2.0 + rng.uniform(-0.2, 0.5) * half)
+        frames = frames[:, :, :cut]
     elif kind == "noise of rows":
         frames += rng.uniform(0.003, 0.008) * full * rng.standard_normal((count, height, 1))
     elif kind == "fixed rows":
@@ -109,12 +152,23 @@ def prepared(kind, rng):
         scene.rest_frames, scene.skip = 0, int(rng.integers(25, 60))
         first = int(rng.integers(0, 20))
         scene.settings["rest_frames"] = int(rng.integers(1, 4)) if rng.random() < 0.6 else (first, first + 2)
-    elif kind in ("pixel size in inches", "pixel size ten percent off", "gauge"):
+    elif kind in SCALES:
         scene.settings["beam_thickness"] = 0.4e-3 * (1.0 + 0.01 * rng.standard_normal())
-        if kind == "pixel size in inches":
-            scale = float(rng.choice([25.4, 1.0 / 25.4]))
-        elif kind == "pixel size ten percent off":
-            scale = float(rng.choice([1.1, 1.0 / 1.1]))
+        scale = float(rng.choice(SCALES[kind])) if len(SCALES[kind]) > 1 else 1.0
+        if kind in ("gauge out of plane", "three rulers", "pixel size ten times off"):
+            scene.settings["tip_diameter"] = scene.stage["shaker_width"] * (
+                1.0 + 0.01 * rng.standard_normal()
+            )
+            scene.cycles = rng.uniform(6.0, 10.0)
+    elif kind == "lamp pulse":
+        scene.camera["exposure"] = 0.9 / scene.camera["frame_rate"]
+    elif kind == "swinging sticker":
+        scene.stage |= {
+            "shaker_width": rng.uniform(0.5e-3, 0.8e-3),
+            "tip_radius": 2.5e-3,
+            "marker_thickness": 0.25e-3,
+        }
+        scene.stage["marker_distance"] = 0.35e-3
     elif kind == "uneven light":
         scene.camera["light"] = (rng.uniform(0.3, 0.6), rng.uniform(-0.5, 0.5))
     elif kind == "dark rod" and not dark:
@@ -143,14 +197,27 @@ def measured(kind, rng, folder, **asked):
     scene, scale = prepared(kind, rng)
     camera, stage = SyntheticCamera(**scene.camera), SyntheticStage(**scene.stage)
     sign = 1.0 if stage.side in ("below", "left") else -1.0
-    time, beam, shaker = motion(rng, camera.pixel_size, camera.frame_rate)
+    time, beam, shaker = motion(rng, camera.pixel_size, camera.frame_rate, scene.cycles)
+    if scene.cycles:
+        scene.settings["drive_amplitude"] = 0.5 * np.ptp(shaker) * (1.0 + 0.002 * rng.standard_normal())
     first = int(scene.skip * 40)
     recording = render_recording(
         time[first:] - time[first], sign * beam[first:], sign * shaker[first:], camera=camera, stage=stage,
         defects=Defects(**scene.defects), rest_frames=scene.rest_frames, rng=int(rng.integers(2**31)),
     )  # fmt: skip
     turn = Orientation(stage.side, camera.shape)
-    frames = turn.turn(np.stack(list(recording)).astype(np.float64)).copy()
+    shown = recording
+    if kind == "lamp pulse":  # the light of the last tenth of an exposure of 0.9 frames
+        late = (
+            np.interp(time + 0.81 / camera.frame_rate, time, beam),
+            np.interp(time + 0.81 / camera.frame_rate, time, shaker),
+        )
+        shown = render_recording(
+            time, *(sign * one for one in late), camera=dataclasses.replace(camera, exposure=0.09 / camera.frame_rate),
+            stage=stage, defects=Defects(**scene.defects), rest_frames=scene.rest_frames, rng=1,
+            zero_row=recording.truth.attrs["zero_row"],
+        )  # fmt: skip
+    frames = turn.turn(np.stack(list(shown)[: len(recording)]).astype(np.float64)).copy()
     frames = changed(kind, frames, recording, rng)
     if stage.side in ("above", "left"):
         frames = frames[:, ::-1]

@@ -10,7 +10,7 @@ import pytest
 from snapbeam.lab import open_recording
 from snapbeam.lab.tracking.diagnostics import never_touching
 from snapbeam.lab.tracking.frame_order import find_order
-from snapbeam.lab.tracking.measure import find_rest, image_lag
+from snapbeam.lab.tracking.measure import exposure_blur, find_rest
 from snapbeam.lab.tracking.survey import border_bar
 from snapbeam.util.diagnostics import diagnostics_of
 
@@ -28,7 +28,7 @@ def motion(count=240, noise=0.03, seed=0):
 
 @pytest.mark.parametrize("at", [75, 140, 170])
 def test_frames_lost_and_shown_twice_are_located(at):
-    whole = motion()
+    whole = motion(noise=0.02)
     assert find_order(*whole) == ((), (), (), ())
     for count in (1, 2):
         order = find_order(*(np.delete(one, np.arange(at, at + count)) for one in whole))
@@ -94,8 +94,18 @@ def test_image_lag_is_told_by_the_blur_of_fast_frames():
     for share, told in ((0.0, False), (0.15, True), (0.3, True)):
         more = step**2 * (0.5**2 / 12.0 + share * (1.0 - share))
         width = np.sqrt(1.0 + more) + 0.01 * rng.standard_normal(beam.size)
-        assert (image_lag(beam, width, 0.5) > 0.0) == told
-    assert image_lag(beam, width, 0.5) == pytest.approx(0.3, abs=0.08)
+        assert (exposure_blur(beam, width, 0.5)[0] > 0.0) == told
+    assert exposure_blur(beam, width, 0.5)[0] == pytest.approx(0.3, abs=0.08)
+
+
+def test_light_shorter_than_the_exposure_is_told_by_the_blur_of_fast_frames():
+    beam = motion(noise=0.0)[0]
+    rng = np.random.default_rng(2)
+    for share, stated, told in ((0.9, 0.9, 0.0), (0.1, 0.9, 0.45), (0.1, None, 0.0), (0.1, 0.1, 0.0)):
+        width = np.sqrt(1.0 + np.gradient(beam) ** 2 * share**2 / 12.0) + 0.005 * rng.standard_normal(
+            beam.size
+        )
+        assert exposure_blur(beam, width, stated) == (0.0, told)
 
 
 def test_a_bar_along_the_border_is_told_from_the_background():
@@ -150,14 +160,18 @@ EXPECTED = {
     "every seventh a copy": "camera.frames_repeated",
     "frames lost now and then": "camera.frames_lost",
     "rest in motion": "camera.rest_moves",
-    "pixel size in inches": "camera.thickness",
-    "pixel size ten percent off": "camera.thickness",
+    "pixel size in inches": "camera.rulers",
+    "pixel size ten percent off": "camera.rulers",
     "image lag": "camera.lag",
+    "swinging sticker": "camera.sticker_loose",
+    "rod at the border": "camera.rod_cut",
 }
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", [*EXPECTED, "white bar at the edge", "gauge", ""])
+@pytest.mark.parametrize(
+    "kind", [*EXPECTED, "white bar at the edge", "tapered beam", "rotated camera", "gauge", ""]
+)
 def test_a_rendered_scene_is_told_or_right(kind, tmp_path):
     outcome = camera_scenes.judged(kind, np.random.default_rng((31, 1, sum(map(ord, kind)))), tmp_path)
     if kind in EXPECTED:
@@ -170,4 +184,4 @@ def test_a_pixel_size_ten_percent_off_beside_a_gauge_and_impossible_motions_are_
     rng = np.random.default_rng((31, 4, sum(map(ord, "pixel size ten percent off"))))
     tracked, _ = camera_scenes.measured("pixel size ten percent off", rng, tmp_path, buckling_level=20e-6)
     codes = [one.code for one in diagnostics_of(tracked)]
-    assert "camera.thickness" in codes and "camera.beyond" in codes
+    assert "camera.rulers" in codes and "camera.beyond" in codes

@@ -293,12 +293,12 @@ def test_the_band_of_a_model_is_that_of_its_runs(synthetic_run):
     runs = [run.assign_attrs(length_scale=1e-3) for run in runs]
     runs[3] = scaled(runs[3], 2e-3)
     model = synthetic_run.assign_attrs(length_scale=1e-3)
-    found = compare_waveforms(synthetic_run, model, 100.0, ensemble=runs)
+    found = compare_waveforms(synthetic_run, model, ensemble=runs)
     waves = found.waveforms
     np.testing.assert_allclose(waves.simulated_high - waves.simulated_displacement, 0.36, atol=1e-9)
     np.testing.assert_allclose(waves.simulated_low - waves.simulated_displacement, -0.36, atol=1e-9)
     assert found.within == 1.0
-    late = compare_waveforms(parting(synthetic_run, 6.0), synthetic_run, 100.0, ensemble=runs)
+    late = compare_waveforms(parting(synthetic_run, 6.0), synthetic_run, ensemble=runs)
     assert late.within == pytest.approx(6.0 / float(waves.cycle[-1]), abs=0.1)
     labels = [each.get_label() for each in plot_waveform_overlay(late).axes[0].collections]
     assert "90 % of the model's runs" in labels
@@ -309,7 +309,7 @@ def test_the_band_of_a_model_is_that_of_its_runs(synthetic_run):
         ([*runs, runs[0].isel(time=slice(0, 900))], r"ensemble\[41\]: must have the coordinate cycle up to"),
     ):
         with pytest.raises(InputError, match=words):
-            compare_waveforms(synthetic_run, synthetic_run, 100.0, ensemble=some)
+            compare_waveforms(synthetic_run, synthetic_run, ensemble=some)
 
 
 # --- the commands -------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from snapbeam.lab.tracking.edges import edge_profile, fit_edges, fit_line, masked_median, width_calibration
+from snapbeam.lab.tracking.survey import noise_shape
 
 OFFSETS = np.arange(13) - 6.0
 
@@ -87,12 +88,12 @@ def test_faint_light_that_lasts_shows_in_the_mean_thickness():
     rng, count = np.random.default_rng(5), 280
     plain = np.zeros(count)
     for _ in range(200):
-        miss, odd = distortion(16.0 + 0.1 * rng.standard_normal(count), plain, plain + 1.3, 1.3)
+        miss, odd = distortion(16.0 + 0.1 * rng.standard_normal(count), plain, plain + 1.3, 1.3, 0.0)
         # single frames beyond five robust deviations are as rare as they should be
         assert odd.sum() <= 1
     thickness = 16.0 + 0.1 * rng.standard_normal(count)
     thickness[40:96] += 0.15
-    miss, odd = distortion(thickness, plain, plain + 1.3, 1.3)
+    miss, odd = distortion(thickness, plain, plain + 1.3, 1.3, 0.0)
     assert odd[44:92].all() and not odd[170:].any()
     assert (miss[44:92] > 0.1).all()
 
@@ -104,7 +105,7 @@ def test_light_over_half_of_the_frames_does_not_hide_behind_the_scatter_that_it_
     thickness = 16.0 + 0.035 * np.random.default_rng(5).standard_normal(150)
     thickness[40:110] += 0.1
     plain = np.zeros(150)
-    miss, odd = distortion(thickness, plain, plain + 1.3, 1.3)
+    miss, odd = distortion(thickness, plain, plain + 1.3, 1.3, 0.0)
     assert odd[44:106].all() and (miss[44:106] > 0.03).all()
 
 
@@ -122,3 +123,15 @@ def test_a_frame_whose_columns_agree_by_chance_is_not_surer_than_the_others():
     freely, error_of_these, *_ = fit_line(x, y, good, 1.5)
     assert np.abs(freely).max() > np.abs(value).max()
     assert np.abs(freely / error_of_these).max() > 8.0
+
+
+@pytest.mark.parametrize(("new", "fixed"), [(0.0, 0.0), (1.5, 0.0), (0.0, 1.5), (1.0, 1.0)])
+def test_noise_of_whole_rows_is_measured_and_is_no_smoothing(new, fixed):
+    rng = np.random.default_rng(4)
+    frames = 100.0 + 4.0 * rng.standard_normal((8, 120, 80)) + fixed * rng.standard_normal((120, 1))
+    frames[:, 40:60] += 60.0
+    frames += new * rng.standard_normal((8, 120, 1))
+    shape = noise_shape(frames)
+    assert shape.rows == pytest.approx(np.hypot(new, fixed), abs=0.25)
+    assert shape.fixed_rows == pytest.approx(np.hypot(fixed, new / np.sqrt(8.0)), abs=0.25)
+    assert shape.along == shape.across == shape.in_time == 0.0

@@ -7,12 +7,13 @@ import pytest
 import tifffile
 
 import snapbeam as sb
-from snapbeam import InputError, lab, paper
+from snapbeam import InputError, lab
+from snapbeam.model import default_values
 
 RATE, PIXEL = 1500.0, 250e-6  # Hz, m: the whole beam in 640 pixels
 WIDTH, HEIGHT, ROWS = 640, 96, (30, 60)
 FINE = 8  # points of a pixel
-MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=4, damping_ratio=0.005)
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=4, damping_ratio=0.005)
 TIME = np.arange(40) / RATE
 FIRST = 3  # columns left of the beam's end
 
@@ -46,7 +47,7 @@ def frames(pattern, shift, noise, rng):
 def moved(seed, pattern, noise, folder, size=1.0):
     """A recording, its true displacement [m] over time and columns, and the amplitudes of its modes."""
     rng = np.random.default_rng(seed)
-    place = (np.arange(WIDTH) - FIRST) * PIXEL / paper.BEAM.length
+    place = (np.arange(WIDTH) - FIRST) * PIXEL / default_values.BEAM.length
     shapes = np.where((place >= 0.0) & (place <= 1.0), MODEL.shape_at(np.clip(place, 0.0, 1.0)).T, 0.0)
     turn = 2.0 * np.pi * TIME[:, None]
     amplitude = np.sin(turn * [120.0, 200.0, 310.0, 500.0] + [0.0, 1.0, 2.0, 0.5]) * [3e-3, 1e-3, 4e-4, 1e-4]
@@ -86,7 +87,7 @@ def test_modes_follow_with_their_errors_and_phases(tmp_path):
     # blocks beyond the clamp do not move, and are no part of the beam
     field = field.sel(position=slice((FIRST + 8) * PIXEL, None))
     found = lab.modal_amplitudes(
-        field, MODEL, contact=(FIRST + 322) * PIXEL, location=322 * PIXEL / paper.BEAM.length
+        field, MODEL, contact=(FIRST + 322) * PIXEL, location=322 * PIXEL / default_values.BEAM.length
     )
     late = slice(8, None)
     miss = (found.modal_amplitude.values - amplitude)[late] / found.modal_amplitude_se.values[late]

@@ -85,12 +85,10 @@ def flags():
     from typer.main import get_command
 
     from snapbeam.cli.app import app
+    from snapbeam.lab.cli import COMMANDS
 
     commands = get_command(app).commands
-    asked = (
-        commands[name]
-        for name in ("track", "vibrometer", "fit-decay", "calibrate", "compare", "process-tests")
-    )
+    asked = (commands[name] for name in COMMANDS)
     return {flag for one in asked for option in one.params for flag in (*option.opts, *option.secondary_opts)}
 
 

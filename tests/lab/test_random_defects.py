@@ -19,12 +19,21 @@ import random_signals
 SURE = 5.0
 SEED = 22
 FALSE = 0.02
-HUNDREDS = {"scene": (200, 200), "camera": (120, 120), "drive": (200, 200), "decay": (200, 200)}
+HUNDREDS = {
+    "scene": (200, 200),
+    "camera": (120, 120),
+    "drive": (200, 200),
+    "sensor": (100, 220),
+    "decay": (200, 200),
+    "mode": (100, 90),
+}
 WORDS = {
     "scene": "scenes",
     "camera": "scenes with errors of the series of frames",
     "drive": "vibrometer records",
+    "sensor": "vibrometer records with errors of sensor or electronics",
     "decay": "free decays",
+    "mode": "free decays with errors of sensor or support",
 }
 FILE = Path(__file__).parents[2] / "docs" / "data" / "random_defects.md"
 HEAD = (
@@ -40,7 +49,12 @@ MAKERS = {
     ),
     "camera": (camera_scenes.ERRORS, camera_scenes.judged),
     "drive": (random_signals.DRIVE_DEFECTS, lambda kind, rng, folder: random_signals.judged_drive(rng, kind)),
+    "sensor": (
+        random_signals.SENSOR_DEFECTS,
+        lambda kind, rng, folder: random_signals.judged_drive(rng, kind),
+    ),
     "decay": (random_signals.DECAY_DEFECTS, lambda kind, rng, folder: random_signals.judged_decay(rng, kind)),
+    "mode": (random_signals.MODE_DEFECTS, lambda kind, rng, folder: random_signals.judged_decay(rng, kind)),
 }
 
 
@@ -105,6 +119,18 @@ def test_what_went_by_in_silence_once(seed, k, kind, tmp_path):
 def test_a_good_scene_whose_columns_agreed_by_chance(tmp_path):
     """Ten of fourteen columns lay on a line by chance, the others were left out: 0.39 px, 5.4 standard errors off."""
     outcome = MAKERS["scene"][1]("", np.random.default_rng((24, 89)), tmp_path)
+    assert not outcome.flagged and outcome.ratio < SURE
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("k", "kind"),
+    [(179, "lossless"), (27, "noise of rows"), (87, "noise of rows"), (171, "noise of rows"),
+     (53, "fixed rows"), (137, "fixed rows"), (185, "fixed rows")],
+)  # fmt: skip
+def test_good_scenes_that_were_flagged_once(k, kind, tmp_path):
+    """A beam struck between frames was a lost frame; noise of whole rows was no error, smoothed, distorted or no rest."""
+    outcome = MAKERS["camera"][1](kind, np.random.default_rng((260, k)), tmp_path)
     assert not outcome.flagged and outcome.ratio < SURE
 
 

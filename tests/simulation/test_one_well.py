@@ -56,6 +56,7 @@ def test_a_crossing_of_the_flat_shape_is_no_snap_through():
     pytest.fail("no run crosses zero without inverting its shape")
 
 
+@pytest.mark.slow
 def test_threshold_of_an_arch_over_one_parameter():
     """One threshold, without another axis, in g; names by their last part."""
     found = sb.threshold(

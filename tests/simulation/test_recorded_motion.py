@@ -32,6 +32,7 @@ def sine_record(model, ratio, amplitude, cycles, side="below"):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["below", "above"])
 def test_a_recorded_sine_is_the_sinusoidal_shaker(model, side):
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.05, side=side)

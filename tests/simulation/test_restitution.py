@@ -19,6 +19,7 @@ def ledger(run):
     return float(abs(residual).max()) / ds.attrs["gross_work"]
 
 
+@pytest.mark.slow
 def test_free_mass_rebounds_with_its_coefficient():
     mass, speed = 0.01, 0.1
     model = sb.ReducedModel.from_matrices(

@@ -105,7 +105,10 @@ def frequency_response(
     averages = count / (1.0 + 2.0 * _OVERLAP * (count - 1) / count)
     error = np.sqrt((1.0 - coherence) / (2.0 * averages * np.maximum(coherence, 1e-300)))
     limit = 1.0 - _UNRELATED ** (1.0 / (averages - 1.0))
-    unit = f"{response.attrs['units']}/{excitation.attrs['units']}"
+    above, below = (str(each.attrs["units"]) for each in (response, excitation))
+    unit = (
+        "1" if above == below else "/".join(f"({each})" if "/" in each else each for each in (above, below))
+    )
     columns = {
         "magnitude": (np.abs(ratio), unit, "magnitude of the frequency response"),
         "magnitude_se": (np.abs(ratio) * error, unit, "standard error of the magnitude"),
@@ -120,7 +123,8 @@ def frequency_response(
         {
             "title": "frequency response", "estimator": estimator, "window": "hann", "segments": count,
             "independent_segments": averages, "resolution": rate / length, "coherence_limit": limit,
-            "excitation": str(excitation.name), "response": str(response.name),
+            "excitation": str(excitation.name), "response": str(response.name), "excitation_units": below,
+            "response_units": above,
         },
     )  # fmt: skip
     found.attrs["diagnostics"] = to_json(_diagnostics(found))

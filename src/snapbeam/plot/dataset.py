@@ -23,8 +23,8 @@ _RUN: dict[str, tuple[_Draws, str]] = {
     "run": (run.plot_run, "displacement_at_striker"),
     "modal_amplitudes": (run.plot_modal_amplitudes, "modal_amplitude"),
     "energies": (run.plot_energies, "energy_beam"),
-    "spectrum": (run.plot_spectrum, "midspan_displacement"),
-    "spectrogram": (run.plot_spectrogram, "midspan_displacement"),
+    "spectrum": (run.plot_spectrum, "displacement_at_striker"),
+    "spectrogram": (run.plot_spectrogram, "displacement_at_striker"),
     "phase_portrait": (run.plot_phase_portrait, "midspan_velocity"),
 }
 """The function that draws each figure of a run, and a variable that it needs."""

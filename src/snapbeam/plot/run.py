@@ -148,7 +148,7 @@ def plot_spectrum(
     run: Run | xr.Dataset,
     ax: Axes | None = None,
     *,
-    variable: str = "midspan_displacement",
+    variable: str | None = None,
     window: Any = None,
 ) -> Axes:
     """Draw the amplitude spectrum of a run, from evenly spaced samples under a Hann window, or an estimated density.
@@ -158,8 +158,8 @@ def plot_spectrum(
     run : Run or xarray.Dataset
         Of a run; or the power spectral density that ``estimated_psd`` of a recorded acceleration or a random vibration
         returns: it is drawn with its interval, over the density that it was drawn from.
-    variable : str
-        A variable over time, by name.
+    variable : str, optional
+        A variable over time, by name; the displacement of mid-span, or at the striker, by default.
     window : pair of float, optional
         First and last cycle to take; everything by default.
 
@@ -182,7 +182,7 @@ def plot_spectrum(
     """
     if not isinstance(run, Run) and "psd_low" in getattr(run, "data_vars", ()):
         return _plot_density(run, ax)
-    dataset, name, even, y = _even_samples(run, variable, window)
+    dataset, variable, name, even, y = _even_samples(run, variable, window)
     weight = np.hanning(even.size)
     spectrum = 2.0 * np.abs(np.fft.rfft((y - y.mean()) * weight)) / weight.sum()
     frequency = np.fft.rfftfreq(even.size, float(even[1] - even[0]))
@@ -201,9 +201,13 @@ def plot_spectrum(
 _FREQUENCY = {"cycle": r"Frequency $f\,/\,f_\mathrm{excitation}$", "time": "Frequency (Hz)"}
 
 
-def _even_samples(run: Run | xr.Dataset, variable: str, window: Any) -> tuple[xr.Dataset, str, Any, Any]:
-    """The dataset of a run, the variable that it is drawn over, even samples of that, and of *variable* there."""
-    dataset = dataset_of(run, variable)
+def _even_samples(
+    run: Run | xr.Dataset, variable: str | None, window: Any
+) -> tuple[xr.Dataset, str, str, Any, Any]:
+    """The dataset of a run, the variable that is drawn, the one it is drawn over, and even samples of both."""
+    dataset = dataset_of(run)
+    if variable is None:
+        variable = "midspan_displacement" if "midspan_displacement" in dataset else "displacement_at_striker"
     choice(
         "variable", variable, tuple(str(key) for key in dataset.data_vars if dataset[key].dims == ("time",))
     )
@@ -221,7 +225,7 @@ def _even_samples(run: Run | xr.Dataset, variable: str, window: Any) -> tuple[xr
             "without them"
         )
     even = np.linspace(x[0], x[-1], min(x.size, 1 << 17))
-    return dataset, name, even, np.interp(even, x, y)
+    return dataset, variable, name, even, np.interp(even, x, y)
 
 
 def _words(dataset: xr.Dataset, variable: str) -> str:
@@ -235,7 +239,7 @@ def plot_spectrogram(
     run: Run | xr.Dataset,
     ax: Axes | None = None,
     *,
-    variable: str = "midspan_displacement",
+    variable: str | None = None,
     window: Any = None,
     segment: float | None = None,
 ) -> Axes:
@@ -244,8 +248,8 @@ def plot_spectrogram(
     Parameters
     ----------
     run : Run or xarray.Dataset
-    variable : str
-        A variable over time, by name.
+    variable : str, optional
+        A variable over time, by name; the displacement of mid-span, or at the striker, by default.
     window : pair of float, optional
         First and last cycle to take; everything by default.
     segment : float, optional
@@ -275,7 +279,7 @@ def plot_spectrogram(
     from scipy.signal import ShortTimeFFT
     from scipy.signal.windows import hann
 
-    dataset, name, even, y = _even_samples(run, variable, window)
+    dataset, variable, name, even, y = _even_samples(run, variable, window)
     step = float(even[1] - even[0])
     span = step * even.size
     size = round((span / 12.0 if segment is None else positive("segment", segment)) / step)

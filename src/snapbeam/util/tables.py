@@ -164,6 +164,7 @@ def universal_record(
     values: NDArray[Any],
     words: str = "",
     function: int = _TIME_RESPONSE,
+    below: str = "",
 ) -> dict[str, Any]:
     """A binary record of dataset 58 of even samples over time or frequency.
 
@@ -171,7 +172,7 @@ def universal_record(
     ----------
     name : str
     unit : str
-        Unit of the values, such as ``"m/s"`` or ``"m/N"``.
+        Unit of the values, or of the response of a frequency response.
     abscissa : array of shape (samples,)
         Even times [s], or frequencies [Hz] of a frequency response or a coherence.
     values : array of shape (samples,)
@@ -180,16 +181,17 @@ def universal_record(
         Second line of the record.
     function : int
         Code of the function; a response over time by default.
+    below : str
+        Unit of the excitation of a frequency response.
     """
     import pyuff
 
     over = "s" if function == _TIME_RESPONSE else "Hz"
-    above, _, below = unit.partition("/") if unit not in _UFF_UNITS else (unit, "", "")
     entry: dict[str, Any] = pyuff.prepare_58(
         binary=1, id1=name[:80], id2=words[:80] or "NONE", func_type=function, rsp_node=1, rsp_dir=3, ref_node=0, ref_dir=0,
         data=values, x=abscissa, num_pts=values.size, abscissa_spacing=1, abscissa_min=float(abscissa[0]),
         abscissa_inc=float(abscissa[-1] - abscissa[0]) / (abscissa.size - 1), abscissa_spec_data_type=_UFF_UNITS[over],
-        abscissa_axis_units_lab=over, ordinate_spec_data_type=_UFF_UNITS.get(above, 0), ordinate_axis_units_lab=above,
+        abscissa_axis_units_lab=over, ordinate_spec_data_type=_UFF_UNITS.get(unit, 0), ordinate_axis_units_lab=unit,
         orddenom_spec_data_type=_UFF_UNITS.get(below, 0), orddenom_axis_units_lab=below or "NONE", z_axis_spec_data_type=0,
         return_full_dict=False,
     )  # fmt: skip
@@ -220,9 +222,11 @@ def _universal_records(dataset: xr.Dataset) -> tuple[list[dict[str, Any]], list[
     if {"magnitude", "phase", "coherence"} <= set(names):
         x, found = dataset["frequency"].values, dataset["magnitude"]
         values = found.values * np.exp(1j * dataset["phase"].values)
-        words = f"{dataset.attrs['response']} over {dataset.attrs['excitation']}"
+        own = dataset.attrs
+        words = f"{own['response']} over {own['excitation']}"
+        units = own["response_units"], own["excitation_units"]
         records = [
-            universal_record(words, found.attrs["units"], x, values, "", _FREQUENCY_RESPONSE),
+            universal_record(words, units[0], x, values, "", _FREQUENCY_RESPONSE, units[1]),
             universal_record(words, "1", x, dataset["coherence"].values, "", _COHERENCE),
         ]
         return records, [name for name in names if name not in ("magnitude", "phase", "coherence")]

@@ -307,7 +307,7 @@ CASES = (
         "Pixel size",
         "a pixel size twice the true one, beside a gauge",
         "flagged",
-        "camera.thickness",
+        "camera.rulers",
         opened={"pixel_size": 2 * PIXEL},
         beam_thickness=0.4e-3,
     ),

@@ -56,7 +56,26 @@ def track(
     tip_distance: Annotated[
         float | None, option("Distance from the tip of the shaker to the nearer edge of the sticker, m.", _SCENE)
     ] = None,
-    beam_thickness: Annotated[float | None, option("Thickness of the beam by gauge, m, for a check.", _SCENE)] = None,
+    beam_thickness: Annotated[
+        float | None, option("Thickness of the beam by gauge, m, to check the pixel size.", _SCENE)
+    ] = None,
+    beam_thickness_error: Annotated[
+        float | None, option("Standard error of --beam-thickness, m; 1 % by default.", _SCENE)
+    ] = None,
+    tip_diameter: Annotated[
+        float | None,
+        option("Diameter of the shaker's rod behind its tip by gauge, m, to check the pixel size.", _SCENE),
+    ] = None,
+    tip_diameter_error: Annotated[
+        float | None, option("Standard error of --tip-diameter, m; 1 % by default.", _SCENE)
+    ] = None,
+    drive_amplitude: Annotated[
+        float | None,
+        option("Amplitude of the shaker's displacement by vibrometer, m, to check the pixel size.", _SCENE),
+    ] = None,
+    drive_amplitude_error: Annotated[
+        float | None, option("Standard error of --drive-amplitude, m; 0.2 % by default.", _SCENE)
+    ] = None,
     columns: Annotated[int, option("Number of columns in which the edge of the beam is fitted.", _SCENE)] = 24,
     blur_limit: Annotated[
         float | None, option("Edge width, px, above which a frame is flagged as blurred.", _SCENE)
@@ -136,7 +155,10 @@ def track(
 
     settings = TrackingSettings(
         buckling_level=buckling_level, location=location, rest_displacement=rest_displacement,
-        rest_frames=_rest(rest_frames), beam_thickness=beam_thickness, side=side, objects=objects,
+        rest_frames=_rest(rest_frames), side=side, objects=objects,
+        beam_thickness=beam_thickness, beam_thickness_error=beam_thickness_error, tip_diameter=tip_diameter,
+        tip_diameter_error=tip_diameter_error, drive_amplitude=drive_amplitude,
+        drive_amplitude_error=drive_amplitude_error,
         threshold=threshold, gamma=gamma, shaker=shaker, marker=marker, tip_distance=tip_distance, columns=columns,
         contact_column=contact_column, blur_limit=blur_limit,
         fixed_marks=[lab.whole_numbers("fixed_mark", text, 4) for text in fixed_mark or ()],  # type: ignore[misc]

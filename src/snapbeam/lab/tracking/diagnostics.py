@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from snapbeam.lab.diagnostics import Kind, table
 from snapbeam.lab.tracking.frame_order import FrameOrder
 from snapbeam.lab.tracking.measure import Rest, Touch, TrackedRows
+from snapbeam.lab.tracking.rulers import Ruler, compare_rulers, option_name, seen_rulers
 from snapbeam.lab.tracking.settings import (
     BeamView,
     EdgeShape,
@@ -37,11 +39,18 @@ KINDS = table(
         "left out as no beam",
     ),
     Kind(
-        "camera.thickness", ERROR,
-        "thickness found in the picture, against that measured with a gauge",
-        "the beam found is {found_mm:.3f} mm thick, beam_thickness (--beam-thickness) says {known_mm:.3f} mm: "
-        "another object (narrow region, --region), or a wrong pixel_size (--pixel-size)",
-        ("beam_thickness", "pixel_size", "region"),
+        "camera.rulers", WARNING,
+        "pixel sizes by the thickness of the beam, the diameter of the striker and the amplitude of the drive, against "
+        "each other, the one given, and factors of mistaken units",
+        "{told}; check these and the planes they were taken in, pixel_size (--pixel-size), beam_thickness "
+        "(--beam-thickness), tip_diameter (--tip-diameter), drive_amplitude (--drive-amplitude), and what was tracked "
+        "(region, --region)",
+        ("pixel_size", "beam_thickness", "tip_diameter", "drive_amplitude", "region"),
+    ),
+    Kind(
+        "camera.ruler_unseen", INFO,
+        "sides of the striker's rod, and steady cycles of the striker",
+        "{told} was given and is not seen in the recording: the pixel size is not checked with it",
     ),
     Kind(
         "camera.scale", ERROR,
@@ -100,6 +109,13 @@ KINDS = table(
         "standard errors; more light and a shorter exposure, or give the frames as they were taken",
     ),
     Kind(
+        "camera.pulse", WARNING,
+        "how the blur of the edge grows with its speed, against what the exposure explains",
+        "edges in motion are sharper than the exposure explains: the lamp pulses, or the exposure of the file is wrong; "
+        "positions are of an instant up to {frames:.2f} frames from the middle of the exposure, which is in their standard "
+        "errors; use steady light, or give the frames as they were taken",
+    ),
+    Kind(
         "camera.smoothed", WARNING,
         "noise of pixels, against that of their neighbours",
         "noise of neighbouring pixels is alike (correlation {correlation:.2f}): pictures were enlarged, smoothed, "
@@ -132,6 +148,25 @@ KINDS = table(
         "{gap_px:.0f} px: taken for a sticker on a dark shaker whose tip touches the beam in the first frames; "
         "give tip_distance (--tip-distance), or marker=False (--no-marker) if the band is the tip",
         ("tip_distance", "marker"),
+    ),
+    Kind(
+        "camera.turned", INFO,
+        "the sides of the striker's rod and the slope of the beam, against rows and columns",
+        "beam and striker lean by {angle:.1f} degrees alike: the camera is turned; taken out",
+    ),
+    Kind(
+        "camera.rod_cut", WARNING,
+        "columns of the striker, against the border of the region",
+        "the border of the region cuts the striker, so where its tip touches is not seen: its position may be off by as "
+        "much as its tip is round; widen region (--region) or give contact_column (--contact-column)",
+        ("region", "contact_column"),
+    ),
+    Kind(
+        "camera.sticker_loose", WARNING,
+        "the way from the sticker to the tip frame by frame, where both are seen, against their noise",
+        "the sticker moves against the tip by {swing_px:.2f} px (standard deviation), which is in the shaker's standard "
+        "errors: it is loose, or another object; fix it, or follow the tip with marker=False (--no-marker)",
+        ("marker",),
     ),
     Kind(
         "camera.never_touches", WARNING,
@@ -258,8 +293,6 @@ KINDS = table(
     ),
 )  # fmt: skip
 
-_OFF = 0.05  # share by which the thickness may be off the known one
-_OFF_PX = 0.3  # and pixels
 _WELLS = 3.0  # buckling levels; a beam that snaps through does not go further
 _FASTEST = (30.0, 3.0)  # m/s of beam and shaker
 _CLOSE = 3.0  # px of gap that is no contact, of a tip that merges with the beam
@@ -277,7 +310,8 @@ class SeenMotion:
 
     ``penetration`` [px] of the tip into the beam, NaN where unknown, and that while they ``touch``; ``scale``
     [mm/px]; ``drift`` [px] of the camera, the largest; ``fields`` of interlaced video; ``order`` of the
-    frames; ``trail``, the share of the frame before that a frame still shows.
+    frames; ``trail``, the share of the frame before that a frame still shows; ``pulse``, the frames by which its
+    instant within the exposure is open; ``open_share``, the exposure over the time between frames, 0 if not known.
     """
 
     rows: TrackedRows
@@ -289,6 +323,8 @@ class SeenMotion:
     fields: VideoFields
     order: FrameOrder
     trail: float
+    pulse: float
+    open_share: float
 
 
 def tracking_diagnostics(
@@ -298,10 +334,13 @@ def tracking_diagnostics(
 
     *offset_mm* is the error of the rest position, *rate* that of the frames [Hz].
     """
-    told = [*_of_the_beam(scene, seen, settings), *_of_the_rest(seen, settings, offset_mm)]
+    told = [*_of_the_beam(scene, seen), *_of_the_scale(scene, seen, settings)]
+    told += [*_of_the_rest(seen, settings, offset_mm)]
     told += [*_of_the_motion(seen, settings, rate), *_of_the_order(seen.order, rate)]
     if seen.trail > 0.0:
         told.append(KINDS["lag"].found(share_percent=100.0 * seen.trail))
+    if seen.pulse > 0.0:
+        told.append(KINDS["pulse"].found(frames=seen.pulse))
     if seen.rows.hollow > 0.0:
         told.append(KINDS["curved"].found(hollow_px=seen.rows.hollow))
     told += _of_the_edges(scene.shape, settings)
@@ -346,7 +385,7 @@ def never_touching(penetration: np.ndarray, rows: TrackedRows) -> float:
     return closest if closest > least else 0.0
 
 
-def _of_the_beam(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> list[Diagnostic]:
+def _of_the_beam(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
     told = []
     beam = scene.beam
     if beam.fixtures:
@@ -359,10 +398,16 @@ def _of_the_beam(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> 
     found = beam.thickness * seen.scale
     if not 0.005 <= found <= 30.0:
         told.append(KINDS["scale"].found(found_mm=found))
-    if settings.beam_thickness is not None:
-        known = settings.beam_thickness * 1e3
-        if abs(found / known - 1.0) > _OFF + _OFF_PX * seen.scale / known:
-            told.append(KINDS["thickness"].found(found_mm=found, known_mm=known))
+    return told
+
+
+def _of_the_scale(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> list[Diagnostic]:
+    rulers, unseen = seen_rulers(scene, seen.rows.shaker, settings, seen.open_share)
+    told = [KINDS["ruler_unseen"].found(told=option_name(name)) for name in unseen]
+    found = compare_rulers([Ruler("pixel_size", 1e-3 * seen.scale / scene.straight, 0.0), *rulers])
+    if found is not None:
+        severity, words, numbers = found
+        told.append(KINDS["rulers"].found(severity, words, **numbers))
     return told
 
 
@@ -480,6 +525,12 @@ def _of_the_tip(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
         # the sticker's own upper edge over the beam
         nearest = float(np.nanmin(gap)) - shaker.tip_offset - 0.5 * shaker.sticker.thickness
         told.append(KINDS["sticker_alone"].found(height_px=shaker.sticker.thickness, gap_px=nearest))
+    if shaker.turn:
+        told.append(KINDS["turned"].found(angle=math.degrees(math.atan(shaker.turn))))
+    if shaker.cut:
+        told.append(KINDS["rod_cut"].found())
+    if shaker.loose > 0.0:
+        told.append(KINDS["sticker_loose"].found(swing_px=shaker.loose))
     closest = never_touching(seen.penetration, seen.rows)
     if closest > 0.0:
         told.append(KINDS["no_contact" if shaker.certain else "never_touches"].found(gap_px=closest))

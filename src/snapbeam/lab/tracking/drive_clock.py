@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import chi2, f
 
 from snapbeam.lab.signals import SignalSamples
-from snapbeam.lab.sine_fit import fit_sine, spectral_peak
+from snapbeam.lab.sine_fit import SineFit, fit_sine, spectral_peak
 from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.vibrometer import moving_part
 from snapbeam.util.validation import InputError
@@ -30,11 +30,11 @@ _MEDIAN = 2.7  # times as many squares a median needs for the error of a mean
 _BLOCK = 8  # frames, for noise that is alike in neighbours
 
 
-def drive_clock(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
-    """Kinds and numbers of what is wrong with the order of the frames, from the rows [px] of the striker."""
+def steady_striker(shaker: Floats) -> tuple[SignalSamples, SineFit] | None:
+    """The steady part of the striker's rows [px], over the numbers of frames, and its sine; None if it is too short."""
     known = np.flatnonzero(np.isfinite(shaker))
     if known.size < 64 or known.size < 0.8 * shaker.size:
-        return []
+        return None
     frames = np.arange(shaker.size, dtype=np.float64)
     samples = SignalSamples(np.interp(frames, frames[known], shaker[known]), frames, 1.0)
     try:
@@ -43,11 +43,20 @@ def drive_clock(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
         first = min(first + round(2.0 / guess), last)
         last = min(last, first + _MOST)
         if (last - first) * guess < _CYCLES:
-            return []
+            return None
         part = SignalSamples(samples.values[first:last], frames[first:last], 1.0)
-        fit = fit_sine(part, guess, 5, keep=np.isfinite(shaker[first:last]))
+        return part, fit_sine(part, guess, 5, keep=np.isfinite(shaker[first:last]))
     except InputError:
+        return None
+
+
+def drive_clock(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
+    """Kinds and numbers of what is wrong with the order of the frames, from the rows [px] of the striker."""
+    steady = steady_striker(shaker)
+    if steady is None:
         return []
+    part, fit = steady
+    first, last = int(part.time[0]), int(part.time[-1]) + 1
     wave = fit.waveform(np.arange(first - 1, last + 1, dtype=np.float64))
     off = np.where(np.isfinite(shaker[first:last]), part.values - wave[1:-1], 0.0)
     told = _jitter(off, 0.5 * (wave[2:] - wave[:-2]))

@@ -23,6 +23,7 @@ from snapbeam.lab.tracking.settings import FrameFlag
 _HALVES = (5, 8, 12)  # frames on either side of a place; of the beam the first
 _DEGREES = (3, 5)
 _BENDS = 7  # degree of a motion over many frames with an even clock
+_STRUCK = np.arange(-2.0, 2.1, 0.5)  # frames about a place, at which a body may be struck
 _MOST = 3  # frames lost at one place
 _BETTER = 50.0  # chi-square by which a clock must be better than one that runs on evenly
 _FURTHER = 15.0  # the same, in a recording in which one place is known
@@ -105,7 +106,7 @@ def _better(values: Floats, half: int) -> Floats:
         return np.min(left, axis=0)
 
     left = np.stack([least([_powers(clock, degree) for degree in _DEGREES]) for clock in others])
-    struck = [np.maximum(even - at, 0.0) for at in (-0.5, 0.0, 0.5)]
+    struck = [np.maximum(even - at, 0.0) for at in _STRUCK]
     smooth = [_powers(even, degree) for degree in _DEGREES]
     smooth += [_powers(even, _BENDS)] * (half > _HALVES[0])
     best = least([*smooth, *(np.column_stack([smooth[0], hinge]) for hinge in struck)])

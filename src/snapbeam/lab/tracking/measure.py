@@ -163,11 +163,12 @@ def wanderings(rows: Floats, lost: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def distortion(
-    thickness: Floats, residual: Floats, width: Floats, usual_width: float
+    thickness: Floats, residual: Floats, width: Floats, usual_width: float, row_error: float
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Deviation of the beam thickness from the usual value [px], and the distorted frames.
 
-    A frame is distorted if that exceeds five robust standard deviations and 0.06 px, if the mean over 32 frames about
+    A frame is distorted if that exceeds five robust standard deviations, 0.06 px and the noise of rows
+    (*row_error* [px] of one edge), if the mean over 32 frames about
     it is as far off (faint light that lasts), or if its edges are no steps: fits that leave three times as much as
     usual without being blurred.
     """
@@ -178,8 +179,9 @@ def distortion(
         usual = float(np.median(thickness[known]))
         spread = 1.4826 * float(np.median(np.abs(thickness[known] - usual)))
         miss[known] = np.abs(thickness[known] - usual)
-        odd = miss > max(_FAR * spread, 0.06)
-        faint = _lasting(thickness[known] - usual)
+        both = _FAR * math.sqrt(2.0) * row_error
+        odd = miss > max(_FAR * spread, 0.06, both)
+        faint = _lasting(thickness[known] - usual, max(_FAINT, both))
         miss[known] = np.maximum(miss[known], faint)
         odd[known] |= faint > 0.0
     sound = np.isfinite(residual)
@@ -190,8 +192,11 @@ def distortion(
     return miss, odd
 
 
-def _lasting(miss: Floats) -> Floats:
-    """Mean deviation of the thickness over the stretch around each frame, if it is significant; otherwise 0.
+def _lasting(miss: Floats, least: float) -> Floats:
+    """Mean deviation of the thickness over the stretch around each frame, if it is significant and beyond *least*.
+
+    Otherwise 0.  It is the larger of those from the median and from the half of the stretches that are most alike,
+    for light on many frames moves the median.
 
     What chance does is told by the steps from frame to frame: light that lasts over a good part of the recording
     widens the scatter of all frames together, but not these.
@@ -201,9 +206,12 @@ def _lasting(miss: Floats) -> Floats:
         return out
     noise = 1.4826 * float(np.median(np.abs(np.diff(miss)))) / math.sqrt(2.0)
     mean = np.convolve(miss, np.full(_STRETCH, 1.0 / _STRETCH), "valid")
-    for first in np.flatnonzero(np.abs(mean) > max(_FAR * noise / math.sqrt(_STRETCH), _FAINT)):
+    ordered, half = np.sort(mean), mean.size // 2
+    at = int(np.argmin(ordered[half:] - ordered[: ordered.size - half]))
+    mean = np.maximum(np.abs(mean), np.abs(mean - float(np.median(ordered[at : at + half + 1]))))
+    for first in np.flatnonzero(mean > max(_FAR * noise / math.sqrt(_STRETCH), least)):
         inside = slice(int(first), int(first) + _STRETCH)
-        out[inside] = np.maximum(out[inside], abs(mean[first]))
+        out[inside] = np.maximum(out[inside], mean[first])
     return out
 
 
@@ -220,8 +228,10 @@ def pooled(error: Floats) -> Floats:
         return np.where(error < usual, usual, error)
 
 
-def unexplained_blur(row: Floats, width: Floats, usual: float) -> Floats:
+def unexplained_blur(row: Floats, width: Floats, usual: float, limit: float) -> Floats:
     """Excess of the edge width over lens and motion blur [px], over the frames; otherwise 0.
+
+    Beyond *limit*, where edges are too wide for their windows, that over the lens alone.
 
     An exposure is no longer than a frame, so motion smears an edge over no more than the step from frame to
     frame, with a standard deviation of that over the root of 12.
@@ -230,7 +240,8 @@ def unexplained_blur(row: Floats, width: Floats, usual: float) -> Floats:
     with np.errstate(invalid="ignore"):
         fastest = np.fmax(np.append(step, np.nan), np.append(np.nan, step))
         explained = np.hypot(usual, fastest / np.sqrt(12.0))
-        return np.where(width > _WIDER * explained + 0.2, width - explained, 0.0)
+        excess = np.where(width > _WIDER * explained + 0.2, width - explained, 0.0)
+        return np.where(width > limit, width - usual, excess)
 
 
 def find_rest(row: Floats, error: Floats, shaker: Floats, given: tuple[int, int] | None) -> Rest:
@@ -254,8 +265,9 @@ def find_rest(row: Floats, error: Floats, shaker: Floats, given: tuple[int, int]
         return Rest(known, math.nan, math.nan, False, math.nan)
     noise = max(float(np.median(error[known])), _STEADY)
     values = row[known]
-    before = np.cumsum(values)[:-1] / np.arange(1, known.size)
-    gone = np.abs(values[1:] - before) > 3.0 * noise + 1e-6
+    averaged = np.arange(1, known.size)
+    before = np.cumsum(values)[:-1] / averaged
+    gone = np.abs(values[1:] - before) > 3.0 * noise * np.sqrt(1.0 + 1.0 / averaged) + 1e-6
     # one frame in some hundred strays by chance; two in a row do not
     away = gone & np.append(gone[1:], True)
     quiet = int(away.argmax()) + 1 if away.any() else known.size
@@ -646,8 +658,6 @@ class Follower:
                 wide = beam.width > self.blur_limit
             if self.scene.shaker.sticker is None:  # the beam's light cannot be taken out of such windows
                 row[wide] = np.nan
-            else:
-                error = np.where(wide, np.hypot(error, 0.2 * (beam.width - view.edge_width)), error)
             gone = ~np.isfinite(row) & ~lost & ~wide
             flags[gone & tip.merged] |= np.uint16(FrameFlag.MERGED)
             other = [
@@ -664,9 +674,7 @@ class Follower:
         self._parts.append(
             {
                 "row": np.where(lost, np.nan, beam.row) - shift,
-                "error": np.where(
-                    lost, np.nan, np.hypot(_with_blur(beam, view.edge_width, self.blur_limit), shift_error)
-                ),
+                "error": np.where(lost, np.nan, np.hypot(beam.error, shift_error)),
                 "slope": np.where(lost, np.nan, beam.slope),
                 "hollow": np.where(lost, np.nan, beam.hollow),
                 "width": beam.width,
@@ -685,11 +693,15 @@ class Follower:
         found = _with_missing(found, numbers)
         flags, row, shaker = found["flags"], found["row"], found["shaker"]
         miss, odd = distortion(
-            found["thickness"], found["residual"], found["width"], self.scene.beam.edge_width
+            found["thickness"],
+            found["residual"],
+            found["width"],
+            self.scene.beam.edge_width,
+            self.scene.row_errors[0],
         )
         odd &= np.isfinite(row)
         flags[odd] |= np.uint16(FrameFlag.DISTORTED)
-        blur = unexplained_blur(row, found["width"], self.scene.beam.edge_width)
+        blur = unexplained_blur(row, found["width"], self.scene.beam.edge_width, self.blur_limit)
         error = np.hypot(
             pooled(found["error"]), np.where(odd, np.fmax(miss, _SMEARED * blur), _SMEARED * blur)
         )
@@ -738,13 +750,6 @@ def _lasting_hollow(hollow: Floats) -> float:
     known = hollow[np.isfinite(hollow)]
     middle = float(np.median(known)) if known.size else 0.0
     return abs(middle) if abs(middle) > _HOLLOW else 0.0
-
-
-def _with_blur(beam: BeamRows, usual: float, limit: float) -> Floats:
-    """Standard errors of the beam's row, widened in frames whose edges are too wide for their windows."""
-    with np.errstate(invalid="ignore"):
-        wide = beam.width > limit
-    return np.where(wide, np.hypot(beam.error, _SMEARED * (beam.width - usual)), beam.error)
 
 
 def _assign(
@@ -855,18 +860,19 @@ _LAG = (
 )
 
 
-def image_lag(row: Floats, width: Floats, exposure: float) -> float:
-    """Share of the light of the frame before that a frame still shows; 0 where none is told.
+def exposure_blur(row: Floats, width: Floats, exposure: float | None) -> tuple[float, float]:
+    """Share of the frame before that a frame still shows, and frames by which its instant is open; 0 where none is told.
 
     Motion at a speed v a frame adds v^2 s^2/12 to the square of an edge's blur, s the exposure over the time between
-    frames; a share a of the frame before adds v^2 a (1 - a).
+    frames; a share a of the frame before adds v^2 a (1 - a).  Less than that is
+    added by light that is shorter than the exposure, at an instant that is not known.
 
     Parameters
     ----------
     row, width
         Of the beam's edge, over the frames [px].
     exposure
-        Over the time between frames; 1 where it is not known.
+        Over the time between frames; None where it is not known.
     """
     speed = np.full(row.size, np.nan)
     speed[1:-1] = 0.5 * (row[2:] - row[:-2])
@@ -875,13 +881,15 @@ def image_lag(row: Floats, width: Floats, exposure: float) -> float:
     with np.errstate(invalid="ignore"):
         used = np.isfinite(width) & (bend < 0.3 * np.abs(speed) + _MOVES)  # not where the beam is struck
     if np.count_nonzero(used & (np.abs(np.nan_to_num(speed)) > 3.0 * _MOVES)) < _LEAST:
-        return 0.0
+        return 0.0, 0.0
     x, y = speed[used] ** 2, width[used] ** 2
     (slope, _), cover = np.polyfit(x, y, 1, cov=True)
-    more = float(slope) - min(exposure, 1.0) ** 2 / 12.0
-    if more < max(_LAG, _SURE_LAG * math.sqrt(float(cover[0, 0]))):
-        return 0.0
-    return 0.5 - math.sqrt(max(0.25 - more, 0.0))
+    opened = 1.0 if exposure is None else min(exposure, 1.0)
+    more = float(slope) - opened**2 / 12.0
+    certain = max(_LAG, _SURE_LAG * math.sqrt(float(cover[0, 0])))
+    if more > certain:
+        return 0.5 - math.sqrt(max(0.25 - more, 0.0)), 0.0
+    return 0.0, (0.5 * opened if exposure is not None and -more > certain else 0.0)
 
 
 def alternation(row: Floats) -> float:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.lab.tracking.edges import Floats
+from snapbeam.lab.tracking.edges import Floats, edge_noise
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -32,6 +32,9 @@ from snapbeam.util.validation import (
 # All tracking is done in one orientation: the beam crosses the picture from left to right, the shaker stands
 # below it and rows count downwards.
 
+
+RULERS = {"beam_thickness": 0.01, "tip_diameter": 0.01, "drive_amplitude": 0.002}
+"""Lengths that check the pixel size, and their relative standard errors where none is given."""
 
 SIDES = ("below", "above", "left", "right")
 HALF = 6  # half height of the fit windows, pixels
@@ -102,8 +105,11 @@ class TrackingSettings:
         Frames in which the beam is at rest: their number at the start, or (first, one past the last), negative
         numbers counted from the end.  Unless given, the first half of those before it first departs from their
         mean by three standard errors.
-    beam_thickness
-        Thickness of the beam as measured with a gauge [m], to check the tracked thickness and the pixel size.
+    beam_thickness, tip_diameter, drive_amplitude
+        Lengths that the recording shows too, to check the pixel size: thickness of the beam and diameter of the
+        shaker's rod behind its tip by gauge, and amplitude of the shaker's steady displacement by vibrometer [m].
+    beam_thickness_error, tip_diameter_error, drive_amplitude_error
+        Their standard errors [m]; 1 % of the gauged ones and 0.2 % of the amplitude unless given.
     side
         Side of the beam on which the shaker is: "below", "above", "left" or "right".  Up (or right) is
         positive.
@@ -143,6 +149,11 @@ class TrackingSettings:
     rest_displacement: float | None = None
     rest_frames: int | tuple[int, int] | None = None
     beam_thickness: float | None = None
+    beam_thickness_error: float | None = None
+    tip_diameter: float | None = None
+    tip_diameter_error: float | None = None
+    drive_amplitude: float | None = None
+    drive_amplitude_error: float | None = None
     side: str = "below"
     objects: str = "auto"
     threshold: float | None = None
@@ -157,7 +168,9 @@ class TrackingSettings:
     fixed_marks: Sequence[tuple[int, int, int, int]] = ()
 
     def __post_init__(self) -> None:
-        for name, unit in (("buckling_level", "m"), ("beam_thickness", "m"), ("blur_limit", "px")):
+        lengths = tuple(f"{name}{more}" for name in RULERS for more in ("", "_error"))
+        for name in ("buckling_level", "blur_limit", *lengths):
+            unit = "px" if name == "blur_limit" else "m"
             self._keep(name, lambda value, name=name, unit=unit: positive(name, value, unit))
         for name in ("rest_displacement", "threshold"):
             self._keep(name, lambda value, name=name: finite(name, value))
@@ -336,6 +349,10 @@ class ShakerView:
     of the tip at the contact counted from it and ``tip_error`` its standard error; ``tip_source`` says in
     words where that is known from; ``isolated`` that the sticker was all that could be seen of the shaker;
     ``certain`` that the tip is no sticker, by its distance or since its body has no gap down to the border.
+    ``width`` [px] is that of the rod behind the tip, and its standard error; NaN where it is not seen.  ``loose``
+    [px] is by how much the sticker moves against the tip, standard deviation.  ``turn`` is the tangent of the angle
+    by which the camera is turned against rod and beam.  ``cut`` says that one border of the picture cuts the rod, so
+    that its middle is not seen.
     """
 
     rod: tuple[int, int]
@@ -346,6 +363,10 @@ class ShakerView:
     tip_source: str
     isolated: bool
     certain: bool
+    width: tuple[float, float]
+    loose: float
+    turn: float
+    cut: bool
 
     @property
     def mark(self) -> str:
@@ -389,12 +410,16 @@ class NoiseShape:
     """Correlations of the noise of pixels.
 
     ``in_time`` with the same pixel in the next frame, ``along`` the beam with the next pixel, and ``across`` the
-    beam; 0 where the noise is that of a sensor or too small to decide.
+    beam; 0 where the noise is that of a sensor or too small to decide.  ``rows`` is the standard deviation of what
+    all pixels of a row along the beam have in common, in grey levels, and ``fixed_rows`` of the part of it that is
+    the same in every frame.
     """
 
     in_time: float
     along: float
     across: float
+    rows: float
+    fixed_rows: float
 
     @property
     def lag(self) -> float:
@@ -441,6 +466,20 @@ class Scene:
     shape: EdgeShape
     noise: NoiseShape
     striker_in_view: bool
+
+    @property
+    def straight(self) -> float:
+        """Length across the beam over that along the rows of a picture that is turned."""
+        return 1.0 if self.shaker is None else 1.0 / math.sqrt(1.0 + self.shaker.turn**2)
+
+    @property
+    def row_errors(self) -> tuple[float, float]:
+        """Standard error [px] of an edge by what all pixels of a row have in common, and by the fixed part of it."""
+        rows = (self.noise.rows, self.noise.fixed_rows)
+        first, second = (
+            edge_noise(self.beam.edge_width, one, self.beam.contrast) if one else 0.0 for one in rows
+        )
+        return first, second
 
     @property
     def placed_error(self) -> float:

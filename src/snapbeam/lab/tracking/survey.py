@@ -23,6 +23,7 @@ from snapbeam.lab.tracking.edges import (
     width_calibration,
 )
 from snapbeam.lab.tracking.measure import (
+    MIN_FLANK,
     MIN_GAP,
     BeamRows,
     measure_beam,
@@ -195,14 +196,21 @@ _GAMMAS = np.exp(np.linspace(math.log(0.25), math.log(4.0), 81))
 
 
 def edge_shape(
-    windows: Floats, fit: EdgeFit, good: NDArray[np.bool_], width: float, sign: float, clipped: float
+    windows: Floats,
+    centre: Floats,
+    fit: EdgeFit,
+    good: NDArray[np.bool_],
+    width: float,
+    sign: float,
+    clipped: float,
 ) -> EdgeShape:
     """Judge the mean edge of many windows.
 
     Parameters
     ----------
-    windows, fit
-        Grey levels (..., rows) and what :func:`fit_edges` made of them with *width* and *sign*.
+    windows, centre, fit
+        Grey levels (frames, columns, rows), rows of their middles, and what :func:`fit_edges` made of them with
+        *width* and *sign*.
     good
         Which windows to use.
     width, sign
@@ -221,7 +229,9 @@ def edge_shape(
     model = edge_profile(offset, width)
     level = (data * sign).mean(-1) - contrast * model.mean(-1)
     share = (data * sign - level[:, None]) / contrast[:, None]
-    x, y, error = _binned(offset, share)
+    places = np.stack(np.nonzero(good))
+    groups = (places[0], places[1], np.floor(centre[good] - centre[good].min()).astype(np.intp))
+    x, y, error = _binned(offset, share, groups)
     if x.size < 24 or clipped > CLIPPED:
         return unknown
     misfit = float(np.sqrt(np.mean((y - edge_profile(x, width)) ** 2)))
@@ -287,17 +297,28 @@ def _asymmetry(x: Floats, light: Floats, error: Floats) -> tuple[float, float]:
     return float(found.fun), float(found.x)
 
 
-def _binned(offset: Floats, share: Floats) -> tuple[Floats, Floats, Floats]:
-    """Mean offset, mean share and its standard error in steps of a fraction of a pixel."""
+def _binned(
+    offset: Floats, share: Floats, groups: tuple[NDArray[np.intp], ...]
+) -> tuple[Floats, Floats, Floats]:
+    """Mean offset, mean share and its standard error in steps of a fraction of a pixel.
+
+    Windows of one frame, one column or one row may be off together, by uneven light, speckle or noise of rows: the
+    error is the largest of those with the windows of a group as one.
+    """
     index = np.floor((offset + _REACH) / _STEP).astype(int)
     inside = (index >= 0) & (index < int(2 * _REACH / _STEP))
+    owners = [np.broadcast_to(one[:, None], index.shape)[inside] for one in groups]
     index, x, y = index[inside], offset[inside], share[inside]
     count = np.bincount(index)
     full = count >= 8
     total = np.maximum(count, 1)
     mean_x, mean = np.bincount(index, x) / total, np.bincount(index, y) / total
-    variance = np.bincount(index, y * y) / total - mean**2
-    error = np.sqrt(np.maximum(variance, 0.0) / total)
+    off = y - mean[index]
+    error = np.sqrt(np.bincount(index, off**2)) / total
+    for owner in owners:
+        step = int(owner.max()) + 1
+        together = np.bincount(index * step + owner, off, minlength=count.size * step).reshape(-1, step)
+        error = np.maximum(error, np.sqrt((together**2).sum(1)) / total)
     return mean_x[full], mean[full], error[full]
 
 
@@ -305,6 +326,8 @@ def _binned(offset: Floats, share: Floats) -> tuple[Floats, Floats, Floats]:
 # The beam in a sample of frames: its levels, its thickness, the blur of its edges and where to measure it.
 
 
+_LEANS = 6.0  # standard errors by which the thickness must change along the beam
+_SURFACE = 0.02  # px
 _STEADY = 1.1  # blur of a frame over the usual one up to which its edges show the camera's own
 
 
@@ -408,10 +431,16 @@ def beam_view(
         contrast = float(np.median(fits[1].contrast[usable]))
         thickness = float(np.median((edges[0] - edges[1])[usable]))
         by_column = masked_median((edges[0] - edges[1]).T, usable.T)
-        by_column = by_column[np.isfinite(by_column)]
+        known = np.isfinite(by_column)
+        by_column, across = by_column[known], columns[known] - rough.contact_column
         # the surface is uneven on the scale of three pixels: neighbouring columns count as one
         independent = max(min(by_column.size, float(np.ptp(columns)) / 3.0), 1.0)
         error = float(np.std(by_column)) / math.sqrt(independent)
+        (lean, level), cover = np.polyfit(across, by_column, 1, cov="unscaled")
+        left = float(np.std(by_column - lean * across))
+        if abs(lean) * math.sqrt(independent / by_column.size) > _LEANS * left * math.sqrt(cover[0, 0]):
+            thickness = float(level)
+            error = max(left, _SURFACE) * math.sqrt(cover[1, 1] * by_column.size / independent)
     clipped = max(
         _hot(frames, rows, columns, good, rough.saturated) for rows in (0.5 * (far + near), far - half)
     )
@@ -431,7 +460,7 @@ def beam_view(
         blur
     ).any():  # an edge that speeds up within the exposure is bent whatever the camera's curve
         steady = usable & (blur <= _STEADY * np.nanpercentile(blur, 25.0))[:, None]
-    return view, edge_shape(windows[1], fits[1], steady, width, rough.sign, clipped)
+    return view, edge_shape(windows[1], np.rint(far), fits[1], steady, width, rough.sign, clipped)
 
 
 def _hot(
@@ -558,6 +587,8 @@ _APART = 4  # frames after which no noise is left of one in the other
 _LEAST_NOISE = 1500  # even pixels
 _ROUNDED = 0.6  # grey levels; less noise than this is rounded away
 _EVEN = 6.0  # standard deviations by which even pixels may differ from their neighbours
+_COLUMNS = 12  # of even pixels that tell the mean of a row, and rows
+_SURE_ROWS = 6.0  # standard errors of the noise of rows
 _CERTAIN_NOISE = 0.2  # correlation that is no chance, and more than a sensor's own
 
 
@@ -573,7 +604,7 @@ def noise_shape(head: NDArray[np.floating]) -> NoiseShape:
     head
         Turned frames that follow each other, (n, height, width).
     """
-    none = NoiseShape(0.0, 0.0, 0.0)
+    none = NoiseShape(0.0, 0.0, 0.0, 0.0, 0.0)
     if head.shape[0] < _APART + 3:
         return none
     mean = head.mean(0)
@@ -585,15 +616,42 @@ def noise_shape(head: NDArray[np.floating]) -> NoiseShape:
     even &= np.ptp(head, axis=0) > 0.0
     if np.count_nonzero(even) < _LEAST_NOISE:
         return none
+    rows = row_noise(head, even)
+    fixed = min(row_noise(mean[None], even), rows)
     far = float(np.median([np.var(one[even]) for one in apart]))
     if far < 2.0 * _ROUNDED**2:
-        return none
+        return dataclasses.replace(none, rows=rows, fixed_rows=fixed)
     near = [_noise_of(after, before, mean) for before, after in itertools.pairwise(head)]
     in_time = 1.0 - float(np.median([np.var(one[even]) for one in near])) / far
-    along, across = (_alike(apart, even, axis) / far for axis in (1, 0))
-    return NoiseShape(
-        *(min(value, 0.9) if value > _CERTAIN_NOISE else 0.0 for value in (in_time, along, across))
+    across = _alike(apart, even, 0) / far
+    count = np.maximum(even.sum(1, keepdims=True), 1)
+    own = [one - np.where(even, one, 0.0).sum(1, keepdims=True) / count for one in apart]
+    along = _alike(own, even, 1) / float(np.median([np.var(one[even]) for one in own]))
+    in_time, along, across = (
+        min(value, 0.9) if value > _CERTAIN_NOISE else 0.0 for value in (in_time, along, across)
     )
+    return NoiseShape(in_time, along, across, rows, fixed)
+
+
+def row_noise(frames: NDArray[np.floating], even: NDArray[np.bool_]) -> float:
+    """Standard deviation of what the pixels of a row along the beam have in common, fixed or new in every frame.
+
+    From second differences across rows of the means over the *even* pixels of each, less what the noise of single
+    pixels leaves of these; 0 where it is no more than that.
+    """
+    whole = even[2:] & even[1:-1] & even[:-2]
+    count = whole.sum(1)
+    used = count >= _COLUMNS
+    if np.count_nonzero(used) < _COLUMNS:
+        return 0.0
+    bends = np.where(whole, frames[:, 2:] - 2.0 * frames[:, 1:-1] + frames[:, :-2], 0.0)[:, used].astype(
+        np.float64
+    )
+    mean = bends.sum(-1) / count[used]
+    single = ((bends**2).sum(-1) / count[used] - mean**2) / count[used]
+    more = float(np.mean(mean**2 - single))
+    chance = math.sqrt(2.0 / mean.size) * float(np.mean(single))
+    return math.sqrt(more / 6.0) if more > _SURE_ROWS * chance else 0.0
 
 
 def _alike(apart: list[Floats], even: NDArray[np.bool_], axis: int) -> float:
@@ -781,6 +839,13 @@ def find_apex(outline: TipOutline, rod: tuple[int, int], contact_column: float) 
 # The shaker in a sample of frames: the columns it covers, its sticker and its tip.
 
 
+_ROWS = 12  # in which the sides of the rod must be seen
+_SIDE = 0.04  # px; error of two sides that no scatter shows
+_TIPS = 12  # frames in which tip and sticker must be seen apart
+_LOOSE = 0.1  # px
+_TURNED = 0.009  # rows a column by which a camera must be turned
+_SQUARE = 0.04  # by which a beam may lean against its striker
+_STEEP = 3.0  # rows a column by which the outline of a tip may fall
 _CLEAR = 4.0  # rows from the beam within which a mark that stands alone may be the tip itself
 
 
@@ -834,16 +899,21 @@ def shaker_view(
         size = sticker_thickness(view, sticker, frames, near)
         sticker = dataclasses.replace(sticker, thickness=size)
         reference = sticker_rows(view, sticker, frames, near).row
-    outline = _outline(view, frames, bands, rod, beam, reference, learn=not isolated)
+    outline, loose = _outline(view, frames, bands, rod, beam, reference, learn=not isolated)
     column = view.contact_column
     certain = _reaches_border(bands, middle) if sticker is None else wanted.tip_distance is not None
-    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain)
+    sides = Rod(math.nan, math.nan, 0.0) if isolated else rod_sides(frames, rod, view.edge_width)
+    turned = abs(sides.lean) > _TURNED and abs(sides.lean + float(np.nanmedian(beam.slope))) < _SQUARE
+    turn = -sides.lean if turned else 0.0
+    cut = not wanted.fixed_column and (rod[0] < 2) != (rod[1] > frames.shape[2] - 2)
+    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain, sides[:2], loose, turn, cut)
     if sticker is not None and wanted.tip_distance is not None:
         offset = -(wanted.tip_distance + 0.5 * sticker.thickness)
         return dataclasses.replace(
             shown, tip_offset=offset, tip_source="distance to the sticker as given"
         ), column
-    apex = None if isolated else find_apex(outline, rod, column)
+    upright = dataclasses.replace(outline, profile=outline.profile - turn * (outline.columns - column))
+    apex = None if isolated else find_apex(upright, rod, column)
     if apex is not None:
         column += 0.0 if wanted.fixed_column else apex.column
         source = "tip seen apart from the beam"
@@ -859,6 +929,49 @@ def shaker_view(
         "so it cannot be followed; set region (--region) or threshold (--threshold), or track the beam alone "
         "with shaker=False (--no-shaker)"
     )
+
+
+class Rod(NamedTuple):
+    """The shaker's rod behind its tip: width [px] across it, its standard error, and columns by which a row leans.
+
+    NaN and 0 where its sides are not seen.
+    """
+
+    width: float
+    error: float
+    lean: float
+
+
+def rod_sides(frames: NDArray[np.floating], rod: tuple[int, int], blur: float) -> Rod:
+    """The rod by its sides, along which it moves, so that they are sharp in the mean over the sample.
+
+    Rows of the lower half count that show as much contrast as most do: neither sticker nor tip.
+    """
+    unknown = Rod(math.nan, math.nan, 0.0)
+    mean = frames[:, frames.shape[1] // 2 :].mean(0, dtype=np.float64)
+    low, high = rod[0] - HALF, rod[1] + HALF
+    if low < 0 or high > mean.shape[1]:
+        return unknown
+    outside = 0.5 * (mean[:, low : low + 3].mean(1) + mean[:, high - 3 : high].mean(1))
+    step = mean[:, rod_middle(rod, 0.2)].mean(1) - outside
+    sign = float(np.sign(np.median(step)))
+    rows = np.flatnonzero(step * sign > 0.8 * float(np.percentile(step * sign, 75.0)))
+    solid = (mean[rows, low:high] - outside[rows, None]) * sign > 0.5 * step[rows, None] * sign
+    first, last = low + solid.argmax(1) - 0.5, high - solid[:, ::-1].argmax(1) - 0.5
+    sides = []
+    for guess, rising in ((first, sign), (last, -sign)):
+        windows, inside = gather(mean.T[None], guess[None], rows, HALF)
+        fit = fit_edges(windows[0], blur, sign=rising)
+        sides.append(np.where(inside[0], np.rint(guess) + fit.position, np.nan))
+    found, middle = sides[1] - sides[0], 0.5 * (sides[0] + sides[1])
+    known = np.isfinite(found)
+    known &= np.abs(found - np.median(found[known])) < 1.0 if known.any() else known
+    if np.count_nonzero(known) < _ROWS:
+        return unknown
+    lean = float(np.polyfit(rows[known], middle[known], 1)[0])
+    across = 1.0 / math.sqrt(1.0 + lean * lean)
+    scatter = float(np.std(found[known])) / math.sqrt(np.count_nonzero(known) / 3.0)
+    return Rod(across * float(np.mean(found[known])), math.hypot(scatter, _SIDE), lean)
 
 
 def _reaches_border(bands: BeamBands, middle: NDArray[np.intp]) -> bool:
@@ -914,12 +1027,15 @@ def _outline(
     reference: Floats,
     *,
     learn: bool,
-) -> TipOutline:
-    """The tip's outline where it stands clear of the beam, counted from the sticker if there is one."""
+) -> tuple[TipOutline, float]:
+    """The tip's outline where it stands clear of the beam, counted from the sticker if there is one.
+
+    Also the standard deviation [px] by which the sticker moves against the tip; 0 if it is no more than noise.
+    """
     columns = spread_columns(rod[0] + 1, rod[1] - 2, 48)
     if not learn:
         nothing: Floats = np.empty(0)
-        return TipOutline(np.empty(0, dtype=np.intp), nothing, nothing)
+        return TipOutline(np.empty(0, dtype=np.intp), nothing, nothing), 0.0
     objects = bands.objects
     near = beam.row + view.thickness
     edge = near[:, None] + beam.slope[:, None] * (columns - view.contact_column)
@@ -934,7 +1050,25 @@ def _outline(
         rows, good, _ = tip_edges(view, frames, columns, tip, edge, tip - edge >= MIN_GAP, light)
         outline, counted = tip_outline(rows, good, reference)
     known = (counted >= max(3, 0.05 * frames.shape[0])) & np.isfinite(light)
-    return TipOutline(columns[known], outline[known], light[known])
+    at = np.flatnonzero(known)
+    smooth = np.abs(np.diff(outline[at])) < _STEEP * np.diff(columns[at])
+    first, last = longest_stretch(smooth)  # beyond a step it is not the tip
+    known[:] = False
+    known[at[first : last + 1]] = True
+    loose = 0.0
+    seen = good & known & np.isfinite(reference)[:, None]
+    count = seen.sum(1)
+    whole = count >= 2 * MIN_FLANK
+    if np.count_nonzero(whole) >= _TIPS:
+        away = np.where(seen, rows - reference[:, None] - outline, 0.0)[whole]
+        mean = away.sum(1) / count[whole]
+        within = float(
+            np.mean(((away - np.where(seen[whole], mean[:, None], 0.0)) ** 2).sum(1) / count[whole] ** 2)
+        )
+        # the smaller of both: a few blurred frames are no motion
+        spread = min(float(np.std(mean)), 1.4826 * float(np.median(np.abs(mean - np.median(mean)))))
+        loose = spread if spread > max(_LOOSE, 4.0 * math.sqrt(within)) else 0.0
+    return TipOutline(columns[known], outline[known], light[known]), loose
 
 
 def _offset_at_rest(beam: BeamRows, near: Floats, reference: Floats, head: int) -> float:

@@ -27,16 +27,15 @@ from snapbeam.lab.tracking.measure import (
     Rest,
     TrackedRows,
     alternation,
+    exposure_blur,
     fields_apart,
     find_rest,
-    image_lag,
     measure_beam,
     measure_shaker,
     touching,
 )
 from snapbeam.lab.tracking.settings import (
     FrameFlag,
-    NoiseShape,
     Orientation,
     Scene,
     TrackingSettings,
@@ -73,11 +72,11 @@ def tracked_dataset(
 
     *drift* [px] is the largest shift of the camera that was taken out, *fields* what is seen of interlaced video.
     """
-    trail = 0.0
+    trail = pulse = 0.0
+    opened = None if recording.exposure is None else recording.exposure * recording.frame_rate
     if not (fields.shift or fields.apart or scene.noise.lag):
-        opened = 1.0 if recording.exposure is None else recording.exposure * recording.frame_rate
-        trail = image_lag(rows.row, rows.width, opened)
-    rows = _as_filtered(rows, scene.noise, fields, trail)
+        trail, pulse = exposure_blur(rows.row, rows.width, opened)
+    rows = _as_filtered(rows, scene, fields, trail + pulse)
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
     if not rest.indices.size:
         located = int(np.isfinite(rows.row).sum())
@@ -94,25 +93,28 @@ def tracked_dataset(
             )
         )
     turn = Orientation(settings.side, recording.shape)
-    scale = recording.pixel_size * 1e3
+    scale = recording.pixel_size * 1e3 * scene.straight
     beam, shaker = scene.beam, scene.shaker
     order = FrameOrder((), (), ())
     if not (fields.shift or fields.apart or scene.noise.lag):
-        clock = tuple(drive_clock(rows.shaker))
+        steady = np.nan if shaker is not None and shaker.loose else 1.0  # a sticker that swings is no clock
+        clock = tuple(drive_clock(steady * rows.shaker))
         if all(kind != "scattered" for kind, _ in clock):  # frames at uneven times look like lost ones
             blurred = (rows.flags & int(FrameFlag.BLUR)) != 0  # which pulls the rows
-            order = find_order(*(np.where(blurred, np.nan, one) for one in (rows.row, rows.shaker)))
+            order = find_order(*(np.where(blurred, np.nan, one) for one in (rows.row, steady * rows.shaker)))
             rows = without_repeats(rows, order)
-            clock = tuple(drive_clock(rows.shaker))
+            clock = tuple(drive_clock(steady * rows.shaker))
         order = order._replace(clock=clock)
     beam_mm = settings.rest * 1e3 - turn.sign * scale * (rows.row - rest.row)
     tip = rows.shaker + (shaker.tip_offset if shaker is not None else np.nan)
     shaker_mm = settings.rest * 1e3 - turn.sign * scale * (tip - beam.thickness - rest.row)
     closing_mm = turn.sign * (shaker_mm - beam_mm)
-    offset = _offset_error(rows.row, rest)
+    offset = math.hypot(_offset_error(rows.row, rest), scene.row_errors[1])
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
-    seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields, order, trail)
+    seen = SeenMotion(
+        rows, rest, penetration, touch, scale, drift, fields, order, trail, pulse, opened or 0.0
+    )
     diagnostics = (
         *recording.diagnostics,
         *tracking_diagnostics(scene, seen, settings, scale * offset, recording.frame_rate),
@@ -121,7 +123,8 @@ def tracked_dataset(
     placed = scene.placed_error
     bent = math.hypot(2.0 * scene.shape.shift, contact_shift(touch, placed), placed)
     apart = 0.0 if shaker is None or shaker.certain else never_touching(penetration, rows)
-    bent = math.hypot(bent, apart, rounding_shift(scene.beam), 2.0 * rows.hollow)
+    loose = 0.0 if shaker is None else shaker.loose
+    bent = math.hypot(bent, apart, loose, rounding_shift(scene.beam), 2.0 * rows.hollow)
     # an edge that is no blurred step is found a little off, by where in its pixel it lies
     share = float(np.interp(beam.edge_width, *_PIXEL_PHASE))
     misfit = share * float(np.nan_to_num(scene.shape.misfit))
@@ -167,19 +170,22 @@ def tracked_dataset(
     return dataset
 
 
-def _as_filtered(rows: TrackedRows, noise: NoiseShape, fields: VideoFields, trail: float) -> TrackedRows:
-    """The rows with errors of pictures that were averaged over frames, smoothed or interlaced, where that is seen.
+def _as_filtered(rows: TrackedRows, scene: Scene, fields: VideoFields, late: float) -> TrackedRows:
+    """The rows with errors of pictures that were averaged over frames, smoothed or interlaced, or whose rows have noise.
 
-    *trail* is the share of the frame before that a frame still shows.
+    *late* is by how many frames a position may be of another instant.
     """
-    lag = noise.lag + fields.lag + trail
+    noise = scene.noise
+    lag = noise.lag + fields.lag + late
 
     def widened(row: Floats, error: Floats) -> Floats:
         step = np.abs(np.diff(row, prepend=np.nan, append=np.nan))
         most = np.nan_to_num(np.fmax(step[1:], step[:-1]))
-        return np.hypot(np.hypot(noise.factor * error, lag * most), fields.shift)
+        return np.hypot(
+            np.hypot(noise.factor * error, lag * most), math.hypot(fields.shift, scene.row_errors[0])
+        )
 
-    if lag == 0.0 and noise.factor == 1.0 and fields.shift == 0.0:
+    if lag == 0.0 and noise.factor == 1.0 and fields.shift == 0.0 and scene.noise.rows == 0.0:
         return rows
     return dataclasses.replace(
         rows, error=widened(rows.row, rows.error), shaker_error=widened(rows.shaker, rows.shaker_error)
