@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import dataclasses
 import hashlib
 import html
 import json
@@ -41,10 +40,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# ----------------------------------------------------------------------------------------------------
-# Which files of a folder are one test: paired by their names, or by a table.
-
-
 _HEADERS = (".cih", ".cihx")
 _SIGNALS = tuple(suffix for suffix in READERS if suffix not in (".h5", ".hdf5", ".npy", ".nc"))
 _WORDS = (
@@ -52,6 +47,30 @@ _WORDS = (
     r"(?![a-z])"
 )
 _COLUMNS = ("test", "recording", "vibrometer", "frequency_hz", "velocity_m_s", "location", "comment")
+_CAMERA = ("frame_rate", "pixel_size", "region")
+_SIGNAL = ("channel", "units", "sensitivity", "sampling_frequency", "columns")
+_NAN = math.nan
+COLUMNS = (
+    "test", "recording", "vibrometer", "status", "frequency_hz", "frequency_se_hz", "velocity_m_s", "velocity_se_m_s",
+    "location", "response_class", "zero_crossings", "cycles", "snr_db", "measured_share", "delay_s", "polarity", "gain",
+    "diagnostics", "comment",
+)  # fmt: skip
+PAGE_START = "<!DOCTYPE html>\n<!-- test series, written by snapbeam -->\n"
+"""First lines of a page, by which it is known."""
+_PAGE = """<html lang="en"><head><meta charset="utf-8"><title>{title}</title>
+<style>
+body {{ font-family: sans-serif; margin: 2em; }}
+table {{ border-collapse: collapse; font-size: 85%; }}
+td, th {{ border: 1px solid #ccc; padding: .3em .5em; text-align: left; }}
+th {{ position: sticky; top: 0; background: #eee; }}
+img {{ max-width: 100%; display: block; margin: 1em 0; }}
+</style></head><body>
+<h1>{title}</h1>
+<p>{words}</p>
+{pictures}
+{table}
+</body></html>
+"""
 
 
 @dataclass(frozen=True)
@@ -75,22 +94,9 @@ def find_tests(folder: Path, table: Path | None = None, besides: Path | None = N
     """The tests of a folder, in the order of their names or of the table.
 
     A recording and a vibrometer file are one test if their names are the same but for the ending and words
-    such as "vib", "velocity_at_striker" or "camera".  A folder of numbered images is a recording.
-
-    Parameters
-    ----------
-    folder
-        Where the files are.
-    table
-        A text table with the columns test, recording, and, as far as known, vibrometer, frequency_hz,
-        velocity_m_s, location and comment.
-    besides
-        A folder that is none of the recordings, such as that of the results.
-
-    Raises
-    ------
-    InputError
-        If there is no recording, a file of the table is missing, or names do not pair uniquely.
+    such as "vib", "velocity_at_striker" or "camera".  A folder of numbered images is a recording, but not *besides*,
+    such as that of the results.  *table* is a text table with the columns test, recording, and, as far as known,
+    vibrometer, frequency_hz, velocity_m_s, location and comment.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: must be a folder of recordings")
@@ -133,9 +139,8 @@ def _from_table(folder: Path, table: Path) -> list[Test]:
         text = decoded(table.read_bytes(), table.name)
     except OSError as error:
         raise InputError(f"table (--table) = {str(table)!r}: cannot be read, {error.strerror}") from error
-    first = next(
-        (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), ""
-    )
+    told = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
+    first = next(told, "")
     mark = next((one for one in (";", "\t") if one in first), ",")
     rows = [
         (number, [cell.strip() for cell in row])
@@ -162,23 +167,16 @@ def _from_table(folder: Path, table: Path) -> list[Test]:
         for name in ("test", "recording"):
             if not row[name]:
                 raise InputError(f"{where}: {name} is empty; must name the {name}")
-        recording = folder / row["recording"]
-        if not recording.exists() and "*" not in recording.name:
-            raise InputError(f"{where}: recording {row['recording']!r} is not in {folder}")
-        vibrometer = folder / row["vibrometer"] if row.get("vibrometer") else None
-        if vibrometer is not None and not vibrometer.exists():
-            raise InputError(f"{where}: vibrometer {row['vibrometer']!r} is not in {folder}")
-        place = _number(row.get("location"), mark, where, "location")
-        tests.append(
-            Test(
-                row["test"],
-                recording,
-                vibrometer,
-                _number(row.get("frequency_hz"), mark, where, "frequency_hz"),
-                _number(row.get("velocity_m_s"), mark, where, "velocity_m_s"),
-                None if place is None else within(f"{where}: location", place, 0.0, 1.0),
-            )
-        )
+        files = [folder / row[name] if row.get(name) else None for name in ("recording", "vibrometer")]
+        for file in files:
+            if file is not None and not file.exists() and not (file is files[0] and "*" in file.name):
+                kind = "recording" if file is files[0] else "vibrometer"
+                raise InputError(f"{where}: {kind} {row[kind]!r} is not in {folder}")
+        stated = ("location", "frequency_hz", "velocity_m_s")
+        place, frequency, velocity = (_number(row.get(name), mark, where, name) for name in stated)
+        if place is not None:
+            within(f"{where}: location", place, 0.0, 1.0)
+        tests.append(Test(row["test"], folder / row["recording"], files[1], frequency, velocity, place))
     names = [test.name for test in tests]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -196,14 +194,6 @@ def _number(cell: str | None, mark: str, where: str, column: str) -> float | Non
         if isinstance(error, InputError):
             raise
         raise InputError(f"{where}: {column} = {shown(cell)}: must be a number") from None
-
-
-# ----------------------------------------------------------------------------------------------------
-# What all tests of a test series have in common, from a TOML file or by name.
-
-
-_CAMERA = ("frame_rate", "pixel_size", "region")
-_SIGNAL = ("channel", "units", "sensitivity", "sampling_frequency", "columns")
 
 
 @dataclass(frozen=True)
@@ -260,27 +250,12 @@ class SeriesSettings:
 
 
 def load_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -> SeriesSettings:
-    """Settings from a TOML file with sections camera, tracking, signal and test_series, and changes to them.
-
-    Parameters
-    ----------
-    path
-        The file; none if None.
-    changes
-        Values by section and name that go before the file's.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or holds an unknown section or name.
-    """
+    """Settings from a TOML file with sections camera, tracking, signal and test_series, and changes that go before them."""
     sections: dict[str, dict[str, Any]] = {"camera": {}, "tracking": {}, "signal": {}, "test_series": {}}
-    if path is not None:
-        read = read_toml("settings", path)
-        for name, values in read.items():
-            if name not in sections or not isinstance(values, dict):
-                raise InputError(f"{path}: [{name}]: unknown section; must be among {', '.join(sections)}")
-            sections[name] |= values
+    for name, values in () if path is None else read_toml("settings", path).items():
+        if name not in sections or not isinstance(values, dict):
+            raise InputError(f"{path}: [{name}]: unknown section; must be among {', '.join(sections)}")
+        sections[name] |= values
     for name, given in changes.items():
         sections[name] |= {key: value for key, value in given.items() if value is not None}
     for key in sections["test_series"]:
@@ -291,13 +266,6 @@ def load_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -
         sections["camera"]["region"] = tuple(region)
     tracking = TrackingSettings().changed(**sections["tracking"])
     return SeriesSettings(sections["camera"], tracking, sections["signal"], **sections["test_series"])
-
-
-# ----------------------------------------------------------------------------------------------------
-# One test of a test series: tracked, aligned with its vibrometer, classed; what went wrong said, never raised.
-
-
-_NAN = math.nan
 
 
 @dataclass(frozen=True)
@@ -363,10 +331,12 @@ def run_test(test: Test, settings: SeriesSettings, folder: Path, fingerprint: st
         reason = _wrong(diagnostics) or str(error).replace(f"{test.recording.parent}{os.sep}", "")
         result = _row(test, diagnostics, status="spoiled", reason=reason)
     result = replace(result, fingerprint=fingerprint)
-    plain = {
-        name: None if isinstance(value, float) and not math.isfinite(value) else value
-        for name, value in asdict(result).items()
+    missing = {
+        name: None
+        for name, value in vars(result).items()
+        if isinstance(value, float) and not math.isfinite(value)
     }
+    plain = asdict(result) | missing
     with atomic_path(folder / f"{test.name}.json") as temporary:
         temporary.write_text(json.dumps(plain, indent=1, ensure_ascii=False), encoding="utf-8")
     return result
@@ -457,16 +427,6 @@ def _start(seen: DriveMeasurement, drive: DriveMeasurement, alignment: Alignment
     return None if seen.startup is None else seen.startup.onset
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-COLUMNS = (
-    "test", "recording", "vibrometer", "status", "frequency_hz", "frequency_se_hz", "velocity_m_s", "velocity_se_m_s",
-    "location", "response_class", "zero_crossings", "cycles", "snr_db", "measured_share", "delay_s", "polarity", "gain",
-    "diagnostics", "comment",
-)  # fmt: skip
-
-
 def run_test_series(
     folder: Path,
     settings: SeriesSettings,
@@ -480,27 +440,9 @@ def run_test_series(
 
     Each test's tracked run (NetCDF) and result (JSON) are kept in ``output/tests`` as soon as they are there,
     and ``output/tests.csv`` is written again after each; a test whose files and settings have not changed since
-    is not measured again, so an interrupted test series goes on where it was.
-
-    Parameters
-    ----------
-    folder
-        Recordings and vibrometer files.
-    settings
-        What all tests have in common.
-    output
-        Folder for the results; made if it is not there.
-    table
-        Which files are which test; by their names if left out.
-    strict
-        Whether a test with any doubtful diagnostic counts as spoiled.
-    progress
-        Called with (tests done, tests in all, the last one's result).
-
-    Raises
-    ------
-    InputError
-        If there are no tests.  A test that cannot be measured has a row with the reason.
+    is not measured again, so an interrupted test series goes on where it was.  A test that cannot be measured has a row
+    with the reason; with *strict*, one with any doubtful diagnostic counts as spoiled.  *table* says which files are
+    which test, by their names if left out; *progress* is called with (tests done, tests in all, the last one's result).
     """
     tests = find_tests(folder, table, output)
     kept = output / "tests"
@@ -514,30 +456,20 @@ def run_test_series(
         progress(0, len(tests), None)
     for test in tests:
         files = [path for path in (test.recording, test.vibrometer) if path is not None]
-        fingerprint = settings.fingerprint(*files) + _set(test)
+        stated = (test.frequency, test.velocity, test.location)
+        words = " ".join("-" if value is None else f"{value:.12g}" for value in stated)
+        fingerprint = settings.fingerprint(*files) + (f" {words}" if any(stated) else "")
         result = kept_result(kept / f"{test.name}.json", fingerprint)
         if result is None:
             result = run_test(test, settings, kept, fingerprint)
-        results.append(strictly(result) if strict else result)
+        if strict and result.doubtful and result.status != "spoiled":
+            words = next(words for _, severity, words in result.diagnostics if severity != "info")
+            result = replace(result, status="spoiled", reason=words)
+        results.append(result)
         write_table(output / "tests.csv", results)
         if progress is not None:
             progress(len(results), len(tests), results[-1])
     return results
-
-
-def strictly(result: TestResult) -> TestResult:
-    """A result that is spoiled if anything makes it doubtful."""
-    if result.status == "spoiled" or not result.doubtful:
-        return result
-    words = next(words for _, severity, words in result.diagnostics if severity != "info")
-    return dataclasses.replace(result, status="spoiled", reason=words)
-
-
-def _set(test: Test) -> str:
-    """Values of a test as text, for its fingerprint."""
-    values = (test.frequency, test.velocity, test.location)
-    words = " ".join("-" if value is None else f"{value:.12g}" for value in values)
-    return f" {words}" if any(values) else ""
 
 
 def write_table(path: Path, results: list[TestResult]) -> None:
@@ -554,43 +486,16 @@ def _row_of(result: TestResult) -> list[str]:
     values = asdict(result)
     values["diagnostics"] = " ".join(code for code, _, _ in result.diagnostics)
     values["comment"] = result.reason
-    return [_cell(values[name]) for name in COLUMNS]
-
-
-PAGE_START = "<!DOCTYPE html>\n<!-- test series, written by snapbeam -->\n"
-"""First lines of a page, by which it is known."""
-_PAGE = """<html lang="en"><head><meta charset="utf-8"><title>{title}</title>
-<style>
-body {{ font-family: sans-serif; margin: 2em; }}
-table {{ border-collapse: collapse; font-size: 85%; }}
-td, th {{ border: 1px solid #ccc; padding: .3em .5em; text-align: left; }}
-th {{ position: sticky; top: 0; background: #eee; }}
-img {{ max-width: 100%; display: block; margin: 1em 0; }}
-</style></head><body>
-<h1>{title}</h1>
-<p>{words}</p>
-{pictures}
-{table}
-</body></html>
-"""
+    values |= {
+        name: f"{x:.9g}" if math.isfinite(x) else "" for name, x in values.items() if isinstance(x, float)
+    }
+    return [str(values[name]) for name in COLUMNS]
 
 
 def write_page(
     path: Path, results: list[TestResult], settings: SeriesSettings, pictures: Iterable[Path]
 ) -> Path:
-    """Write the table of tests as a page for a browser, with pictures beside it.
-
-    Parameters
-    ----------
-    path
-        The page; pictures are linked by their names.
-    results
-        One row each.
-    settings
-        For the operator.
-    pictures
-        Figures in the folder of the page.
-    """
+    """Write the table of tests as a page for a browser, with links to pictures in its folder."""
     import pandas as pd
 
     table = pd.DataFrame([_row_of(result) for result in results], columns=COLUMNS)
@@ -599,26 +504,17 @@ def write_page(
     if settings.operator:
         words.insert(1, f"operator: {settings.operator}")
     images = [f'<img src="{quote(each.name)}" alt="{html.escape(each.stem)}">' for each in pictures]
+    page = _PAGE.format(
+        title=html.escape(f"Test series {path.resolve().parent.parent.name}"),
+        words=html.escape("; ".join(words)),
+        pictures="\n".join(images),
+        table=table.to_html(index=False, border=0),
+    )
     with atomic_path(path) as temporary:
-        temporary.write_text(
-            PAGE_START
-            + _PAGE.format(
-                title=html.escape(f"Test series {path.resolve().parent.parent.name}"),
-                words=html.escape("; ".join(words)),
-                pictures="\n".join(images),
-                table=table.to_html(index=False, border=0),
-            ),
-            encoding="utf-8",
-        )
+        temporary.write_text(PAGE_START + page, encoding="utf-8")
     return path
 
 
 def check_table(path: Path) -> Path:
     """Refuse, before any work, a table that cannot be written."""
     return check_writable(path, "output", begin=",".join(COLUMNS))
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, float):
-        return f"{value:.9g}" if math.isfinite(value) else ""
-    return str(value)

@@ -11,12 +11,13 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.lab.diagnostics import KINDS_CALIBRATION
+from snapbeam.lab.least_squares import weighted_line
 from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import BoundaryConditions
 from snapbeam.model.default_values import BEAM, MODES
@@ -32,11 +33,30 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# ----------------------------------------------------------------------------------------------------
-# What makes two measured wells unequal.
-
-
 _UNITS = {"midspan_amplitude": "m", "point_load": "N", "uniform_load": "N/m"}
+_Array = NDArray[np.float64]
+STARTS = (1.0, 0.75, 1.33, 0.55, 1.8)
+"""Buckling levels to start from, over the given one."""
+HIGHER = (1.05, 1.15, 1.3)
+"""Buckling levels that are tried beyond the one found, over it."""
+UNDETERMINED = 1e-5
+"""Minimum singular value of the relative sensitivities that counts as a response, over the maximum."""
+_CROSSING = 0.05  # share within which the first two frequencies may be in the other order
+ASSUMED = 0.005
+"""Standard error of a frequency for which none is given, as a share of it."""
+_LINKED = 0.95  # correlation from which two parameters are said to be linked
+_VAGUE = 0.05  # relative standard error from which a parameter is said to be hardly known
+_SHOWN = {
+    "thickness": (1e3, "mm"),
+    "buckling_level": (1e3, "mm"),
+    "length": (1e3, "mm"),
+    "young_modulus": (1e-9, "GPa"),
+    "density": (1.0, "kg/m^3"),
+}
+FITTED = ("thickness", "young_modulus", "density", "length", "buckling_level")
+_HERTZ_POWER = -0.2
+_LEAST_SPAN = 2.0  # factor by which speeds must differ for the power to be told
+_COARSE = 6.0  # frames
 
 
 def uneven_beam(beam: Beam, measured: Measurements, kind: str, modes: int) -> ReducedModel:
@@ -59,21 +79,8 @@ def uneven_beam(beam: Beam, measured: Measurements, kind: str, modes: int) -> Re
 def _symmetric(measured: Measurements, well: str) -> list[float]:
     """Frequencies [Hz] about a well that belong to symmetric modes, or all if their shapes are not given."""
     values, shapes = getattr(measured, f"{well}_well_frequencies"), getattr(measured, f"{well}_well_shape")
-    return [
-        f
-        for f, shape in zip(values, shapes or ["symmetric"] * len(values), strict=True)
-        if shape == "symmetric"
-    ]
-
-
-def uneven_words(kind: str, model: ReducedModel) -> str:
-    """Message about the imperfection found, and its ambiguity."""
-    assert model.imperfection is not None and model.beam is not None
-    value, level = getattr(model.imperfection, kind), model.beam.buckling_level * 1e3
-    return (
-        f"{kind} = {value:.4g} {_UNITS[kind]} with a buckling level of {level:.4g} mm gives each well "
-        "its own first frequency; which kind of imperfection it is, two frequencies do not say"
-    )
+    kinds = shapes or ["symmetric"] * len(values)
+    return [f for f, shape in zip(values, kinds, strict=True) if shape == "symmetric"]
 
 
 def imperfection_section(imperfection: Imperfection | None) -> dict[str, Any]:
@@ -81,37 +88,19 @@ def imperfection_section(imperfection: Imperfection | None) -> dict[str, Any]:
     if imperfection is None:
         return {}
     perfect = vars(Imperfection())
-    return {name: value for name, value in vars(imperfection).items() if not _same(value, perfect[name])}
-
-
-def boundary_section(beam: Beam) -> dict[str, Any]:
-    """Ends that are no clamps, as the section of a parameter file."""
-    return {name: float(value) for name, value in vars(beam.boundary).items() if value is not None}
-
-
-def _same(value: Any, other: Any) -> bool:
-    return value is other or (isinstance(value, (int, float, str)) and value == other)
-
-
-# ----------------------------------------------------------------------------------------------------
-# Least squares of a calibration: its minimum, its sensitivities, and what the data respond to.
-
-
-STARTS = (1.0, 0.75, 1.33, 0.55, 1.8)
-"""Buckling levels to start from, over the given one."""
-HIGHER = (1.05, 1.15, 1.3)
-"""Buckling levels that are tried beyond the one found, over it."""
-UNDETERMINED = 1e-5
-"""Minimum singular value of the relative sensitivities that counts as a response, over the maximum."""
+    changed = {name: value for name, value in vars(imperfection).items() if value is not perfect[name]}
+    return {
+        name: value
+        for name, value in changed.items()
+        if not (isinstance(value, (int, float, str)) and value == perfect[name])
+    }
 
 
 def sensitivity(frequencies: Callable[[_Array], _Array], logs: _Array, errors: _Array) -> _Array:
     """Change of the frequencies, in standard errors, with the logarithms of the parameters."""
     step = 1e-5
-    columns = [
-        (frequencies(logs + step * e) - frequencies(logs - step * e)) / (2.0 * step)
-        for e in np.eye(logs.size)
-    ]
+    steps = step * np.eye(logs.size)
+    columns = [(frequencies(logs + e) - frequencies(logs - e)) / (2.0 * step) for e in steps]
     return np.column_stack(columns) / errors[:, None]
 
 
@@ -160,13 +149,6 @@ def directions(jacobian: _Array) -> _Array:
     return np.asarray(rows[told].T)
 
 
-# ----------------------------------------------------------------------------------------------------
-# Which of the modes about a well is meant: symmetric and antisymmetric ones change places at b/r = 6.2.
-
-
-_CROSSING = 0.05  # share within which the first two frequencies may be in the other order
-
-
 def shape_diagnostics(beam: Beam, measured: Measurements, modes: int) -> list[Diagnostic]:
     """Diagnostics for an uncertain order of the modes about a well, if only the frequencies identify them."""
     told = [measured.lower_well_shape, measured.upper_well_shape]
@@ -204,33 +186,14 @@ def either_well(beam: Beam, measured: Measurements, modes: int) -> tuple[float, 
 
     here = symmetric(1.0)
     for goal in goals:
-
-        def miss(factor: float, goal: float = goal) -> float:
-            return symmetric(factor) / goal - 1.0
-
+        options = {"x1": goal / here + 1e-6, "tol": 1e-7, "maxiter": 12}
         try:
-            levels.append(level * float(newton(miss, 1.0, x1=goal / here + 1e-6, tol=1e-7, maxiter=12)))
+            levels.append(
+                level * float(newton(lambda at, goal=goal: symmetric(at) / goal - 1.0, 1.0, **options))
+            )
         except RuntimeError:  # no level gives that frequency
             return ()
     return tuple(levels)
-
-
-# ----------------------------------------------------------------------------------------------------
-# What a calibration says in words: remarks on what was found, diagnostics on what to beware of.
-
-
-ASSUMED = 0.005
-"""Standard error of a frequency for which none is given, as a share of it."""
-
-_LINKED = 0.95  # correlation from which two parameters are said to be linked
-_VAGUE = 0.05  # relative standard error from which a parameter is said to be hardly known
-_SHOWN = {
-    "thickness": (1e3, "mm"),
-    "buckling_level": (1e3, "mm"),
-    "length": (1e3, "mm"),
-    "young_modulus": (1e-9, "GPa"),
-    "density": (1.0, "kg/m^3"),
-}
 
 
 def _listed(names: tuple[str, ...]) -> str:
@@ -249,14 +212,13 @@ def with_error(result: Calibration, name: str) -> str:
 def links(names: list[str], covariance: NDArray[np.float64], hidden: tuple[str, ...]) -> list[Diagnostic]:
     """Diagnostics for parameters that the data do not determine or determine only in combination."""
     told = []
-    if len(hidden) == 1:
+    if hidden:
         words = f"no measured frequency depends on {hidden[0]}: it keeps its start"
-        told.append(KINDS_CALIBRATION["undetermined"].found(told=words))
-    elif hidden:
-        words = (
-            f"the measured frequencies cannot tell {_listed(hidden)} apart: they depend on a combination of "
-            "them only; fix one of them by another measurement (the values given keep nearest to the start)"
-        )
+        if len(hidden) > 1:
+            words = (
+                f"the measured frequencies cannot tell {_listed(hidden)} apart: they depend on a combination of "
+                "them only; fix one of them by another measurement (the values given keep nearest to the start)"
+            )
         told.append(KINDS_CALIBRATION["undetermined"].found(told=words))
     spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     for i, name in enumerate(names):
@@ -275,15 +237,6 @@ def links(names: list[str], covariance: NDArray[np.float64], hidden: tuple[str, 
                 )
                 told.append(KINDS_CALIBRATION["linked"].found(told=words, correlation=linked))
     return told
-
-
-def at_least(level: float) -> Diagnostic:
-    """Diagnostic for a buckling level [m] of which the data determine only a lower bound."""
-    text = (
-        f"any buckling_level above {level * 1e3:.4g} mm meets the measured frequencies as well: the first one about "
-        "a well may be that of the antisymmetric mode, which does not depend on the level; measure the symmetric one"
-    )
-    return KINDS_CALIBRATION["undetermined"].found(told=text, least=level)
 
 
 def remarks(result: Calibration, measured: Measurements) -> list[str]:
@@ -335,11 +288,8 @@ def doubts(result: Calibration, measured: Measurements) -> list[Diagnostic]:
                 levels = " and ".join(f"{level * 1e3:.4g}" for level in result.either_well)
                 text += f"; either alone would ask for a buckling level of {levels} mm"
             told.append(KINDS_CALIBRATION["unequal_wells"].found(told=text, first=one, second=two))
-    assumed = [
-        state
-        for state in ("straight_frequencies", "lower_well_frequencies", "upper_well_frequencies")
-        if getattr(measured, state) and getattr(measured, f"{state}_se") is None
-    ]
+    states = ("straight_frequencies", "lower_well_frequencies", "upper_well_frequencies")
+    assumed = [name for name in states if getattr(measured, name) and getattr(measured, f"{name}_se") is None]
     if assumed:
         words = (
             f"no standard errors given for {_listed(tuple(assumed))}: {ASSUMED:.1%} assumed, on which the "
@@ -348,24 +298,14 @@ def doubts(result: Calibration, measured: Measurements) -> list[Diagnostic]:
         told.append(KINDS_CALIBRATION["assumed_errors"].found(told=words))
     for item in result.residuals:
         if abs(item.deviation) > 3.0:
-            told.append(
-                KINDS_CALIBRATION["outlier"].found(
-                    told=item.name, model=item.model, measured=item.measured, apart=abs(item.deviation)
-                )
-            )
+            numbers = {"model": item.model, "measured": item.measured, "apart": abs(item.deviation)}
+            told.append(KINDS_CALIBRATION["outlier"].found(None, item.name, **numbers))
     if result.scatter > 1.1:
         told.append(KINDS_CALIBRATION["scatter"].found(scatter=result.scatter))
     ratios = measured.damping_ratio
     if len(ratios) > 1 and max(ratios) > 1.3 * min(ratios):
         told.append(KINDS_CALIBRATION["damping_differs"].found(low=min(ratios), high=max(ratios)))
     return told
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_Array = NDArray[np.float64]
-FITTED = ("thickness", "young_modulus", "density", "length", "buckling_level")
 
 
 @dataclass(frozen=True)
@@ -435,17 +375,13 @@ class Calibration:
 
     def sections(self) -> dict[str, dict[str, Any]]:
         """The result as the sections of a parameter file."""
-        beam: dict[str, Any] = {
-            name: float(getattr(self.beam, name))
-            for name in ("length", "thickness", "width", "density", "young_modulus")
-        }
-        if self.beam.is_buckled:
-            beam["buckling_level"] = float(self.beam.buckling_level)
-        else:
-            beam["axial_load"] = float(self.beam.axial_load)
+        last = "buckling_level" if self.beam.is_buckled else "axial_load"
+        names = ("length", "thickness", "width", "density", "young_modulus", last)
+        beam = {name: float(getattr(self.beam, name)) for name in names}
         sections: dict[str, dict[str, Any]] = {"beam": beam, "model": {"modes": self.modes}}
         if self.beam.boundary != BoundaryConditions():
-            sections["boundary"] = boundary_section(self.beam)
+            ends = vars(self.beam.boundary).items()
+            sections["boundary"] = {name: float(value) for name, value in ends if value is not None}
         if self.imperfection:
             sections["imperfection"] = imperfection_section(self.imperfection)
         if self.damping_ratio is not None:
@@ -545,9 +481,9 @@ def calibrate(
             "beam: is straight, but frequencies about wells were measured; give a buckling_level (in the file of "
             "--config)"
         )
-    if beam.boundary.left_rotational_stiffness != beam.boundary.right_rotational_stiffness and any(
-        item.parity for item in data
-    ):
+    ends = beam.boundary
+    unequal = ends.left_rotational_stiffness != ends.right_rotational_stiffness
+    if unequal and any(item.parity for item in data):
         raise InputError(
             "lower_well_shape, upper_well_shape: between unequal ends no mode is symmetric; give frequencies by order"
         )
@@ -555,17 +491,15 @@ def calibrate(
     diagnostics = list(fitted_to.diagnostics)
     result = _changed(beam, names, fitted_to.logs)
     fitted = _model(result, data, count)
-    residuals = tuple(
-        Residual(item.name, item.measured, item.standard_error, float(f))
-        for item, f in zip(data, fitted, strict=True)
-    )
+    pairs = zip(data, fitted, strict=True)
+    residuals = tuple(Residual(one.name, one.measured, one.standard_error, float(f)) for one, f in pairs)
     values, standard, correlation = fitted_to.values(names)
     uneven = None if imperfection is None else uneven_beam(result, measured, imperfection, count)
     damping, damping_se = _mean(measured.damping_ratio, measured.damping_ratio_se, 0.1)
     tests = [test.stiffness() for test in measured.contact]
     contact, contact_se = _mean(tuple(k for k, _ in tests), tuple(se for _, se in tests) or None, 0.1)
-    gauges = {name: getattr(measured, name) for name in ("thickness", "buckling_level")}
-    gauges = {name: value for name, value in gauges.items() if value is not None}
+    names_by_gauge = ("thickness", "buckling_level")
+    gauges = {name: value for name in names_by_gauge if (value := getattr(measured, name)) is not None}
     answer = Calibration(
         beam=result,
         start=beam,
@@ -593,13 +527,16 @@ def calibrate(
     told = remarks(answer, measured)
     if uneven is not None and imperfection is not None:
         assert uneven.beam is not None
-        told.append(uneven_words(imperfection, uneven))
+        value, level = getattr(uneven.imperfection, imperfection), uneven.beam.buckling_level * 1e3
+        told.append(
+            f"{imperfection} = {value:.4g} {_UNITS[imperfection]} with a buckling level of {level:.4g} mm gives each well "
+            "its own first frequency; which kind of imperfection it is, two frequencies do not say"
+        )
         answer = dataclasses.replace(answer, beam=uneven.beam, imperfection=uneven.imperfection)
     return dataclasses.replace(answer, remarks=tuple(told), diagnostics=tuple(diagnostics))
 
 
-@dataclass(frozen=True)
-class _Fitted:
+class _Fitted(NamedTuple):
     """Estimates of the fitted parameters from the measured frequencies."""
 
     logs: _Array
@@ -613,11 +550,8 @@ class _Fitted:
         """Values and standard errors by name, and the correlations."""
         values = {name: math.exp(log) for name, log in zip(names, self.logs, strict=True)}
         spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        standard = {
-            name: values[name] * float(s)
-            for name, s in zip(names, spread, strict=True)
-            if name not in self.undetermined
-        }
+        standard = {name: values[name] * float(s) for name, s in zip(names, spread, strict=True)}
+        standard = {name: error for name, error in standard.items() if name not in self.undetermined}
         if names and (spread > 0.0).all():
             return values, standard, self.covariance / np.outer(spread, spread)
         return values, standard, np.eye(len(names))
@@ -629,14 +563,15 @@ def _fit(beam: Beam, data: list[_Datum], names: list[str], modes: int) -> _Fitte
     target = np.array([item.measured for item in data])
     errors = np.array([item.standard_error for item in data])
 
+    if not names:
+        return _Fitted(begin, np.zeros((0, 0)), (), 1.0, len(data), ())
+
     def frequencies(logs: _Array) -> _Array:
         return _model(_changed(beam, names, logs), data, modes)
 
     def residual(logs: _Array) -> _Array:
         return (frequencies(logs) - target) / errors
 
-    if not names:
-        return _Fitted(begin, np.zeros((0, 0)), (), 1.0, len(data), ())
     keep = directions(sensitivity(frequencies, begin, errors))
     freedom = len(data) - keep.shape[1]
     logs = search(residual, begin, keep, names, freedom)
@@ -653,14 +588,18 @@ def _fit(beam: Beam, data: list[_Datum], names: list[str], modes: int) -> _Fitte
     diagnostics = list(links(names, covariance, undetermined))
     if "buckling_level" not in undetermined and open_upwards(residual, logs, names):
         undetermined += ("buckling_level",)
-        diagnostics.append(at_least(math.exp(logs[names.index("buckling_level")])))
+        least = math.exp(logs[names.index("buckling_level")])
+        words = (
+            f"any buckling_level above {least * 1e3:.4g} mm meets the measured frequencies as well: the first one about "
+            "a well may be that of the antisymmetric mode, which does not depend on the level; measure the symmetric one"
+        )
+        diagnostics.append(KINDS_CALIBRATION["undetermined"].found(told=words, least=least))
     if freedom <= 0:
         diagnostics.append(KINDS_CALIBRATION["no_check"].found())
     return _Fitted(logs, covariance, undetermined, scatter, freedom, tuple(diagnostics))
 
 
-@dataclass(frozen=True)
-class _Datum:
+class _Datum(NamedTuple):
     name: str
     state: str
     mode: int
@@ -740,20 +679,12 @@ def _mean(
     return mean, float(1.0 / np.sqrt(weight.sum())) * max(1.0, spread)
 
 
-# ----------------------------------------------------------------------------------------------------
-# Contact stiffness from tracked impacts: their durations over the speeds at which tip and body close.
-#
 # For a force k d^1.5 between two bodies of effective mass m that close at v (Hertz), the contact lasts
 #
 #     T = 2.943 (5 m/(4 k))^0.4 v^-0.2 .
 #
 # The power of v checks that the impacts are such collisions; on a limp beam, which bends while it is in touch,
 # they are not, and then there is no stiffness to tell.
-
-
-_HERTZ_POWER = -0.2
-_LEAST_SPAN = 2.0  # factor by which speeds must differ for the power to be told
-_COARSE = 6.0  # frames
 
 
 @dataclass(frozen=True)
@@ -808,34 +739,28 @@ def stiffness_from_impacts(impacts: xr.Dataset, effective_mass: float) -> Contac
     mass = positive("effective_mass", effective_mass, "kg")
     if not isinstance(impacts, xr.Dataset):
         raise InputTypeError(f"impacts: must be an xarray.Dataset, not {type(impacts).__name__}")
-    missing = [
-        name for name in ("duration", "duration_stderr", "closing_speed", "frames") if name not in impacts
-    ]
+    needed = ("duration", "duration_stderr", "closing_speed", "frames")
+    missing = [name for name in needed if name not in impacts]
     if missing:
         raise InputError(f"impacts without {', '.join(missing)}: must come from contact_onsets()")
     speed, duration = impacts["closing_speed"].values, impacts["duration"].values
-    error = impacts["duration_stderr"].values
     good = np.isfinite(speed) & (speed > 0.0) & (duration > 0.0) & (impacts["bounded"].values == 1)
     if good.sum() < 3:
         raise InputError(
             f"impacts: {int(good.sum())} of {speed.size} seen from end to end: must be at least 3"
         )
     log_v, log_t = np.log(speed[good]), np.log(duration[good])
-    spread = np.maximum(error[good] / duration[good], 1e-3)
+    spread = np.maximum(impacts["duration_stderr"].values[good] / duration[good], 1e-3)
     weight = 1.0 / spread**2
-    middle = float((weight * log_v).sum() / weight.sum())
-    lever = float((weight * (log_v - middle) ** 2).sum())
-    level = float((weight * log_t).sum() / weight.sum())
-    exponent = float((weight * (log_v - middle) * log_t).sum()) / lever if lever > 0.0 else math.nan
+    middle, level, exponent, lever = weighted_line(log_v, log_t, weight)
     rest = log_t - level - (log_v - middle) * (exponent if math.isfinite(exponent) else 0.0)
     scatter = max(1.0, float(np.sqrt((weight * rest**2).sum() / max(good.sum() - 2, 1))))
     exponent_se = scatter / math.sqrt(lever) if lever > 0.0 else math.inf
     # the constant of the law, with its power held
     constant = float((weight * (log_t - _HERTZ_POWER * log_v)).sum() / weight.sum())
     held = log_t - _HERTZ_POWER * log_v - constant
-    constant_se = math.sqrt(1.0 / weight.sum()) * max(
-        1.0, float(np.sqrt((weight * held**2).sum() / max(good.sum() - 1, 1)))
-    )
+    raised = max(1.0, float(np.sqrt((weight * held**2).sum() / max(good.sum() - 1, 1))))
+    constant_se = math.sqrt(1.0 / weight.sum()) * raised
     stiffness = 1.25 * mass * (HERTZ_TIME / math.exp(constant)) ** 2.5
     told = []
     span = float(np.exp(np.ptp(log_v)))
@@ -846,6 +771,5 @@ def stiffness_from_impacts(impacts: xr.Dataset, effective_mass: float) -> Contac
     frames = float(np.median(impacts["frames"].values[good]))
     if frames < _COARSE:
         told.append(KINDS_CALIBRATION["coarse"].found(frames=frames))
-    return ContactStiffness(
-        stiffness, 2.5 * constant_se * stiffness, exponent, exponent_se, int(good.sum()), tuple(told)
-    )
+    error = 2.5 * constant_se * stiffness
+    return ContactStiffness(stiffness, error, exponent, exponent_se, int(good.sum()), tuple(told))

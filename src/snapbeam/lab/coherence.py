@@ -150,10 +150,7 @@ def _common(x: SignalSamples, y: SignalSamples) -> tuple[SignalSamples, SignalSa
     size = min(x.values.size - first[0], y.values.size - first[1])
     if size < 2:
         raise InputError("response: has no time in common with excitation")
-    parts = [
-        SignalSamples(each.values[at : at + size], each.time[at : at + size], x.sampling_frequency)
-        for each, at in zip((x, y), first, strict=True)
-    ]
+    parts = [each.part(slice(at, at + size)) for each, at in zip((x, y), first, strict=True)]
     return parts[0], parts[1]
 
 

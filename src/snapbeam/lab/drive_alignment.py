@@ -156,9 +156,17 @@ def align(
     delay, delay_se = _refine(camera, moved, seen, felt, delay, sign)
     gain = one.amplitude / two.amplitude
     gain_se = gain * math.hypot(one.amplitude_se / one.amplitude, two.amplitude_se / two.amplitude)
-    told = _Told(
-        sign, polarity is not None, turned, certain, period, gain, gain_se, difference, difference_se
-    )
+    told = []
+    if polarity is None and not turned:
+        told.append(KINDS_ALIGNMENT["polarity_open"].found())
+    elif sign < 0:
+        told.append(KINDS_ALIGNMENT["polarity"].found())
+    if not certain:
+        told.append(KINDS_ALIGNMENT["cycle_open"].found(period_ms=1e3 * period))
+    if abs(gain - 1.0) > max(5.0 * gain_se, _SAME):
+        told.append(KINDS_ALIGNMENT["amplitude"].found(gain=gain, error=gain_se))
+    if abs(difference) > 4.0 * difference_se:
+        told.append(KINDS_ALIGNMENT["clocks"].found(difference=difference))
     return Alignment(
         delay=delay,
         delay_se=delay_se,
@@ -170,44 +178,14 @@ def align(
         certain=certain,
         margin=margin,
         period=period,
-        diagnostics=tuple(_diagnostics(told)),
+        diagnostics=tuple(told),
     )
-
-
-@dataclass(frozen=True)
-class _Told:
-    """Input of the diagnostics of an alignment; ``turned``: the onset determined the polarity."""
-
-    polarity: int
-    given: bool
-    turned: bool
-    certain: bool
-    period: float
-    gain: float
-    gain_se: float
-    clocks: float
-    clocks_se: float
-
-
-def _diagnostics(told: _Told) -> list[Diagnostic]:
-    found = []
-    if not told.given and not told.turned:
-        found.append(KINDS_ALIGNMENT["polarity_open"].found())
-    elif told.polarity < 0:
-        found.append(KINDS_ALIGNMENT["polarity"].found())
-    if not told.certain:
-        found.append(KINDS_ALIGNMENT["cycle_open"].found(period_ms=1e3 * told.period))
-    if abs(told.gain - 1.0) > max(5.0 * told.gain_se, _SAME):
-        found.append(KINDS_ALIGNMENT["amplitude"].found(gain=told.gain, error=told.gain_se))
-    if abs(told.clocks) > 4.0 * told.clocks_se:
-        found.append(KINDS_ALIGNMENT["clocks"].found(difference=told.clocks))
-    return found
 
 
 def _window(signal: xr.DataArray, start: float, stop: float) -> SignalSamples:
     samples = check_signal(signal)
     inside = (samples.time >= start) & (samples.time < stop)
-    return SignalSamples(samples.values[inside], samples.time[inside], samples.sampling_frequency)
+    return samples.part(inside)
 
 
 def _candidates(
@@ -234,13 +212,10 @@ def _candidates(
     inside = (eye.time >= begin) & (eye.time <= end)
     time, values = eye.time[inside], eye.values[inside] - one.offset
     spline = CubicSpline(ear.time, ear.values - two.offset, extrapolate=False)
-    noise = one.noise_rms**2 + two.noise_rms**2
-    noise = max(noise, (1e-6 * one.amplitude) ** 2)
+    noise = max(one.noise_rms**2 + two.noise_rms**2, (1e-6 * one.amplitude) ** 2)
     found = []
     for sign in signs:
-        turn = two.phase_at(middle - coarse) - one.phase_at(middle) + (0.0 if sign > 0 else math.pi)
-        shift = (turn + math.pi) % (2.0 * math.pi) - math.pi
-        base = coarse + shift / (2.0 * math.pi * two.frequency)
+        base = coarse + _shift(one, two, middle, coarse, sign) / (2.0 * math.pi * two.frequency)
         for cycle in range(-3, 4):
             delay = base + cycle * period
             other = sign * spline(time - delay)
@@ -275,14 +250,14 @@ def _refine(
     one = fit_sine(_window(camera, start, stop), common, fixed=True)
     two = fit_sine(_window(moved, start - delay, stop - delay), common, fixed=True)
     middle = 0.5 * (start + stop)
-    turn = two.phase_at(middle - delay) - one.phase_at(middle) + (0.0 if sign > 0 else math.pi)
-    shift = (turn + math.pi) % (2.0 * math.pi) - math.pi
     se = math.hypot(one.phase_se, two.phase_se) / (2.0 * math.pi * common)
-    return delay + shift / (2.0 * math.pi * common), se
+    return delay + _shift(one, two, middle, delay, sign) / (2.0 * math.pi * common), se
 
 
-# ----------------------------------------------------------------------------------------------------
-# A measured drive made ready for the model: drift-free, band-limited, resampled without adding energy.
+def _shift(one: SineFit, two: SineFit, at: float, delay: float, sign: int) -> float:
+    """Phase [rad], within half a turn, by which the second sine is ahead of the first at a time, *delay* undone."""
+    turn = two.phase_at(at - delay) - one.phase_at(at) + (0.0 if sign > 0 else math.pi)
+    return (turn + math.pi) % (2.0 * math.pi) - math.pi
 
 
 def recorded_drive(
@@ -350,9 +325,8 @@ def recorded_drive(
     rate = positive("sampling_frequency", sampling_frequency, "Hz")
     drive = measurement or measure_drive(velocity)
     if drive.startup is not None and not drive.has_start:
-        words = next(
-            one.message for one in drive.diagnostics if one.code == KINDS_VIBROMETER["dropout_in_start"].code
-        )
+        broken = KINDS_VIBROMETER["dropout_in_start"].code
+        words = next(one.message for one in drive.diagnostics if one.code == broken)
         raise InputError(f"velocity: {words}; cut the record after its start-up, or record again")
     scale = _scale(alignment, polarity, amplitude_from)
     top = 0.4 * samples.sampling_frequency

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
+from typing import Any, TypeVar
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _Array = NDArray[np.float64]
+_Fit = TypeVar("_Fit", bound=Any)
 
 
 def sines(time: _Array, frequencies: ArrayLike) -> _Array:
@@ -34,6 +39,23 @@ def covariance(design: _Array, rcond: float = 1e-15) -> _Array:
     scale = _scale(design)
     inverse = np.asarray(np.linalg.pinv((design / scale).T @ (design / scale), rcond=rcond), dtype=np.float64)
     return inverse / np.outer(scale, scale)
+
+
+def weighted_line(x: _Array, y: _Array, weight: _Array) -> tuple[float, float, float, float]:
+    """Weighted mean of x and of y, the slope of a line through them, and the weighted sum of squares of x about its mean."""
+    total = weight.sum()
+    middle = float((weight * x).sum() / total)
+    lever = float((weight * (x - middle) ** 2).sum())
+    slope = float((weight * (x - middle) * y).sum()) / lever if lever > 0.0 else math.nan
+    return middle, float((weight * y).sum() / total), slope, lever
+
+
+def widened(fit: _Fit, **errors: tuple[float, ...]) -> _Fit:
+    """A fit whose standard errors, by the names of the numbers, hold further independent errors."""
+    names = {f"{name}_se": added for name, added in errors.items()}
+    return dataclasses.replace(
+        fit, **{name: math.hypot(getattr(fit, name), *added) for name, added in names.items()}
+    )
 
 
 def _scale(design: _Array) -> _Array:

@@ -157,14 +157,11 @@ def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -
     belongs = np.ones(count, dtype=bool)
     axes = {name: axis(name, dataset[name].values, -math.inf, math.inf) for name in dims}
     place, inside, simulated = _on_map(response, axes, where)
-    for name in _AXES:
-        value = where[name]
-        if name in dims:
-            continue
+    for name in (name for name in _AXES if name not in dims):
         fixed = dataset.coords[name].item() if name in dataset.coords else dataset.attrs.get(name)
         if fixed is not None:
             fixed = finite(name, fixed)
-            belongs &= np.isnan(value) | (np.abs(value - fixed) <= _NEAR * abs(fixed))
+            belongs &= np.isnan(where[name]) | (np.abs(where[name] - fixed) <= _NEAR * abs(fixed))
     known = (measured != ResponseClass.UNKNOWN) & (simulated != ResponseClass.UNKNOWN)
     repeated, contradicting = _repeated(where, measured)
     used = inside & belongs & known & ~repeated & ~contradicting
@@ -182,17 +179,13 @@ def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -
     ):
         if mask.any():
             notes.append(f"{int(mask.sum())} of {count} measured points do not count: {text}")
-    distance = _distance(response.values, dims, place, measured)
+    distance = np.where(used, _distance(response.values, dims, place, measured), np.nan)
     data: dict[str, Any] = {name: ("point", where[name]) for name in _AXES}
     data |= {
         "measured": ("point", measured),
         "simulated": ("point", np.where(inside & belongs, simulated, ResponseClass.UNKNOWN).astype(np.int8)),
         "used": ("point", used.astype(np.int8)),
-        "distance": (
-            "point",
-            np.where(used, distance, np.nan),
-            {"long_name": "steps to the nearest point alike"},
-        ),
+        "distance": ("point", distance, {"long_name": "steps to the nearest point alike"}),
     }
     return MapComparison(xr.Dataset(data), confusion, _CLASSES, tuple(notes), tuple(diagnostics))
 
@@ -246,43 +239,37 @@ def _units(
         known = inside & (measured != ResponseClass.UNKNOWN)
         return int(known.sum()), int((known & (simulated == measured)).sum())
 
-    frequency, velocity = where["frequency_ratio"], where["velocity_amplitude"]
+    names = ("frequency_ratio", "velocity_amplitude")
+    frequency, velocity = (where[name] for name in names)
     turn = 2.0 * math.pi
     others = {
         "the frequency is in rad/s": {"frequency_ratio": frequency / turn},
         "the velocity is in mm/s": {"velocity_amplitude": velocity / 1e3},
         "the velocity is in km/s": {"velocity_amplitude": velocity * 1e3},
-        "the frequency is in rad/s and the velocity in mm/s": {
-            "frequency_ratio": frequency / turn,
-            "velocity_amplitude": velocity / 1e3,
-        },
-        "the columns of frequency and velocity are exchanged": {
-            "frequency_ratio": velocity,
-            "velocity_amplitude": frequency,
-        },
+        "the frequency is in rad/s and the velocity in mm/s": dict(
+            zip(names, (frequency / turn, velocity / 1e3), strict=True)
+        ),
+        "the columns of frequency and velocity are exchanged": dict(
+            zip(names, (velocity, frequency), strict=True)
+        ),
     }
     level, first = attrs.get("beam_buckling_level"), attrs.get("reference_frequency")
     if level is not None:  # exchanged in Hz and m/s
         scale = turn * float(level)
-        others["the columns of frequency (Hz) and velocity (m/s) are exchanged"] = {
-            "frequency_ratio": velocity * scale,
-            "velocity_amplitude": frequency / scale,
-        }
+        others["the columns of frequency (Hz) and velocity (m/s) are exchanged"] = dict(
+            zip(names, (velocity * scale, frequency / scale), strict=True)
+        )
     if first is not None:
         others["the frequency ratio is a frequency in Hz"] = {"frequency_ratio": frequency / float(first)}
     inside, alike = fits({})
-    best, (found, agree) = max(
-        ((words, fits(points)) for words, points in others.items()), key=lambda one: one[1]
-    )
+    tried = {words: fits(points) for words, points in others.items()}
+    best, (found, agree) = max(tried.items(), key=lambda one: one[1])
     off_map = inside < 0.5 * count and found > 0.8 * count
     disagree = agree > 0.6 * count and alike < 0.5 * agree
     if not (off_map or disagree):
         return []
-    return [
-        KINDS_COMPARISON["units"].found(
-            told=best, inside=float(inside), fitting=float(found), points=float(count)
-        )
-    ]
+    numbers = {"inside": float(inside), "fitting": float(found), "points": float(count)}
+    return [KINDS_COMPARISON["units"].found(None, best, **numbers)]
 
 
 def _steps(axis: _Array, value: _Array) -> _Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -21,10 +20,37 @@ from snapbeam.lab.sine_fit import SineFit
 from snapbeam.util.diagnostics import Diagnostic
 
 _Array = NDArray[np.float64]
-
-
-# ----------------------------------------------------------------------------------------------------
-# Noise that is not white.
+_SURE = 6.0  # standard errors
+_LEAST = 0.003  # of the drive's amplitude
+_ALIKE = 0.4  # of its amplitude by which it may differ between the halves of the rest
+_ONE_SIDED = 0.8  # of the amplitude by which the mean may move
+FALSE_ALARM_RATE = 1e-3
+"""Rate of false alarms of one detector on one record, for normal noise."""
+_LINES = 32  # lines of a spectrum, at least
+_MATTERS = 0.004  # of the amplitude that an error must take, or move it by, to be of concern
+_SHIFTS = 5e-4  # of the frequency
+_AHEAD = 10.0  # chi-square by which an error must better what is none
+_CURVE_ERROR = 0.05  # of its harmonics by which a curve may differ from a family's
+_CHANGES = 0.02  # of the amplitude, or rad, by which a steady motion may change
+_EXPLAINS = 0.75  # of the odd harmonics that a curve must explain
+_BILINEAR = np.array([[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]])
+_START = 20.0  # cycles of the start that a filter shapes
+_START_LIMIT = 40.0  # chi-square by which a start, which no model describes to the noise, speaks against a filter
+_CONSTANT = 4  # cycles on either side of a jump
+_TAIL = 4.0  # cycles after the start-up whose transient is no noise
+_MAINS = (50.0, 60.0, 100.0, 120.0)
+_FASTEST = 3.0  # m/s
+_HARDEST = 1500.0  # m/s^2
+_FARTHEST = 0.05  # m
+_G = 9.80665
+_SAME_RATE = 5e-3  # by which two clocks may differ
+_AGREE = 0.05  # by which two sensors may differ
+_UNITS = {
+    "one of the units is wrong by a power of ten": None,
+    "g was read as m/s^2": 1.0 / _G,
+    "m/s^2 was read as g": _G,
+    "inches were read as centimetres": 2.54,
+}
 
 
 def noise_colour(quiet: _Array, rate: float, frequency: float) -> float:
@@ -42,15 +68,6 @@ def noise_colour(quiet: _Array, rate: float, frequency: float) -> float:
     return math.sqrt(ratio) if ratio > 1.0 + 4.0 / math.sqrt(near.sum()) else 1.0
 
 
-# ----------------------------------------------------------------------------------------------------
-# What is there at rest at the drive's own frequency: crosstalk of the amplifier, or a floor that moves.
-
-
-_SURE = 6.0  # standard errors
-_LEAST = 0.003  # of the drive's amplitude
-_ALIKE = 0.4  # of its amplitude by which it may differ between the halves of the rest
-
-
 def find_crosstalk(samples: SignalSamples, rest: int, fit: SineFit) -> Line | None:
     """A line at the drive's own frequency over the first *rest* samples, of the same amplitude and phase throughout."""
     period = samples.sampling_frequency / fit.frequency
@@ -66,18 +83,9 @@ def find_crosstalk(samples: SignalSamples, rest: int, fit: SineFit) -> Line | No
         halves.append((solution[1] - 1j * solution[2], noise * math.sqrt(2.0 / time.size)))
     (one, _), (other, error), (whole, sure) = halves
     size = abs(whole)
-    if size < max(_SURE * sure, _LEAST * fit.amplitude):
-        return None
-    if abs(one - other) > max(_ALIKE * size, 3.0 * error):
+    if size < max(_SURE * sure, _LEAST * fit.amplitude) or abs(one - other) > max(_ALIKE * size, 3.0 * error):
         return None
     return Line(fit.frequency, float(size), float(np.angle(whole)))
-
-
-# ----------------------------------------------------------------------------------------------------
-# A signal that is no velocity: rectified or squared.
-
-
-_ONE_SIDED = 0.8  # of the amplitude by which the mean may move
 
 
 def one_sided(samples: SignalSamples, rest: int, first: int, last: int, fit: SineFit) -> float:
@@ -91,36 +99,6 @@ def one_sided(samples: SignalSamples, rest: int, first: int, last: int, fit: Sin
     moved = float(samples.values[first + (last - first) // 3 : last].mean()) - still
     share = abs(moved) / fit.amplitude
     return share if share > _ONE_SIDED else 0.0
-
-
-def with_loss(fit: SineFit, share: float, shift: float = 0.0) -> SineFit:
-    """A sine whose amplitude is uncertain by *share* of it, and its frequency by *shift* of it."""
-    return dataclasses.replace(
-        fit,
-        amplitude_se=math.hypot(fit.amplitude_se, share * fit.amplitude),
-        frequency_se=math.hypot(fit.frequency_se, shift * fit.frequency),
-    )
-
-
-# ----------------------------------------------------------------------------------------------------
-# Errors of electronics, each as a hypothesis: the chi-square it explains, against the limit of its degrees of freedom
-# and against its alternatives.  Alternatives that are no errors, as a shaker's own harmonic, are among them.
-
-
-FALSE_ALARM_RATE = 1e-3
-"""Rate of false alarms of one detector on one record, for normal noise."""
-_LINES = 32  # lines of a spectrum, at least
-_MATTERS = 0.004  # of the amplitude that an error must take, or move it by, to be of concern
-_SHIFTS = 5e-4  # of the frequency
-_AHEAD = 10.0  # chi-square by which an error must better what is none
-_CURVE_ERROR = 0.05  # of its harmonics by which a curve may differ from a family's
-_CHANGES = 0.02  # of the amplitude, or rad, by which a steady motion may change
-_EXPLAINS = 0.75  # of the odd harmonics that a curve must explain
-_BILINEAR = np.array([[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]])
-_START = 20.0  # cycles of the start that a filter shapes
-_CONSTANT = 4  # cycles on either side of a jump
-_TAIL = 4.0  # cycles after the start-up whose transient is no noise
-_MAINS = (50.0, 60.0, 100.0, 120.0)
 
 
 class Record(NamedTuple):
@@ -165,6 +143,12 @@ class Hypothesis(NamedTuple):
         return bool(self.kind) and (self.loss > _MATTERS or self.shift > _SHIFTS)
 
 
+def best_of(found: list[Hypothesis]) -> tuple[Hypothesis | None, float]:
+    """The best hypothesis, and the score of the best of those by which nothing is wrong, at least 0."""
+    usual = max([0.0, *(one.score for one in found if not one.kind)])
+    return max(found, key=lambda one: one.score, default=None), usual
+
+
 def find_errors(record: Record) -> list[Hypothesis]:
     """The best explanation of each detector, where it is not explained by chance; of a clipped record its converter's.
 
@@ -174,21 +158,27 @@ def find_errors(record: Record) -> list[Hypothesis]:
     slow = np.asarray(
         np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, record.left.size), 3), dtype=np.float64
     )
-    record = record._replace(
-        left=record.left - slow @ solve(slow, record.left)
-    )  # a zero that drifts is no noise
+    # a zero that drifts is no noise
+    record = record._replace(left=record.left - slow @ solve(slow, record.left))
     told: list[Hypothesis] = []
     for group in ((_converters, _jumps), (_curves, _courses), (_clocks, _jitter), (_filters,)):
-        if any(one.kind for one in told) or (record.clipped and group[0] is not _converters):
+        if any(one.matters for one in told) or (record.clipped and group[0] is not _converters):
             break
         for detector in group:
             found = detector(record)
-            best = max(found, key=lambda one: one.score, default=None)
-            if best is None or not max(best.loss, best.shift) > 0.0:
+            best, usual = best_of(found)
+            if best is None:
                 continue
-            usual = max((one.score for one in found if not one.kind), default=0.0)
-            if best.score > (usual + _AHEAD if best.kind and usual > 0.0 else 0.0):
+            if max(best.loss, best.shift) > 0.0 and best.score > (
+                usual + _AHEAD if best.kind and usual > 0.0 else 0.0
+            ):
                 told.append(best)
+                continue
+            # an error that explains nearly as much is not told, but may be there
+            near = [one for one in found if one.score > max(best.score - _AHEAD, 0.0)]
+            loss, shift = (max((getattr(one, name) for one in near), default=0.0) for name in ("loss", "shift"))
+            if max(loss, shift) > 0.0:
+                told.append(Hypothesis("", best.score, 1, loss, shift))
     return told
 
 
@@ -225,21 +215,16 @@ def _jumps(record: Record) -> list[Hypothesis]:
     course = course * np.exp(-1j * turns * np.arange(course.size))
     sd = float(np.median(np.abs(late))) / math.sqrt(6.0 * math.log(4.0)) + 1e-6 * record.fit.amplitude
     parts = np.lib.stride_tricks.sliding_window_view(course, _CONSTANT)
-    mean, spread = (
-        parts.mean(1),
-        np.ptp(np.abs(parts), axis=1) + np.ptp(np.unwrap(np.angle(parts)), axis=1) * np.abs(parts.mean(1)),
-    )
+    mean = parts.mean(1)
+    spread = np.ptp(np.abs(parts), axis=1) + np.ptp(np.unwrap(np.angle(parts)), axis=1) * np.abs(mean)
     before, after = mean[: -_CONSTANT - 1], mean[_CONSTANT + 1 :]
     jump = np.abs(after - before)
     constant = np.maximum(spread[: -_CONSTANT - 1], spread[_CONSTANT + 1 :]) < 0.15 * jump + 6.0 * sd
     size = np.minimum(np.abs(before), np.abs(after)), np.maximum(np.abs(before), np.abs(after))
     turned = np.abs(np.angle(after / np.where(before == 0.0, 1.0, before)))
     kinds = {"gain": turned < 0.2, "sign": (turned > np.pi - 0.2) & (size[0] > 0.5 * size[1])}
-    seen = (
-        constant
-        & (size[0] > np.maximum(8.0 * sd, 0.03 * size[1]))
-        & (jump > np.maximum(12.0 * sd, 0.05 * size[1]))
-    )
+    seen = constant & (size[0] > np.maximum(8.0 * sd, 0.03 * size[1]))
+    seen &= jump > np.maximum(12.0 * sd, 0.05 * size[1])
     told = []
     for kind, alike in kinds.items():
         at = np.flatnonzero(seen & alike)
@@ -261,17 +246,12 @@ def _families() -> dict[str, tuple[_Array, NDArray[np.complex128]]]:
     drive = np.geomspace(0.1, 3.0, 60)
     dead = np.geomspace(2e-3, 0.3, 60)
     share = np.linspace(0.4, 0.998, 80)
-    lagging = np.empty((1440, share.size))
-    at = np.zeros(share.size)
-    for k in range(1440):
-        at = at + np.clip(wave[k % 720] - at, -share * turn[1], share * turn[1])
-        lagging[k] = at
     width = np.geomspace(2e-3, 0.15, 60)
-    played = np.empty((1440, width.size))
-    at = np.zeros(width.size)
+    lagging, played = np.zeros((1440, share.size)), np.zeros((1440, width.size))
     for k in range(1440):
-        at = np.clip(at, wave[k % 720] - width, wave[k % 720] + width)
-        played[k] = at
+        now = wave[k % 720]
+        lagging[k] = lagging[k - 1] + np.clip(now - lagging[k - 1], -share * turn[1], share * turn[1])
+        played[k] = np.clip(played[k - 1], now - width, now + width)
     curves = {
         "saturated": np.hstack([np.tanh(drive * wave) / drive, np.arctan(drive * wave) / drive]),
         "crossover": np.sign(wave) * np.maximum(np.abs(wave) - dead, 0.0),
@@ -369,7 +349,7 @@ def _filters(record: Record) -> list[Hypothesis]:
             "wanted": 20.0 * drive,
             "delay_ms": 1e3 * order / (2.0 * math.pi * one.centre),
         }
-        gain += plain - noise(one)
+        gain = max(gain, -_START_LIMIT) + plain - noise(one)
         told.append(Hypothesis(one.kind, gain, 2, 1.0 / kept - 1.0, numbers=numbers))
     return told
 
@@ -388,9 +368,8 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None], float]:
     if freq.size < 2 * _LINES or not power.min() > 1e-18 * n * record.fit.amplitude**2:
         return lambda one: 0.0  # a computed signal has no noise that a filter shapes
     # neighbours that differ in frequency by less than 1 % are averaged
-    edges = np.unique(
-        np.searchsorted(freq, freq[0] * 1.01 ** np.arange(math.log(freq[-1] / freq[0]) / 0.00996))
-    )
+    steps = np.arange(math.log(freq[-1] / freq[0]) / 0.00996)
+    edges = np.unique(np.searchsorted(freq, freq[0] * 1.01**steps))
     count = np.diff(np.append(edges, freq.size))
     freq, power = np.add.reduceat(freq, edges) / count, np.add.reduceat(power, edges) / count
     slope, white = np.meshgrid(np.linspace(-2.0, 2.0, 9), [0.0, 0.1, 1.0, 10.0])
@@ -423,10 +402,7 @@ def _start_gains(record: Record, filters: list[_Filter]) -> list[float]:
         return [0.0] * len(filters)
     aim = moving.values[:count:every] - fit.offset
     turn = np.exp(2j * math.pi * fit.frequency * time)
-    waves = [turn * np.exp(-time * rate) for rate in (0.0, 8.0, 40.0, 200.0)] + [
-        turn**2,
-        turn**3,
-    ]
+    waves = [turn * np.exp(-time * rate) for rate in (0.0, 8.0, 40.0, 200.0)] + [turn**2, turn**3]
     columns = np.column_stack([part for wave in waves for part in (wave.real, wave.imag)])
     rate, slow = moving.sampling_frequency / every, np.column_stack([np.ones_like(time), time])
 
@@ -536,10 +512,8 @@ def _jitter(record: Record) -> list[Hypothesis]:
     if jitter <= 0.0:
         return []
     loss = 0.5 * jitter
-    numbers = {
-        "jitter_us": 1e6 * math.sqrt(jitter) / (2.0 * math.pi * fit.frequency),
-        "loss_percent": 100.0 * loss,
-    }
+    jitter_us = 1e6 * math.sqrt(jitter) / (2.0 * math.pi * fit.frequency)
+    numbers = {"jitter_us": jitter_us, "loss_percent": 100.0 * loss}
     return [
         Hypothesis("jitter", 2.0 * seen.real**2 / noise, 1, loss, numbers=numbers),
         Hypothesis("", 2.0 * seen.imag**2 / noise, 1),
@@ -557,10 +531,8 @@ def _courses(record: Record) -> list[Hypothesis]:
     bends = [np.diff(one, 2) for one in course]
     noise = [1.4826 * float(np.median(np.abs(one - np.median(one)))) / math.sqrt(6.0) + 1e-9 for one in bends]
     found = [np.linalg.lstsq(basis, one, rcond=None)[0] for one in course]
-    gain = [
-        (coefficients * np.linalg.norm(basis, axis=0) / sd) ** 2
-        for coefficients, sd in zip(found, noise, strict=True)
-    ]
+    size = np.linalg.norm(basis, axis=0)
+    gain = [(coefficients * size / sd) ** 2 for coefficients, sd in zip(found, noise, strict=True)]
     found[0][0] = found[1][0] = found[1][1] = 0.0
     change, bend = (float(np.ptp(basis @ coefficients)) for coefficients in found)
     line = float(np.ptp(basis[:, :2] @ found[0][:2]))
@@ -568,76 +540,41 @@ def _courses(record: Record) -> list[Hypothesis]:
     span = float(t[-1] - t[0]) * record.fit.frequency
     numbers = {"change_percent": 100.0 * change, "bend": bend}
     turned = 6.0 * float(np.abs(found[1][2:4]).sum()) / (2.0 * np.pi * span)
-    slow, close = float(gain[0][1:3].sum()), float(gain[0][1:].sum() + gain[1][2:].sum())
+    slow = float(gain[0][1:3].sum()) if line > 0.8 * change else 0.0
+    close = float(gain[0][1:].sum() + gain[1][2:].sum()) if bend > _CHANGES and change > 0.1 * bend else 0.0
+    pulled = math.hypot(change, bend) / (2.0 * np.pi * span)
+    clock = numbers | {"share_percent": 200.0 * turned}
     return [
-        Hypothesis(kinds[0], slow if line > 0.8 * change else 0.0, 2, 0.5 * change, numbers=numbers),
-        Hypothesis(
-            kinds[1],
-            close if bend > _CHANGES and change > 0.1 * bend else 0.0,
-            9,
-            0.5 * change,
-            math.hypot(change, bend) / (2.0 * np.pi * span),
-            numbers,
-        ),
-        Hypothesis(
-            kinds[2], float(gain[1][2:4].sum()), 2, 0.0, turned, numbers | {"share_percent": 200.0 * turned}
-        ),
+        Hypothesis(kinds[0], slow, 2, 0.5 * change, numbers=numbers),
+        Hypothesis(kinds[1], close, 9, 0.5 * change, pulled, numbers),
+        Hypothesis(kinds[2], float(gain[1][2:4].sum()), 2, 0.0, turned, clock),
     ]
-
-
-# ----------------------------------------------------------------------------------------------------
-# Motions that no shaker makes, as of numbers in another unit.
-
-
-_FASTEST = 3.0  # m/s
-_HARDEST = 1500.0  # m/s^2
-_FARTHEST = 0.05  # m
-_G = 9.80665
-
-
-_SAME_RATE = 5e-3  # by which two clocks may differ
-_AGREE = 0.05  # by which two sensors may differ
-_UNITS = {
-    "one of the units is wrong by a power of ten": None,
-    "g was read as m/s^2": 1.0 / _G,
-    "m/s^2 was read as g": _G,
-    "inches were read as centimetres": 2.54,
-}
 
 
 def beside_acceleration(fit: SineFit, units: str, acceleration: SineFit) -> list[Diagnostic]:
     """Diagnostics of a sine of displacement or velocity, against the acceleration of the same shaker."""
     clocks = acceleration.frequency / fit.frequency
-    if abs(clocks - 1.0) > max(
-        _SAME_RATE, 6.0 * (fit.frequency_se + acceleration.frequency_se) / fit.frequency
-    ):
-        return [
-            KINDS_VIBROMETER["clocks"].found(own=fit.frequency, other=acceleration.frequency, ratio=clocks)
-        ]
+    unsure = 6.0 * (fit.frequency_se + acceleration.frequency_se) / fit.frequency
+    if abs(clocks - 1.0) > max(_SAME_RATE, unsure):
+        numbers = {"own": fit.frequency, "other": acceleration.frequency, "ratio": clocks}
+        return [KINDS_VIBROMETER["clocks"].found(None, "", **numbers)]
     omega = 2.0 * math.pi * fit.frequency
     ratio = acceleration.amplitude / (omega * fit.amplitude * (omega if units == "m" else 1.0))
     if abs(ratio - 1.0) < _AGREE:
         return []
-    turned = omega if units == "m/s" else 1.0 / omega
-    read = (
-        "a displacement was read as a velocity" if units == "m/s" else "a velocity was read as a displacement"
-    )
-    causes = {read: turned} | _UNITS
-    told = [
-        cause
-        for cause, factor in causes.items()
-        if _tens(ratio / (factor or 1.0), cause == read or factor is None)
-    ]
+    read = "a velocity was read as a displacement", 1.0 / omega
+    if units == "m/s":
+        read = "a displacement was read as a velocity", omega
+    told = []
+    for cause, factor in (read, *_UNITS.items()):
+        exponent = math.log10(ratio / (factor or 1.0))
+        tens = round(exponent) if cause == read[0] or factor is None else 0.0
+        if abs(exponent - tens) < math.log10(1.0 + _AGREE):
+            told.append(cause)
     words = (
         " or ".join(told) or "look at sensitivity (--sensitivity), units (--units) and channels (--channel)"
     )
     return [KINDS_VIBROMETER["acceleration"].found(told=words, ratio=ratio)]
-
-
-def _tens(ratio: float, powers: bool) -> bool:
-    """Return whether a ratio is 1, or any power of ten."""
-    exponent = math.log10(ratio)
-    return abs(exponent - (round(exponent) if powers else 0.0)) < math.log10(1.0 + _AGREE)
 
 
 def beyond_shakers(fit: SineFit, units: str) -> list[Diagnostic]:
@@ -645,20 +582,13 @@ def beyond_shakers(fit: SineFit, units: str) -> list[Diagnostic]:
     omega = 2.0 * math.pi * fit.frequency
     speed = fit.amplitude if units == "m/s" else omega * fit.amplitude
     hard, far = speed * omega, speed / omega
-    beyond = [
-        words
-        for words, value, limit in (
-            (f"{speed:.3g} m/s are above {_FASTEST:g} m/s", speed, _FASTEST),
-            (f"{hard / _G:.3g} g are above {_HARDEST / _G:.3g} g", hard, _HARDEST),
-            (f"{1e3 * far:.3g} mm are above {1e3 * _FARTHEST:g} mm", far, _FARTHEST),
-        )
-        if value > limit
-    ]
-    if not beyond:
+    limits = {
+        f"{speed:.3g} m/s are above {_FASTEST:g} m/s": speed > _FASTEST,
+        f"{hard / _G:.3g} g are above {_HARDEST / _G:.3g} g": hard > _HARDEST,
+        f"{1e3 * far:.3g} mm are above {1e3 * _FARTHEST:g} mm": far > _FARTHEST,
+    }
+    if not any(limits.values()):
         return []
-    told = ", ".join(beyond)
-    return [
-        KINDS_VIBROMETER["beyond_shakers"].found(
-            told=told, speed=speed, acceleration_g=hard / _G, travel_mm=1e3 * far
-        )
-    ]
+    told = ", ".join(words for words, beyond in limits.items() if beyond)
+    numbers = {"speed": speed, "acceleration_g": hard / _G, "travel_mm": 1e3 * far}
+    return [KINDS_VIBROMETER["beyond_shakers"].found(None, told, **numbers)]

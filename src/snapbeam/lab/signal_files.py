@@ -89,12 +89,8 @@ def read_channels(
                 "was given"
             )
         if rate is not None and "time" in channel:
-            agree(
-                f"{source}: {channel['name']}",
-                channel["time"],
-                rate,
-                "leave out sampling_frequency (--sampling-freq)",
-            )
+            way_out = "leave out sampling_frequency (--sampling-freq)"
+            agree(f"{source}: {channel['name']}", channel["time"], rate, way_out)
         if told is None and "time" not in channel:
             if rate is None:
                 raise InputError(
@@ -178,20 +174,9 @@ def read_columns(
 ) -> list[tuple[list[float], str]]:
     """Return columns of a text table whose header names them, each with its unit.
 
-    Parameters
-    ----------
-    path : path
-        A table as :func:`read_channels` reads it, without the need of a time.
-    names : sequence of str or None
-        Names of the columns, with or without their units; the first ones if left out.
-    units : sequence of str
-        Unit of each column where the header does not state it.
-    are_stated : bool
-        Whether a header that states another unit of the last column is refused.
-
-    Raises
-    ------
-    InputError
+    The table is as for :func:`read_channels`, without the need of a time.  *names* are those of the columns, with or
+    without units, the first ones if left out; *units* those where the header states none.  With *are_stated* a header that
+    states another unit of the last column is refused.
     """
     source = Path(path)
     if not source.is_file():
@@ -223,9 +208,9 @@ def _to_signal(entry: Channel, units: str | None, sensitivity: str | None, sourc
         raise InputError(
             f"{name} has no stated unit; state units (--units), such as 'mm/s', or sensitivity (--sensitivity)"
         )
-    scale, target, per = (
-        (1.0, "", "") if sensitivity is None else parse_sensitivity("sensitivity", sensitivity)
-    )
+    per = ""
+    if sensitivity is not None:
+        scale, target, per = parse_sensitivity("sensitivity", sensitivity)
     factor, base = si_unit(name, unit or per)
     if sensitivity is not None:
         if per != base:
@@ -242,8 +227,8 @@ def _to_signal(entry: Channel, units: str | None, sensitivity: str | None, sourc
             f"{name}, sample {bad[0]}: {data[bad[0]]:g} is not a finite number ({bad.size} such, fill values "
             "included): cut the signal there"
         )
-    kwargs: dict[str, Any] = {"time": entry["time"]} if "time" in entry else {}
-    if not kwargs:
+    kwargs: dict[str, Any] = {"time": entry.get("time")}
+    if "time" not in entry:
         kwargs = {"sampling_frequency": entry["fs"], "start": entry.get("time_offset", 0.0)}
     attrs = {"source": source}
     if entry.get("diagnostics"):

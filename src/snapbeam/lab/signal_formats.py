@@ -45,6 +45,15 @@ _SCALES = (
     "scale", "scalefactor", "scaling", "gain", "factor", "slope", "multiplier", "conversion", "conversionfactor", "lsb",
 )  # fmt: skip
 _OFFSETS = ("offset", "addoffset", "intercept", "zerooffset", "bias")
+_PACKING = (
+    "scale_factor",
+    "add_offset",
+    "_FillValue",
+    "missing_value",
+    "valid_min",
+    "valid_max",
+    "valid_range",
+)
 _COMMENT = ("#", "%", "//", "!")
 _LOOK = 400  # lines in which the table must begin
 _ABOVE = 20
@@ -77,6 +86,8 @@ _INTEGER_SCALE = {"int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "uint8": (12
 
 
 # One channel as it comes out of a file, and what a reader is told beside the path.
+_FORTRAN = re.compile(rb"(\.\d*)[Dd]([-+]\d\d)")
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
 class Told(NamedTuple):
@@ -129,11 +140,6 @@ def with_time(channels: list[Channel]) -> list[Channel]:
     """Take the time axes out of *channels* and give each to the channels of its group and length.
 
     An axis belongs to its group and the groups in it.  A channel may name its own under ``axis``.
-
-    Raises
-    ------
-    InputError
-        If an axis is not in seconds, is of another length than a channel, or contradicts another or the sampling rate.
     """
     axes: dict[str, NDArray[np.float64]] = {}
     signals: list[Channel] = []
@@ -141,8 +147,7 @@ def with_time(channels: list[Channel]) -> list[Channel]:
     for channel in channels:
         name = channel["name"]
         if name in stated or is_time(split_unit(name.rpartition("/")[2])[0]):
-            scale = _seconds(name, channel["unit_str"])
-            axes[name] = np.asarray(channel["data"], dtype=np.float64) * scale
+            axes[name] = np.asarray(channel["data"], dtype=np.float64) * _seconds(name, channel["unit_str"])
         else:
             signals.append(channel)
     for channel in signals:
@@ -154,19 +159,20 @@ def with_time(channels: list[Channel]) -> list[Channel]:
             if not folder:
                 break
             folder = folder.rpartition("/")[0]
-        fitting = {each: axis for each, axis in found.items() if axis.size == np.size(channel["data"])}
-        if not fitting:
-            if found:
-                first, axis = next(iter(found.items()))
-                size = np.size(channel["data"])
-                raise InputError(f"{name} has {size} samples, its time axis {first} {axis.size}")
+        size = np.size(channel["data"])
+        fitting = {each: axis for each, axis in found.items() if axis.size == size}
+        if found and not fitting:
+            first, axis = next(iter(found.items()))
+            raise InputError(f"{name} has {size} samples, its time axis {first} {axis.size}")
+        if not found:
             continue
         (first, axis), *others = fitting.items()
         least = 1e-3 * abs(axis[-1] - axis[0]) / axis.size
         for other, times in others:
             if not np.allclose(times - times[0], axis - axis[0], rtol=0.0, atol=least):
-                both = f"{first} and {other}"
-                raise InputError(f"{name} has the time axes {both}, which differ: remove the wrong one")
+                raise InputError(
+                    f"{name} has the time axes {first} and {other}, which differ: remove the wrong one"
+                )
         if "fs" in channel:
             agree(name, axis, channel.pop("fs"), "rename or remove the wrong one")
         channel["time"] = axis
@@ -182,9 +188,6 @@ def numbered(channels: list[Channel]) -> list[Channel]:
         if seen[name] > 1:
             channel["name"] = f"{name} ({seen[name]})"
     return channels
-
-
-# NumPy's files: .npy with one channel, .npz with several, their units and their rate.
 
 
 def read_numpy(path: Path, _told: Told) -> list[Channel]:
@@ -244,26 +247,11 @@ class _Stored(NamedTuple):
 
 
 def _unpacked(name: str, data: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[Any]:
-    """The numbers of a packed array by the CF conventions; NaN where it is filled.
-
-    Raises
-    ------
-    InputError
-        If an attribute is no number, or states a scale under a name whose meaning is not known.
-    """
+    """The numbers of a packed array by the CF conventions; NaN where it is filled."""
     from snapbeam.util.datasets import xr
 
     packing: dict[str, Any] = {}
-    numbers = (
-        "scale_factor",
-        "add_offset",
-        "_FillValue",
-        "missing_value",
-        "valid_min",
-        "valid_max",
-        "valid_range",
-    )
-    for key in (key for key in numbers if key in attributes):
+    for key in (key for key in _PACKING if key in attributes):
         value = np.asarray(attributes[key])
         filling = key in ("_FillValue", "missing_value")
         size = 2 if key == "valid_range" else 1
@@ -332,11 +320,8 @@ def _channels(stored: Mapping[str, _Stored], groups: Mapping[str, Mapping[str, A
     channels: list[Channel] = []
     for name, item in vectors.items():
         data = item.data
-        folder, _, last = name.rpartition("/")
-        around: list[tuple[str, Mapping[str, Any]]] = [
-            (name, item.attributes),
-            (folder, levels.get(folder, {})),
-        ]
+        folder, last = name, name.rpartition("/")[2]
+        around: list[tuple[str, Mapping[str, Any]]] = [(name, item.attributes)]
         while folder:
             folder = folder.rpartition("/")[0]
             around.append((folder, levels.get(folder, {})))
@@ -376,9 +361,6 @@ def _text(value: Any) -> str:
     found = np.asarray(value)
     item = found.reshape(-1)[0] if found.size == 1 else value
     return item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item)
-
-
-# HDF5 and NetCDF files.
 
 
 def _refuse_length(path: Path, ends: tuple[int, ...]) -> None:
@@ -499,9 +481,7 @@ def write_hdf5(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
         data.attrs["units"] = signal.attrs["units"]
 
 
-# Text tables of many dialects: where the header ends, what separates cells, what the header says.
-#
-# A table is a block of rows of numbers with the same count of cells, after any header.  Cells are separated by
+# A text table is a block of rows of numbers with the same count of cells, after any header.  Cells are separated by
 # semicolons, tabs, commas or blanks; with all but commas a comma may be the decimal sign, and points between
 # groups of three digits before it are left out.  Nothing is dropped: after the first row of numbers every line
 # must be one.
@@ -556,9 +536,8 @@ class _Dialect:
 
 
 def _is_row(cells: list[str], used: tuple[int, ...], decimal_comma: bool) -> bool:
-    return bool(used) and all(
-        i < len(cells) and math.isfinite(to_number(cells[i], decimal_comma)) for i in used
-    )
+    numbers = (to_number(cells[i], decimal_comma) if i < len(cells) else math.nan for i in used)
+    return bool(used) and all(map(math.isfinite, numbers))
 
 
 def _dialects(lines: list[str]) -> list[_Dialect]:
@@ -591,27 +570,12 @@ def _is_short(cells: list[list[str]]) -> bool:
     """Return whether the last number has fewer decimals than those above it, which all have equally many."""
     column = [re.search(r"[.,](\d*)$", row[-1].strip()) for row in cells[-_ABOVE:] if row]
     digits = {len(found[1]) for found in column[:-1] if found}
-    if len(digits) != 1 or len(column) < _ABOVE:
-        return False
     last = column[-1]
-    return last is None or len(last[1]) < digits.pop()
+    return len(digits) == 1 and len(column) >= _ABOVE and (last is None or len(last[1]) < digits.pop())
 
 
 def read_block(path: Path, columns: int = 0) -> TextBlock:
-    """Take a text file apart.
-
-    Parameters
-    ----------
-    path
-        The file.
-    columns
-        Number of columns, if the user gives it.
-
-    Raises
-    ------
-    InputError
-        If there is no row of numbers, or the way to read it is not clear.
-    """
+    """Take a text file apart; *columns* is the number of columns, if the user gives it."""
     text = decoded(path.read_bytes(), str(path))
     numbered = [(i, line.rstrip("\r")) for i, line in enumerate(text.split("\n"), 1) if line.strip()]
     comments = [line.strip().lstrip("#%/!").strip() for _, line in numbered if line.startswith(_COMMENT)]
@@ -689,12 +653,12 @@ def _best(
     if columns:
         seen = [entry for entry in seen if len(entry[0].used) == columns] or seen
     named = [entry for entry in seen if entry[1] is not None]
-    if named:  # the earliest table, then the most columns
-        return min(named, key=lambda entry: (entry[0].first, -len(entry[0].used)))
-    best = min(seen, key=lambda entry: (entry[0].first, -len(entry[0].used)))
-    rivals = [
-        entry for entry in seen if entry[0].first == best[0].first and len(entry[0].used) != len(best[0].used)
-    ]
+    # the earliest table, then the most columns
+    best = min(named or seen, key=lambda entry: (entry[0].first, -len(entry[0].used)))
+    if named:
+        return best
+    same_start = [one for one, *_ in seen if one.first == best[0].first]
+    rivals = [one for one in same_start if len(one.used) != len(best[0].used)]
     if rivals and not columns and best[0].separator == ",":
         raise InputError(
             f"{path}: without a header it is not clear whether commas part columns or decimals in "
@@ -735,19 +699,11 @@ def _like_unit(cell: str) -> bool:
     return True
 
 
-# LabVIEW's text files (.lvm): a header of the file, then for each segment its own and a table.
-
-
 def read_lvm(path: Path, _told: Told) -> list[Channel]:
     """Channels of the first segment of an .lvm file.
 
     A file whose number of samples is not that of its header is read with a diagnostic.  Channels that the header
-    names and that have no sample are left out.
-
-    Raises
-    ------
-    InputError
-        If the header is not that of such a file, or the file holds several segments: they need not join.
+    names and that have no sample are left out.  Several segments need not join, so they are refused.
     """
     lines = [line.rstrip("\r") for line in decoded(path.read_bytes(), str(path)).split("\n")]
     if not lines[0].lower().startswith("labview measurement"):
@@ -785,14 +741,12 @@ def read_lvm(path: Path, _told: Told) -> list[Channel]:
         step, start, samples = (
             to_number(_of(header.get(key) or ["0"], number), comma) for key in ("delta_x", "x0", "samples")
         )
-        if not (math.isfinite(step) and step > 0.0):
-            raise InputError(
-                f"Delta_X = {_of(header['delta_x'] or [''], number)!r}: must be a positive number of seconds"
-            )
-        if not samples >= 1.0:
-            raise InputError(
-                f"Samples = {_of(header['samples'] or [''], number)!r}: must be a whole number from 1"
-            )
+        for key, good, wanted in (
+            ("Delta_X", math.isfinite(step) and step > 0.0, "a positive number of seconds"),
+            ("Samples", samples >= 1.0, "a whole number from 1"),
+        ):
+            if not good:
+                raise InputError(f"{key} = {_of(header[key.lower()] or [''], number)!r}: must be {wanted}")
         clock: dict[str, Any] = {"fs": 1.0 / step, "time_offset": start if math.isfinite(start) else 0.0}
         told: list[Diagnostic] = []
         if len(cells) != samples:
@@ -828,9 +782,6 @@ def _header(lines: list[str], at: int, separator: str | None) -> tuple[dict[str,
             key, *values = line.split(mark)
             fields.setdefault(key.strip().lower(), [value.strip() for value in values if value.strip()])
     raise InputError("the header has no end (***End_of_Header***)")
-
-
-# MATLAB files: version 5 by SciPy, version 7.3 by h5py.  Numbers and text only; objects are left alone.
 
 
 def read_matlab(path: Path, _told: Told) -> list[Channel]:
@@ -922,9 +873,6 @@ def _version_73(path: Path) -> dict[str, Any]:
     return values
 
 
-# What the lines above a table say: sampling rate and units, under the names that instruments give them.
-
-
 def header_values(lines: Iterable[str]) -> dict[str, str]:
     """Keys and values of header lines such as ``Sample Rate: 12 kHz`` or ``Vertical Units,V``.
 
@@ -943,13 +891,7 @@ def header_values(lines: Iterable[str]) -> dict[str, str]:
 
 
 def header_rate(values: dict[str, str], where: str) -> float | None:
-    """Samples per second [Hz] that a header states; None if it does not.
-
-    Raises
-    ------
-    InputError
-        If it states two that differ.
-    """
+    """Samples per second [Hz] that a header states; None if it does not."""
     found = {key: rate for key, value in values.items() if (rate := _rate_of(key, value)) is not None}
     return _one_rate(found, f"{where}: the header") if found else None
 
@@ -963,19 +905,12 @@ def _one_rate(found: Mapping[str, float], where: str) -> float:
 
 
 def _rate_of(name: str, value: Any) -> float | None:
-    """Samples per second [Hz] that a named value states; None if the name states none, or the value is 0 or no number.
-
-    Raises
-    ------
-    InputError
-        If it states a negative or infinite rate.
-    """
+    """Samples per second [Hz] that a named value states; None if the name states none, or the value is 0 or no number."""
     word, suffix = (name, None) if len(name) > _LONGEST_NAME else split_unit(name)
     key = _key(name)
     if key not in _RATES and key not in _STEPS:
-        ending = next(
-            (end for end in ("hz", "s") if key.endswith(end) and key[: -len(end)] in _RATES + _STEPS), ""
-        )
+        units = (end for end in ("hz", "s") if key.endswith(end) and key[: -len(end)] in _RATES + _STEPS)
+        ending = next(units, "")
         key = _key(word) if suffix else key[: -len(ending)] if ending else ""
     if key not in _RATES and key not in _STEPS:
         return None
@@ -991,11 +926,8 @@ def _rate_of(name: str, value: Any) -> float | None:
 
 def header_unit(values: dict[str, str], *keys: str) -> str | None:
     """The unit that stands under one of *keys*, without a channel's name before it; None if none does."""
-    for key in keys:
-        word = values.get(key, "").rpartition(":")[2].strip()
-        if word:
-            return word
-    return None
+    words = (values.get(key, "").rpartition(":")[2].strip() for key in keys)
+    return next((word for word in words if word), None)
 
 
 def _quantity(text: str) -> tuple[float, str]:
@@ -1007,9 +939,6 @@ def _quantity(text: str) -> tuple[float, str]:
     return to_number(found[1], comma), found[2].strip()
 
 
-# Time series as text tables: one column a channel, units in the header, faults named by line and column.
-
-
 class Table(NamedTuple):
     """A text table: its ``columns`` of cells by name, and the ``block`` of the file that they are of."""
 
@@ -1017,13 +946,7 @@ class Table(NamedTuple):
     columns: dict[str, tuple[str, ...]]
 
     def numbers(self, name: str) -> NDArray[np.float64]:
-        """Return a column as floats; refuse a cell that is no finite number, naming its line.
-
-        Raises
-        ------
-        InputError
-            Naming the file, the line, the column and the cell.
-        """
+        """Return a column as floats; refuse a cell that is no finite number, naming its line."""
         cells, block = self.columns[name], self.block
         try:
             if block.decimal_comma:
@@ -1039,25 +962,11 @@ class Table(NamedTuple):
 
 
 def read_table(path: Path, columns: str | None = None) -> Table:
-    """Read a text table; see :mod:`snapbeam.lab.signal_formats` for its dialects.
-
-    Parameters
-    ----------
-    path
-        The file.
-    columns
-        Names and units of the columns, separated by commas, instead of those in the file.
-
-    Raises
-    ------
-    InputError
-        If there is no header and no *columns*, no row, a row of another length, or a column without a name of
-        its own.
-    """
+    """Read a text table; *columns* are names and units, separated by commas, instead of those in the file."""
     given = [name.strip() for name in columns.split(",")] if columns else []
     block = read_block(path, len(given))
     width = len(block.rows[0])
-    names = tuple(given) if given else _names(block)
+    names = tuple(given) or _names(block)
     if names is None:
         raise InputError(
             f"{path}: its first row, line {block.lines[0]}, has no header above it that names its {width} column(s); "
@@ -1111,12 +1020,8 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
         word, unit = columns[times[0]]
         common["time"] = table.numbers(times[0]) * _seconds(f"{path}: column {word!r}", unit)
         if rate is not None:
-            agree(
-                str(path),
-                common["time"],
-                rate,
-                "correct the header, or name the times otherwise in columns (--columns), such as 'number [1],velocity [m/s]'",
-            )
+            way_out = "correct the header, or name the times otherwise in columns (--columns), such as "
+            agree(str(path), common["time"], rate, f"{way_out}'number [1],velocity [m/s]'")
     elif rate is not None:
         common["fs"] = rate
     upward = header_unit(values, "verticalunits", "yunit", "yunits", "unity")
@@ -1135,13 +1040,7 @@ def _is_time(word: str, unit: str | None) -> bool:
 
 
 def agree(name: str, time: NDArray[np.float64], rate: float, way_out: str) -> None:
-    """Refuse times that contradict a stated sampling rate [Hz].
-
-    Raises
-    ------
-    InputError
-        With *way_out*, if they do, or are not even.
-    """
+    """Refuse times that contradict a stated sampling rate [Hz], or are not even."""
     if time.size < 3:
         return
     _, found = even_sampling(name, time)
@@ -1176,9 +1075,6 @@ def split_unit(column: str) -> tuple[str, str | None]:
     if column.strip().lower() in ("volt", "volts", "second", "seconds"):
         return column, column.strip()
     return column, None
-
-
-# LabVIEW's TDMS files.
 
 
 def read_tdms(path: Path, _told: Told) -> list[Channel]:
@@ -1223,12 +1119,6 @@ def write_tdms(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
     properties["unit_string"] = signal.attrs["units"]
     with TdmsWriter(str(path)) as writer:
         writer.write_segment([ChannelObject("snapbeam", str(signal.name), values, properties=properties)])
-
-
-# Universal files, dataset 58, ASCII or binary.
-
-
-_FORTRAN = re.compile(rb"(\.\d*)[Dd]([-+]\d\d)")
 
 
 def read_uff(path: Path, told: Told) -> list[Channel]:
@@ -1282,9 +1172,6 @@ def read_uff(path: Path, told: Told) -> list[Channel]:
     return numbered(channels)
 
 
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-
-
 def _bodies(content: bytes) -> list[list[str]]:
     """Lines of numbers of each dataset 58 of a file, without the header's eleven."""
     lines = content.decode("latin-1").splitlines()
@@ -1299,10 +1186,9 @@ def _numbers_58(name: str, body: list[str], entry: Mapping[str, Any]) -> dict[st
         raise InputError(f"{name}: complex numbers, or of a type that is not known, are no time series")
     rows = []
     for line in body:
-        found = _NUMBER.findall(line)
         if _NUMBER.sub("", line).strip():
             raise InputError(f"{name}: {line.strip()[:60]!r} is no line of numbers")
-        rows.append([float(word) for word in found])
+        rows.append([float(word) for word in _NUMBER.findall(line)])
     values = np.array([number for row in rows for number in row])
     each = 1 if entry["abscissa_spacing"] == 1 else 2
     count = each * int(entry["num_pts"])
@@ -1327,9 +1213,6 @@ def write_uff(path: Path, signal: xr.DataArray, _full_scale: float | None) -> No
 def _first(text: Any, otherwise: str) -> str:
     word = str(text or "").strip()
     return otherwise if word.upper() in ("", "NONE") else word
-
-
-# Sound files: whole numbers are fractions of full scale, floating point numbers what the caller says.
 
 
 def read_wav(path: Path, _told: Told) -> list[Channel]:

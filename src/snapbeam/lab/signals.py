@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# ----------------------------------------------------------------------------------------------------
-# Units of measured signals: into SI, and the sensitivities of sensors.
-
-
 _PREFIX = {"": 1.0, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9}
 _WITH_PREFIX = ("m", "m/s", "m/s^2", "N", "V", "s", "Hz", "Pa")
 _GRAVITY = 9.80665  # m/s^2, standard acceleration of free fall
@@ -51,18 +47,17 @@ KNOWN_UNITS = (
     "m, m/s, m/s^2, N, V, s, Hz or Pa with a prefix k, c, m, u or n, g, in, in/s, in/s^2, or FS (fraction of full "
     "scale)"
 )
+_LONG_NAMES = {
+    "m": "displacement", "m/s": "velocity", "m/s^2": "acceleration", "N": "force", "V": "voltage", "Pa": "pressure",
+}  # fmt: skip
+MINIMUM_SAMPLES = 16
 
 
 def si_unit(name: str, unit: str) -> tuple[float, str]:
-    """Return the factor and the SI unit for *unit*, such as ``(1e-3, "m/s")`` for ``"mm/s"``.
+    """Return the factor and the SI unit for *unit*, such as ``(1e-3, "m/s")`` for ``"mm/s"``; *name* is the signal's.
 
     Known are m, m/s, m/s^2, N, V, s, Hz and Pa with the prefixes k, c, m, u (or µ), n; g, the standard
     acceleration of free fall; in, in/s, in/s^2; and FS, the fraction of full scale of a sound file.
-
-    Raises
-    ------
-    InputError
-        If the unit is unknown; *name* is the name of the signal in the message.
     """
     if not isinstance(unit, str):
         where = f"unit of {name}" if isinstance(name, str) else "unit"
@@ -85,20 +80,13 @@ def parse_sensitivity(name: str, text: str) -> tuple[float, str, str]:
 
     Either the sensitivity per volt (or full scale), ``"125 mm/s/V"``, or the volts that a sensor gives, ``"100
     mV/g"``, ``"50 mV/Pa"``, ``"10 mV/(m/s^2)"``.
-
-    Raises
-    ------
-    InputError
-        If *text* is neither.
     """
     found = re.fullmatch(r"\s*([-+0-9.eE]+)\s*(\S.*)", text) if isinstance(text, str) else None
     try:
         number = float(found[1]) if found else float("nan")
     except ValueError:
         number = float("nan")
-    if found is None or not np.isfinite(number) or number == 0.0:
-        raise InputError(f"{name} = {text!r}: must read like '125 mm/s/V', '100 mV/g' or '0.5 m/s/FS'")
-    rest = found[2].replace(" ", "")
+    rest = found[2].replace(" ", "") if found is not None and np.isfinite(number) and number != 0.0 else ""
     per = re.fullmatch(r"(.+)/(V|mV|FS)", rest)
     if per is not None:
         factor, unit = si_unit(name, per[1].strip("()"))
@@ -112,15 +100,6 @@ def parse_sensitivity(name: str, text: str) -> tuple[float, str, str]:
     return factor / (number * volts), unit, "V"
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-_LONG_NAMES = {
-    "m": "displacement", "m/s": "velocity", "m/s^2": "acceleration", "N": "force", "V": "voltage", "Pa": "pressure",
-}  # fmt: skip
-MINIMUM_SAMPLES = 16
-
-
 class SignalSamples(NamedTuple):
     """The numbers of a signal: ``values`` and ``time`` [s] of shape (samples,), the sampling rate [Hz]."""
 
@@ -128,16 +107,20 @@ class SignalSamples(NamedTuple):
     time: NDArray[np.float64]
     sampling_frequency: float
 
+    @property
+    def duration(self) -> float:
+        """Samples over the sampling rate [s]."""
+        return self.values.size / self.sampling_frequency
+
+    def part(self, which: slice | NDArray[np.bool_]) -> SignalSamples:
+        """The samples of a slice or a mask."""
+        return SignalSamples(self.values[which], self.time[which], self.sampling_frequency)
+
 
 def even_sampling(name: str, time: ArrayLike) -> tuple[float, float]:
     """Return the start [s] and the sampling frequency [Hz] of an evenly sampled time axis.
 
     Times rounded on printing are accepted as long as none is a fifth of a step away from an even grid.
-
-    Raises
-    ------
-    InputError
-        If the times are not finite, do not increase, have a gap, or are not evenly spaced.
     """
     times = finite_array(f"{name}: time", time, 1)
     if times.size < 2:
@@ -233,13 +216,7 @@ def make_signal(
 def check_signal(
     signal: xr.DataArray, units: str | tuple[str, ...] = (), name: str = "signal"
 ) -> SignalSamples:
-    """Return the samples of *signal* if it is one: evenly sampled, finite, long enough and in one of *units*.
-
-    Raises
-    ------
-    InputError
-        Naming what is wrong: the dimensions, a missing or wrong unit, NaN, times that do not increase.
-    """
+    """Return the samples of *signal* if it is one: evenly sampled, finite, long enough and in one of *units*."""
     from snapbeam.util.datasets import xr
 
     if not isinstance(signal, xr.DataArray):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 _Array = NDArray[np.float64]
 _MIN_CYCLES = 2.0
+_FLAT = 0.105  # share of a cycle within 3 % of its extreme from which a top is flat; 0.078 for a sine
+_NEAR = 0.03
 
 
 @dataclass(frozen=True)
@@ -116,17 +118,28 @@ def spectral_peak(samples: SignalSamples, low: float = 0.0, high: float | None =
     spectrum = np.abs(np.fft.rfft(y * np.hanning(n), 4 * n))
     freq = np.fft.rfftfreq(4 * n, 1.0 / samples.sampling_frequency)
     top = samples.sampling_frequency / 2 if high is None else high
-    inside = np.flatnonzero((freq >= max(low, samples.sampling_frequency / n)) & (freq <= top))
-    if inside.size == 0 or not spectrum[inside].max() > 0.0:
-        raise InputError(f"signal: no oscillation between {low:g} and {top:g} Hz")
+    return highest_peak(freq, spectrum, (low, top), samples.sampling_frequency / n)
+
+
+def highest_peak(
+    freq: NDArray[Any], spectrum: _Array, band: tuple[float, float], lowest: float, floor: float = 0.0
+) -> float:
+    """Frequency [Hz] of the highest peak in a band, from *lowest* on and above *floor*, by a parabola through logarithms."""
+    inside = np.flatnonzero((freq >= max(band[0], lowest)) & (freq <= band[1]))
+    if inside.size == 0 or not spectrum[inside].max() > floor:
+        raise InputError(f"signal: no oscillation between {band[0]:g} and {band[1]:g} Hz")
     at = int(inside[np.argmax(spectrum[inside])])
+    shift = 0.0
     if 0 < at < spectrum.size - 1 and spectrum[at - 1] > 0.0 and spectrum[at + 1] > 0.0:
         a, b, c = np.log(spectrum[at - 1 : at + 2])
         bend = a - 2.0 * b + c
         shift = 0.5 * (a - c) / bend if bend < 0.0 else 0.0
-    else:
-        shift = 0.0
     return float(freq[at] + shift * (freq[1] - freq[0]))
+
+
+def falling_window(size: int) -> _Array:
+    """Half of a Hann window, whose maximum is the first sample."""
+    return np.asarray(np.cos(0.5 * math.pi * np.arange(size) / size) ** 2, dtype=np.float64)
 
 
 def white_variance(
@@ -281,14 +294,6 @@ def _slope(t: _Array, design: _Array, solution: _Array) -> _Array:
 
 def _wrap(angle: float) -> float:
     return math.pi - (math.pi - angle) % (2.0 * math.pi)
-
-
-# ----------------------------------------------------------------------------------------------------
-# What spoils a record of a periodic motion: dropouts, spikes, and tops cut off.
-
-
-_FLAT = 0.105  # share of a cycle within 3 % of its extreme from which a top is flat; 0.078 for a sine
-_NEAR = 0.03
 
 
 class Flaw(NamedTuple):

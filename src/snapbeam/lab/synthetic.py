@@ -45,11 +45,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# ----------------------------------------------------------------------------------------------------
-# The picture of a few edges, summed over an exposure: compiled loops for the synthetic camera.
-
-
 TABLE_ENTRIES_PER_PIXEL = 256  # table entries per pixel
+CELLS_PER_PIXEL = 4  # cells to a pixel, each way
+FRAME_LISTS = ("glare_frames", "blurred_frames", "repeated_frames", "blank_frames", "hidden_frames")
+_FINE = 8  # rows of light drawn for a row of pixels
 
 
 def step_table(blur: float) -> NDArray[np.float64]:
@@ -58,10 +57,8 @@ def step_table(blur: float) -> NDArray[np.float64]:
     The first and last offsets are -reach and +reach with reach = (entries - 1)/(2 FINE).
     """
     reach = int(np.ceil(5.0 * blur)) + 2
-    offsets = (
-        np.arange(-reach * TABLE_ENTRIES_PER_PIXEL, reach * TABLE_ENTRIES_PER_PIXEL + 1)
-        / TABLE_ENTRIES_PER_PIXEL
-    )
+    last = reach * TABLE_ENTRIES_PER_PIXEL
+    offsets = np.arange(-last, last + 1) / TABLE_ENTRIES_PER_PIXEL
     return edge_profile(offsets, blur) - edge_profile(offsets - 1.0, blur)
 
 
@@ -122,10 +119,6 @@ def _expose(
 expose = keep_code(_expose, numba.__version__)
 
 
-# ----------------------------------------------------------------------------------------------------
-# The synthetic laboratory's camera and scene, in sizes a person would measure.
-
-
 @dataclass(frozen=True)
 class SyntheticCamera:
     """The camera: sampling, optics, light and noise.
@@ -151,14 +144,9 @@ class SyntheticCamera:
 
     Examples
     --------
-    >>> import numpy as np
     >>> from snapbeam import lab
-    >>> time = np.arange(60) / 10e3  # s
-    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
-    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
-    >>> camera = lab.SyntheticCamera(shape=(160, 64))
-    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
-    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
+    >>> lab.SyntheticCamera(frame_rate=20e3, shape=(160, 64)).exposure  # s
+    2.5e-05
     """
 
     frame_rate: float = 10_000.0
@@ -180,11 +168,8 @@ class SyntheticCamera:
         for name, value in zip(("shape[0]", "shape[1]"), self.shape, strict=True):
             integer(name, value, 16, 8192)
         exposure = 0.5 / rate if self.exposure is None else self.exposure
-        object.__setattr__(
-            self,
-            "exposure",
-            within("exposure", exposure, 0.0, 1.0 / rate * (1 + 1e-9), closed="right", unit="s"),
-        )
+        exposure = within("exposure", exposure, 0.0, 1.0 / rate * (1 + 1e-9), closed="right", unit="s")
+        object.__setattr__(self, "exposure", exposure)
         integer("bit_depth", self.bit_depth, 8, 16)
         if not (isinstance(self.snr_db, float) and math.isinf(self.snr_db) and self.snr_db > 0.0):
             within("snr_db", self.snr_db, -20.0, 200.0, closed="both", unit="dB")
@@ -204,14 +189,9 @@ class SyntheticStage:
 
     Examples
     --------
-    >>> import numpy as np
     >>> from snapbeam import lab
-    >>> time = np.arange(60) / 10e3  # s
-    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
-    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
-    >>> camera = lab.SyntheticCamera(shape=(160, 64))
-    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
-    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
+    >>> lab.SyntheticStage(shaker_width=0.4e-3, side="above").beam_thickness  # m
+    0.0004
     """
 
     beam_thickness: float = 0.4e-3
@@ -239,10 +219,6 @@ class SyntheticStage:
             raise InputError(f"beam = {self.beam!r}: must differ from background = {self.background!r}")
 
 
-# ----------------------------------------------------------------------------------------------------
-# The scene drawn as ideal edges blurred by a Gaussian: the edge model that the tracker fits.
-
-
 class Outline:
     """The scene's shapes in turned pixels, columns counted from the contact at ``centre``."""
 
@@ -266,18 +242,14 @@ def lamp_light(camera: SyntheticCamera, height: int, width: int) -> NDArray[np.f
     """The lamp's unevenness over a turned picture."""
     across = 1.0 + camera.light[0] * ((np.arange(width) - (width - 1) / 2.0) / width)
     down = 1.0 + camera.light[1] * (np.arange(height) / height - 0.5)
-    light: NDArray[np.float32] = (down[:, None] * across[None, :]).astype(np.float32)
-    return light
+    return np.asarray(down[:, None] * across[None, :], dtype=np.float32)
 
 
 def glare_light(height: int, width: int, row: float, strength: float, wide: bool) -> NDArray[np.float32]:
     """A reflection about *row*, in the middle columns or, if *wide*, in all."""
     rows = (np.arange(height) - row) / (0.12 * height)
     columns = np.zeros(width) if wide else (np.arange(width) - (width - 1) / 2.0) / (0.3 * width)
-    light: NDArray[np.float32] = (strength * np.exp(-(rows[:, None] ** 2) - columns[None, :] ** 2)).astype(
-        np.float32
-    )
-    return light
+    return np.asarray(strength * np.exp(-(rows[:, None] ** 2) - columns[None, :] ** 2), dtype=np.float32)
 
 
 class GaussianPicture:
@@ -312,19 +284,12 @@ class GaussianPicture:
             (stage.beam - stage.background, stage.shaker - stage.background, sticker),
             self.tables[blurred],
         )
-        light: NDArray[np.float32] = np.cumsum(steps, axis=0).astype(np.float32)
-        return light
+        return np.asarray(np.cumsum(steps, axis=0), dtype=np.float32)
 
 
-# ----------------------------------------------------------------------------------------------------
-# The scene drawn as areas seen through a lens out of focus: an edge model that is not the tracker's.
-#
 # Every shape covers an exact share of each cell of a grid four times finer than the pixels, averaged over the
 # exposure; the cells are spread over the lens's disk of confusion and summed into pixels.  Nothing here knows
 # of error functions, so a tracker that fits them is not tested against itself.
-
-
-CELLS_PER_PIXEL = 4  # cells to a pixel, each way
 
 
 @numba.njit
@@ -385,8 +350,7 @@ def disk_kernel(radius: float) -> NDArray[np.float32]:
     kernel = inside.reshape(2 * reach + 1, 8, 2 * reach + 1, 8).sum((1, 3))
     if not kernel.sum() > 0.0:
         kernel[reach, reach] = 1.0
-    out: NDArray[np.float32] = (kernel / kernel.sum()).astype(np.float32)
-    return out
+    return np.asarray(kernel / kernel.sum(), dtype=np.float32)
 
 
 class AreaPicture:
@@ -440,22 +404,10 @@ class AreaPicture:
                 layer *= self.grain[rows - shift : 2 * rows - shift]
         fine: NDArray[Any] = np.float32(stage.background) + layers[0] + layers[1]
         fine = cv2.filter2D(fine, -1, self.kernels[blurred], borderType=cv2.BORDER_REPLICATE)
-        inner = fine[
-            margin * CELLS_PER_PIXEL : (margin + shape.height) * CELLS_PER_PIXEL,
-            margin * CELLS_PER_PIXEL : -margin * CELLS_PER_PIXEL,
-        ]
-        cells = np.asarray(inner, dtype=np.float32).reshape(
-            shape.height, CELLS_PER_PIXEL, shape.width, CELLS_PER_PIXEL
-        )
-        pixels: NDArray[np.float32] = cells.mean((1, 3), dtype=np.float32)
-        return pixels
-
-
-# ----------------------------------------------------------------------------------------------------
-# What goes wrong in front of a camera and in it, to be drawn into a synthetic recording.
-
-
-FRAME_LISTS = ("glare_frames", "blurred_frames", "repeated_frames", "blank_frames", "hidden_frames")
+        edge = margin * CELLS_PER_PIXEL
+        inner = fine[edge : edge + shape.height * CELLS_PER_PIXEL, edge:-edge]
+        cells = inner.reshape(shape.height, CELLS_PER_PIXEL, shape.width, CELLS_PER_PIXEL)
+        return np.asarray(cells.mean((1, 3), dtype=np.float32))
 
 
 @dataclass(frozen=True)
@@ -542,13 +494,6 @@ class Defects:
         return chosen
 
 
-# ----------------------------------------------------------------------------------------------------
-# From light to grey levels: a fixed bar in view, exposure, the camera's curve, noise and bits.
-
-
-_FINE = 8  # rows of light drawn for a row of pixels
-
-
 def with_fixture(
     light: NDArray[np.float32], fixture: Fixture, shift: float, blur: float
 ) -> NDArray[np.float32]:
@@ -561,8 +506,7 @@ def with_fixture(
     ramp = max(1.0, 2.0 * math.sqrt(3.0) * blur)
     inside = 0.5 * fixture.thickness - np.abs(rows - fixture.row - shift)
     cover = np.clip(0.5 + inside / ramp, 0.0, 1.0).mean(1).astype(np.float32)[:, None]
-    out: NDArray[np.float32] = light * (1.0 - cover) + np.float32(fixture.level) * cover
-    return out
+    return np.asarray(light * (1.0 - cover) + np.float32(fixture.level) * cover, dtype=np.float32)
 
 
 def read_out(
@@ -583,12 +527,7 @@ def read_out(
     level = np.clip(light, 0.0, 1.0)
     if defects.gamma != 1.0:
         level = level ** np.float32(defects.gamma)
-    full = 2**camera.bit_depth - 1
-    grey: NDArray[np.uint16] = np.rint(level * full).astype(np.uint16)
-    return grey
-
-
-# ----------------------------------------------------------------------------------------------------
+    return np.asarray(np.rint(level * (2**camera.bit_depth - 1)), dtype=np.uint16)
 
 
 class SyntheticRecording:
@@ -616,11 +555,9 @@ class SyntheticRecording:
         self.truth = truth
         self.seed = seed
         self._instants = instants
-        self._picture = (
-            GaussianPicture(camera, stage)
-            if camera.lens == "gaussian"
-            else AreaPicture(camera, stage, defects.texture, seed)
-        )
+        self._picture: GaussianPicture | AreaPicture = GaussianPicture(camera, stage)
+        if camera.lens == "disk":
+            self._picture = AreaPicture(camera, stage, defects.texture, seed)
         shape = self._picture.outline
         self._lamp = lamp_light(camera, shape.height, shape.width)
         self._spoiled = defects.frames(len(self))
@@ -719,11 +656,8 @@ class _Instants:
         step = inside - self.time[k]
         slope = (values[k + 1] - values[k]) / (self.time[k + 1] - self.time[k])
         part = total[k] + step * (values[k] + 0.5 * slope * step)
-        return (
-            part
-            + np.minimum(at - self.time[0], 0.0) * values[0]
-            + np.maximum(at - self.time[-1], 0.0) * values[-1]
-        )
+        part = part + np.minimum(at - self.time[0], 0.0) * values[0]
+        return part + np.maximum(at - self.time[-1], 0.0) * values[-1]
 
     def rows(self, index: int) -> tuple[Floats, Floats]:
         """Rows of the beam's middle and of the tip less half a thickness, at instants of one exposure."""
@@ -820,11 +754,9 @@ def render_recording(
     rest = integer("rest_frames", rest_frames, 0)
     seed = seed_of(rng)
     sign = Orientation(stage.side, camera.shape).sign
-    row = (
-        _fitting_row(camera, stage, sign * beam, sign * shaker)
-        if zero_row is None
-        else finite("zero_row", zero_row)
-    )
+    row = None if zero_row is None else finite("zero_row", zero_row)
+    if row is None:
+        row = _fitting_row(camera, stage, sign * beam, sign * shaker)
     span = instants[-1] - instants[0]
     count = rest + math.floor((span - float(camera.exposure or 0.0)) * camera.frame_rate + 1e-9) + 1
     if count <= rest:
@@ -854,19 +786,14 @@ def _attributes(
     values = {f"camera_{name}": getattr(camera, name) for name in camera.__dataclass_fields__}
     values |= {f"stage_{name}": getattr(stage, name) for name in stage.__dataclass_fields__}
     plain = {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
-    return plain | {
-        "rest_frames": rest,
-        "zero_row": row,
-        "seed": seed,
-        "title": "truth of a synthetic recording",
-    }
+    title = "truth of a synthetic recording"
+    return plain | {"rest_frames": rest, "zero_row": row, "seed": seed, "title": title}
 
 
 def _fitting_row(camera: SyntheticCamera, stage: SyntheticStage, beam: Floats, shaker: Floats) -> float:
     """Row of zero displacement that centres what must be seen: beam, and sticker or tip."""
     size = camera.pixel_size
-    height = camera.shape[0] if stage.side in ("below", "above") else camera.shape[1]
-    width = camera.shape[1] if stage.side in ("below", "above") else camera.shape[0]
+    height, width = camera.shape if stage.side in ("below", "above") else camera.shape[::-1]
     margin = 8.0 + 3.0 * camera.blur
     lean = abs(stage.slope) * width / 2.0
     above = beam.max() / size + 0.5 * stage.beam_thickness / size + lean + margin
@@ -882,10 +809,6 @@ def _fitting_row(camera: SyntheticCamera, stage: SyntheticStage, beam: Floats, s
             f"taller region, larger pixels than {size * 1e6:g} um, or give zero_row"
         )
     return (height - 1) / 2.0 + 0.5 * (above - below)
-
-
-# ----------------------------------------------------------------------------------------------------
-# From a simulated run to what a laboratory would have recorded of it: frames, and a vibrometer's signal.
 
 
 def render_run(
@@ -926,10 +849,8 @@ def render_run(
     scale = positive("length_scale", attrs["length_scale"], "m")
     if stage is None:
         plain = SyntheticStage()
-        stage = SyntheticStage(
-            side=attrs.get("side", plain.side),
-            beam_thickness=attrs.get("beam_thickness", plain.beam_thickness),
-        )
+        thickness = attrs.get("beam_thickness", plain.beam_thickness)
+        stage = SyntheticStage(side=attrs.get("side", plain.side), beam_thickness=thickness)
     recording = render_recording(
         dataset["time"].values,
         scale * dataset["displacement_at_striker"].values,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from snapbeam.lab.decay.poles import Line, without_lines
 from snapbeam.lab.diagnostics import KINDS_VIBROMETER
-from snapbeam.lab.least_squares import covariance, phasors, sines, solve
+from snapbeam.lab.least_squares import covariance, phasors, sines, solve, widened
 from snapbeam.lab.sensor_errors import (
     Hypothesis,
     Record,
@@ -26,7 +26,6 @@ from snapbeam.lab.sensor_errors import (
     find_errors,
     noise_colour,
     one_sided,
-    with_loss,
 )
 from snapbeam.lab.signals import SignalSamples, check_signal, make_signal, stretches
 from snapbeam.lab.sine_fit import (
@@ -47,23 +46,33 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# ----------------------------------------------------------------------------------------------------
-# The steady sine of a shaker's record: without its flaws, and with errors that hold its wandering.
-
-
 _PULLED = 1.8  # times the noise by which phases off a line are no chance
 _SMOOTH = 0.6  # of twice the variance, which the square of steps has on average where parts are by chance
 _IN_A_ROW = 5  # steady cycles that end a start-up
+_Array = NDArray[np.float64]
+_MOST = 4
+_HARMONICS = 10
+_ABOVE = 16.0  # times the power about it by which a line stands out
+_LEAST = 0.005  # of the drive's amplitude
+_HUM_ALIKE = 0.35  # of a hum's amplitude by which it may differ at rest
+_SURE = 0.25  # of its amplitude to which a line must be known at rest
+_NOISE_FLOOR = 1e-6
+"""Minimum noise over the amplitude, which prevents rounding errors in the search for the onset."""
+_DEGREES = (0, 1, 2, 3, 5)
+_LONGEST = 4000  # samples that are fitted
+SNR_LIMIT = 15.0
+_STEADY = 0.03  # share by which the cycles of a steady motion may stray
+_SAME_LINE = 0.02  # of the frequency by which the highest line may differ
+_BRIDGED = 5  # frames
 
 
-def robust_fit(samples: SignalSamples, frequency: float, harmonics: int) -> SineFit:
-    """A sine fitted to what is sound of a record: twice, the second time without its flaws."""
-    fit = fit_sine(samples, frequency, harmonics)
-    flaws = find_flaws(samples, fit)
-    if not flaws:
-        return fit
-    keep = sound_samples(samples.values.size, flaws)
-    return fit if keep.mean() < 0.5 else fit_sine(samples, fit.frequency, harmonics, keep=keep)
+def _late_fit(samples: SignalSamples, first: int, last: int, frequency: float) -> SineFit:
+    """The sine of the last two thirds of a motion, twice fitted: the second time without its flaws."""
+    part = samples.part(slice(first + (last - first) // 3, last))
+    fit = fit_sine(part, frequency, 3)
+    flaws = find_flaws(part, fit)
+    keep = sound_samples(part.values.size, flaws)
+    return fit if not flaws or keep.mean() < 0.5 else fit_sine(part, fit.frequency, 3, keep=keep)
 
 
 def steady_fit(samples: SignalSamples, frequency: float) -> tuple[SineFit, list[Flaw], Clipping]:
@@ -85,9 +94,7 @@ def steady_fit(samples: SignalSamples, frequency: float) -> tuple[SineFit, list[
     if keep.mean() < 0.25:
         return dataclasses.replace(fit, amplitude_se=0.5 * fit.amplitude), [], clipping
     inner = fit_sine(samples, fit.frequency, 1, keep=keep)
-    whole = SignalSamples(
-        np.where(cut, inner.waveform(samples.time), samples.values), samples.time, samples.sampling_frequency
-    )
+    whole = samples._replace(values=np.where(cut, inner.waveform(samples.time), samples.values))
     flaws = find_flaws(whole, inner, keep)
     keep &= sound_samples(keep.size, flaws)
     if flaws and keep.mean() > 0.25:
@@ -175,18 +182,6 @@ def _counts(parts: _Array) -> float:
     return 1.0 if total > 0.0 and steps < _SMOOTH * total else float(parts.size)
 
 
-# ----------------------------------------------------------------------------------------------------
-# Lines in a shaker's record beside its own: mains hum, which is there at rest too, and a second motion.
-
-
-_MOST = 4
-_HARMONICS = 10
-_ABOVE = 16.0  # times the power about it by which a line stands out
-_LEAST = 0.005  # of the drive's amplitude
-_HUM_ALIKE = 0.35  # of a hum's amplitude by which it may differ at rest
-_SURE = 0.25  # of its amplitude to which a line must be known at rest
-
-
 class DriveLines(NamedTuple):
     """Lines that are there at rest as well (``hum``), and those ``beside`` the drive that are not, or may not be."""
 
@@ -197,37 +192,27 @@ class DriveLines(NamedTuple):
 def find_drive_lines(samples: SignalSamples, first: int, last: int, rough: SineFit) -> DriveLines:
     """Lines beside a drive and its harmonics, of more than half a percent of its amplitude.
 
-    They are sought in what the sine leaves of the steady motion, and their frequencies fitted together with its own.
-    Hum goes on with the same amplitude and phase through the rest before the start; a record without such a rest
-    cannot tell it from a motion.
-
-    Parameters
-    ----------
-    samples
-        The record.
-    first, last
-        Samples of the moving part.
-    rough
-        The sine of its last two thirds.
+    They are sought in what the sine leaves of the steady motion, from *first* to *last* sample, and their frequencies
+    fitted together with its own.  Hum goes on with the same amplitude and phase through the rest before the start; a
+    record without such a rest cannot tell it from a motion.
     """
     begin = first + (last - first) // 3
-    part = SignalSamples(samples.values[begin:last], samples.time[begin:last], samples.sampling_frequency)
+    part = samples.part(slice(begin, last))
     sound = sound_samples(part.values.size, find_flaws(part, rough))
     rest = slice(0, max(first - 3 * round(samples.sampling_frequency / rough.frequency), 0))
-    base = rough.frequency
-    found: list[float] = []
+    own = [rough.frequency]
     for _ in range(_MOST):
-        left = _left(part, [base, *found], sound)[0]
-        peak = _peak(left, part.sampling_frequency, rough)
+        peak = _peak(_left(part, own, sound)[0], part.sampling_frequency, rough)
         if peak is None:
             break
-        base, *found = _refined(part, [base, *found, peak], sound)
-        apart = min(abs(found[-1] - f) for f in (base, *found[:-1]))
+        own = _refined(part, [*own, peak], sound)
+        apart = min(abs(own[-1] - f) for f in own[:-1])
         if apart * part.values.size < 0.5 * part.sampling_frequency:
             return DriveLines((), ())  # two that cannot be parted are a motion that wanders
+    found = own[1:]
     if not found:
         return DriveLines((), ())
-    moving = phasors(_left(part, [base, *found], sound)[1])[1 : 1 + len(found)]
+    moving = phasors(_left(part, own, sound)[1])[1 : 1 + len(found)]
     still, error = _at_rest(samples, rest, found)
     hum: list[Line] = []
     beside: list[Line] = []
@@ -238,11 +223,6 @@ def find_drive_lines(samples: SignalSamples, first: int, last: int, rough: SineF
     return DriveLines(
         tuple(hum), tuple(line for line in beside if line.amplitude > 2.0 * _LEAST * rough.amplitude)
     )
-
-
-def without_hum(samples: SignalSamples, lines: DriveLines) -> SignalSamples:
-    """A record less its hum."""
-    return without_lines(samples, list(lines.hum)) if lines.hum else samples
 
 
 def beside_lines(steady: SineFit, lines: DriveLines) -> SineFit:
@@ -258,12 +238,7 @@ def beside_lines(steady: SineFit, lines: DriveLines) -> SineFit:
     if pull == 0.0:
         return steady
     share = pull / steady.amplitude
-    return dataclasses.replace(
-        steady,
-        amplitude_se=math.hypot(steady.amplitude_se, pull),
-        phase_se=math.hypot(steady.phase_se, share),
-        frequency_se=math.hypot(steady.frequency_se, share / span),
-    )
+    return widened(steady, amplitude=(pull,), phase=(share,), frequency=(share / span,))
 
 
 def _left(part: SignalSamples, frequencies: list[float], sound: NDArray[np.bool_]) -> tuple[_Array, _Array]:
@@ -300,11 +275,13 @@ def _refined(part: SignalSamples, frequencies: list[float], sound: NDArray[np.bo
     step = part.sampling_frequency / part.values.size
     start = np.array(frequencies)
 
-    def left(off: _Array) -> _Array:
-        return _left(part, (start + step * off).tolist(), sound)[0]
-
     solved = least_squares(
-        left, np.zeros(start.size), bounds=(-1.5, 1.5), x_scale=0.1, diff_step=1e-3, max_nfev=15
+        lambda off: _left(part, (start + step * off).tolist(), sound)[0],
+        np.zeros(start.size),
+        bounds=(-1.5, 1.5),
+        x_scale=0.1,
+        diff_step=1e-3,
+        max_nfev=15,
     )
     return [float(f) for f in start + step * solved.x]
 
@@ -323,19 +300,10 @@ def _at_rest(
     return phasors(solution), np.hypot(spread[1::2], spread[2::2])
 
 
-# ----------------------------------------------------------------------------------------------------
-# When a shaker starts: the likeliest instant, with an interval that is honest for gentle starts.
-#
 # From the start on the motion is a sine whose amplitude and phase are polynomials of time, of degree 0 to 5;
 # before it there is rest.  The likelihood of every instant follows from a linear least squares fit; degrees are
 # weighed by the Bayesian information criterion, so a start that could be a jump or a ramp has the spread of
 # both.
-
-
-_NOISE_FLOOR = 1e-6
-"""Minimum noise over the amplitude, which prevents rounding errors in the search for the onset."""
-_DEGREES = (0, 1, 2, 3, 5)
-_LONGEST = 4000  # samples that are fitted
 
 
 def _level(samples: SignalSamples, frequency: float, width: int) -> _Array:
@@ -384,14 +352,7 @@ def moves_outside(samples: SignalSamples, frequency: float, first: int, last: in
 def find_onset(samples: SignalSamples, first: int, rough: SineFit) -> tuple[float | None, float]:
     """Time [s] the motion starts and its standard error; None where the record begins in motion.
 
-    Parameters
-    ----------
-    samples
-        The record.
-    first
-        First sample of the moving part, up to a few cycles off.
-    rough
-        The steady sine.
+    *first* is the first sample of the moving part, up to a few cycles off.
     """
     width = round(samples.sampling_frequency / rough.frequency)
     if first < max(8, width // 8):
@@ -411,17 +372,14 @@ def find_onset(samples: SignalSamples, first: int, rough: SineFit) -> tuple[floa
     values = samples.values[begin:end:every] - rest(time)
     if time.size < 16:
         return None, 0.0
-    candidates = time[
-        (time >= samples.time[max(early - width, 0)]) & (time < time[-1] - 0.7 / rough.frequency)
-    ]
+    possible = (time >= samples.time[max(early - width, 0)]) & (time < time[-1] - 0.7 / rough.frequency)
+    candidates = time[possible]
     coarse = candidates[:: max(1, candidates.size // 160)]
     scans = [_scan(time, values, coarse, rough.frequency, degree, noise) for degree in _DEGREES]
     step = float(coarse[1] - coarse[0]) if coarse.size > 1 else 1.0 / samples.sampling_frequency
     # once more about the best instants, sample by sample
-    best = {float(coarse[int(np.argmin(scan))]) for scan in scans}
-    near = np.zeros(candidates.size, dtype=bool)
-    for at in best:
-        near |= np.abs(candidates - at) <= 2.0 * step
+    best = np.array([coarse[int(np.argmin(scan))] for scan in scans])
+    near = (np.abs(candidates[:, None] - best) <= 2.0 * step).any(1)
     fine = np.union1d(coarse, candidates[near])
     scans = [_scan(time, values, fine, rough.frequency, degree, noise) for degree in _DEGREES]
     return _weighed(fine, scans, values.size, every / samples.sampling_frequency, width / every)
@@ -490,25 +448,13 @@ def _weighed(
     if unit > 1.0 + 4.0 * math.sqrt(2.0 / freedom):
         unit *= max(0.25 * width, 1.0)
     spacing = np.gradient(starts) if starts.size > 1 else np.ones(1)
-    table = np.array(
-        [
-            (scan - least) / unit + 2.0 * (degree + 1) * math.log(count)
-            for degree, scan in zip(_DEGREES, scans, strict=True)
-        ]
-    )
+    penalty = 2.0 * (np.array(_DEGREES)[:, None] + 1) * math.log(count)
+    table = (np.array(scans) - least) / unit + penalty
     share = np.exp(-0.5 * (table - table.min())) * spacing
     share /= share.sum()
     mean = float((share * starts).sum())
     spread = math.sqrt(float((share * (starts - mean) ** 2).sum()))
     return mean, math.hypot(1.25 * spread, 0.5 * step)  # a quarter more: the likelihood has many hills
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_Array = NDArray[np.float64]
-SNR_LIMIT = 15.0
-_STEADY = 0.03  # share by which the cycles of a steady motion may stray
 
 
 @dataclass(frozen=True)
@@ -668,30 +614,25 @@ def measure_drive(
         )
     guess = spectral_peak(samples) if frequency is None else positive("frequency", frequency, "Hz")
     first, last = moving_part(samples, guess)
-    moving = _slice(samples, first, last)
     outside = moves_outside(samples, guess, first, last)
-    span = moving.values.size / samples.sampling_frequency * guess
+    span = (last - first) / samples.sampling_frequency * guess
     if span < 8.0:
         raise InputError(
             f"signal: the shaker moves for {span:.1f} cycles of {guess:g} Hz: must be at least 8"
         )
-    settled_part = _slice(moving, moving.values.size // 3, None)
-    rough = robust_fit(settled_part, guess, 3)
+    rough = _late_fit(samples, first, last, guess)
     lines = find_drive_lines(samples, first, last, rough)
     if lines.hum:
-        samples = without_hum(samples, lines)
+        samples = without_lines(samples, lines.hum)
         first, last = moving_part(samples, rough.frequency)
-        moving = _slice(samples, first, last)
-        settled_part = _slice(moving, moving.values.size // 3, None)
-        rough = robust_fit(settled_part, rough.frequency, 3)
+        rough = _late_fit(samples, first, last, rough.frequency)
     rest_end = _rest_end(samples, first, rough)
     crosstalk = find_crosstalk(samples, rest_end, rough)
-    onset, uncertainty = find_onset(
-        without_lines(samples, [crosstalk]) if crosstalk is not None else samples, first, rough
-    )
+    quiet = samples if crosstalk is None else without_lines(samples, [crosstalk])
+    onset, uncertainty = find_onset(quiet, first, rough)
     start = float(samples.time[0]) if onset is None else onset
     period = 1.0 / rough.frequency
-    stop = float(moving.time[-1]) + 1.0 / samples.sampling_frequency
+    stop = float(samples.time[last - 1]) + 1.0 / samples.sampling_frequency
     before = 0 if onset is None or crosstalk is not None else int((start - samples.time[0]) * rough.frequency)
     times, cycles = _cycle_phasors(samples, rough, start - before * period, stop)
     early, times, cycles = cycles[:before], times[before:], cycles[before:]
@@ -700,7 +641,7 @@ def measure_drive(
     settled, stray = settled_cycles(cycles, tol)
     margin = 1 if settled == 0 else max(2 * settled, 5)
     begin = start + min(settled + margin, max(settled, cycles.size // 2)) * period
-    part = _slice(samples, *np.searchsorted(samples.time, (begin, stop - 0.25 * period)).tolist())
+    part = samples.part(slice(*np.searchsorted(samples.time, (begin, stop - 0.25 * period)).tolist()))
     steady, flaws, clipping = steady_fit(part, rough.frequency)
     if steady.cycles < 5.0:
         raise InputError(f"signal: only {steady.cycles:.1f} cycles of steady motion: must be at least 5")
@@ -711,7 +652,7 @@ def measure_drive(
     left = part.values - steady.waveform(part.time)
     left[~sound_samples(left.size, flaws)] = 0.0
     others = tuple(line.frequency for line in (*lines.hum, *lines.beside))
-    whole = _slice(samples, *np.searchsorted(samples.time, (start, stop)).tolist())
+    whole = samples.part(slice(*np.searchsorted(samples.time, (start, stop)).tolist()))
     record = Record(steady, part, left, others, times, cycles, early, whole, clipping.found)
     errors = find_errors(record)
     kinds = {one.kind for one in errors if one.matters}
@@ -720,7 +661,9 @@ def measure_drive(
     if "few_bits" in kinds:
         clipping = Clipping(-math.inf, math.inf, 0.0, 0.0)  # whose levels are hit again and again
     for one in errors:
-        steady = with_loss(steady, one.loss, one.shift)
+        steady = widened(
+            steady, amplitude=(one.loss * steady.amplitude,), frequency=(one.shift * steady.frequency,)
+        )
         if one.kind == "low_pass":
             uncertainty = math.hypot(uncertainty, 1e-3 * one.numbers["delay_ms"])
         elif one.kind == "interpolated":
@@ -746,9 +689,7 @@ def measure_drive(
         *diagnostics_of(signal),
         *_flaw_diagnostics(samples, everywhere, broken, clipping),
         *_doubts(steady, limit, wander, stray, frequency, stated),
-        *_start_diagnostics(startup, period),
-        *_line_diagnostics(lines, steady),
-        *_sensor_diagnostics(steady, crosstalk, errors, mean_moves),
+        *_found(startup, period, lines, steady, crosstalk, errors, mean_moves),
         *_not_there(samples, steady, frequency),
         *beyond_shakers(steady, str(signal.attrs["units"])),
         *_against(acceleration, steady, str(signal.attrs["units"])),
@@ -809,12 +750,7 @@ def _flaw_diagnostics(
 
 
 def _doubts(
-    steady: SineFit,
-    limit: float,
-    wander: float,
-    stray: float,
-    frequency: float | None,
-    stated: float | None,
+    steady: SineFit, limit: float, wander: float, stray: float, frequency: float | None, stated: float | None
 ) -> list[Diagnostic]:
     told = []
     noise = steady.noise_rms * math.sqrt(2.0 * steady.cycles / steady.samples) / steady.amplitude
@@ -824,38 +760,33 @@ def _doubts(
     if frequency is not None and abs(steady.frequency - frequency) > max(0.002 * frequency, unsure):
         told.append(KINDS_VIBROMETER["frequency"].found(found=steady.frequency, stated=frequency))
     if stated is not None and abs(steady.amplitude - stated) > max(0.05 * stated, 6.0 * steady.amplitude_se):
-        share = 100.0 * (steady.amplitude / stated - 1.0)
-        told.append(
-            KINDS_VIBROMETER["amplitude"].found(found=steady.amplitude, stated=stated, share_percent=share)
-        )
+        share, found = 100.0 * (steady.amplitude / stated - 1.0), steady.amplitude
+        told.append(KINDS_VIBROMETER["amplitude"].found(found=found, stated=stated, share_percent=share))
     if steady.sinad <= limit:
         cause = "noisy" if steady.snr <= limit else "distorted"
         told.append(KINDS_VIBROMETER[cause].found(sinad_db=steady.sinad, limit_db=limit))
     return told
 
 
-def _line_diagnostics(lines: DriveLines, steady: SineFit) -> list[Diagnostic]:
-    told = []
-    for name, some in (("hum", lines.hum), ("second_line", lines.beside)):
-        for line in some:
-            share = 100.0 * line.amplitude / steady.amplitude
-            told.append(KINDS_VIBROMETER[name].found(frequency=line.frequency, share_percent=share))
-    return told
-
-
-def _rest_end(samples: SignalSamples, first: int, rough: SineFit) -> int:
-    """Samples of the rest before the motion, a cycle left out before it rises out of the noise."""
-    width = round(samples.sampling_frequency / rough.frequency)
-    return max(_quiet_end(samples, first, rough, width) - width, 0) if first > width else 0
-
-
-def _sensor_diagnostics(
+def _found(
+    startup: StartUp | None,
+    period: float,
+    lines: DriveLines,
     steady: SineFit,
     crosstalk: Line | None,
     errors: list[Hypothesis],
     mean_moves: float,
 ) -> list[Diagnostic]:
+    """Diagnostics of the start, of lines and of the electronics."""
     told = []
+    if startup is None:
+        told.append(KINDS_VIBROMETER["no_rest"].found())
+    elif startup.onset_uncertainty > 0.05 * period:
+        told.append(KINDS_VIBROMETER["slow_start"].found(uncertainty_ms=1e3 * startup.onset_uncertainty))
+    for name, some in (("hum", lines.hum), ("second_line", lines.beside)):
+        for line in some:
+            share = 100.0 * line.amplitude / steady.amplitude
+            told.append(KINDS_VIBROMETER[name].found(frequency=line.frequency, share_percent=share))
     if crosstalk is not None:
         share = 100.0 * crosstalk.amplitude / steady.amplitude
         told.append(KINDS_VIBROMETER["crosstalk"].found(share_percent=share))
@@ -865,6 +796,12 @@ def _sensor_diagnostics(
     return told
 
 
+def _rest_end(samples: SignalSamples, first: int, rough: SineFit) -> int:
+    """Samples of the rest before the motion, a cycle left out before it rises out of the noise."""
+    width = round(samples.sampling_frequency / rough.frequency)
+    return max(_quiet_end(samples, first, rough, width) - width, 0) if first > width else 0
+
+
 def _against(acceleration: xr.DataArray | None, steady: SineFit, units: str) -> list[Diagnostic]:
     """Diagnostics against the acceleration of the same shaker, if it is given."""
     if acceleration is None:
@@ -872,12 +809,7 @@ def _against(acceleration: xr.DataArray | None, steady: SineFit, units: str) -> 
     samples = check_signal(acceleration, "m/s^2", "acceleration")
     guess = spectral_peak(samples)
     first, last = moving_part(samples, guess)
-    return beside_acceleration(
-        steady, units, robust_fit(_slice(samples, first + (last - first) // 3, last), guess, 3)
-    )
-
-
-_SAME_LINE = 0.02  # of the frequency by which the highest line may differ
+    return beside_acceleration(steady, units, _late_fit(samples, first, last, guess))
 
 
 def _not_there(samples: SignalSamples, steady: SineFit, frequency: float | None) -> list[Diagnostic]:
@@ -885,22 +817,10 @@ def _not_there(samples: SignalSamples, steady: SineFit, frequency: float | None)
     if frequency is None or steady.sinad > 0.0:
         return []
     found = spectral_peak(samples)
-    length = samples.values.size / samples.sampling_frequency
+    length = samples.duration
     if abs(found - frequency) < max(_SAME_LINE * frequency, 2.0 / length):
         return []
     return [KINDS_VIBROMETER["not_there"].found(stated=frequency, found=found)]
-
-
-def _start_diagnostics(startup: StartUp | None, period: float) -> list[Diagnostic]:
-    if startup is None:
-        return [KINDS_VIBROMETER["no_rest"].found()]
-    if startup.onset_uncertainty > 0.05 * period:
-        return [KINDS_VIBROMETER["slow_start"].found(uncertainty_ms=1e3 * startup.onset_uncertainty)]
-    return []
-
-
-def _slice(samples: SignalSamples, first: int, last: int | None) -> SignalSamples:
-    return SignalSamples(samples.values[first:last], samples.time[first:last], samples.sampling_frequency)
 
 
 def _cycle_phasors(samples: SignalSamples, fit: SineFit, start: float, stop: float) -> tuple[_Array, Any]:
@@ -918,10 +838,6 @@ def _cycle_phasors(samples: SignalSamples, fit: SineFit, start: float, stop: flo
         )
     middle: _Array = start + (np.arange(count, dtype=np.float64) + 0.5) * period
     return middle, found
-
-
-# ----------------------------------------------------------------------------------------------------
-# From the shaker's velocity to its displacement, without drift and without the flaws of the record.
 
 
 def displacement_from_velocity(
@@ -987,7 +903,7 @@ def mended(samples: SignalSamples, drive: DriveMeasurement) -> SignalSamples:
     In steady motion that is the steady sine; in the start-up cut tops follow from a sine of changing amplitude
     through what is left of the two cycles about them.
     """
-    samples = without_hum(samples, drive.lines)
+    samples = without_lines(samples, drive.lines.hum)
     if not drive.flaws and not drive.clipping.found:
         return samples
     values = samples.values.copy()
@@ -1001,7 +917,7 @@ def mended(samples: SignalSamples, drive: DriveMeasurement) -> SignalSamples:
     values[late] = model[late]
     for first, last in stretches(early):
         values[first:last] = _about(samples, drive, first, last, ~(cut | bad))
-    return SignalSamples(values, samples.time, samples.sampling_frequency)
+    return samples._replace(values=values)
 
 
 def _about(
@@ -1023,13 +939,6 @@ def _about(
         return samples.values[first:last]
     solution = np.linalg.lstsq(design(since[used]), samples.values[used] - drive.steady.offset, rcond=None)[0]
     return drive.steady.offset + design(since[first:last]) @ solution
-
-
-# ----------------------------------------------------------------------------------------------------
-# The shaker's motion as the camera saw it, as a signal on the camera's clock.
-
-
-_BRIDGED = 5  # frames
 
 
 def shaker_signal(tracked: xr.Dataset) -> xr.DataArray:

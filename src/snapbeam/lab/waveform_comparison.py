@@ -30,21 +30,22 @@ from snapbeam.util.validation import (
 if TYPE_CHECKING:
     import xarray as xr
 
-
-# ----------------------------------------------------------------------------------------------------
-# When the excitation of a measured run starts, read from its own shaker.
+_Array = NDArray[np.float64]
+_APART = 0.1  # b, by which two beams must differ to have parted
+_SHIFTED = 0.15  # cycles by which a known start may be off
+_RATIO = 0.05  # share by which the shakers' amplitudes may differ
+_BAND = ("simulated_low", "simulated_high")
+_LEAST_RUNS = 20  # for quantiles of 5 and 95 %
+_PLACES = ("displacement_at_striker", "midspan_displacement")
+_HYSTERESIS = 5.0  # in standard deviations of the noise
+TOO_SHORT = "too short"
+"""First words of the reason that too few cycles were recorded; the status of such a test."""
+LEAST_CYCLES = 20  # the rule of more than n/5 crossings in n cycles means nothing below n = 5
+_WHOLE = 0.98  # share of the wanted cycles that counts as all of them
 
 
 def start_of_shaker(run: xr.Dataset, frequency: float) -> float | None:
-    """The time [s] at which the shaker starts to move, where the run shows it at rest before; else None.
-
-    Parameters
-    ----------
-    run : xarray.Dataset
-        A run with ``striker_displacement`` over ``time`` [s].
-    frequency : float
-        Of the excitation [Hz].
-    """
+    """The time [s] at which the shaker of a run starts to move, where the run shows it at rest before; else None."""
     time = np.asarray(run["time"].values, dtype=np.float64)
     values = np.asarray(run["striker_displacement"].values, dtype=np.float64)
     known = np.isfinite(values)
@@ -58,17 +59,6 @@ def start_of_shaker(run: xr.Dataset, frequency: float) -> float | None:
     except InputError:
         return None
     return None if startup is None else startup.onset
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_Array = NDArray[np.float64]
-_APART = 0.1  # b, by which two beams must differ to have parted
-_SHIFTED = 0.15  # cycles by which a known start may be off
-_RATIO = 0.05  # share by which the shakers' amplitudes may differ
-_BAND = ("simulated_low", "simulated_high")
-_LEAST_RUNS = 20  # for quantiles of 5 and 95 %
 
 
 @dataclass(frozen=True)
@@ -106,30 +96,11 @@ class WaveformComparison:
     within: float = math.nan
 
 
-_PLACES = ("displacement_at_striker", "midspan_displacement")
-
-
 def run_of_signal(signal: xr.DataArray, length: float, at: str = "midspan_displacement") -> xr.Dataset:
     """A measured displacement as a run, without a shaker.
 
-    Parameters
-    ----------
-    signal : xarray.DataArray
-        Displacement [m] over ``time`` [s], zero midway between the wells (see :func:`read_signal`).
-    length : float
-        Length scale b of the structure [m].
-    at : {"midspan_displacement", "displacement_at_striker"}
-        Where it was measured.
-
-    Returns
-    -------
-    xarray.Dataset
-        Displacement over b.
-
-    Raises
-    ------
-    InputError
-        If the signal is no displacement.
+    The signal is a displacement [m], zero midway between the wells, measured *at* midspan or at the shaker; *length* is
+    the length scale b of the structure [m], over which the run is.
     """
     from snapbeam.util.datasets import xr
 
@@ -244,16 +215,13 @@ def compare_waveforms(
     low = float(clock[np.searchsorted(clock, low)])  # a sample, so that no measured value lies between two
     step = max(float(np.median(np.diff(clock))), 1.0 / 400.0)
     grid = np.asarray(low + step * np.arange(int((high - low) / step + 1e-9) + 1), dtype=np.float64)
-    columns = {
-        "measured_displacement": _on(grid, clock, measured[at].values),
-        "simulated_displacement": _on(grid, model_clock, simulated[at].values),
-        "measured_shaker": np.full(grid.size, np.nan),
-        "simulated_shaker": np.full(grid.size, np.nan),
-    }
-    if shaker_seen:
-        columns["measured_shaker"] = _on(grid, clock, measured["striker_displacement"].values)
-    if "striker_displacement" in simulated:
-        columns["simulated_shaker"] = _on(grid, model_clock, simulated["striker_displacement"].values)
+    columns = {}
+    for word, name in (("displacement", at), ("shaker", "striker_displacement")):
+        for kind, run, cycle in (("measured", measured, clock), ("simulated", simulated, model_clock)):
+            seen_here = name in run
+            columns[f"{kind}_{word}"] = (
+                _on(grid, cycle, run[name].values) if seen_here else np.full(grid.size, np.nan)
+            )
     waveforms = xr.Dataset(
         {name: ("cycle", value, {"units": "1"}) for name, value in columns.items()},
         {"cycle": ("cycle", grid, {"long_name": "cycles of excitation", "units": "1"})},
@@ -280,7 +248,9 @@ def compare_waveforms(
         diagnostics = _diagnostics(columns, grid, shift, ratio, start is not None or frequency is None)
     else:
         diagnostics = [KINDS_COMPARISON["no_shaker"].found()]
-    diagnostics += _gaps(columns)
+    missing = float(np.mean(~np.isfinite(one)))
+    if missing > 0.1:
+        diagnostics.append(KINDS_COMPARISON["gaps"].found(share_percent=100.0 * missing))
     return WaveformComparison(
         waveforms=waveforms,
         spectra=_spectra(grid, step, columns),
@@ -324,23 +294,16 @@ def _diagnostics(
 ) -> list[Diagnostic]:
     """Diagnostics of a comparison from the two shaker motions; *started*: their first cycle is known."""
     told = []
+    same = _same_way(columns, grid, shift)
     if not started:
         told.append(KINDS_COMPARISON["no_start"].found())
-    else:
-        same = _same_way(columns, grid, shift)
-        if abs(abs(shift) - 0.5) < 0.2 and same < -0.5:
-            told.append(KINDS_COMPARISON["turned_over"].found(correlation=same))
-        elif abs(shift) > _SHIFTED:
-            told.append(KINDS_COMPARISON["shifted"].found(shift=shift))
+    elif abs(abs(shift) - 0.5) < 0.2 and same < -0.5:
+        told.append(KINDS_COMPARISON["turned_over"].found(correlation=same))
+    elif abs(shift) > _SHIFTED:
+        told.append(KINDS_COMPARISON["shifted"].found(shift=shift))
     if abs(ratio - 1.0) > _RATIO:
         told.append(KINDS_COMPARISON["amplitude"].found(ratio=ratio))
     return told
-
-
-def _gaps(columns: dict[str, _Array]) -> list[Diagnostic]:
-    """Diagnostic for a large fraction of missing measured displacements."""
-    missing = float(np.mean(~np.isfinite(columns["measured_displacement"])))
-    return [KINDS_COMPARISON["gaps"].found(share_percent=100.0 * missing)] if missing > 0.1 else []
 
 
 def _same_way(columns: dict[str, _Array], grid: _Array, shift: float) -> float:
@@ -425,19 +388,9 @@ def _impacts(onsets: _Array, start: float, rate: float, shift: float, low: float
     return at[(at >= low) & (at <= high)]
 
 
-# ----------------------------------------------------------------------------------------------------
-# Response class of a measured run, by the rules used for simulations, or why it cannot be told.
-#
 # A measured displacement is noisy and may be short or have dropouts.  A crossing of zero counts only when the
 # displacement has gone beyond a hysteresis on the other side, several times the noise; what dropouts could hide
 # and what a record too short cannot show leave the class unknown, with the reason.
-
-
-_HYSTERESIS = 5.0  # in standard deviations of the noise
-TOO_SHORT = "too short"
-"""First words of the reason that too few cycles were recorded; the status of such a test."""
-LEAST_CYCLES = 20  # the rule of more than n/5 crossings in n cycles means nothing below n = 5
-_WHOLE = 0.98  # share of the wanted cycles that counts as all of them
 
 
 @dataclass(frozen=True)
@@ -521,7 +474,7 @@ def measure_response(
     >>> lab.measure_response(run.dataset, cycles=20).zero_crossings
     16
     """
-    choice("at", at, ("displacement_at_striker", "midspan_displacement"))
+    choice("at", at, _PLACES)
     check_trajectory(run, require=(at,))
     wanted = integer("cycles", cycles, 1)
     time = np.asarray(run["time"].values, dtype=np.float64)
@@ -546,11 +499,9 @@ def measure_response(
 
     side, crossed = _crossings(shown, hysteresis)
     total = min(float(covered[-1]), float(wanted))
-    inside = covered[crossed] <= wanted
-    crossed = crossed[inside]
+    crossed = crossed[covered[crossed] <= wanted]
     late = int(np.count_nonzero(covered[crossed] > 0.75 * wanted))
-    last_index = int(np.flatnonzero(covered <= wanted)[-1])
-    final = int(side[last_index])
+    final = int(side[np.flatnonzero(covered <= wanted)[-1]])
     first = int(side[np.flatnonzero(side)[0]]) if side.any() else 0
 
     gaps = np.diff(covered)
@@ -568,11 +519,13 @@ def measure_response(
     typical = float(np.median(gaps)) if gaps.size else 0.0
     if longest > max(0.25, 4.0 * typical) and not certain_continuous:
         reasons.append(f"a dropout of {longest:.2f} cycles could hide crossings")
-    response = ResponseClass.UNKNOWN
-    if not reasons:
-        response = ResponseClass(int(classify(crossed.size, late, wanted, -first * final)))
+    told = (
+        ResponseClass.UNKNOWN
+        if reasons
+        else ResponseClass(int(classify(crossed.size, late, wanted, -first * final)))
+    )
     return MeasuredResponse(
-        response_class=response,
+        response_class=told,
         zero_crossings=int(crossed.size),
         zero_crossings_last_quarter=late,
         last_zero_crossing=float(when[crossed[-1]]) if crossed.size else math.nan,
@@ -602,5 +555,4 @@ def _crossings(values: _Array, hysteresis: float) -> tuple[NDArray[np.int8], NDA
     index = np.where(beyond != 0, np.arange(values.size), -1)
     held = np.maximum.accumulate(index)
     side = np.where(held >= 0, beyond[np.maximum(held, 0)], 0).astype(np.int8)
-    changes = np.flatnonzero((side[1:] != side[:-1]) & (side[:-1] != 0)) + 1
-    return side, changes
+    return side, np.flatnonzero((side[1:] != side[:-1]) & (side[:-1] != 0)) + 1

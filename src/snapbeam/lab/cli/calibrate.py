@@ -137,9 +137,8 @@ def calibrate(
     beam = settings.model.beam
     assert beam is not None
     chosen = tuple(name.strip() for name in fit.split(",")) if fit else None
-    result = fit_beam(
-        Measurements(**given), beam, fit=chosen, modes=settings.model.modes, imperfection=imperfection
-    )
+    count = settings.model.modes
+    result = fit_beam(Measurements(**given), beam, fit=chosen, modes=count, imperfection=imperfection)
     console = out()
     for name in result.values:
         console.print(f"  {name:<20}{with_error(result, name)}")
@@ -201,10 +200,9 @@ def _contact_tests(
         raise InputError(f"{path}: {found.diagnostics[0].message}")
     # one collision at 1 m/s that stands for all
     duration = HERTZ_TIME * (1.25 * effective_mass / found.stiffness) ** 0.4
-    share = (
-        found.stiffness_se / found.stiffness / 2.69
-    )  # a test's error of both its numbers gives 2.69 times itself
+    # a test's error of both its numbers gives 2.69 times itself
+    share = max(found.stiffness_se / found.stiffness / 2.69, 1e-6)
     test = ContactTest(
-        closing_speed=1.0, duration=duration, effective_mass=effective_mass, relative_error=max(share, 1e-6)
+        closing_speed=1.0, duration=duration, effective_mass=effective_mass, relative_error=share
     )
     return (test,), found.diagnostics

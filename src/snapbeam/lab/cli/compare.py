@@ -81,16 +81,9 @@ def compare(
         else:
             signal = lab.open_signal(measured, channel, units, sensitivity, sampling_frequency, columns)
             run = run_of_signal(signal, float(dataset.attrs["length_scale"]), _AT[place])
-        summary, figure, diagnostics = _run(
-            run,
-            dataset,
-            frequency,
-            start,
-            cycles,
-            _AT[place],
-            opt.parse_window(window),
-            ("overlay" if overlay else "beside") if plot is not None else "",
-        )
+        draw = ("overlay" if overlay else "beside") if plot is not None else ""
+        part = opt.parse_window(window)
+        summary, figure, diagnostics = _run(run, dataset, frequency, start, cycles, _AT[place], part, draw)
     if plot is not None and figure is not None:
         lab.save_plot(figure, plot)
     if strict:
@@ -101,16 +94,7 @@ def compare(
 def _map(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | None, tuple[Diagnostic, ...]]:
     from rich.table import Table
 
-    from snapbeam.lab.map_comparison import compare_measured_points
-    from snapbeam.sweeps.measured_points import read_measured_points
-
-    attrs = dataset.attrs
-    points = read_measured_points(
-        path,
-        reference_frequency=attrs.get("reference_frequency"),
-        buckling_level=attrs.get("beam_buckling_level"),
-    )
-    result = compare_measured_points(points, dataset)
+    points, result = lab.map_comparison(dataset, path)
     console = out()
     low, high = result.agreement_interval
     if result.used:
@@ -126,9 +110,7 @@ def _map(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | No
     for kind, row in zip(result.classes, result.confusion, strict=True):
         table.add_row(_short(kind), *map(str, row))
     console.print(table)
-    for note in result.notes:
-        console.print(f"[yellow]note[/] {note}")
-    lab.print_diagnostics(console, result.diagnostics)
+    lab.print_notes(result)
     figure = None
     if draw:
         from snapbeam.lab.plot.comparison import plot_map_comparison

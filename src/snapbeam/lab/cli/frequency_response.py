@@ -52,16 +52,13 @@ def frequency_response(
 
     lab.check_files(FIGURE_SUFFIXES, plot=plot)
     lab.check_files((".nc",), output=output)
-    pair = [
-        lab.open_signal(signal, channel, None, None, sampling_frequency, columns)
-        for channel in (excitation, response)
-    ]
+    channels = (excitation, response)
+    pair = [lab.open_signal(signal, channel, None, None, sampling_frequency, columns) for channel in channels]
     found = estimate(*pair, resolution=resolution, estimator=estimator)
     coherent = found["coherence"] > found.attrs["coherence_limit"]
     top = found.isel(frequency=int(np.argmax(found["magnitude"].where(coherent, 0.0).values)))
-    peak = {
-        name: float(top[name]) for name in ("frequency", "magnitude", "magnitude_se", "phase", "coherence")
-    }
+    names = ("frequency", "magnitude", "magnitude_se", "phase", "coherence")
+    peak = {name: float(top[name]) for name in names}
     console = out()
     unit = found["magnitude"].attrs["units"]
     console.print(

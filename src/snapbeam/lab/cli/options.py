@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from snapbeam.lab.map_comparison import MapComparison
+    from snapbeam.sweeps.measured_points import MeasuredPoints
     from snapbeam.util.diagnostics import Diagnostic
 
 
@@ -100,6 +102,23 @@ def open_signal(
         sampling_frequency=sampling_frequency,
         columns=columns,
     )
+
+
+def map_comparison(dataset: xr.Dataset, measured: Path) -> tuple[MeasuredPoints, MapComparison]:
+    """Compare a table of measured responses with a map, in the units of its beam."""
+    from snapbeam.lab.map_comparison import compare_measured_points
+    from snapbeam.sweeps.measured_points import read_measured_points
+
+    first, level = dataset.attrs.get("reference_frequency"), dataset.attrs.get("beam_buckling_level")
+    points = read_measured_points(measured, reference_frequency=first, buckling_level=level)
+    return points, compare_measured_points(points, dataset)
+
+
+def print_notes(result: MapComparison) -> None:
+    """Print the points of a comparison that do not count, and its diagnostics."""
+    for note in result.notes:
+        out().print(f"[yellow]note[/] {note}")
+    print_diagnostics(out(), result.diagnostics)
 
 
 def print_diagnostics(console: Console, diagnostics: Iterable[Diagnostic]) -> None:

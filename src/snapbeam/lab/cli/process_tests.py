@@ -138,26 +138,16 @@ def _tell(done: int, total: int, result: Any) -> None:
 def _on_map(target: Path, simulated: Path) -> Path:
     """Draw the responses on a map, and print the fraction that agrees."""
     from snapbeam.cli.console import open_result
-    from snapbeam.lab.map_comparison import compare_measured_points
     from snapbeam.lab.plot.comparison import plot_map_comparison
     from snapbeam.plot.style import save_figure
-    from snapbeam.sweeps.measured_points import read_measured_points
 
     dataset = open_result(simulated)
-    points = read_measured_points(
-        target / "tests.csv",
-        reference_frequency=dataset.attrs.get("reference_frequency"),
-        buckling_level=dataset.attrs.get("beam_buckling_level"),
-    )
-    result = compare_measured_points(points, dataset)
-    console = out()
+    points, result = lab.map_comparison(dataset, target / "tests.csv")
     if result.used:
         low, high = result.agreement_interval
-        console.print(
+        out().print(
             f"{100 * result.agreement:.0f} % of {result.used} agree with the map "
             f"(95 %: {100 * low:.0f} to {100 * high:.0f} %)"
         )
-    for note in result.notes:
-        console.print(f"[yellow]note[/] {note}")
-    lab.print_diagnostics(console, result.diagnostics)
+    lab.print_notes(result)
     return save_figure(plot_map_comparison(dataset, points, result), target / "measurements.png")

@@ -40,35 +40,25 @@ class FitResult(NamedTuple):
     noise_rms: float
 
 
+class FitSettings(NamedTuple):
+    """Unit of the signal, which tells displacement from velocity, and whether frequencies may depend on amplitude.
+
+    ``known`` are the softening kappa of the first mode and its standard deviation, known beforehand.
+    """
+
+    units: str
+    soften: bool
+    known: tuple[float, float] | None
+
+
 def fit_decay(
-    samples: SignalSamples,
-    guesses: list[ModeEstimate],
-    units: str,
-    *,
-    soften: bool = True,
-    known: tuple[float, float] | None = None,
-    law: DampingLaw | None = None,
+    samples: SignalSamples, guesses: list[ModeEstimate], settings: FitSettings, law: DampingLaw | None = None
 ) -> FitResult:
     """Fit decaying modes to a signal, starting from *guesses* (the first is the one that softens most).
 
-    Parameters
-    ----------
-    samples : SignalSamples
-    guesses : list of ModeEstimate
-    units : str
-        Unit of the signal; tells displacement from velocity.
-    soften : bool
-        True if frequencies may depend on amplitude.
-    known : (float, float), optional
-        Softening kappa of the first mode and its standard deviation, known beforehand.
-    law : DampingLaw, optional
-        A second law by which the first mode is damped; its strength is fitted too.
-
-    Raises
-    ------
-    InputError
-        If lmfit finds no minimum, or is not there.
+    *law* is a second one by which the first mode is damped; its strength is fitted too.
     """
+    units, soften, known = settings
     try:
         import lmfit
     except ImportError as missing:
@@ -79,12 +69,8 @@ def fit_decay(
     prior = law_priors(units)
     parameters = lmfit.Parameters()
     for i, guess in enumerate(guesses):
-        parameters.add(
-            f"f{i}",
-            guess.natural_frequency,
-            min=0.5 * guess.natural_frequency,
-            max=1.5 * guess.natural_frequency,
-        )
+        freq = guess.natural_frequency
+        parameters.add(f"f{i}", freq, min=0.5 * freq, max=1.5 * freq)
         parameters.add(f"z{i}", max(guess.damping_ratio, 1e-6), min=1e-9, max=0.5)
         if soften:
             start = guess.softening * guesses[0].amplitude ** 2
@@ -109,18 +95,16 @@ def fit_decay(
                 parts.append(np.array([(value["s0"] / square - known[0]) / known[1]]))
         return np.concatenate(parts)
 
-    def wrapped(p: lmfit.Parameters) -> _Array:
-        return residual(p.valuesdict())
-
-    search = lmfit.Minimizer(wrapped, parameters, scale_covar=False, calc_covar=False)
+    search = lmfit.Minimizer(
+        lambda p: residual(p.valuesdict()), parameters, scale_covar=False, calc_covar=False
+    )
     value = dict(search.leastsq(xtol=1e-9, ftol=1e-9).params.valuesdict())
     design = _design(t, value, len(guesses), soften, name)
     solution = solve(design, y, 1e-12)
     rest = y - design @ solution
     fitted = [value[f"f{i}"] for i in range(len(guesses))]
-    lines = [0.0, *fitted, *(2.0 * f for f in fitted)]
     free = design.shape[1] + len(parameters)
-    near = [math.sqrt(white_variance(rest, samples.sampling_frequency, f, lines, free)) for f in fitted]
+    near = [noise_near(samples.sampling_frequency, rest, f, fitted, free) for f in fitted]
     sigma = max(near[0], trifle)
     error = _errors(residual, value)
     linear = sigma * np.sqrt(np.diag(covariance(design, 1e-12)))
@@ -170,10 +154,14 @@ def explain(samples: SignalSamples, modes: list[ModeEstimate], units: str, softe
     rest = samples.values - design @ solution
     free = design.shape[1] + 3 * len(modes)
     frequencies = [mode.natural_frequency for mode in modes]
-    lines = [0.0, *frequencies, *(2.0 * f for f in frequencies)]
-    near = math.sqrt(white_variance(rest, samples.sampling_frequency, frequencies[-1], lines, free))
+    near = noise_near(samples.sampling_frequency, rest, frequencies[-1], frequencies, free)
     alone = _alone(design, solution, rest, _columns(len(modes), soften))
     return FitResult(modes, rest, alone, near, math.sqrt(float(rest @ rest) / max(t.size - free, 1)))
+
+
+def noise_near(rate: float, rest: _Array, frequency: float, fitted: list[float], free: int) -> float:
+    """Standard deviation of the noise near a frequency [Hz], the fitted modes and their second harmonics left out."""
+    return math.sqrt(white_variance(rest, rate, frequency, [0.0, *fitted, *(2.0 * f for f in fitted)], free))
 
 
 def _errors(residual: Callable[[dict[str, float]], _Array], value: dict[str, float]) -> dict[str, float]:
@@ -239,5 +227,4 @@ def _alone(design: _Array, solution: _Array, rest: _Array, columns: list[int]) -
     first = np.ones(solution.size, dtype=bool)
     for column in columns[1:]:
         first[column : column + 2] = False
-    alone: _Array = rest + design[:, first] @ solution[first]
-    return alone
+    return np.asarray(rest + design[:, first] @ solution[first], dtype=np.float64)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.lab.decay.fit import FitResult, explain
+from snapbeam.lab.decay.fit import FitResult, FitSettings, explain, noise_near
 from snapbeam.lab.decay.joint_fit import fit_modes, mode_by_cycles
 from snapbeam.lab.decay.model import Cycles, DecayFit, ModeEstimate, backbone, noise_level, regress
 from snapbeam.lab.decay.poles import without_poles
@@ -22,12 +22,11 @@ from snapbeam.lab.decay.residual_diagnostics import (
     judged,
     misfit_of,
     sampled_diagnostics,
-    widened,
+    with_doubts,
 )
 from snapbeam.lab.decay.window import find_centres, noise_fall, prepared, undone, unexplained
 from snapbeam.lab.diagnostics import KINDS_DECAY
 from snapbeam.lab.signals import SignalSamples, check_signal
-from snapbeam.lab.sine_fit import white_variance
 from snapbeam.util.diagnostics import diagnostics_of
 from snapbeam.util.validation import InputError, choice, finite_array, integer, positive
 
@@ -109,14 +108,10 @@ def identify_decay(
     units = str(signal.attrs["units"])
     choice("method", method, METHODS)
     count = integer("modes", modes, 1, 10)
-    asked = (
-        None
-        if frequencies is None
-        else [
-            positive(f"frequencies[{i}]", f, "Hz")
-            for i, f in enumerate(np.atleast_1d(finite_array("frequencies", frequencies)).tolist())
-        ]
-    )
+    asked = None
+    if frequencies is not None:
+        given = np.atleast_1d(finite_array("frequencies", frequencies)).tolist()
+        asked = [positive(f"frequencies[{i}]", f, "Hz") for i, f in enumerate(given)]
     if asked == []:
         raise InputError("frequencies = []: must hold at least one frequency, Hz")
     samples = check_signal(signal)
@@ -125,15 +120,15 @@ def identify_decay(
     decay = prepared(samples, start, stop, buckling_level is not None)
     centres = find_centres(decay, count, asked)
     told = list(centres.told)
-    known = _known_softening(buckling_level, units, centres.wanted[0])
+    settings = FitSettings(units, soften, _known_softening(buckling_level, units, centres.wanted[0]))
     diagram = centres.diagram
     if method == "fit":
-        samples, result, cycles, more, diagram = fit_modes(decay, centres, units, soften, known)
+        samples, result, cycles, more, diagram = fit_modes(decay, centres, settings)
         told += more
         if diagram is None and unexplained(result.residual, samples.sampling_frequency):
             # other modes are in the record: once more with them known
             centres = find_centres(decay, 1, [result.modes[0].natural_frequency])
-            samples, result, cycles, told, diagram = fit_modes(decay, centres, units, soften, known)
+            samples, result, cycles, told, diagram = fit_modes(decay, centres, settings)
     else:
         samples = without_poles(decay.samples, centres.far, centres.own)
         result, cycles = _by_cycles(samples, centres.wanted, units, soften, method)
@@ -144,7 +139,7 @@ def identify_decay(
     wanted = tuple(estimates[: len(centres.wanted)])
     doubts += diagnostics_about(samples, wanted, result.noise_near, soften)
     doubts += sampled_diagnostics(wanted, decay.samples.sampling_frequency)
-    left = SignalSamples(result.residual, samples.time, samples.sampling_frequency)
+    left = samples._replace(values=result.residual)
     omega = 2.0 * math.pi * wanted[0].natural_frequency
     falls = noise_fall(left, wanted[0].natural_frequency, omega * wanted[0].damping_ratio)
     if falls is not None:
@@ -154,11 +149,10 @@ def identify_decay(
             if falls.even
             else KINDS_DECAY["fade"].found(factor=falls.factor, added_percent=added)
         )
-    wanted = widened(wanted, decay.doubt, falls.rate if falls is not None else 0.0)
+    wanted = with_doubts(wanted, decay.doubt, falls.rate if falls is not None else 0.0)
     free = [mode.natural_frequency for mode in wanted]
-    lines = [0.0, *free, *(2.0 * f for f in free)]
-    near = white_variance(result.residual, samples.sampling_frequency, free[0], lines, 3 * len(free))
-    top = noise_level(SignalSamples(result.residual, samples.time, samples.sampling_frequency))
+    near = noise_near(samples.sampling_frequency, result.residual, free[0], free, 3 * len(free))
+    top = noise_level(left)
     amplitude, freq, freq_se = backbone(cycles)
     power = wanted[0].amplitude ** 2 / 2.0
     return DecayFit(
@@ -168,7 +162,7 @@ def identify_decay(
         start=float(samples.time[0]),
         stop=float(samples.time[-1]),
         units=units,
-        residual_whiteness=math.sqrt(near) / top if top > 0.0 else 1.0,
+        residual_whiteness=near / top if top > 0.0 else 1.0,
         misfit=misfit.ratio,
         lines=decay.lines,
         poles=diagram,
@@ -199,7 +193,7 @@ def _by_cycles(
         heard = cycles._replace(noise=cycles.noise * result.noise_near / sigma) if sigma > 0.0 else cycles
         found[-1] = regress(heard, float(samples.time[0]), units, method, soften and len(found) == 1)
         result = result._replace(modes=list(found))
-        rest = SignalSamples(result.residual, samples.time, samples.sampling_frequency)
+        rest = samples._replace(values=result.residual)
     assert kept is not None and result is not None
     return result, kept
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
 
-from snapbeam.lab.decay.fit import FitResult, explain, fit_decay
+from snapbeam.lab.decay.fit import FitResult, FitSettings, explain, fit_decay
 from snapbeam.lab.decay.model import (
     Cycles,
     DampingLaw,
@@ -18,10 +17,19 @@ from snapbeam.lab.decay.model import (
     peak_cycles,
     regress,
 )
-from snapbeam.lab.decay.poles import Pole, Stabilisation, find_poles, thinned, without_poles
+from snapbeam.lab.decay.poles import (
+    Line,
+    Pole,
+    Stabilisation,
+    find_poles,
+    thinned,
+    without_lines,
+    without_poles,
+)
 from snapbeam.lab.decay.residual_diagnostics import misfit_of
 from snapbeam.lab.decay.window import CLOSE, ENERGY, Centres, Decay
 from snapbeam.lab.diagnostics import KINDS_DECAY
+from snapbeam.lab.least_squares import widened
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import fit_sine
 from snapbeam.util.diagnostics import Diagnostic
@@ -32,20 +40,8 @@ _CANCEL = 1.0  # of the range of a record that the amplitude of a mode may reach
 _MANY = 12_000  # samples from which a record is thinned before it is fitted
 
 
-def _thinned(samples: SignalSamples, highest: float) -> SignalSamples:
-    """A long record at fourteen samples or more to the shortest period."""
-    factor = int(samples.sampling_frequency / (14.0 * highest))
-    if samples.values.size < _MANY or factor < 2:
-        return samples
-    return thinned(samples, max(min(factor, samples.values.size // 3000), 1))
-
-
 def fit_modes(
-    decay: Decay,
-    centres: Centres,
-    units: str,
-    soften: bool,
-    known: tuple[float, float] | None,
+    decay: Decay, centres: Centres, settings: FitSettings
 ) -> tuple[SignalSamples, FitResult, Cycles, list[Diagnostic], Stabilisation | None]:
     """The modes fitted, those that lie close together and, in a short record, all of them, at once.
 
@@ -65,10 +61,13 @@ def fit_modes(
         beside = [pole for pole in centres.near if any(abs(pole.frequency / f - 1.0) < CLOSE for f in group)]
         away = [pole for pole in centres.near if pole not in beside]
         part = without_poles(clean, [*others, *away] if len(groups) > 1 else away, [*mine, *beside])
-        part = _thinned(part, max([*group, *(pole.frequency for pole in beside)]))
-        result, cycles, more, diagram = _group_fit(part, group, mine, beside, units, soften, known, diagram)
-        part, result, cycles, again = _lines_again(decay, part, result, cycles, units, soften, known)
-        told += [one for one in more if not again or one.code != KINDS_DECAY["misfit"].code]
+        # a long record at fourteen samples or more to the shortest period
+        factor = int(part.sampling_frequency / (14.0 * max([*group, *(pole.frequency for pole in beside)])))
+        if part.values.size >= _MANY and factor >= 2:
+            part = thinned(part, max(min(factor, part.values.size // 3000), 1))
+        result, cycles, more, diagram = _group_fit(part, group, mine, beside, settings, diagram)
+        part, result = _lines_again(decay, part, result, settings)
+        told += more
         found |= dict(zip(group, result.modes, strict=False))
         first = first or (part, result, cycles)
     assert first is not None
@@ -90,18 +89,12 @@ def _groups(frequencies: list[float]) -> list[list[float]]:
 
 
 def _lines_again(
-    decay: Decay,
-    samples: SignalSamples,
-    result: FitResult,
-    cycles: Cycles,
-    units: str,
-    soften: bool,
-    known: tuple[float, float] | None,
-) -> tuple[SignalSamples, FitResult, Cycles, bool]:
+    decay: Decay, samples: SignalSamples, result: FitResult, settings: FitSettings
+) -> tuple[SignalSamples, FitResult]:
     """The fit once more, lines that do not decay fitted to what the modes left; as it was without such lines."""
     if not decay.lines:
-        return samples, result, cycles, False
-    rest = SignalSamples(result.residual, samples.time, samples.sampling_frequency)
+        return samples, result
+    rest = samples._replace(values=result.residual)
     for line in decay.lines:
         if line.frequency > 0.45 * samples.sampling_frequency:
             continue
@@ -109,16 +102,11 @@ def _lines_again(
             left = fit_sine(rest, line.frequency, 1, fixed=True)
         except InputError:
             continue
-        wave = left.amplitude * np.cos(2.0 * math.pi * left.frequency * rest.time + left.phase)
-        rest = SignalSamples(rest.values - wave, rest.time, rest.sampling_frequency)
+        rest = without_lines(rest, [Line(left.frequency, left.amplitude, left.phase)])
     change = rest.values - result.residual
-    better = SignalSamples(samples.values + change, samples.time, samples.sampling_frequency)
-    law = None
-    if result.modes[0].law != "viscous":
-        mode = result.modes[0]
-        law = DampingLaw(mode.law, mode.law_strength, mode.law_strength_se, 0.0, 0.0)
-    again = fit_decay(better, result.modes, units, soften=soften, known=known, law=law)
-    return better, again, cycles, True
+    better, mode = samples._replace(values=samples.values + change), result.modes[0]
+    law = None if mode.law == "viscous" else DampingLaw(mode.law, mode.law_strength, mode.law_strength_se)
+    return better, fit_decay(better, result.modes, settings, law)
 
 
 def _group_fit(
@@ -126,23 +114,20 @@ def _group_fit(
     centres: list[float],
     own: list[Pole],
     beside: list[Pole],
-    units: str,
-    soften: bool,
-    known: tuple[float, float] | None,
+    settings: FitSettings,
     diagram: Stabilisation | None,
 ) -> tuple[FitResult, Cycles, list[Diagnostic], Stabilisation | None]:
     """Modes fitted together; where they leave more than noise, a second law of damping or a close mode."""
     start = float(samples.time[0])
-    guesses, cycles = _guesses(samples, centres, own, units, soften)
+    guesses, cycles = _guesses(samples, centres, own, settings.units, settings.soften)
     apart = [pole for pole in beside if _apart(samples, pole, guesses)]
     made: tuple[FitResult, float, float, list[Diagnostic]] | None = None
     for some in ([], apart) if apart else ([],):
         if some and made is not None and made[0].modes[0].law != "viscous" and made[1] < _MISFIT:
             apart = []
             break  # a law of damping explains what looked like modes
-        result = fit_decay(
-            samples, [*guesses, *(_of_pole(pole) for pole in some)], units, soften=soften, known=known
-        )
+        start_from = [*guesses, *(_of_pole(pole) for pole in some)]
+        result = fit_decay(samples, start_from, settings)
         largest = max(mode.amplitude for mode in result.modes)
         if made is not None and largest > _CANCEL * float(np.ptp(samples.values)):
             apart = []
@@ -153,48 +138,37 @@ def _group_fit(
         left = misfit_of(samples, result.residual, result.modes).ratio
         told: list[Diagnostic] = []
         if law is not None:
-            result, left, told = _with_law(samples, result, left, units, soften, known, law)
+            result, left, told = _with_law(samples, result, left, settings, law)
         made = result, left, doubt, told
     assert made is not None
     result, left, doubt, told = made
     guesses = [*guesses, *(_of_pole(pole) for pole in apart)]
     if left > _MISFIT and len(guesses) < 8:
         near = [pole for pole in beside if pole not in apart]
-        better, diagram = _with_close_mode(samples, result, near, units, diagram)
+        better, diagram = _with_close_mode(samples, result, near, settings, diagram)
         if better is not None:
             result = better
             first = better.modes[0].natural_frequency
             second = min((mode.natural_frequency for mode in better.modes[1:]), key=lambda f: abs(f - first))
             told = [KINDS_DECAY["close_modes"].found(first=first, second=second)]
     if result.modes[0].law == "viscous":
-        first_mode = result.modes[0]
-        error = math.hypot(first_mode.damping_ratio_se, doubt * first_mode.damping_ratio)
-        result.modes[0] = dataclasses.replace(first_mode, damping_ratio_se=error)
+        result.modes[0] = widened(result.modes[0], damping_ratio=(doubt * result.modes[0].damping_ratio,))
     return result, _own_cycles(samples, result, cycles), told, diagram
 
 
 def _apart(samples: SignalSamples, pole: Pole, modes: list[ModeEstimate]) -> bool:
     """Return whether a pole is too far from all modes to be a side pole of a softening mode."""
-    span = samples.values.size / samples.sampling_frequency
-    return all(
-        abs(pole.frequency - mode.natural_frequency)
-        > max(8.0 / span, 2.0 * mode.damping_ratio * mode.natural_frequency, 0.06 * mode.natural_frequency)
-        for mode in modes
-    )
+    widths = ((mode.natural_frequency, max(2.0 * mode.damping_ratio, 0.06)) for mode in modes)
+    least = 8.0 / samples.duration
+    return all(abs(pole.frequency - f) > max(least, width * f) for f, width in widths)
 
 
 def _with_law(
-    samples: SignalSamples,
-    result: FitResult,
-    left: float,
-    units: str,
-    soften: bool,
-    known: tuple[float, float] | None,
-    law: DampingLaw,
+    samples: SignalSamples, result: FitResult, left: float, settings: FitSettings, law: DampingLaw
 ) -> tuple[FitResult, float, list[Diagnostic]]:
     """The fit with a second law of damping where that is told apart and leaves less; else as it was."""
     try:
-        other = fit_decay(samples, result.modes, units, soften=soften, known=known, law=law)
+        other = fit_decay(samples, result.modes, settings, law)
     except InputError:
         return result, left, []
     first = other.modes[0]
@@ -202,10 +176,8 @@ def _with_law(
     told_apart = first.law_strength > 3.0 * first.law_strength_se
     if not told_apart or other.noise_rms >= 0.999 * result.noise_rms or rest >= max(0.8 * left, _MISFIT):
         return result, left, []
-    diagnostic = KINDS_DECAY["damping_law"].found(
-        told=first.law, strength=first.law_strength, error=first.law_strength_se
-    )
-    return other, rest, [diagnostic]
+    strength, error = first.law_strength, first.law_strength_se
+    return other, rest, [KINDS_DECAY["damping_law"].found(told=first.law, strength=strength, error=error)]
 
 
 def _of_pole(pole: Pole) -> ModeEstimate:
@@ -234,9 +206,7 @@ def _guesses(
         kept = kept or cycles
         found.append(estimate)
         if len(centres) > 1:
-            rest = SignalSamples(
-                explain(samples, found, units, soften).residual, samples.time, samples.sampling_frequency
-            )
+            rest = samples._replace(values=explain(samples, found, units, soften).residual)
     assert kept is not None
     return found, kept
 
@@ -262,7 +232,7 @@ def _own_cycles(samples: SignalSamples, result: FitResult, otherwise: Cycles) ->
     if len(result.modes) == 1:
         return otherwise
     try:
-        alone = SignalSamples(result.alone, samples.time, samples.sampling_frequency)
+        alone = samples._replace(values=result.alone)
         return hilbert_cycles(alone, first.natural_frequency, noise_level(samples))
     except InputError:
         return otherwise
@@ -272,7 +242,7 @@ def _with_close_mode(
     samples: SignalSamples,
     result: FitResult,
     near: list[Pole],
-    units: str,
+    settings: FitSettings,
     diagram: Stabilisation | None,
 ) -> tuple[FitResult | None, Stabilisation | None]:
     """The fit with one mode more, close to the first, if the pencil sees one and it explains what is left."""
@@ -280,19 +250,14 @@ def _with_close_mode(
     if len(near) < 2:
         poles, fresh = find_poles(samples, noise_level(samples))
         diagram = diagram or fresh
-        near = [
-            pole
-            for pole in poles
-            if pole.energy > ENERGY
-            and abs(pole.frequency / first - 1.0) < CLOSE
-            and pole.damping_ratio > -1e-3
-        ]
+        near = [one for one in poles if one.energy > ENERGY and one.damping_ratio > -1e-3]
+        near = [one for one in near if abs(one.frequency / first - 1.0) < CLOSE]
     if len(near) < 2:
         return None, diagram
     others = [mode for mode in result.modes[1:] if abs(mode.natural_frequency / first - 1.0) > CLOSE]
     pair = [_of_pole(pole) for pole in near[:2]]
     try:
-        better = fit_decay(samples, [pair[0], *others, pair[1]], units, soften=False)
+        better = fit_decay(samples, [pair[0], *others, pair[1]], FitSettings(settings.units, False, None))
     except InputError:
         return None, diagram
     return (better if better.noise_rms < 0.9 * result.noise_rms else None), diagram

@@ -22,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from snapbeam.lab.decay.poles import Line, Stabilisation
+from snapbeam.lab.decay.poles import Line, Stabilisation, damped_waves
+from snapbeam.lab.least_squares import phasors, weighted_line
 from snapbeam.lab.signals import SignalSamples, check_signal
 from snapbeam.util.diagnostics import Diagnostic, doubtful
 from snapbeam.util.validation import InputError, nonnegative, positive
@@ -32,6 +33,15 @@ if TYPE_CHECKING:
 
 
 _Array = NDArray[np.float64]
+_LOWEST = 4.0  # least amplitude of a usable cycle, in standard deviations of its noise
+LAWS = ("viscous", "dry", "quadratic")
+_CERTAIN = 30.0  # chi-square by which a second law must better the fit
+_MOST = 0.45  # of the viscous rate that laws which are not told may put in doubt; more is no damping
+_ODDS = 6.0  # chi-square at which a second law is as likely as none: its parameter, and that it is rare
+_MATTERS = 0.03  # change of the viscous rate from which it matters
+SHAPES = ("symmetric", "antisymmetric", "unclear")
+_IN_PHASE = 0.7  # cosine of the angle between two sensors from which a mode is told
+_ALIKE = 0.2  # amplitude of one sensor over the other's below which it is not
 
 
 @dataclass(frozen=True)
@@ -106,18 +116,8 @@ class DecayFit:
 
     def summary(self) -> dict[str, Any]:
         """The figures as plain numbers and words, for a table or a JSON file."""
-        names = (
-            "natural_frequency",
-            "natural_frequency_se",
-            "damping_ratio",
-            "damping_ratio_se",
-            "amplitude",
-            "amplitude_se",
-            "softening",
-            "softening_se",
-            "law_strength",
-            "law_strength_se",
-        )
+        stems = ("natural_frequency", "damping_ratio", "amplitude", "softening", "law_strength")
+        names = [name for stem in stems for name in (stem, f"{stem}_se")]
         return {
             "method": self.modes[0].method,
             "units": self.units,
@@ -143,14 +143,8 @@ def law_priors(units: str) -> dict[str, tuple[float, float]]:
     return {"q": (0.7, 0.7), "r": (1.0 / 6.0, 1.0 / 6.0)}
 
 
-# ----------------------------------------------------------------------------------------------------
-# Decay from cycle to cycle: the logarithmic decrement and the analytic signal (Hilbert transform).
-#
-# Both give an amplitude and a phase for each cycle of a filtered mode, with known noise; two weighted linear
+# Logarithmic decrement and analytic signal (Hilbert transform) give an amplitude and a phase for each cycle of a filtered mode, with known noise; two weighted linear
 # regressions, of log amplitude and of phase against the law of ``decay_model``, do the rest.
-
-
-_LOWEST = 4.0  # least amplitude of a usable cycle, in standard deviations of its noise
 
 
 class Cycles(NamedTuple):
@@ -177,8 +171,9 @@ def _band(samples: SignalSamples, frequency: float) -> _Array:
     high = min(1.5 * frequency, 0.49 * samples.sampling_frequency)
     sections = butter(3, (0.5 * frequency, high), "bandpass", fs=samples.sampling_frequency, output="sos")
     pad = min(samples.values.size - 1, int(3 * samples.sampling_frequency / frequency))
-    filtered: _Array = sosfiltfilt(sections, samples.values - samples.values.mean(), padlen=pad)
-    return filtered
+    return np.asarray(
+        sosfiltfilt(sections, samples.values - samples.values.mean(), padlen=pad), dtype=np.float64
+    )
 
 
 def hilbert_cycles(samples: SignalSamples, frequency: float, sigma: float) -> Cycles:
@@ -307,18 +302,13 @@ def backbone(cycles: Cycles, parts: int = 12) -> tuple[_Array, _Array, _Array]:
     amplitude, freq, error = [], [], []
     for part in np.array_split(np.arange(cycles.time.size), max(1, min(parts, cycles.time.size // 3))):
         t, a, p = cycles.time[part], cycles.amplitude[part], cycles.phase[part]
-        weight = a**2
-        middle = float(np.sum(weight * t) / weight.sum())
-        spread = float(np.sum(weight * (t - middle) ** 2))
+        slope, lever = weighted_line(t, p, a**2)[2:]
         amplitude.append(math.sqrt(float(np.mean(a**2))))
-        freq.append(float(np.sum(weight * (t - middle) * p)) / spread / (2.0 * math.pi))
-        error.append(cycles.noise / math.sqrt(spread) / (2.0 * math.pi))
+        freq.append(slope / (2.0 * math.pi))
+        error.append(cycles.noise / math.sqrt(lever) / (2.0 * math.pi))
     return np.array(amplitude), np.array(freq), np.array(error)
 
 
-# ----------------------------------------------------------------------------------------------------
-# How damping depends on amplitude: viscous alone, or with dry friction or quadratic drag beside it.
-#
 # The amplitude a of a free oscillation falls as da/dt = -delta a - c - q a^2, of which one of c and q is taken
 # to act beside the viscous delta.  Over the viscous fall e = exp(-delta t) that is
 #
@@ -328,24 +318,12 @@ def backbone(cycles: Cycles, parts: int = 12) -> tuple[_Array, _Array, _Array]:
 # so h is the strength of the other law at the start, over the viscous one.
 
 
-LAWS = ("viscous", "dry", "quadratic")
-_CERTAIN = 30.0  # chi-square by which a second law must better the fit
-_MOST = 0.45  # of the viscous rate that laws which are not told may put in doubt; more is no damping
-_ODDS = 6.0  # chi-square at which a second law is as likely as none: its parameter, and that it is rare
-_MATTERS = 0.03  # change of the viscous rate from which it matters
-
-
 class DampingLaw(NamedTuple):
-    """A law of damping: its name, its strength h over the viscous one at the start, and the standard error.
-
-    ``decay_rate`` [1/s] is the viscous rate, with its standard error.
-    """
+    """A law of damping: its name, its strength h over the viscous one at the start, and the standard error."""
 
     name: str
     strength: float
     strength_se: float
-    decay_rate: float
-    decay_rate_se: float
 
 
 def envelope(law: str, time: _Array, decay_rate: float, strength: float) -> _Array:
@@ -367,16 +345,8 @@ def find_law(cycles: Cycles, start: float, decay_rate: float) -> tuple[DampingLa
     """The second law of damping that the amplitude of each cycle shows; None if viscous damping says it all.
 
     With it comes the share of the viscous rate that laws which are not told put in doubt: its change under each, by the
-    root of the probability of that law.
-
-    Parameters
-    ----------
-    cycles
-        Amplitude of each cycle with its noise.
-    start
-        Time [s] at which the decay begins.
-    decay_rate
-        A guess of the viscous rate [1/s].
+    root of the probability of that law.  *start* [s] is where the decay begins, *decay_rate* [1/s] a guess of the
+    viscous rate.
     """
     t = cycles.time - start
     if t.size < 10:
@@ -389,10 +359,9 @@ def find_law(cycles: Cycles, start: float, decay_rate: float) -> tuple[DampingLa
             strength = float(p[2]) if p.size > 2 else 0.0
             return (math.exp(p[0]) * envelope(law, t, math.exp(p[1]), strength) - cycles.amplitude) / noise
 
-        lower = [-np.inf, -np.inf, 0.0][: len(guess)]
-        found = least_squares(
-            miss, guess, bounds=(lower, [np.inf] * len(guess)), x_scale=[0.1, 0.3, 0.3][: len(guess)]
-        )
+        n = len(guess)
+        bounds = [-np.inf, -np.inf, 0.0][:n], [np.inf] * n
+        found = least_squares(miss, guess, bounds=bounds, x_scale=[0.1, 0.3, 0.3][:n])
         gram = found.jac.T @ found.jac
         spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(gram)), 0.0))
         return found.x, 2.0 * float(found.cost), spread
@@ -406,31 +375,10 @@ def find_law(cycles: Cycles, start: float, decay_rate: float) -> tuple[DampingLa
         unit = max(1.0, better / max(t.size - 3, 1))
         changed = abs(math.exp(p[1] - plain[1]) - 1.0)
         doubt = max(doubt, math.sqrt(likely((chi - better) / unit)) * changed)
-        if (
-            better < least
-            and (chi - better) / unit > _CERTAIN
-            and changed > _MATTERS
-            and p[2] > 4.0 * spread[2] * math.sqrt(unit)
-        ):
-            least = better
-            value = math.exp(p[1])
-            best = DampingLaw(
-                law,
-                float(p[2]),
-                float(spread[2]) * math.sqrt(unit),
-                value,
-                value * float(spread[1]) * math.sqrt(unit),
-            )
+        certain = (chi - better) / unit > _CERTAIN and p[2] > 4.0 * spread[2] * math.sqrt(unit)
+        if better < least and certain and changed > _MATTERS:
+            least, best = better, DampingLaw(law, float(p[2]), float(spread[2]) * math.sqrt(unit))
     return best, min(doubt, _MOST) if best is None else 0.0
-
-
-# ----------------------------------------------------------------------------------------------------
-# Whether a mode is symmetric or antisymmetric about the middle of the beam, from two sensors.
-
-
-SHAPES = ("symmetric", "antisymmetric", "unclear")
-_IN_PHASE = 0.7  # cosine of the angle between two sensors from which a mode is told
-_ALIKE = 0.2  # amplitude of one sensor over the other's below which it is not
 
 
 def mode_shapes(first: xr.DataArray, second: xr.DataArray, fit: DecayFit) -> tuple[str, ...]:
@@ -460,10 +408,8 @@ def mode_shapes(first: xr.DataArray, second: xr.DataArray, fit: DecayFit) -> tup
     ('symmetric',)
     """
     one, two = check_signal(first, (), "first"), check_signal(second, (), "second")
-    if (
-        one.values.size != two.values.size
-        or abs(one.sampling_frequency / two.sampling_frequency - 1.0) > 1e-9
-    ):
+    rates = one.sampling_frequency / two.sampling_frequency
+    if one.values.size != two.values.size or abs(rates - 1.0) > 1e-9:
         raise InputError(
             f"second: {two.values.size} samples at {two.sampling_frequency:g} Hz, first has {one.values.size} at "
             f"{one.sampling_frequency:g} Hz: must be one recording"
@@ -482,19 +428,10 @@ def _complex_amplitudes(samples: SignalSamples, fit: DecayFit) -> list[complex]:
     """Amplitude and phase of each mode in a record, by linear least squares."""
     inside = (samples.time >= fit.start - 1e-12) & (samples.time <= fit.stop + 1e-12)
     t, y = samples.time[inside] - fit.start, samples.values[inside]
-    columns = [np.ones_like(t)]
-    for mode in fit.modes:
-        omega = 2.0 * math.pi * mode.natural_frequency
-        turn = omega * math.sqrt(1.0 - mode.damping_ratio**2)
-        wave = np.exp((-mode.damping_ratio * omega + 1j * turn) * t)
-        columns += [wave.real, wave.imag]
-    solution = np.linalg.lstsq(np.column_stack(columns), y, rcond=None)[0]
-    return [complex(solution[1 + 2 * k], -solution[2 + 2 * k]) for k in range(len(fit.modes))]
+    design = damped_waves(t, [(mode.natural_frequency, mode.damping_ratio) for mode in fit.modes])
+    return phasors(np.asarray(np.linalg.lstsq(design, y, rcond=None)[0], dtype=np.float64)).tolist()
 
 
-# ----------------------------------------------------------------------------------------------------
-# Whether the two wells of a beam have one natural frequency.
-#
 # The paper tests both and finds 81.3 and 80.5 Hz (section 2).
 
 

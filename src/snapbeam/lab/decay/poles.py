@@ -10,6 +10,7 @@ there are is not known: a mode is what stays where it is while more and more are
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,14 +27,16 @@ _Array = NDArray[np.float64]
 _WINDOW = 240  # samples of a window
 _WINDOWS = 6000  # of them used
 _MOST = 40  # poles asked for at most, two a mode
-_SAME = (
-    0.01,
-    0.3,
-    0.004,
-)  # shares of frequency and damping ratio, and damping ratio, within which a pole stays
+# shares of frequency and damping ratio, and damping ratio, within which a pole stays
+_SAME = (0.01, 0.3, 0.004)
 _STABLE = 4  # orders in a row at which a pole must stay
 _LARGEST_DAMPING = 0.25
 _BANDS = (0.02, 0.42)  # of the sampling rate, in which poles of one stage count
+_MAINS = (50.0, 60.0)
+_MOST_LINES = 6
+_PEAKS = 10  # of the spectrum that are looked at for a line
+_HIGHEST_DEGREE = 6
+_MATTERS = 0.03  # of the amplitude; a drift below that is let be
 
 
 class Pole(NamedTuple):
@@ -76,14 +79,7 @@ def find_poles(samples: SignalSamples, noise: float) -> tuple[list[Pole], Stabil
     """The modes of a decay, strongest first, and the diagram from which they were read.
 
     The record is looked at in stages, each thinned to a quarter of the one before, so that low frequencies are
-    seen in long windows.
-
-    Parameters
-    ----------
-    samples
-        The decay, from its start on.
-    noise
-        Standard deviation of white noise in it.
+    seen in long windows.  *noise* is the standard deviation of white noise in it.
     """
     found: list[Pole] = []
     rows: list[tuple[int, float, float, bool]] = []
@@ -98,14 +94,17 @@ def find_poles(samples: SignalSamples, noise: float) -> tuple[list[Pole], Stabil
         found += poles
         factor *= 4
     lowest = 4.0 * samples.sampling_frequency / samples.values.size
-    merged = _merged([pole for pole in found if pole.frequency > lowest])
-    weighed = _weighed(samples, merged, noise)
-    diagram = Stabilisation(
-        np.array([row[0] for row in rows], dtype=np.int64),
-        np.array([row[1] for row in rows], dtype=np.float64),
-        np.array([row[2] for row in rows], dtype=np.float64),
-        np.array([row[3] for row in rows], dtype=bool),
-    )
+    merged: list[Pole] = []  # each mode once: the pole that stayed longest
+    for pole in sorted((one for one in found if one.frequency > lowest), key=lambda one: -one.orders):
+        if all(abs(pole.frequency / other.frequency - 1.0) > 0.015 for other in merged):
+            merged.append(pole)
+    floor = max(noise, 1e-9 * float(np.abs(samples.values).max()))
+    weighed = [
+        pole._replace(amplitude=amplitude, energy=float(part @ part) / floor**2)
+        for pole, amplitude, part in zip(merged, *_parts(samples, merged), strict=True)
+    ]
+    kinds = (np.int64, np.float64, np.float64, bool)
+    diagram = Stabilisation(*(np.array([row[k] for row in rows], dtype=kind) for k, kind in enumerate(kinds)))
     return sorted(weighed, key=lambda pole: -pole.energy), diagram
 
 
@@ -140,11 +139,7 @@ def _stage(
         turn = part + np.outer(end, end @ part) / max(1.0 - float(end @ end), 1e-12)
         roots = np.linalg.eigvals(turn)
         s = np.log(roots.astype(np.complex128)) * samples.sampling_frequency
-        poles = [
-            (abs(one) / (2.0 * math.pi), -one.real / abs(one))
-            for one in s
-            if one.imag > 0.0 and abs(one) > 0.0
-        ]
+        poles = [(abs(one) / (2.0 * math.pi), -one.real / abs(one)) for one in s if one.imag > 0.0]
         poles = [one for one in poles if low <= one[0] <= high and -0.02 < one[1] < _LARGEST_DAMPING]
         fresh: dict[int, int] = {}
         for k, pole in enumerate(poles):
@@ -177,30 +172,12 @@ def _nearest(pole: tuple[float, float], others: list[tuple[float, float]]) -> in
     return where
 
 
-def _merged(poles: list[Pole]) -> list[Pole]:
-    """Poles of all stages, each mode once: the one that stayed longest."""
-    out: list[Pole] = []
-    for pole in sorted(poles, key=lambda one: -one.orders):
-        if all(abs(pole.frequency / other.frequency - 1.0) > 0.015 for other in out):
-            out.append(pole)
-    return out
-
-
-def _weighed(samples: SignalSamples, poles: list[Pole], noise: float) -> list[Pole]:
-    """Amplitudes and energies of poles, by linear least squares on the record."""
-    floor = max(noise, 1e-9 * float(np.abs(samples.values).max()))
-    return [
-        pole._replace(amplitude=amplitude, energy=float(part @ part) / floor**2)
-        for pole, amplitude, part in zip(poles, *_parts(samples, poles), strict=True)
-    ]
-
-
 def without_poles(samples: SignalSamples, poles: list[Pole], others: list[Pole]) -> SignalSamples:
     """A record less the sines of *poles*, their amplitudes fitted together with those of *others*."""
     if not poles:
         return samples
     _, parts = _parts(samples, [*poles, *others])
-    return SignalSamples(samples.values - sum(parts[: len(poles)]), samples.time, samples.sampling_frequency)
+    return samples._replace(values=samples.values - sum(parts[: len(poles)]))
 
 
 def _parts(samples: SignalSamples, poles: list[Pole]) -> tuple[list[float], list[_Array]]:
@@ -208,31 +185,23 @@ def _parts(samples: SignalSamples, poles: list[Pole]) -> tuple[list[float], list
     if not poles:
         return [], []
     t = samples.time - samples.time[0]
-    columns = [np.ones_like(t)]
-    for pole in poles:
-        omega = 2.0 * math.pi * pole.frequency
-        zeta = min(max(pole.damping_ratio, 0.0), 0.99)
-        wave = np.exp((-zeta * omega + 1j * omega * math.sqrt(1.0 - zeta * zeta)) * t)
-        columns += [wave.real, wave.imag]
-    design = np.column_stack(columns)
+    design = damped_waves(t, [(pole.frequency, min(max(pole.damping_ratio, 0.0), 0.99)) for pole in poles])
     solution = solve(design, samples.values, 1e-10)
     amplitudes, parts = [], []
-    for k in range(len(poles)):
-        c, s = solution[1 + 2 * k], solution[2 + 2 * k]
-        amplitudes.append(math.hypot(c, s))
-        parts.append(np.asarray(c * columns[1 + 2 * k] + s * columns[2 + 2 * k]))
+    for k in range(1, 2 * len(poles), 2):
+        amplitudes.append(math.hypot(solution[k], solution[k + 1]))
+        parts.append(np.asarray(solution[k] * design[:, k] + solution[k + 1] * design[:, k + 1]))
     return amplitudes, parts
 
 
-# ----------------------------------------------------------------------------------------------------
-# What moves in a record beside the decay: a zero that drifts, and lines that do not decay.
-
-
-_MAINS = (50.0, 60.0)
-_MOST_LINES = 6
-_PEAKS = 10  # of the spectrum that are looked at for a line
-_HIGHEST_DEGREE = 6
-_MATTERS = 0.03  # of the amplitude; a drift below that is let be
+def damped_waves(t: _Array, modes: list[tuple[float, float]]) -> _Array:
+    """Columns of an offset, and of cosine and sine of each mode, by its undamped frequency [Hz] and damping ratio."""
+    columns = [np.ones_like(t)]
+    for frequency, zeta in modes:
+        omega = 2.0 * math.pi * frequency
+        wave = np.exp((-zeta * omega + 1j * omega * math.sqrt(1.0 - zeta * zeta)) * t)
+        columns += [wave.real, wave.imag]
+    return np.column_stack(columns)
 
 
 class Line(NamedTuple):
@@ -251,15 +220,8 @@ class Line(NamedTuple):
 def find_drift(samples: SignalSamples, frequency: float, decay_rate: float) -> tuple[_Array, int]:
     """A polynomial that the mean motion follows, at every sample, and its degree; 0 if none is needed.
 
-    The mean is that under a bell of two periods.  A softening mode shifts it in proportion to the square of
-    its amplitude; what falls so is no drift.
-
-    Parameters
-    ----------
-    samples
-        The decay.
-    frequency, decay_rate
-        Of the mode [Hz, 1/s].
+    The mean is that under a bell of two periods of the mode's *frequency* [Hz].  A softening mode shifts it in
+    proportion to the square of its amplitude; what falls so, at twice *decay_rate* [1/s], is no drift.
     """
     n = samples.values.size
     nothing: _Array = np.zeros(n)
@@ -281,13 +243,9 @@ def find_drift(samples: SignalSamples, frequency: float, decay_rate: float) -> t
         score = mean.size * math.log(left) + 2.0 * (degree + 1) * math.log(mean.size)
         if score < best - 6.0:
             best, chosen, solution = score, degree, found
-    if chosen == 0:
-        return nothing, 0
     whole = 2.0 * (np.arange(n) + 0.5) / n - 1.0
     drift = np.asarray(np.polynomial.legendre.legval(whole, solution), dtype=np.float64)
-    if np.ptp(drift) < _MATTERS * largest:
-        return nothing, 0
-    return drift - drift.mean(), chosen
+    return (drift - drift.mean(), chosen) if chosen and np.ptp(drift) >= _MATTERS * largest else (nothing, 0)
 
 
 def find_lines(samples: SignalSamples, decay_rate: float) -> list[Line]:
@@ -305,7 +263,7 @@ def find_lines(samples: SignalSamples, decay_rate: float) -> list[Line]:
         if line is None:
             break
         found.append(line)
-        rest = SignalSamples(rest.values - line.waveform(rest.time), rest.time, rest.sampling_frequency)
+        rest = rest._replace(values=rest.values - line.waveform(rest.time))
     return found
 
 
@@ -324,10 +282,7 @@ def _strongest(part: SignalSamples, decay_rate: float) -> Line | None:
             continue
         try:
             whole = fit_sine(part, float(freq[at]), 1)
-            parts = [
-                SignalSamples(part.values[cut], part.time[cut], part.sampling_frequency)
-                for cut in (slice(0, n // 2), slice(n // 2, n))
-            ]
+            parts = [part.part(cut) for cut in (slice(0, n // 2), slice(n // 2, n))]
             halves = [fit_sine(one, whole.frequency, 1, fixed=True) for one in parts]
         except InputError:
             continue
@@ -342,9 +297,9 @@ def _strongest(part: SignalSamples, decay_rate: float) -> Line | None:
     return None
 
 
-def without_lines(samples: SignalSamples, lines: list[Line]) -> SignalSamples:
+def without_lines(samples: SignalSamples, lines: Sequence[Line]) -> SignalSamples:
     """A record less its lines."""
     values = samples.values
     for line in lines:
         values = values - line.waveform(samples.time)
-    return SignalSamples(values, samples.time, samples.sampling_frequency)
+    return samples._replace(values=values)

@@ -14,6 +14,7 @@ from snapbeam.lab.decay.fit import FitResult
 from snapbeam.lab.decay.model import Cycles, ModeEstimate, envelope
 from snapbeam.lab.decay.window import Doubt
 from snapbeam.lab.diagnostics import KINDS_DECAY
+from snapbeam.lab.least_squares import weighted_line, widened
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.util.diagnostics import Diagnostic
 
@@ -47,16 +48,11 @@ def misfit_of(samples: SignalSamples, residual: _Array, modes: list[ModeEstimate
     freq = np.fft.rfftfreq(n, 1.0 / samples.sampling_frequency)
     away = np.abs(freq - first.natural_frequency)
     inside = away <= half
-    beside = (
-        (away > half)
-        & (away < max(12.0 * half, 0.5 * first.natural_frequency))
-        & (freq > 0.3 * first.natural_frequency)
-    )
+    beside = (away > half) & (away < max(12.0 * half, 0.5 * first.natural_frequency))
+    beside &= freq > 0.3 * first.natural_frequency
     for mode in modes[1:]:
-        own = np.abs(freq - mode.natural_frequency) < max(
-            5.0 / span, 2.0 * mode.damping_ratio * mode.natural_frequency
-        )
-        beside &= ~own
+        width = max(5.0 / span, 2.0 * mode.damping_ratio * mode.natural_frequency)
+        beside &= np.abs(freq - mode.natural_frequency) >= width
     beside &= np.abs(freq - 2.0 * first.natural_frequency) > half
     if beside.sum() < 8 or inside.sum() < 3:
         return Misfit(1.0, 0.0)
@@ -81,10 +77,7 @@ def judged(
     omega = 2.0 * math.pi * first.natural_frequency
     damping_apart = abs(rates[0]) / omega
     freq_apart = abs(turns[0]) / (2.0 * math.pi)
-    worse_damping, worse_frequency = (
-        abs(rates[0]) / max(rates[1], 1e-300),
-        abs(turns[0]) / max(turns[1], 1e-300),
-    )
+    worse_damping, worse_frequency = (abs(one[0]) / max(one[1], 1e-300) for one in (rates, turns))
     doubtful = misfit.ratio > _RATIO and misfit.share > _MATTERS
     if doubtful:
         told.append(KINDS_DECAY["misfit"].found(ratio=misfit.ratio, share_percent=100.0 * misfit.share))
@@ -96,22 +89,14 @@ def judged(
         return list(result.modes), told
     grown = max(misfit.ratio, 1.0)
     missed = misfit.share * first.damping_ratio
-    raised = dataclasses.replace(
-        first,
-        natural_frequency_se=max(
-            first.natural_frequency_se * grown, freq_apart, missed * first.natural_frequency
-        ),
-        damping_ratio_se=max(first.damping_ratio_se * grown, damping_apart, missed),
-    )
-    others = [
-        dataclasses.replace(
-            mode,
-            natural_frequency_se=mode.natural_frequency_se * grown,
-            damping_ratio_se=mode.damping_ratio_se * grown,
-        )
-        for mode in result.modes[1:]
-    ]
-    return [raised, *others], told
+    raised = []
+    for mode in result.modes:
+        freq_se, damping_se = mode.natural_frequency_se * grown, mode.damping_ratio_se * grown
+        if mode is first:
+            freq_se = max(freq_se, freq_apart, missed * mode.natural_frequency)
+            damping_se = max(damping_se, damping_apart, missed)
+        raised.append(dataclasses.replace(mode, natural_frequency_se=freq_se, damping_ratio_se=damping_se))
+    return raised, told
 
 
 def _halves(
@@ -140,12 +125,11 @@ def _halves(
         slopes, errors = [], []
         for part in (slice(0, half), slice(half, t.size)):
             w, x, y = weight[part], t[part], series[part]
-            middle = float((w * x).sum() / w.sum())
-            spread = float((w * (x - middle) ** 2).sum())
-            slopes.append(float((w * (x - middle) * y).sum()) / spread)
-            rest = y - float((w * y).sum() / w.sum()) - slopes[-1] * (x - middle)
+            middle, level, slope, lever = weighted_line(x, y, w)
+            rest = y - level - slope * (x - middle)
             noise = max(cycles.noise**2, float((w * rest**2).sum()) / max(x.size - 2, 1))
-            errors.append(math.sqrt(noise / spread))
+            slopes.append(slope)
+            errors.append(math.sqrt(noise / lever))
         out.append((slopes[1] - slopes[0], math.hypot(*errors)))
     return out[0], out[1]
 
@@ -153,34 +137,20 @@ def _halves(
 def sampled_diagnostics(modes: tuple[ModeEstimate, ...], sampling_frequency: float) -> list[Diagnostic]:
     """Diagnostics for modes above the band that is free of aliasing."""
     limit = sampling_frequency / _BAND
-    return [
-        KINDS_DECAY["above_band"].found(
-            frequency=mode.natural_frequency,
-            limit_hz=limit,
-            folded=sampling_frequency - mode.natural_frequency,
-        )
-        for mode in modes
-        if mode.natural_frequency > limit
-    ]
+    high = [mode.natural_frequency for mode in modes if mode.natural_frequency > limit]
+    kind = KINDS_DECAY["above_band"]
+    return [kind.found(frequency=one, limit_hz=limit, folded=sampling_frequency - one) for one in high]
 
 
-def widened(modes: tuple[ModeEstimate, ...], doubt: Doubt, added: float) -> tuple[ModeEstimate, ...]:
+def with_doubts(modes: tuple[ModeEstimate, ...], doubt: Doubt, added: float) -> tuple[ModeEstimate, ...]:
     """Modes whose errors hold a *doubt*, and a rate [1/s] *added* by a window."""
     first = modes[0].amplitude ** 2
     return tuple(
-        dataclasses.replace(
+        widened(
             mode,
-            natural_frequency_se=math.hypot(
-                mode.natural_frequency_se, doubt.frequency * mode.natural_frequency
-            ),
-            damping_ratio_se=math.hypot(
-                mode.damping_ratio_se,
-                added / (2.0 * math.pi * mode.natural_frequency),
-                max(doubt) * mode.damping_ratio,
-            ),
-            softening_se=math.hypot(
-                mode.softening_se, doubt.frequency / first if mode.softening_se > 0.0 else 0.0
-            ),
+            natural_frequency=(doubt.frequency * mode.natural_frequency,),
+            damping_ratio=(added / (2.0 * math.pi * mode.natural_frequency), max(doubt) * mode.damping_ratio),
+            softening=(doubt.frequency / first if mode.softening_se > 0.0 else 0.0,),
         )
         for mode in modes
     )
@@ -191,7 +161,7 @@ def diagnostics_about(
 ) -> list[Diagnostic]:
     """Diagnostics from the numbers of one decay alone."""
     told = []
-    span = samples.values.size / samples.sampling_frequency
+    span = samples.duration
     first = modes[0]
     left = math.exp(-first.damping_ratio * 2.0 * math.pi * first.natural_frequency * span)
     if left > 0.7:

@@ -24,26 +24,33 @@ from snapbeam.lab.decay.poles import (
     without_lines,
 )
 from snapbeam.lab.diagnostics import KINDS_DECAY
-from snapbeam.lab.sensor_errors import Hypothesis
+from snapbeam.lab.sensor_errors import Hypothesis, best_of
 from snapbeam.lab.signals import SignalSamples
-from snapbeam.lab.sine_fit import stuck_runs
+from snapbeam.lab.sine_fit import falling_window, highest_peak, stuck_runs
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.validation import InputError, finite
 
-# ----------------------------------------------------------------------------------------------------
 _Array = NDArray[np.float64]
-
-# Which part of a record is a free decay: from the release on, below the ceiling, until something disturbs it.
-
-
 _RISE = 0.3  # share of the greatest swing below which nothing is released yet
 _PLATEAU = 0.012  # share by which maxima under a ceiling may fall
-
-
-class Ceiling(NamedTuple):
-    """Tops cut off up to the sample *until*."""
-
-    until: int
+_SPAN = 4  # cycles whose least and greatest values are taken together
+_FALLS = 0.4  # of the first tops by which the tops must fall
+_LEVEL = 0.08  # of that by which the bottoms may change
+_EXPLAINED = 2.0  # times the noise that the likeliest may leave; more is left by two modes that beat
+_BETTER = 4.0  # times as much that the others must leave then
+_MATTERS = 1e-4  # of the frequency, over the record
+_SECOND = 2.0  # times the square of the softening that its next order may be, to a standard deviation
+_LEVELS = np.geomspace(0.06, 0.65, 22)  # of the first amplitude at which a stop may stand
+_TOLD = 16.0  # chi-square by which an explanation must better all others to be told
+_LEAST_CYCLES = 8.0  # of a decay
+ENERGY = 40.0  # of a pole over the noise, from which it is a mode
+CLOSE = 0.25  # share within which modes are fitted together
+_ASKED = 0.1  # share by which a mode may be off the frequency asked for
+_PARTS = 8  # of a record whose noise is compared
+_LEAST = 64  # lines of the spectrum of a part
+_QUANTILE = 0.25  # of the lines of a part that hold noise alone, however many modes there are
+_CERTAIN_NOISE_FALL = 5.0  # standard errors
+_FALL = 0.2  # of the logarithm of the noise over the record
 
 
 class Doubt(NamedTuple):
@@ -51,13 +58,6 @@ class Doubt(NamedTuple):
 
     frequency: float = 0.0
     damping: float = 0.0
-
-
-class AmplitudeJump(NamedTuple):
-    """A cycle at which a decay jumps: its time [s], and by what share of the amplitude."""
-
-    time: float
-    share: float
 
 
 def find_release(samples: SignalSamples, frequency: float) -> int:
@@ -91,8 +91,8 @@ def find_release(samples: SignalSamples, frequency: float) -> int:
     return begin + (int(inside[0]) if inside.size else 0) + short
 
 
-def find_ceiling(samples: SignalSamples, frequency: float) -> Ceiling | None:
-    """Detect clipping of the first cycles of a decay, and its end.
+def find_ceiling(samples: SignalSamples, frequency: float) -> int:
+    """Detect clipping of the first cycles of a decay: the sample at which it ends, 0 without it.
 
     Either the record hits its maximum or minimum value in runs of equal samples, or the maxima of at least four
     cycles stay level, and flat, where the later ones fall.
@@ -104,11 +104,9 @@ def find_ceiling(samples: SignalSamples, frequency: float) -> Ceiling | None:
         runs = [run for run in stuck_runs(values, 3) if values[run.first] == extreme]
         if len(runs) >= 2 and np.ptp(values) > 0.0:
             until = max(until, runs[-1].last)
-    if until:
-        return Ceiling(min(until + width // 4, values.size))
-    for sign in (1.0, -1.0):
+    for sign in () if until else (1.0, -1.0):
         until = max(until, _plateau(sign * (values - np.median(values)), width))
-    return Ceiling(min(until + width // 4, values.size)) if until else None
+    return min(until + width // 4, values.size) if until else 0
 
 
 def _plateau(values: _Array, width: int) -> int:
@@ -130,8 +128,8 @@ def _plateau(values: _Array, width: int) -> int:
     return last * width if falls and wide else 0
 
 
-def find_jump(cycles: Cycles) -> AmplitudeJump | None:
-    """The cycle at which amplitude or phase of a mode jumps; None if neither does.
+def find_jump(cycles: Cycles) -> tuple[float, float] | None:
+    """Time [s] at which amplitude or phase of a mode jumps, and by what share; None if neither does.
 
     Straight lines through the logarithm of the amplitude and through the phase of six cycles on either side
     must differ there by more than eight standard errors and by more than eight percent (or 0.08 rad), and more
@@ -149,11 +147,7 @@ def find_jump(cycles: Cycles) -> AmplitudeJump | None:
     for k in range(span, n - span - 1):
         for row, series in enumerate((log_a, phase)):
             left = np.polyfit(x - span, series[k - span : k], 1)
-            right = (
-                np.polyfit(x + 2.0, series[k + 2 : k + 2 + span][: x.size], 1) if k + 2 + span <= n else None
-            )
-            if right is None:
-                continue
+            right = np.polyfit(x + 2.0, series[k + 2 : k + 2 + span], 1)
             steps[row, k] = np.polyval(right, 0.5) - np.polyval(left, 0.5)
         relative = cycles.noise / float(np.min(cycles.amplitude[k - span : k + span]))
         errors[k] = relative * math.sqrt(2.0 * (1.0 / span + 12.0 * (0.5 * span + 1.0) ** 2 / span**3))
@@ -163,12 +157,7 @@ def find_jump(cycles: Cycles) -> AmplitudeJump | None:
     at = int(np.argmax(size))
     if size[at] < max(8.0 * errors[at], 0.08, 6.0 * usual):
         return None
-    return AmplitudeJump(float(cycles.time[at]), float(size[at]))
-
-
-_SPAN = 4  # cycles whose least and greatest values are taken together
-_FALLS = 0.4  # of the first tops by which the tops must fall
-_LEVEL = 0.08  # of that by which the bottoms may change
+    return float(cycles.time[at]), float(size[at])
 
 
 def one_sided(samples: SignalSamples, frequency: float) -> bool:
@@ -186,19 +175,6 @@ def one_sided(samples: SignalSamples, frequency: float) -> bool:
     return False
 
 
-# ----------------------------------------------------------------------------------------------------
-# Hypotheses about the course of amplitude and phase: a mode that softens and is damped by one of three laws, a frequency
-# that changes with time as with temperature, a stop that the beam touches while its amplitude is large.
-
-
-_EXPLAINED = 2.0  # times the noise that the likeliest may leave; more is left by two modes that beat
-_BETTER = 4.0  # times as much that the others must leave then
-_MATTERS = 1e-4  # of the frequency, over the record
-_SECOND = 2.0  # times the square of the softening that its next order may be, to a standard deviation
-_LEVELS = np.geomspace(0.06, 0.65, 22)  # of the first amplitude at which a stop may stand
-_TOLD = 16.0  # chi-square by which an explanation must better all others to be told
-
-
 def touching(ratio: _Array) -> _Array:
     """Describing function of a stop on one side, of stiffness and damping alike, by amplitude over its distance."""
     angle = np.arccos(1.0 / np.maximum(ratio, 1.0))
@@ -206,20 +182,13 @@ def touching(ratio: _Array) -> _Array:
 
 
 def courses(cycles: Cycles, frequency: float) -> list[Hypothesis]:
-    """Hypotheses about amplitude and phase of a decay, the likeliest first; none for less than 14 cycles.
+    """Hypotheses about amplitude and phase of a decay; none for less than 14 cycles.
 
     The phase of the cycles is a line, the integrals of a^2 and a^4 (softening, a the amplitude of the cycles as it is;
     the second is held to the size that goes with the first) and, where the frequency creeps at a steady rate, t^2.
     The logarithm of the amplitude is a line, and the integral of a (drag) or 1/a (friction).  A stop adds to both
     the integral of its describing function.  ``loss`` is the change of the decay rate, and ``shift`` that of the frequency
     over the record, relative to those of the straight lines.
-
-    Parameters
-    ----------
-    cycles
-        The first mode, cycle by cycle.
-    frequency
-        Of the mode [Hz].
     """
     t = cycles.time - cycles.time[0]
     if t.size < 14:
@@ -270,7 +239,7 @@ def courses(cycles: Cycles, frequency: float) -> list[Hypothesis]:
     unit = float(rest.min()) / (2.0 * t.size)
     if unit > _EXPLAINED**2 and rest[:3].min() < _BETTER * rest.min():
         return []
-    return sorted((one._replace(gain=one.gain / max(unit, 1.0)) for one in told), key=lambda one: -one.score)
+    return [one._replace(gain=one.gain / max(unit, 1.0)) for one in told]
 
 
 def steadied(samples: SignalSamples, share: float) -> SignalSamples:
@@ -283,12 +252,6 @@ def steadied(samples: SignalSamples, share: float) -> SignalSamples:
     even = np.arange(int(clock[-1] * samples.sampling_frequency + 1e-9) + 1) / samples.sampling_frequency
     values = CubicSpline(clock, samples.values)(even)
     return SignalSamples(values, samples.time[0] + even, samples.sampling_frequency)
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-_LEAST_CYCLES = 8.0
 
 
 @dataclass(frozen=True)
@@ -305,62 +268,45 @@ class Decay:
 
 
 def dominant(samples: SignalSamples, low: float = 0.0, high: float | None = None) -> float:
-    """Frequency [Hz] of the strongest decaying sine, under a window that is maximum at the start.
-
-    A window that rises from zero would hide what decays fast.
-
-    Raises
-    ------
-    InputError
-        If the band holds no oscillation.
-    """
+    """Frequency [Hz] of the strongest decaying sine; a window that rises from zero would hide what decays fast."""
     n = samples.values.size
     values = samples.values - samples.values.mean()
-    window = np.cos(0.5 * math.pi * np.arange(n) / n) ** 2
+    window = falling_window(n)
     values = values - float((values * window).sum() / window.sum())
     freq = np.fft.rfftfreq(4 * n, 1.0 / samples.sampling_frequency)
     # what passes fewer than eight times is rather a drift
     slow = np.minimum(freq * n / samples.sampling_frequency / _LEAST_CYCLES, 1.0) ** 2
     spectrum = np.abs(np.fft.rfft(values * window, 4 * n)) * slow
     top = samples.sampling_frequency / 2.0 if high is None else high
-    inside = np.flatnonzero((freq >= max(low, 3.0 * samples.sampling_frequency / n)) & (freq <= top))
-    if inside.size == 0 or not spectrum[inside].max() > 1e-14 * float(np.abs(samples.values).max() + 1e-300):
-        raise InputError(f"signal: no oscillation between {low:g} and {top:g} Hz")
-    at = int(inside[np.argmax(spectrum[inside])])
-    if 0 < at < spectrum.size - 1 and spectrum[at - 1] > 0.0 and spectrum[at + 1] > 0.0:
-        a, b, c = np.log(spectrum[at - 1 : at + 2])
-        bend = a - 2.0 * b + c
-        return float(freq[at] + (0.5 * (a - c) / bend if bend < 0.0 else 0.0) * (freq[1] - freq[0]))
-    return float(freq[at])
+    floor = 1e-14 * float(np.abs(samples.values).max() + 1e-300)
+    return highest_peak(freq, spectrum, (low, top), 3.0 * samples.sampling_frequency / n, floor)
 
 
 def prepared(samples: SignalSamples, start: float | None, stop: float | None, known: bool = False) -> Decay:
-    """Cut a record to its free decay and take out what does not belong to it.
+    """Cut a record to its free decay, from *start* to *stop* [s] as far as given, and take out what does not belong to it.
 
-    Parameters
-    ----------
-    samples
-        The record.
-    start, stop
-        Part [s] of the free decay, as far as the user gives it.
-    known
-        True if its softening is known beforehand.
-
-    Raises
-    ------
-    InputError
-        If fewer than 64 samples or 8 cycles are left.
+    *known*: its softening is known beforehand.
     """
-    part = _cut(samples, start, stop)
+    low = samples.time[0] if start is None else finite("start", start)
+    high = samples.time[-1] if stop is None else finite("stop", stop)
+    inside = (samples.time >= low) & (samples.time <= high)
+    if inside.sum() < 64:
+        raise InputError(
+            f"start = {low:g}, stop = {high:g}: hold {inside.sum()} samples of the signal, which runs from "
+            f"{samples.time[0]:g} to {samples.time[-1]:g} s: must hold at least 64"
+        )
+    part = samples.part(inside)
     diagnostics: list[Diagnostic] = []
     frequency = dominant(part)
     if start is None:
         first = find_release(part, frequency)
         if first:
-            part = _sliced(part, first, None)
+            part = part.part(slice(first, None))
             diagnostics.append(KINDS_DECAY["release"].found(start=float(part.time[0])))
             frequency = dominant(part)
-    _enough(part, frequency)
+    cycles = frequency * part.values.size / part.sampling_frequency
+    if cycles < _LEAST_CYCLES:
+        raise InputError(f"signal spans {cycles:.1f} cycles of {frequency:g} Hz: must span at least 8")
     if one_sided(part, frequency):
         diagnostics.append(KINDS_DECAY["one_sided"].found(half_hz=0.5 * frequency))
     part, told = _below_ceiling(part, frequency)
@@ -370,57 +316,39 @@ def prepared(samples: SignalSamples, start: float | None, stop: float | None, kn
     clean = without_lines(part, lines)
     largest = max(float(np.percentile(np.abs(clean.values - np.median(clean.values)), 99)), 1e-300)
     for line in lines:
-        diagnostics.append(
-            KINDS_DECAY["hum"].found(
-                frequency=line.frequency, amplitude_percent=100.0 * line.amplitude / largest
-            )
-        )
+        share = 100.0 * line.amplitude / largest
+        diagnostics.append(KINDS_DECAY["hum"].found(frequency=line.frequency, amplitude_percent=share))
     frequency = dominant(clean)
     rate = _decay_rate(clean, frequency)
     drift, degree = find_drift(clean, frequency, rate)
     if degree:
-        clean = SignalSamples(clean.values - drift, clean.time, clean.sampling_frequency)
-        diagnostics.append(
-            KINDS_DECAY["drift"].found(drift_percent=100.0 * float(np.ptp(drift)) / largest, degree=degree)
-        )
+        clean = clean._replace(values=clean.values - drift)
+        share = 100.0 * float(np.ptp(drift)) / largest
+        diagnostics.append(KINDS_DECAY["drift"].found(drift_percent=share, degree=degree))
         frequency = dominant(clean)
     clean, told = _undisturbed(clean, frequency)
     clean, doubt, more = _on_course(clean, frequency, known)
     return Decay(clean, tuple(lines), (*diagnostics, *told, *more), doubt)
 
 
-def _cut(samples: SignalSamples, start: float | None, stop: float | None) -> SignalSamples:
-    low = samples.time[0] if start is None else finite("start", start)
-    high = samples.time[-1] if stop is None else finite("stop", stop)
-    inside = (samples.time >= low) & (samples.time <= high)
-    if inside.sum() < 64:
-        raise InputError(
-            f"start = {low:g}, stop = {high:g}: hold {inside.sum()} samples of the signal, which runs from "
-            f"{samples.time[0]:g} to {samples.time[-1]:g} s: must hold at least 64"
-        )
-    return SignalSamples(samples.values[inside], samples.time[inside], samples.sampling_frequency)
-
-
-def _sliced(samples: SignalSamples, first: int, last: int | None) -> SignalSamples:
-    return SignalSamples(samples.values[first:last], samples.time[first:last], samples.sampling_frequency)
-
-
-def _enough(samples: SignalSamples, frequency: float) -> None:
-    cycles = frequency * samples.values.size / samples.sampling_frequency
-    if cycles < _LEAST_CYCLES:
-        raise InputError(f"signal spans {cycles:.1f} cycles of {frequency:g} Hz: must span at least 8")
-
-
 def _below_ceiling(samples: SignalSamples, frequency: float) -> tuple[SignalSamples, list[Diagnostic]]:
     """The decay from where its tops are no longer cut off."""
-    ceiling = find_ceiling(samples, frequency)
-    if ceiling is None:
+    until = find_ceiling(samples, frequency)
+    if not until:
         return samples, []
-    left = frequency * (samples.values.size - ceiling.until) / samples.sampling_frequency
+    left = frequency * (samples.values.size - until) / samples.sampling_frequency
     if left < 1.5 * _LEAST_CYCLES:
         return samples, [KINDS_DECAY["clipped_throughout"].found()]
-    rest = _sliced(samples, ceiling.until, None)
+    rest = samples.part(slice(until, None))
     return rest, [KINDS_DECAY["clipped"].found(until=float(rest.time[0]))]
+
+
+def _cycles(samples: SignalSamples, frequency: float) -> Cycles | None:
+    """Cycles of the strongest mode; None where too few stand out of the noise."""
+    try:
+        return hilbert_cycles(samples, frequency, noise_level(samples))
+    except InputError:
+        return None
 
 
 def _decay_rate(samples: SignalSamples, frequency: float) -> float:
@@ -437,30 +365,29 @@ def _on_course(
     samples: SignalSamples, frequency: float, known: bool
 ) -> tuple[SignalSamples, Doubt, list[Diagnostic]]:
     """The decay without what a stop or a creeping frequency does to it, and the doubt that is left."""
-    try:
-        cycles = hilbert_cycles(samples, frequency, noise_level(samples))
-    except InputError:
+    cycles = _cycles(samples, frequency)
+    told = [] if cycles is None else courses(cycles, frequency)
+    best, usual = best_of(told)
+    if cycles is None or best is None:
         return samples, Doubt(), []
-    told = courses(cycles, frequency)
-    ahead = told[0].score - max(0.0, *(one.score for one in told if not one.kind)) if told else 0.0
-    if ahead > _TOLD and told[0].kind == "touches":
-        numbers = told[0].numbers
-        kept = _sliced(samples, int(np.searchsorted(samples.time, numbers["until"])), None)
+    certain = best.score - usual > _TOLD
+    if certain and best.kind == "touches":
+        numbers = best.numbers
+        kept = samples.part(slice(int(np.searchsorted(samples.time, numbers["until"])), None))
         diagnostic = KINDS_DECAY["touches"].found(None, "", **numbers)
         if np.count_nonzero(cycles.time > numbers["until"]) < 1.5 * _LEAST_CYCLES:
-            return samples, Doubt(told[0].shift, told[0].loss), [diagnostic]
+            return samples, Doubt(best.shift, best.loss), [diagnostic]
         again, doubt, more = _on_course(kept, frequency, known)
         return again, doubt, [diagnostic, *(one for one in more if one.code != diagnostic.code)]
-    within = told[0].shift if told else 0.0
-    if ahead > _TOLD and told[0].kind and abs(within) > _MATTERS:
-        share = within * float((samples.time[-1] - samples.time[0]) / (cycles.time[-1] - cycles.time[0]))
+    if certain and best.kind and abs(best.shift) > _MATTERS:
+        share = best.shift * float((samples.time[-1] - samples.time[0]) / (cycles.time[-1] - cycles.time[0]))
         told_so = KINDS_DECAY["frequency_drift"].found(share_percent=100.0 * share)
         return steadied(samples, share), Doubt(abs(share)), [told_so]
     # a softening that a creep explains as well
     pair = [one for one in told if one.numbers.get("shares", 0) in (1, 2)]
     if len(pair) < 2 or known:
         return samples, Doubt(), []
-    behind = told[0].gain - next(one.gain for one in pair if one.kind)
+    behind = best.gain - next(one.gain for one in pair if one.kind)
     apart = abs(pair[0].numbers["start"] - pair[1].numbers["start"])
     softens = all(one.numbers["start"] > 1.0 for one in pair if not one.kind)
     apart *= math.sqrt(likely(-behind, 2.0)) if softens else 1.0
@@ -469,34 +396,22 @@ def _on_course(
 
 def _undisturbed(samples: SignalSamples, frequency: float) -> tuple[SignalSamples, list[Diagnostic]]:
     """The decay up to a jump of its amplitude or phase, or from it on where that is longer."""
-    try:
-        cycles = hilbert_cycles(samples, frequency, noise_level(samples))
-    except InputError:
-        return samples, []
-    jump = find_jump(cycles)
+    cycles = _cycles(samples, frequency)
+    jump = None if cycles is None else find_jump(cycles)
     if jump is None:
         return samples, []
-    at = int(np.searchsorted(samples.time, jump.time))
+    at, percent = int(np.searchsorted(samples.time, jump[0])), 100.0 * jump[1]
     margin = int(2.5 * samples.sampling_frequency / frequency)
     before, after = at - margin, samples.values.size - at - margin
     least = 1.5 * _LEAST_CYCLES * samples.sampling_frequency / frequency
-    if max(before, after) < least:
-        return samples, [
-            KINDS_DECAY["disturbed"].found(told="about", at=jump.time, jump_percent=100.0 * jump.share)
-        ]
     early = before >= least and before >= 0.4 * after
-    kept = _sliced(samples, 0, before) if early else _sliced(samples, at + margin, None)
-    side = "before" if early else "after"
-    return kept, [KINDS_DECAY["disturbed"].found(told=side, at=jump.time, jump_percent=100.0 * jump.share)]
-
-
-# ----------------------------------------------------------------------------------------------------
-# Which modes of a decay are to be identified, and which others are in it.
-
-
-ENERGY = 40.0  # of a pole over the noise, from which it is a mode
-CLOSE = 0.25  # share within which modes are fitted together
-_ASKED = 0.1  # share by which a mode may be off the frequency asked for
+    kept, side = (
+        samples.part(slice(0, before) if early else slice(at + margin, None)),
+        "before" if early else "after",
+    )
+    if max(before, after) < least:
+        kept, side = samples, "about"
+    return kept, [KINDS_DECAY["disturbed"].found(told=side, at=jump[0], jump_percent=percent)]
 
 
 class Centres(NamedTuple):
@@ -516,7 +431,7 @@ class Centres(NamedTuple):
 def find_centres(decay: Decay, count: int, asked: list[float] | None) -> Centres:
     """The modes wanted, and the others that the record holds."""
     samples = decay.samples
-    span = samples.values.size / samples.sampling_frequency
+    span = samples.duration
     sigma = noise_level(samples)
     if asked is None and count == 1:
         center = dominant(samples)
@@ -527,7 +442,11 @@ def find_centres(decay: Decay, count: int, asked: list[float] | None) -> Centres
         _stands_out(samples, center, sigma)
         return Centres([center], [], [], [], None, [])
     poles, diagram = find_poles(samples, sigma)
-    modes = [pole for pole in poles if _is_mode(pole, span)]
+    modes = [
+        one
+        for one in poles
+        if one.energy > ENERGY and one.damping_ratio > -1e-3 and one.frequency * span >= 8.0
+    ]
     told: list[Diagnostic] = []
     wanted: list[float] = []
     own: list[Pole] = []
@@ -545,10 +464,8 @@ def find_centres(decay: Decay, count: int, asked: list[float] | None) -> Centres
             continue
         hum = [line for line in decay.lines if abs(line.frequency / frequency - 1.0) < 2.5 * _ASKED]
         if hum:
-            raise InputError(
-                "signal: "
-                + KINDS_DECAY["hum_asked"].found(asked=frequency, frequency=hum[0].frequency).message
-            )
+            found = KINDS_DECAY["hum_asked"].found(asked=frequency, frequency=hum[0].frequency)
+            raise InputError(f"signal: {found.message}")
         center = dominant(samples, 0.8 * frequency, 1.2 * frequency)
         _stands_out(samples, center, sigma)
         wanted.append(center)
@@ -563,7 +480,7 @@ def find_centres(decay: Decay, count: int, asked: list[float] | None) -> Centres
 def unexplained(residual: NDArray[np.float64], sampling_frequency: float) -> bool:
     """Return whether a residual contains an oscillation that noise does not explain."""
     n = residual.size
-    window = np.cos(0.5 * math.pi * np.arange(n) / n) ** 2
+    window = falling_window(n)
     power = np.abs(np.fft.rfft(residual * window)) ** 2
     freq = np.fft.rfftfreq(n, 1.0 / sampling_frequency)
     power[freq * n < 6.0 * sampling_frequency] = 0.0
@@ -573,16 +490,11 @@ def unexplained(residual: NDArray[np.float64], sampling_frequency: float) -> boo
     return bool((power > 25.0 * np.maximum(around, 1e-300)).any())
 
 
-def _is_mode(pole: Pole, span: float) -> bool:
-    """Return whether a pole is a mode: above the noise, decaying, and eight or more cycles long."""
-    return pole.energy > ENERGY and pole.damping_ratio > -1e-3 and pole.frequency * span >= 8.0
-
-
 def _stands_out(samples: SignalSamples, frequency: float, sigma: float) -> None:
     """Refuse a peak of the spectrum that noise alone could make."""
     n = samples.values.size
     span = n / samples.sampling_frequency
-    window = np.cos(0.5 * math.pi * np.arange(n) / n) ** 2
+    window = falling_window(n)
     values = samples.values - float((samples.values * window).sum() / window.sum())
     spectrum = np.abs(np.fft.rfft(values * window, 4 * n)) ** 2
     freq = np.fft.rfftfreq(4 * n, 1.0 / samples.sampling_frequency)
@@ -591,19 +503,9 @@ def _stands_out(samples: SignalSamples, frequency: float, sigma: float) -> None:
         raise InputError("signal: no further mode stands out of the noise (found: none)")
 
 
-# ----------------------------------------------------------------------------------------------------
-# Noise that falls with the decay: what an exponential window leaves behind.
-#
 # Analysers multiply records of hammer tests by exp(-t/T) to make them end in nothing.  What is left is the free decay
 # of a mode that is damped more, by 1/(T omega_0): no number of the decay itself tells.  But the noise of the sensor,
 # which does not decay, was multiplied too.
-
-
-_PARTS = 8
-_LEAST = 64  # lines of the spectrum of a part
-_QUANTILE = 0.25  # of these lines that hold noise alone, however many modes there are
-_CERTAIN_NOISE_FALL = 5.0  # standard errors
-_FALL = 0.2  # of the logarithm of the noise over the record
 
 
 class NoiseFall(NamedTuple):
@@ -621,14 +523,8 @@ def noise_fall(rest: SignalSamples, frequency: float, decay_rate: float) -> Nois
     left in it do not reach; its logarithm must fall by more than five standard errors, and nowhere rise.  Where it
     falls along no straight line, the rate is the mean one while the mode is seen.
 
-    Parameters
-    ----------
-    rest
-        What a fit leaves of a decay.
-    frequency
-        Of the first mode [Hz]; noise is sought above one and a half times it.
-    decay_rate
-        Of the first mode [1/s].
+    *rest* is what a fit leaves; *frequency* [Hz] and *decay_rate* [1/s] are those of the first mode, and noise is sought
+    above one and a half times the frequency.
     """
     size = rest.values.size // _PARTS
     freq = np.fft.rfftfreq(size, 1.0 / rest.sampling_frequency)
@@ -650,9 +546,8 @@ def noise_fall(rest: SignalSamples, frequency: float, decay_rate: float) -> Nois
     slope, base = np.polyfit(t, y, 1)
     off = float(np.sqrt(np.mean((y - base - slope * t) ** 2)))
     fall = -float(slope) * rest.values.size / rest.sampling_frequency
-    certain = -float(slope) > _CERTAIN_NOISE_FALL * max(error, off) / math.sqrt(
-        float(((t - t.mean()) ** 2).sum())
-    )
+    lever = math.sqrt(float(((t - t.mean()) ** 2).sum()))
+    certain = -float(slope) > _CERTAIN_NOISE_FALL * max(error, off) / lever
     straight = off < max(2.5 * error, 0.08 * fall)
     if certain and straight and fall > _FALL:
         return NoiseFall(-float(slope), math.exp(fall), True)
@@ -670,4 +565,4 @@ def noise_fall(rest: SignalSamples, frequency: float, decay_rate: float) -> Nois
 def undone(samples: SignalSamples, constant: float) -> SignalSamples:
     """A record before it was multiplied by an exponential window of *constant* [s] from its first sample on."""
     values: NDArray[np.float64] = samples.values * np.exp((samples.time - samples.time[0]) / constant)
-    return SignalSamples(values, samples.time, samples.sampling_frequency)
+    return samples._replace(values=values)

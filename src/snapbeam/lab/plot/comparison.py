@@ -57,13 +57,11 @@ def plot_map_comparison(dataset: xr.Dataset, points: MeasuredPoints, result: Map
         ax.set_yticks(np.arange(len(names)), names)
         ax.set(xlabel="Simulated", ylabel="Measured")
         low, high = result.agreement_interval
-        ax.set_title(
-            f"{100 * result.agreement:.0f} % of {result.used} agree, × do not\n"
-            f"(95 %: {100 * low:.0f} to {100 * high:.0f} %)"
-            if result.used
-            else "No measured point counts",
-            loc="left",
-        )
+        title = "No measured point counts"
+        if result.used:
+            title = f"{100 * result.agreement:.0f} % of {result.used} agree, × do not\n"
+            title += f"(95 %: {100 * low:.0f} to {100 * high:.0f} %)"
+        ax.set_title(title, loc="left")
         fix_ticks(ax)
     return figure
 
@@ -100,10 +98,6 @@ def _mark_disagreeing(ax: Axes, dataset: xr.Dataset, result: MapComparison) -> N
     )  # fmt: skip
 
 
-# ----------------------------------------------------------------------------------------------------
-# Measured beside simulated waveforms with their spectra (Fig. 4 of the paper), and one laid over the other.
-
-
 def plot_waveform_comparison(
     result: WaveformComparison, window: tuple[float, float] | None = None, multiples: float = 8.0
 ) -> Figure:
@@ -119,10 +113,7 @@ def plot_waveform_comparison(
     multiples : float
         Highest frequency of the spectra, in multiples of the excitation frequency.
     """
-    low, high = (finite("window", value) for value in window) if window else (None, None)
-    waveforms = result.waveforms.sel(cycle=slice(low, high))
-    if waveforms.sizes["cycle"] < 2:
-        raise InputError(f"window = {window}: holds none of the compared cycles")
+    waveforms = _inside(result, window)
     cycle = waveforms["cycle"].values
     columns = (
         ("measured", "measured_displacement", "measured_shaker", result.measured_impacts),
@@ -138,12 +129,7 @@ def plot_waveform_comparison(
             top.axhline(0.0, color="0.7", linewidth=0.5)
             top.plot(cycle, waveforms[beam], color=BEAM_COLOR, label=_PLACES[result.at])
             top.plot(cycle, waveforms[shaker], color=SHAKER_COLOR, label="shaker")
-            shown = impacts[(impacts >= cycle[0]) & (impacts <= cycle[-1])]
-            if shown.size:
-                top.plot(
-                    shown, np.full(shown.size, 0.02), "|", color=BEAM_COLOR, markersize=5,
-                    transform=top.get_xaxis_transform(), label="impact",
-                )  # fmt: skip
+            _ticks(top, impacts, cycle, BEAM_COLOR, 0.02, "impact")
             top.set(xlabel=r"Cycles of excitation $\tau$", xlim=(cycle[0], cycle[-1]))
             top.set_title(name, loc="left")
             ratio = result.spectra["frequency_ratio"].values
@@ -159,6 +145,25 @@ def plot_waveform_comparison(
     return figure
 
 
+def _inside(result: WaveformComparison, window: tuple[float, float] | None) -> xr.Dataset:
+    """The compared cycles in a window."""
+    low, high = (finite("window", value) for value in window) if window else (None, None)
+    waveforms = result.waveforms.sel(cycle=slice(low, high))
+    if waveforms.sizes["cycle"] < 2:
+        raise InputError(f"window = {window}: holds none of the compared cycles")
+    return waveforms
+
+
+def _ticks(
+    ax: Axes, impacts: NDArray[np.float64], cycle: NDArray[np.float64], color: str, height: float, label: str
+) -> None:
+    """Impacts among the drawn cycles as ticks at a height of the axes."""
+    shown = impacts[(impacts >= cycle[0]) & (impacts <= cycle[-1])]
+    if shown.size:
+        at, upward = np.full(shown.size, height), ax.get_xaxis_transform()
+        ax.plot(shown, at, "|", color=color, markersize=5, transform=upward, label=label)
+
+
 def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float] | None = None) -> Figure:
     """Draw a simulated run over a measured one: beams, shakers, and their difference; where they part is marked.
 
@@ -170,44 +175,28 @@ def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float
     window : (float, float), optional
         First and last cycle to draw; all by default.
     """
-    low, high = (finite("window", value) for value in window) if window else (None, None)
-    waveforms = result.waveforms.sel(cycle=slice(low, high))
-    if waveforms.sizes["cycle"] < 2:
-        raise InputError(f"window = {window}: holds none of the compared cycles")
+    waveforms = _inside(result, window)
     cycle = waveforms["cycle"].values
     told = result.diagnostics
     with figure_style():
         figure = new_figure("double", 105.0 + diagnostics_height(told, COLUMN_WIDTHS["double"], 3))
         draw_diagnostics(figure, told, 3)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0))
-        pairs = (
-            (top, "displacement", _PLACES[result.at]),
-            (middle, "shaker", "shaker"),
-        )
-        for ax, name, word in pairs:
-            if ax is top:
-                ax.axhline(0.0, color="0.8", linewidth=0.5)
-                if "simulated_low" in waveforms:
-                    ax.fill_between(
-                        cycle, waveforms["simulated_low"], waveforms["simulated_high"], color=SHAKER_COLOR, alpha=0.25,
-                        linewidth=0.0, label="90 % of the model's runs",
-                    )  # fmt: skip
+        top.axhline(0.0, color="0.8", linewidth=0.5)
+        if "simulated_low" in waveforms:
+            top.fill_between(
+                cycle, waveforms["simulated_low"], waveforms["simulated_high"], color=SHAKER_COLOR, alpha=0.25,
+                linewidth=0.0, label="90 % of the model's runs",
+            )  # fmt: skip
+        for ax, name, word in ((top, "displacement", _PLACES[result.at]), (middle, "shaker", "shaker")):
             ax.plot(cycle, waveforms[f"measured_{name}"], color=BEAM_COLOR, label="measured")
             ax.plot(
                 cycle, waveforms[f"simulated_{name}"], color=SHAKER_COLOR, dashes=(4, 1.5), linewidth=0.8,
                 label="simulated",
             )  # fmt: skip
             ax.set_ylabel(f"{word} ($b$)")
-        for ax, impacts, color, height, word in (
-            (top, result.measured_impacts, BEAM_COLOR, 0.03, "impact, measured"),
-            (top, result.simulated_impacts, SHAKER_COLOR, 0.09, "impact, simulated"),
-        ):
-            shown = impacts[(impacts >= cycle[0]) & (impacts <= cycle[-1])]
-            if shown.size:
-                ax.plot(
-                    shown, np.full(shown.size, height), "|", color=color, markersize=5,
-                    transform=ax.get_xaxis_transform(), label=word,
-                )  # fmt: skip
+        _ticks(top, result.measured_impacts, cycle, BEAM_COLOR, 0.03, "impact, measured")
+        _ticks(top, result.simulated_impacts, cycle, SHAKER_COLOR, 0.09, "impact, simulated")
         difference = waveforms["measured_displacement"] - waveforms["simulated_displacement"]
         bottom.axhspan(
             -result.apart, result.apart, color=CENTER_COLOR, alpha=0.35, linewidth=0.0,

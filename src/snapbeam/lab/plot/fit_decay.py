@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from snapbeam.lab.decay.model import envelope as law_envelope
 from snapbeam.lab.decay.model import noise_level
 from snapbeam.lab.decay.poles import find_poles
-from snapbeam.lab.signals import SignalSamples, check_signal
+from snapbeam.lab.signals import check_signal
+from snapbeam.lab.sine_fit import falling_window
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CENTER_COLOR,
@@ -45,8 +46,7 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
         What :func:`snapbeam.lab.decay.identify.identify_decay` made of it.
     """
     samples = check_signal(signal)
-    part = (samples.time >= fit.start) & (samples.time <= fit.stop)
-    time, values = samples.time[part], samples.values[part]
+    values, time, _ = samples.part((samples.time >= fit.start) & (samples.time <= fit.stop))
     scale, unit = _SCALE.get(fit.units, (1.0, fit.units))
     mode = fit.modes[0]
     rate = 2.0 * np.pi * mode.natural_frequency * mode.damping_ratio
@@ -107,12 +107,10 @@ def plot_stabilisation(signal: xr.DataArray, fit: DecayFit) -> Figure:
         What :func:`snapbeam.lab.decay.identify.identify_decay` made of it.
     """
     samples = check_signal(signal)
-    part = (samples.time >= fit.start) & (samples.time <= fit.stop)
-    cut = SignalSamples(samples.values[part], samples.time[part], samples.sampling_frequency)
+    cut = samples.part((samples.time >= fit.start) & (samples.time <= fit.stop))
     poles = fit.poles if fit.poles is not None else find_poles(cut, noise_level(cut))[1]
     n = cut.values.size
-    window = np.cos(0.5 * np.pi * np.arange(n) / n) ** 2
-    level = np.abs(np.fft.rfft((cut.values - cut.values.mean()) * window))
+    level = np.abs(np.fft.rfft((cut.values - cut.values.mean()) * falling_window(n)))
     freq = np.fft.rfftfreq(n, 1.0 / cut.sampling_frequency)
     with figure_style():
         figure = new_figure("double", 80.0)
@@ -122,42 +120,17 @@ def plot_stabilisation(signal: xr.DataArray, fit: DecayFit) -> Figure:
         back.set_ylabel("Spectrum (of its maximum)")
         ax.set_zorder(back.get_zorder() + 1)
         ax.patch.set_visible(False)
-        light = (poles.damping_ratio > 0.0) & (
-            poles.damping_ratio < 0.1
-        )  # heavier ones are no modes of a beam
+        # heavier ones are no modes of a beam
+        light = (poles.damping_ratio > 0.0) & (poles.damping_ratio < 0.1)
         free, stable = ~poles.stable & light, poles.stable & light
-        ax.plot(
-            poles.frequency[free],
-            poles.order[free],
-            "o",
-            ms=2.5,
-            mfc="none",
-            mec=BEAM_COLOR,
-            mew=0.4,
-            label="new",
-        )
-        ax.plot(
-            poles.frequency[stable],
-            poles.order[stable],
-            "o",
-            ms=3,
-            color=SHAKER_COLOR,
-            label="stable",
-        )
+        new: dict[str, Any] = {"ms": 2.5, "mfc": "none", "mec": BEAM_COLOR, "mew": 0.4, "label": "new"}
+        ax.plot(poles.frequency[free], poles.order[free], "o", **new)
+        ax.plot(poles.frequency[stable], poles.order[stable], "o", ms=3, color=SHAKER_COLOR, label="stable")
         for k, mode in enumerate(fit.modes):
-            ax.axvline(
-                mode.natural_frequency,
-                color=CENTER_COLOR,
-                linewidth=1.2,
-                zorder=0,
-                label="identified" if k == 0 else None,
-            )
-        highest = max(mode.natural_frequency for mode in fit.modes)
-        ax.set(
-            xlabel="Frequency (Hz)",
-            ylabel="Order",
-            xlim=(0.0, min(3.0 * highest, cut.sampling_frequency / 2.0)),
-        )
+            label = "identified" if k == 0 else None
+            ax.axvline(mode.natural_frequency, color=CENTER_COLOR, linewidth=1.2, zorder=0, label=label)
+        top = min(3.0 * max(mode.natural_frequency for mode in fit.modes), cut.sampling_frequency / 2.0)
+        ax.set(xlabel="Frequency (Hz)", ylabel="Order", xlim=(0.0, top))
         figure.legend(loc="outside upper right", ncols=3)
         fix_ticks(ax, back)
     return figure

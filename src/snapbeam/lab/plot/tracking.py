@@ -43,6 +43,7 @@ __all__ = ["annotated_video", "found_edges", "plot_first_look", "plot_frame", "p
 BEAM_MARK, NEAR_MARK, SHAKER_MARK, STICKER_MARK = "#E69F00", "#F0E442", "#56B4E9", "#CC79A7"
 
 Line = tuple[str, str, str, NDArray[np.floating], NDArray[np.floating]]
+_STRIP = 96  # height of the waveform under the picture, pixels
 
 
 def found_edges(dataset: xr.Dataset, index: int, shape: tuple[int, int]) -> list[Line]:
@@ -211,13 +212,6 @@ def plot_tracking_quality(dataset: xr.Dataset) -> Figure:
         bottom.set_xlim(time[0], time[-1] if time.size > 1 else time[0] + 1.0)
         figure.align_ylabels()
     return figure
-
-
-# ----------------------------------------------------------------------------------------------------
-# An annotated video of a tracked recording.
-
-
-_STRIP = 96  # height of the waveform under the picture, pixels
 
 
 def annotated_video(

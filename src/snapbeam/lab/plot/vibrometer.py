@@ -43,7 +43,7 @@ def plot_drive(signal: xr.DataArray, drive: DriveMeasurement, cycles: float = 12
     cycles : float
         How many cycles of the start to draw.
     """
-    time, values, rate = _parts(signal)
+    values, time, rate = check_signal(signal)
     scale, unit, word = _SCALE[drive.units]
     fit = drive.steady
     begin = fit.start if drive.startup is None else drive.startup.onset
@@ -74,9 +74,8 @@ def plot_drive(signal: xr.DataArray, drive: DriveMeasurement, cycles: float = 12
             high = float(time[min(flaw.last, time.size - 1)])
             wide = max(high - low, 0.002 * float(time[-1] - time[0]))
             left.axvspan(low, low + wide, color=SHAKER_COLOR, alpha=0.5, linewidth=0.0)
-            top.axvspan(
-                1e3 * (low - begin), 1e3 * (high - begin), color=SHAKER_COLOR, alpha=0.3, linewidth=0.0
-            )
+            edges = 1e3 * (low - begin), 1e3 * (high - begin)
+            top.axvspan(*edges, color=SHAKER_COLOR, alpha=0.3, linewidth=0.0)
         for cut in (drive.clipping.low, drive.clipping.high):
             if np.isfinite(cut):
                 top.axhline(scale * (cut - fit.offset), color=SHAKER_COLOR, linewidth=0.6, dashes=(1, 2))
@@ -94,9 +93,8 @@ def plot_drive(signal: xr.DataArray, drive: DriveMeasurement, cycles: float = 12
         right.plot(freq, power, color=BEAM_COLOR, linewidth=0.5, rasterized=freq.size > 20_000)
         count = fit.harmonic_amplitude.size
         level = 20.0 * np.log10(np.maximum(fit.harmonic_amplitude, 1e-12 * fit.amplitude) / fit.amplitude)
-        right.plot(
-            fit.frequency * np.arange(1, count + 1), level, "o", color=SHAKER_COLOR, markersize=3, mfc="none"
-        )
+        multiples = fit.frequency * np.arange(1, count + 1)
+        right.plot(multiples, level, "o", color=SHAKER_COLOR, markersize=3, mfc="none")
         floor = float(np.median(power))
         right.set(xlabel="Frequency (Hz)", ylabel="Level (dB of the sine)", ylim=(floor - 25.0, 5.0))
         right.set_xlim(0.0, min(rate / 2.0, fit.frequency * (count + 1.5)))
@@ -106,8 +104,3 @@ def plot_drive(signal: xr.DataArray, drive: DriveMeasurement, cycles: float = 12
         )
         fix_ticks(top, left, right)
     return figure
-
-
-def _parts(signal: xr.DataArray) -> tuple[np.ndarray, np.ndarray, float]:
-    samples = check_signal(signal)
-    return samples.time, samples.values, samples.sampling_frequency
