@@ -250,7 +250,7 @@ class SeriesSettings:
 
 
 def load_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -> SeriesSettings:
-    """Settings from a TOML file with sections camera, tracking, signal and test_series, and changes that go before them."""
+    """Settings from a TOML file with sections camera, tracking, signal and test_series, and changes, which go first."""
     sections: dict[str, dict[str, Any]] = {"camera": {}, "tracking": {}, "signal": {}, "test_series": {}}
     for name, values in () if path is None else read_toml("settings", path).items():
         if name not in sections or not isinstance(values, dict):

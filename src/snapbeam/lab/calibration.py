@@ -529,8 +529,8 @@ def calibrate(
         assert uneven.beam is not None
         value, level = getattr(uneven.imperfection, imperfection), uneven.beam.buckling_level * 1e3
         told.append(
-            f"{imperfection} = {value:.4g} {_UNITS[imperfection]} with a buckling level of {level:.4g} mm gives each well "
-            "its own first frequency; which kind of imperfection it is, two frequencies do not say"
+            f"{imperfection} = {value:.4g} {_UNITS[imperfection]} with a buckling level of {level:.4g} mm gives each "
+            "well its own first frequency; which kind of imperfection it is, two frequencies do not say"
         )
         answer = dataclasses.replace(answer, beam=uneven.beam, imperfection=uneven.imperfection)
     return dataclasses.replace(answer, remarks=tuple(told), diagnostics=tuple(diagnostics))
@@ -590,8 +590,9 @@ def _fit(beam: Beam, data: list[_Datum], names: list[str], modes: int) -> _Fitte
         undetermined += ("buckling_level",)
         least = math.exp(logs[names.index("buckling_level")])
         words = (
-            f"any buckling_level above {least * 1e3:.4g} mm meets the measured frequencies as well: the first one about "
-            "a well may be that of the antisymmetric mode, which does not depend on the level; measure the symmetric one"
+            f"any buckling_level above {least * 1e3:.4g} mm meets the measured frequencies as well: the first one "
+            "about a well may be that of the antisymmetric mode, which does not depend on the level; measure the "
+            "symmetric one"
         )
         diagnostics.append(KINDS_CALIBRATION["undetermined"].found(told=words, least=least))
     if freedom <= 0:

@@ -42,7 +42,7 @@ def covariance(design: _Array, rcond: float = 1e-15) -> _Array:
 
 
 def weighted_line(x: _Array, y: _Array, weight: _Array) -> tuple[float, float, float, float]:
-    """Weighted mean of x and of y, the slope of a line through them, and the weighted sum of squares of x about its mean."""
+    """Weighted means of x and y, slope of a line through them, and weighted sum of squares of x about its mean."""
     total = weight.sum()
     middle = float((weight * x).sum() / total)
     lever = float((weight * (x - middle) ** 2).sum())

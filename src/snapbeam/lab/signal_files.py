@@ -175,8 +175,8 @@ def read_columns(
     """Return columns of a text table whose header names them, each with its unit.
 
     The table is as for :func:`read_channels`, without the need of a time.  *names* are those of the columns, with or
-    without units, the first ones if left out; *units* those where the header states none.  With *are_stated* a header that
-    states another unit of the last column is refused.
+    without units, the first ones if left out; *units* those where the header states none.  With *are_stated* a header
+    that states another unit of the last column is refused.
     """
     source = Path(path)
     if not source.is_file():

@@ -83,9 +83,6 @@ _SUFFIX_UNITS = {
     "_s": "s", "_v": "V", "_n": "N", "_hz": "Hz",
 }  # fmt: skip
 _INTEGER_SCALE = {"int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "uint8": (128.0, 128.0)}
-
-
-# One channel as it comes out of a file, and what a reader is told beside the path.
 _FORTRAN = re.compile(rb"(\.\d*)[Dd]([-+]\d\d)")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
@@ -905,7 +902,7 @@ def _one_rate(found: Mapping[str, float], where: str) -> float:
 
 
 def _rate_of(name: str, value: Any) -> float | None:
-    """Samples per second [Hz] that a named value states; None if the name states none, or the value is 0 or no number."""
+    """Samples per second [Hz] that a named value states; None if it states none, or is 0 or no number."""
     word, suffix = (name, None) if len(name) > _LONGEST_NAME else split_unit(name)
     key = _key(name)
     if key not in _RATES and key not in _STEPS:

@@ -124,7 +124,7 @@ def spectral_peak(samples: SignalSamples, low: float = 0.0, high: float | None =
 def highest_peak(
     freq: NDArray[Any], spectrum: _Array, band: tuple[float, float], lowest: float, floor: float = 0.0
 ) -> float:
-    """Frequency [Hz] of the highest peak in a band, from *lowest* on and above *floor*, by a parabola through logarithms."""
+    """Frequency [Hz] of the highest peak in a band, from *lowest* on, by a parabola through logarithms."""
     inside = np.flatnonzero((freq >= max(band[0], lowest)) & (freq <= band[1]))
     if inside.size == 0 or not spectrum[inside].max() > floor:
         raise InputError(f"signal: no oscillation between {band[0]:g} and {band[1]:g} Hz")

@@ -143,8 +143,8 @@ def law_priors(units: str) -> dict[str, tuple[float, float]]:
     return {"q": (0.7, 0.7), "r": (1.0 / 6.0, 1.0 / 6.0)}
 
 
-# Logarithmic decrement and analytic signal (Hilbert transform) give an amplitude and a phase for each cycle of a filtered mode, with known noise; two weighted linear
-# regressions, of log amplitude and of phase against the law of ``decay_model``, do the rest.
+# Logarithmic decrement and analytic signal (Hilbert transform) give an amplitude and a phase for each cycle of a
+# filtered mode, with known noise; two weighted linear regressions against the law above do the rest.
 
 
 class Cycles(NamedTuple):

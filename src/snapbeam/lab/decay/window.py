@@ -283,9 +283,9 @@ def dominant(samples: SignalSamples, low: float = 0.0, high: float | None = None
 
 
 def prepared(samples: SignalSamples, start: float | None, stop: float | None, known: bool = False) -> Decay:
-    """Cut a record to its free decay, from *start* to *stop* [s] as far as given, and take out what does not belong to it.
+    """Cut a record to its free decay, from *start* to *stop* [s] as far as given, without what does not belong to it.
 
-    *known*: its softening is known beforehand.
+    *known*: the softening is known beforehand.
     """
     low = samples.time[0] if start is None else finite("start", start)
     high = samples.time[-1] if stop is None else finite("stop", stop)
@@ -523,8 +523,8 @@ def noise_fall(rest: SignalSamples, frequency: float, decay_rate: float) -> Nois
     left in it do not reach; its logarithm must fall by more than five standard errors, and nowhere rise.  Where it
     falls along no straight line, the rate is the mean one while the mode is seen.
 
-    *rest* is what a fit leaves; *frequency* [Hz] and *decay_rate* [1/s] are those of the first mode, and noise is sought
-    above one and a half times the frequency.
+    *rest* is what a fit leaves; *frequency* [Hz] and *decay_rate* [1/s] are those of the first mode, and noise is
+    sought above one and a half times the frequency.
     """
     size = rest.values.size // _PARTS
     freq = np.fft.rfftfreq(size, 1.0 / rest.sampling_frequency)
