@@ -11,6 +11,7 @@ from snapbeam.lab.drive_alignment import align, recorded_drive
 from snapbeam.lab.sensor_errors import beyond_shakers
 from snapbeam.lab.signals import SignalSamples, make_signal
 from snapbeam.lab.sine_fit import fit_sine, spectral_peak
+from snapbeam.lab.synthetic import render_vibrometer
 from snapbeam.lab.vibrometer import displacement_from_velocity, measure_drive
 from snapbeam.util.validation import InputError
 
@@ -395,3 +396,20 @@ def test_a_motion_that_no_shaker_makes_says_which_limit_it_passes():
 def _tone(amplitude, frequency):
     time = np.arange(20_000) / 2e4
     return amplitude * np.cos(2.0 * np.pi * frequency * time), time
+
+
+@pytest.mark.parametrize(("frequency", "start_up"), [(200.0, 0.02), (300.0, 0.01)])
+def test_a_start_that_is_not_over_is_in_the_standard_error(frequency, start_up):
+    """Twenty cycles of a shaker that is within a percent of its amplitude: 10 to 20 standard errors in silence once."""
+    for seed in range(3):
+        record = render_vibrometer(
+            frequency,
+            0.01,
+            duration=0.1 + 20.0 / frequency,
+            onset=0.1,
+            start_up=start_up,
+            snr_db=40.0,
+            rng=seed,
+        )
+        steady = measure_drive(record).steady
+        assert abs(steady.amplitude - 0.01) < 3.0 * steady.amplitude_se < 0.1 * 0.01

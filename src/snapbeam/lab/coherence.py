@@ -41,7 +41,7 @@ def frequency_response(
     """Estimate the frequency response and the coherence of two signals by Welch's method.
 
     With the densities S of Hann windows that overlap by half, H1 = S_xy/S_xx is unbiased by noise of the response, and
-    H2 = S_yy/S_yx by noise of the excitation.  The coherence is |S_xy|^2/(S_xx S_yy).  The relative standard error of
+    H2 = S_yy/S_yx by noise of the excitation.  The coherence is ``|S_xy|**2 / (S_xx S_yy)``.  The relative standard error of
     the magnitude, and that of the phase in rad, is sqrt((1 - coherence)/(2 n coherence)) with n independent segments
     (J. S. Bendat and A. G. Piersol, *Random Data*, 4th ed., section 9.2).  The response of a nonlinear system is that
     of its best linear approximation for this excitation.
@@ -72,7 +72,8 @@ def frequency_response(
     >>> force = lab.make_signal(np.random.default_rng(0).standard_normal(20_000), "N", 2000.0)
     >>> motion = lab.make_signal(0.002 * force.values, "m", 2000.0)
     >>> found = lab.frequency_response(force, motion, resolution=5.0)
-    >>> print(f"{found.magnitude.sel(frequency=100.0, method="nearest").item():.4f} {found.magnitude.attrs['units']}")
+    >>> line = found.sel(frequency=100.0, method="nearest")
+    >>> print(f"{line.magnitude.item():.4f} {line.magnitude.attrs['units']}")
     0.0020 m/N
     """
     from scipy.signal import csd

@@ -595,8 +595,8 @@ KINDS_VIBROMETER = table(
     Kind(
         "vibrometer.drifts", WARNING,
         "amplitude and phase cycle by cycle, against constant ones, drifts of either and two close lines",
-        "the amplitude drifts by {change_percent:.2g} % over the steady part (temperature of shaker or amplifier): half of "
-        "that is in its standard error; let the shaker warm up, or cut the record",
+        "the amplitude drifts by {change_percent:.2g} % over the steady part (temperature of shaker or amplifier, or a start "
+        "that is not over): half of that is in its standard error; let the shaker warm up, record longer, or cut the record",
     ),
     Kind(
         "vibrometer.beat", WARNING,

@@ -76,7 +76,7 @@ def full_field(
     >>> from snapbeam import lab
     >>> time = np.arange(100) / 10e3  # s
     >>> beam = -0.335e-3 + 5e-5 * np.sin(2 * np.pi * 100 * time)
-    >>> camera = lab.SyntheticCamera(shape=(160, 96))
+    >>> camera = lab.SyntheticCamera(shape=(192, 96))
     >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
     >>> synthetic = lab.render_recording(time, beam, beam - 0.6e-3, camera=camera, stage=stage)
     >>> with lab.open_recording(synthetic.write("test.cihx"), pixel_size=12e-6) as recording:

@@ -29,13 +29,17 @@ FALSE_ALARM_RATE = 1e-3
 _LINES = 32  # lines of a spectrum, at least
 _MATTERS = 0.004  # of the amplitude that an error must take, or move it by, to be of concern
 _SHIFTS = 5e-4  # of the frequency
+_HIDDEN = 0.1  # of the amplitude, above which an error does not go by with little evidence
 _AHEAD = 10.0  # chi-square by which an error must better what is none
 _CURVE_ERROR = 0.05  # of its harmonics by which a curve may differ from a family's
+_COURSE = 8  # cycles of a course, at least
 _CHANGES = 0.02  # of the amplitude, or rad, by which a steady motion may change
 _EXPLAINS = 0.75  # of the odd harmonics that a curve must explain
 _BILINEAR = np.array([[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]])
 _START = 20.0  # cycles of the start that a filter shapes
-_START_LIMIT = 40.0  # chi-square by which a start, which no model describes to the noise, speaks against a filter
+_START_LIMIT = (
+    40.0  # chi-square by which a start, which no model describes to the noise, speaks against a filter
+)
 _CONSTANT = 4  # cycles on either side of a jump
 _TAIL = 4.0  # cycles after the start-up whose transient is no noise
 _MAINS = (50.0, 60.0, 100.0, 120.0)
@@ -169,14 +173,14 @@ def find_errors(record: Record) -> list[Hypothesis]:
             best, usual = best_of(found)
             if best is None:
                 continue
-            if max(best.loss, best.shift) > 0.0 and best.score > (
-                usual + _AHEAD if best.kind and usual > 0.0 else 0.0
-            ):
+            if max(best.loss, best.shift) > 0.0 and best.score > (usual + _AHEAD if best.kind else 0.0):
                 told.append(best)
                 continue
-            # an error that explains nearly as much is not told, but may be there
-            near = [one for one in found if one.score > max(best.score - _AHEAD, 0.0)]
-            loss, shift = (max((getattr(one, name) for one in near), default=0.0) for name in ("loss", "shift"))
+            # an error that explains nearly as much is not told, but may be there; a large one would show elsewhere
+            near = [one for one in found if one.score > max(best.score - _AHEAD, 0.0) and one.loss < _HIDDEN]
+            loss, shift = (
+                max((getattr(one, name) for one in near), default=0.0) for name in ("loss", "shift")
+            )
             if max(loss, shift) > 0.0:
                 told.append(Hypothesis("", best.score, 1, loss, shift))
     return told
@@ -524,29 +528,33 @@ def _courses(record: Record) -> list[Hypothesis]:
     """Amplitude and phase over the steady part: constant, drifting, or bent as by a line too close to be parted."""
     inside = (record.times > record.fit.start) & (record.times < record.fit.stop)
     cycles, t = record.cycles[inside], record.times[inside]
-    if t.size < 24 or not np.abs(cycles).min() > 0.0:
+    if t.size < _COURSE or not np.abs(cycles).min() > 0.0:
         return []
-    basis = np.polynomial.legendre.legvander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, 5)
+    degree = min(5, t.size // 3)
+    basis = np.polynomial.legendre.legvander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, degree)
     course = np.log(np.abs(cycles)), np.unwrap(np.angle(cycles))
     bends = [np.diff(one, 2) for one in course]
     noise = [1.4826 * float(np.median(np.abs(one - np.median(one)))) / math.sqrt(6.0) + 1e-9 for one in bends]
+    # of few cycles the scatter may be small by chance
+    white = record.fit.noise_rms / record.fit.amplitude * math.sqrt(2.0 * t.size / record.fit.samples)
+    noise = [max(one, white) for one in noise]
     found = [np.linalg.lstsq(basis, one, rcond=None)[0] for one in course]
     size = np.linalg.norm(basis, axis=0)
     gain = [(coefficients * size / sd) ** 2 for coefficients, sd in zip(found, noise, strict=True)]
     found[0][0] = found[1][0] = found[1][1] = 0.0
     change, bend = (float(np.ptp(basis @ coefficients)) for coefficients in found)
-    line = float(np.ptp(basis[:, :2] @ found[0][:2]))
+    smooth = float(np.ptp(basis[:, :4] @ found[0][:4]))  # a drift, or a start-up that is not over
     kinds = ("drifts", "beat", "clock_drifts") if max(change, bend) > _CHANGES else ("", "", "")
     span = float(t[-1] - t[0]) * record.fit.frequency
     numbers = {"change_percent": 100.0 * change, "bend": bend}
     turned = 6.0 * float(np.abs(found[1][2:4]).sum()) / (2.0 * np.pi * span)
-    slow = float(gain[0][1:3].sum()) if line > 0.8 * change else 0.0
+    slow = float(gain[0][1:4].sum()) if smooth > 0.8 * change else 0.0
     close = float(gain[0][1:].sum() + gain[1][2:].sum()) if bend > _CHANGES and change > 0.1 * bend else 0.0
     pulled = math.hypot(change, bend) / (2.0 * np.pi * span)
     clock = numbers | {"share_percent": 200.0 * turned}
     return [
-        Hypothesis(kinds[0], slow, 2, 0.5 * change, numbers=numbers),
-        Hypothesis(kinds[1], close, 9, 0.5 * change, pulled, numbers),
+        Hypothesis(kinds[0], slow, 3, 0.5 * change, numbers=numbers),
+        Hypothesis(kinds[1], close, 2 * degree - 1, 0.5 * change, pulled, numbers),
         Hypothesis(kinds[2], float(gain[1][2:4].sum()), 2, 0.0, turned, clock),
     ]
 

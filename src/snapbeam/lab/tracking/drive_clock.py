@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.stats import chi2, f
 
 from snapbeam.lab.signals import SignalSamples
@@ -27,6 +28,8 @@ _SURER = 10.0  # chi-square by which one kind of step must explain more than the
 _FRAMES, _PIXELS = 0.3, 0.2  # that a step is at least
 _JITTER = 0.05  # frames
 _MEDIAN = 2.7  # times as many squares a median needs for the error of a mean
+_NEIGHBOURS = 9  # frames about one
+_FADING = (0.05, 0.2)  # time constants of a start that is not over, over the length
 _BLOCK = 8  # frames, for noise that is alike in neighbours
 
 
@@ -63,12 +66,16 @@ def drive_clock(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
     if told:
         return told
     noise = max(1.4826 * float(np.median(np.abs(np.diff(off, 2)))) / math.sqrt(6.0), _LEAST_NOISE)
+    # a start that is not over leaves a slow residual; frames out of order are alone among their neighbours
+    alone = off - median_filter(off, _NEIGHBOURS, mode="nearest")
     whole = max(1.4826 * float(np.median(np.abs(off))), noise)
-    return _frames(off, wave, whole, first) or _steps(part, off, noise, fit.frequency)
+    return _frames(off, alone, wave, whole, first) or _steps(part, off, noise, fit.frequency)
 
 
-def _frames(off: Floats, wave: Floats, noise: float, first: int) -> list[tuple[str, dict[str, float]]]:
-    """Frames shown again, and frames exchanged with the next."""
+def _frames(
+    off: Floats, alone: Floats, wave: Floats, noise: float, first: int
+) -> list[tuple[str, dict[str, float]]]:
+    """Frames shown again, and frames exchanged with the next, from the residual and that without its slow part."""
     before, after = wave[:-2] - wave[1:-1], wave[2:] - wave[1:-1]
     limit = float(chi2.isf(_RATE / off.size, 1)) * noise**2
     again = off**2 - (off - before) ** 2
@@ -78,6 +85,9 @@ def _frames(off: Floats, wave: Floats, noise: float, first: int) -> list[tuple[s
     exchanged = (turned > limit) & (turned > _EXPLAINS * pair) & (off[:-1] ** 2 > 0.2 * pair)
     exchanged &= off[1:] ** 2 > 0.2 * pair
     shown = (again > limit) & (again > _EXPLAINS * off**2)
+    own = alone**2 > 0.5 * off**2
+    shown &= own
+    exchanged &= own[:-1] & own[1:]
     shown[:-1] &= ~exchanged
     shown[1:] &= ~exchanged
     for kind, found in (("frames_exchanged", exchanged), ("frames_copied", shown)):
@@ -96,7 +106,9 @@ def _steps(
     slope = part.values - part.values.mean()
     slope = wave @ np.linalg.lstsq(wave, slope, rcond=None)[0]
     slope = np.gradient(slope)
-    base = np.linalg.qr(np.column_stack([np.ones_like(turn), wave, since * slope]))[0]
+    begun = part.time - part.time[0]
+    fading = [np.exp(-begun / (share * begun[-1]))[:, None] * wave for share in _FADING]
+    base = np.linalg.qr(np.column_stack([np.ones_like(turn), wave, since * slope, *fading]))[0]
     left = off - base @ (base.T @ off)
     places = np.arange(_BLOCK, off.size - _BLOCK)
     after = (np.arange(off.size)[:, None] >= places).astype(np.float64)
