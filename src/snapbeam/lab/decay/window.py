@@ -390,7 +390,7 @@ def _on_course(
     behind = best.gain - next(one.gain for one in pair if one.kind)
     apart = abs(pair[0].numbers["start"] - pair[1].numbers["start"])
     softens = all(one.numbers["start"] > 1.0 for one in pair if not one.kind)
-    apart *= math.sqrt(likely(-behind, 2.0)) if softens else 1.0
+    apart *= math.sqrt(likely(-behind, 5.0)) if softens else 1.0
     return samples, Doubt(apart), []
 
 
