@@ -131,8 +131,8 @@ def track(
     The command finds the beam, the shaker and a sticker on it, fits their edges to a fraction of a pixel, and writes the
     displacements with standard errors and flags to a NetCDF file.  Frames without a valid edge are NaN and have a flag.
     Diagnostics report doubtful results; with --strict they are errors.  If tracking fails or a
-    scale is missing, the command writes a picture to the file of --picture, or beside --output: one frame with the objects
-    at the threshold and the regions in which a beam was found. It prints the options of each region.
+    scale is missing, the command writes a picture to the file of --picture, or beside --output.  It shows one frame with
+    the objects at the threshold and the regions in which a beam was found.  The options of each region are printed.
 
     Example: snapbeam track test.cihx --pixel-size 12e-6 --buckling-level 0.335e-3 -o test.nc --picture
     frame.png --report quality.png

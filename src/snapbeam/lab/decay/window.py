@@ -381,8 +381,8 @@ def _on_course(
         return again, doubt, [diagnostic, *(one for one in more if one.code != diagnostic.code)]
     if certain and best.kind and abs(best.shift) > _MATTERS:
         share = best.shift * float((samples.time[-1] - samples.time[0]) / (cycles.time[-1] - cycles.time[0]))
-        told_so = KINDS_DECAY["frequency_drift"].found(share_percent=100.0 * share)
-        return steadied(samples, share), Doubt(abs(share)), [told_so]
+        creeps = KINDS_DECAY["frequency_drift"].found(share_percent=100.0 * share)
+        return steadied(samples, share), Doubt(abs(share)), [creeps]
     # a softening that a creep explains as well
     pair = [one for one in told if one.numbers.get("shares", 0) in (1, 2)]
     if len(pair) < 2 or known:

@@ -167,7 +167,7 @@ def _ticks(
 def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float] | None = None) -> Figure:
     """Draw a simulated run over a measured one: beams, shakers, and their difference; where they part is marked.
 
-    With an ensemble, the band that contains 90 % of its runs is grey.
+    With an ensemble, the band that contains 90 % of its runs is shaded.
 
     Parameters
     ----------
