@@ -165,3 +165,17 @@ def test_the_command_writes_what_can_be_drawn_and_exported(tmp_path, monkeypatch
         response["ordinate_axis_units_lab"].strip() == "m"
         and response["orddenom_axis_units_lab"].strip() == "N"
     )
+
+
+def test_the_command_names_no_peak_of_unrelated_signals(tmp_path, monkeypatch):
+    """Single lines exceed the limit by chance; none of them is a peak."""
+    monkeypatch.chdir(tmp_path)
+    values = np.random.default_rng(0).standard_normal((20_000, 2))
+    table = np.column_stack([np.arange(20_000) / RATE, values])
+    np.savetxt("noise.csv", table, delimiter=",", header="time [s],force [N],beam [m]", comments="")
+    answer = CliRunner().invoke(app, ["frf", "noise.csv", "--excitation", "force", "--response", "beam"])
+    assert (
+        answer.exit_code == 0
+        and "response.incoherent" in answer.output
+        and "highest peak" not in answer.output
+    )

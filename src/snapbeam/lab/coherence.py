@@ -155,16 +155,21 @@ def _common(x: SignalSamples, y: SignalSamples) -> tuple[SignalSamples, SignalSa
     return parts[0], parts[1]
 
 
+def coherent_lines(found: xr.Dataset) -> tuple[NDArray[np.bool_], int]:
+    """Lines of a frequency response that are coherent with their neighbours, and the most neighbouring ones."""
+    seen = stretches(found["coherence"].values > found.attrs["coherence_limit"])
+    coherent = np.zeros(found.sizes["frequency"], dtype=bool)
+    for first, last in seen:
+        coherent[first:last] = last - first >= _NEIGHBOURS
+    return coherent, max((last - first for first, last in seen), default=0)
+
+
 def _diagnostics(found: xr.Dataset) -> list[Diagnostic]:
     """Findings about the coherence, and about the resolution of the highest peak."""
-    seen = stretches(found["coherence"].values > found.attrs["coherence_limit"])
-    longest = max((last - first for first, last in seen), default=0)
-    if longest < _NEIGHBOURS:
+    coherent, longest = coherent_lines(found)
+    if not coherent.any():
         return [KINDS_RESPONSE["incoherent"].found(lines=longest)]
-    size = np.zeros(found.sizes["frequency"])
-    for first, last in seen:
-        if last - first >= _NEIGHBOURS:
-            size[first:last] = found["magnitude"].values[first:last]
+    size = np.where(coherent, found["magnitude"].values, 0.0)
     top = int(np.argmax(size))
     if 0 < top < size.size - 1:
         high = size > size[top] / math.sqrt(2.0)

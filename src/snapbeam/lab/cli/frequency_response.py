@@ -44,6 +44,7 @@ def frequency_response(
     """
     import numpy as np
 
+    from snapbeam.lab.coherence import coherent_lines
     from snapbeam.lab.coherence import frequency_response as estimate
     from snapbeam.plot.run import plot_frequency_response
     from snapbeam.plot.style import FIGURE_SUFFIXES
@@ -55,10 +56,12 @@ def frequency_response(
     channels = (excitation, response)
     pair = [lab.open_signal(signal, channel, None, None, sampling_frequency, columns) for channel in channels]
     found = estimate(*pair, resolution=resolution, estimator=estimator)
-    coherent = found["coherence"] > found.attrs["coherence_limit"]
-    top = found.isel(frequency=int(np.argmax(found["magnitude"].where(coherent, 0.0).values)))
-    names = ("frequency", "magnitude", "magnitude_se", "phase", "coherence")
-    peak = {name: float(top[name]) for name in names}
+    coherent, _ = coherent_lines(found)
+    peak: dict[str, float] = {}
+    if coherent.any():
+        top = found.isel(frequency=int(np.argmax(np.where(coherent, found["magnitude"].values, 0.0))))
+        names = ("frequency", "magnitude", "magnitude_se", "phase", "coherence")
+        peak = {name: float(top[name]) for name in names}
     console = out()
     unit = found["magnitude"].attrs["units"]
     console.print(
@@ -67,10 +70,11 @@ def frequency_response(
         f"{100.0 * float(coherent.mean()):.0f} % of the lines",
         markup=False,
     )
-    console.print(
-        f"  highest peak  {peak['magnitude']:.5g} +- {peak['magnitude_se']:.1g} {unit} at {peak['frequency']:.5g} Hz, phase "
-        f"{peak['phase']:.3f} rad, coherence {peak['coherence']:.3f}"
-    )
+    if peak:
+        console.print(
+            f"  highest peak  {peak['magnitude']:.5g} +- {peak['magnitude_se']:.1g} {unit} at {peak['frequency']:.5g} Hz, "
+            f"phase {peak['phase']:.3f} rad, coherence {peak['coherence']:.3f}"
+        )
     diagnostics = diagnostics_of(found)
     lab.print_diagnostics(console, diagnostics)
     if plot is not None:
@@ -83,6 +87,6 @@ def frequency_response(
         write_netcdf(found, output)
         console.print(f"Written: {file_line(output)}")
     add_json(
-        peak=peak, coherent_share=float(coherent.mean()), resolution_hz=float(found.attrs["resolution"]),
+        peak=peak or None, coherent_share=float(coherent.mean()), resolution_hz=float(found.attrs["resolution"]),
         segments=int(found.attrs["segments"]), diagnostics=[one.plain() for one in diagnostics],
     )  # fmt: skip
