@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -66,7 +68,7 @@ def test_a_matlab_file_has_every_array(tmp_path):
     np.testing.assert_array_equal(back["time"].ravel(), RUN["time"])
 
 
-def test_a_universal_file_has_a_record_of_each_variable_over_time(tmp_path):
+def test_a_universal_file_has_a_record_of_each_variable_over_time(tmp_path, monkeypatch):
     """Even samples are kept; the contact samples of a run are interpolated, and the record says so."""
     pyuff = pytest.importorskip("pyuff")
     assert sb.write_table(RUN, tmp_path / "run.uff") == ["shape"]
@@ -81,6 +83,10 @@ def test_a_universal_file_has_a_record_of_each_variable_over_time(tmp_path):
     record = pyuff.UFF(str(tmp_path / "uneven.uff")).read_sets(0)
     np.testing.assert_allclose(record["data"], 0.2 * np.arange(11))
     assert record["id2"] == "interpolated from 13 uneven samples"
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "pyuff", None)
+        with pytest.raises(sb.InputError, match=r"a universal file needs pyuff; install it .*\[lab\]"):
+            sb.write_table(RUN, tmp_path / "without.uff")
     with pytest.raises(sb.InputError, match="must have a variable over time"):
         sb.write_table(xr.Dataset({"a": ("x", [1.0, 2.0])}), tmp_path / "a.uff")
 
