@@ -28,7 +28,7 @@ from snapbeam.simulation.advance import advance, differences, tangent_obstacle
 from snapbeam.simulation.request import cycle_of
 from snapbeam.simulation.states import states_of
 from snapbeam.solver.assemble import cycles_of, make_ensemble, phases_of, plans_of, run_columns
-from snapbeam.solver.registry import resolve
+from snapbeam.solver.registry import engine_of
 from snapbeam.solver.statistics import statistics_of
 from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates, perturbed_start
 from snapbeam.util.diagnostics import Diagnostic
@@ -706,7 +706,7 @@ class Stroboscope:
             start=begun.flat(),
             periods=periods * self.cycles_per_period,
         )
-        _, engine = resolve("cpu")
+        engine = engine_of(ensemble)
         model = self.system.model
         moved = None
         if tangents is None:

@@ -10,7 +10,7 @@ from snapbeam.model.quantity import check_fields, quantities, quantity
 from snapbeam.util.validation import InputError
 
 ACCURACIES = ("standard", "reference")
-ENGINES = ("auto", "cpu", "cuda")
+ENGINES = ("auto", "cpu", "cuda", "native")
 CYCLES = 200
 """Default number of cycles of a run."""
 

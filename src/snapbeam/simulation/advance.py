@@ -16,7 +16,7 @@ from snapbeam.simulation.request import require_motion
 from snapbeam.simulation.states import states_of
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.registry import resolve
+from snapbeam.solver.registry import engine_of
 from snapbeam.solver.statistics import OutputStates, statistics_of
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.status_codes import RunStatus
@@ -115,7 +115,7 @@ def advance(
             f"tolerance = {integration.tolerance:g}: applies to simulate; give step, or accuracy = 'reference'"
         )
     ensemble = make_ensemble(system, integration.replace(early_termination=False), start=flat, periods=span)
-    _, engine = resolve("cpu")
+    engine = engine_of(ensemble)
     vectors, doubt = None, {}
     if tangent is None:
         ends = engine.integrate_with_output_states(ensemble, integration.threads, report)

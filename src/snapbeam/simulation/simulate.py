@@ -26,7 +26,7 @@ from snapbeam.simulation.tolerance import ErrorEstimate, steps_for
 from snapbeam.solver.assemble import make_ensemble, plans_of, run_columns
 from snapbeam.solver.cpu.driver import usable_cores
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.registry import resolve
+from snapbeam.solver.registry import engine_of
 from snapbeam.solver.statistics import Recorded, lost_in_circuits, rounding_energy, statistics_of
 from snapbeam.solver.step_size import Plan
 from snapbeam.solver.terms import WORKS
@@ -404,8 +404,7 @@ def simulate(
     run = prepared(system, integration, sample_times)
     times, ensemble = run.times, run.ensemble
     check_memory(system, run.samples, times is None)
-    _, engine = resolve("cpu")
-    recorded = joined(list(engine.record(ensemble, run.instants, times is None, report)))
+    recorded = joined(list(engine_of(ensemble).record(ensemble, run.instants, times is None, report)))
     if report is not None:
         report(1.0)
     summary = RunSummary.from_statistics(statistics_of(ensemble, recorded.accumulators_of_runs))

@@ -15,7 +15,7 @@ from snapbeam.simulation.dataset import impact_table, joined, run_dataset
 from snapbeam.simulation.save import compressed, description, summary_dataset
 from snapbeam.simulation.simulate import Prepared, end_state, prepared, reached_by, run_attributes
 from snapbeam.simulation.summary import RunSummary
-from snapbeam.solver.registry import resolve
+from snapbeam.solver.registry import engine_of
 from snapbeam.solver.statistics import Recorded, statistics_of
 from snapbeam.util.diagnostics import sharing
 from snapbeam.util.files import check_writable
@@ -89,7 +89,6 @@ def simulate_to_file(
     )
     target, report = check_writable(path, "path", (".nc",)), sharing(progress, "run")
     run = prepared(system, integration, sample_times)
-    _, engine = resolve("cpu")
 
     def reported(share: float) -> None:
         raise_held()
@@ -98,7 +97,7 @@ def simulate_to_file(
 
     with netcdf_file(target) as file:
         writer = _Writer(file, run)
-        for piece in engine.record(run.ensemble, run.instants, run.times is None, reported):
+        for piece in engine_of(run.ensemble).record(run.ensemble, run.instants, run.times is None, reported):
             writer.take(piece)
         summary = writer.finish()
     if report is not None:

@@ -21,7 +21,7 @@ from snapbeam.simulation.dataset import joined
 from snapbeam.simulation.request import checked_request, cycle_of
 from snapbeam.solver.assemble import make_ensemble, plans_of, run_columns
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.registry import resolve
+from snapbeam.solver.registry import engine_of
 from snapbeam.solver.step_size import Plan
 from snapbeam.util.provenance import made_by
 from snapbeam.util.validation import InputError, choice, positive
@@ -235,7 +235,7 @@ def _perturbed(ensemble: Ensemble, system: System, size: float) -> Ensemble:
 
 def _watch(system: System, ensemble: Ensemble, times: _Array) -> _Array:
     """Return displacements of the beam at the striker and at mid-span, over b, shape (times, 2)."""
-    recorded = joined(list(resolve("cpu")[1].record(ensemble, times, False)))
+    recorded = joined(list(engine_of(ensemble).record(ensemble, times, False)))
     beam = ensemble.structure.row_of_beam(ensemble.contact_rows[0])
     read_out = np.column_stack((beam, ensemble.structure.center))
     found = np.full((times.size, 2), np.nan)

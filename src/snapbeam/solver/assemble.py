@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -22,6 +23,7 @@ from snapbeam.model.quantity import numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
 from snapbeam.model.system import System
+from snapbeam.solver.channels import channels_of
 from snapbeam.solver.ensemble import FAR_AWAY, RUN, CircuitCoupling, Ensemble, FurtherContactTable
 from snapbeam.solver.excitation import tip_motion
 from snapbeam.solver.further_contacts import LAW, NUMBERS, OFFSET, REST, SIGN, SINCE, SPEED
@@ -299,6 +301,11 @@ def _is_around(section: str) -> bool:
     return section in ("base_excitation", "axial_load") or numbered(section)[0] == "force"
 
 
+def is_native(engine: str) -> bool:
+    """Return whether the native core integrates: by name, or for tests by the variable SNAPBEAM_ENGINE."""
+    return engine == "native" or (engine in ("auto", "cpu") and os.environ.get("SNAPBEAM_ENGINE") == "native")
+
+
 _LOWEST = {"standard": 1e-9, "reference": 1e-13}
 """Height of a flight after an impact that lasts no time, over b, below which chatter ends in sticking."""
 _RESOLVED = 24.0
@@ -378,7 +385,7 @@ def make_ensemble(
     _decisions(table, system, structure, integration, time, places.location, highest)
     table["lowest"] = system.scale.length * _LOWEST[integration.accuracy]
     law: type[ContactLaw] = HertzContact if system.contact_law is None else type(system.contact_law)
-    return Ensemble(
+    ensemble = Ensemble(
         structure=structure,
         scale=system.scale,
         order=plans[0].order,
@@ -398,6 +405,9 @@ def make_ensemble(
         circuits=_circuits(system, columns, runs),
         others=others_of(system, structure, columns, runs, since),
     )
+    if is_native(integration.engine):
+        ensemble = dataclasses.replace(ensemble, channels=channels_of(system, ensemble, columns))
+    return ensemble
 
 
 def _require_record(system: System, table: NDArray[Any], driven: Driven) -> None:

@@ -107,6 +107,8 @@ class Ensemble:
     circuits: tuple[CircuitCoupling, ...] = ()
     """Circuits of the harvesters."""
     others: FurtherContactTable | None = None
+    channels: Any = None
+    """:class:`~snapbeam.solver.channels.Channels` for the native core."""
 
     @property
     def circuit_rates(self) -> _Array:

@@ -13,6 +13,7 @@ from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.integration import ENGINES
+from snapbeam.solver.assemble import is_native
 from snapbeam.solver.cpu import driver as cpu
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.statistics import OutputStates, Recorded
@@ -62,6 +63,15 @@ class Engine(Protocol):
         ...
 
 
+def engine_of(ensemble: Ensemble) -> Engine:
+    """The engine that an ensemble was arranged for, of those that run on the processor."""
+    if ensemble.channels is None:
+        return cpu
+    from snapbeam.solver import native
+
+    return native
+
+
 def resolve(
     name: str,
     *,
@@ -106,6 +116,10 @@ def resolve(
         For another name, or for ``"cuda"`` without a device: the message says what is missing.
     """
     choice("engine", name, ENGINES)
+    if is_native(name):
+        from snapbeam.solver import native
+
+        return "native", native
     pays = runs >= _FEWEST_RUNS and runs * cycles >= _FEWEST_CYCLES
     if name == "cuda" or (name == "auto" and pays and find_spec("numba_cuda")):
         from snapbeam.solver.cuda import driver as cuda

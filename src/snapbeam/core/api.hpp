@@ -1,0 +1,96 @@
+// What a host hands to a kernel and gets back: numbers and pointers to arrays, SI units.
+//
+// A Problem is what all runs share, a Batch what differs between them.  Time is counted in ticks, whole numbers below 2^53 that
+// doubles hold exactly; *tick* is the length of one in seconds.
+#pragma once
+
+namespace snapbeam {
+
+struct Problem {
+    int modes;
+    const double *omega, *sigma;  // q'' + 2 sigma q' + omega^2 q = ...
+    const double *G, *g;          // tension: q'' = ... - gamma [(q.Gq) g + (2 g.q + q.Gq) Gq]
+    double gamma;
+    const double *shift;          // from the first well to its mirror image, as q; null: runs stay about the first well
+    const double *far_force;      // acceleration about the mirror image where the wells are unequal; null
+    double lift;                  // potential energy of the mirror image above the first well, J
+    int blocks;                   // G couples no modes of different blocks, which follow each other
+    const int *block_sizes;
+    int composition;              // a number of COMPOSITIONS
+    int channels;
+    const int *laws;              // law of each channel
+    int signals;
+    const double *uses;           // (channels, signals): factor of each signal in the motion or force of a channel
+    int law_numbers;              // numbers of a law in Batch.numbers
+    const double *center;         // row of the centre, (modes,)
+    const double *high;           // 1 of a mode that counts as high, else 0; null: none does
+    const double *beam;           // 1 of a mode of the beam, 0 of one of a striker's own
+    const double *second;         // the second well about the mirror image, as q; null: the mirror image itself
+    double center_rest;           // displacement of the centre in the first well
+    double dividing_height;       // displacement of the centre that divides the wells
+    int levels;                   // lengths of steps: step / 2^0 ... step / 2^(levels - 1)
+    int fewest_parts;             // parts of a kick in which forces of the velocity are integrated, at least
+    double parts_per_decay;       // and parts over the time in which the damping stops the motion along a row
+};
+
+// Numbers of a run.
+enum RunNumber : int {
+    TICK, STEP, END, OUTPUT_INTERVAL, LAST_QUARTER, WELL_SIGN, COARSEST, FINEST, DECIDE_ENERGY, DECIDE_REACH, DECIDE_CROSSINGS,
+    MAX_STEPS, STRETCH, RUN_NUMBERS
+};
+// Numbers of a signal: mean + amplitude sin(rate t + phase); its period in ticks, 0 if it has none.
+enum SignalNumber : int { MEAN, AMPLITUDE, RATE, PHASE, PERIOD, SIGNAL_NUMBERS };
+enum Status : int { OK, EARLY_STOP, RUNNING, DIVERGED, STEP_LIMIT };
+enum Statistic : int {
+    STATUS, TIME, SIDE, CROSSINGS, LATE_CROSSINGS, LAST_CROSSING, STEPS, TRIALS, SAMPLED_STEPS, MIN_DISPLACEMENT,
+    MAX_DISPLACEMENT, MIN_CENTER, MAX_CENTER, PEAK_VELOCITY, PEAK_CENTER_VELOCITY, SQUARE_DISPLACEMENT, SQUARE_CENTER,
+    SQUARE_VELOCITY, SQUARE_CENTER_VELOCITY, ENERGY_TIME, HIGH_ENERGY_TIME, DISSIPATED, FIRST_ENERGY, ENERGY,
+    DISPLACEMENT, CENTER, EARLY_STOP_TIME, STATISTICS
+};
+// Of each channel; of a force only WORK, GROSS_WORK and LOST are not 0.
+enum OfChannel : int { IMPACTS, IMPULSE, WORK, GROSS_WORK, LOST, PEAK_FORCE, DEEPEST, CONTACT_TIME, TOUCHING, ONSET, OF_CHANNEL };
+// Of a sample, and in addition penetration, force, potential energy, work and loss of each channel.
+enum OfSample : int { SAMPLE_TIME, BEAM_ENERGY, SAMPLE_DISSIPATED, OF_SAMPLE };
+enum ChannelSample : int { SAMPLE_DEPTH, SAMPLE_FORCE, SAMPLE_POTENTIAL, SAMPLE_WORK, SAMPLE_LOST, CHANNEL_SAMPLE };
+enum OfImpact : int { IMPACT_CHANNEL, IMPACT_ONSET, IMPACT_DURATION, IMPACT_FORCE, IMPACT_IMPULSE, OF_IMPACT };
+
+// Records of one run; a kernel returns when the room is used up, and goes on from *saved* in the next call.
+struct Recorder {
+    int instants;
+    const double *times;          // (instants,) s, ascending
+    bool in_contact;              // the ends of steps in contact too
+    int samples, impacts;         // room
+    double *rows;                 // (samples, 2 modes): q about the first well, p
+    double *values;               // (samples, OF_SAMPLE + CHANNEL_SAMPLE channels)
+    double *impact_rows;          // (impacts, OF_IMPACT)
+    long *marks;                  // instants, samples and impacts recorded, samples of the contact at hand, begun
+    double *saved;                // the state between two calls
+    long budget;                  // steps of a call
+};
+
+struct Batch {
+    int runs;
+    const double *run;            // (runs, RUN_NUMBERS)
+    const double *signals;        // (runs, signals, SIGNAL_NUMBERS)
+    const double *numbers;        // (runs, channels, law_numbers)
+    const double *offset;         // (runs, channels): of a contact, penetration in the first well with its signals at 0
+    const double *since;          // (runs, channels): ticks in contact at the start, negative: apart, NaN: the penetration decides
+    const double *rows;           // (rows, modes)
+    const int *row_of;            // (runs, channels + 1): row of each channel, then that of the displacement observed
+    const double *rest;           // (runs, channels + 1): displacement along these in the first well
+    const double *q, *p;          // (runs, modes) about the well of WELL_SIGN
+    const int *order;             // (runs,): the order in which runs are taken
+    int outputs;                  // output states of each run
+    double *states;               // (runs, outputs, 2 modes + 1 + channels): q, p, well, ticks in contact (-1: apart)
+    double *statistics;           // (runs, STATISTICS)
+    double *of_channels;          // (runs, channels, OF_CHANNEL)
+    bool account;                 // account for the dissipation of the modes
+    const volatile int *stop;
+    int *next;                    // the next run, shared by threads
+    int *done;                    // runs that ended
+    Recorder *recorder;           // null: nothing is recorded
+};
+
+typedef void (*Kernel)(const Problem &, const Batch &);
+
+}  // namespace snapbeam

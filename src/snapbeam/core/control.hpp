@@ -1,0 +1,672 @@
+// The controller, once for every layout: propose a step, take it, inspect it, accept it or take a shorter one.
+//
+// In free flight a step is the flight step, halved where the beam is stretched far beyond its wells.  In contact, steps grow from the
+// onset and shrink towards the release.  A step inside which a contact closes or opens, or a lossy contact begins or ceases to
+// press, is cut to end there, and the cut is corrected on the true motion until it is right to a tick.  If several do, the first
+// one counts; the others are found again.  A force that begins acts from the first kick of the next step.  Each run of a pack has
+// its own time, length of step and contacts; a run that ends is replaced.
+#pragma once
+#include "statistics.hpp"
+
+namespace SNAPBEAM_SET {
+
+constexpr double GRADING = 0.5, RELEASE = 0.5, STRETCH_LIMIT = 4.0, NEVER = 1e300;
+constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
+
+// What a channel does at the end of a step.
+template <class L> struct Event {
+    typename L::Marks flip;       // the contact opens or closes
+    typename L::Marks force;      // a lossy contact begins or ceases to press
+    typename L::Real at_force;    // 1: the step is cut at such a change
+    typename L::Real low, low_f, high, high_f;  // bracket of it: ticks, and the force there
+};
+
+template <class L> struct Group {
+    typedef typename L::Number Number;
+    typedef typename L::Real Real;
+    typedef typename L::Cell Cell;
+    typedef typename L::Plain Plain;
+    typedef typename L::Marks Marks;
+
+    Structure<L> *s;
+    const Problem *problem;
+    const Batch *batch;
+    Runs<L> z;
+    Totals<L> totals;
+    Plain *tables, *own, *scratch, *amplitude;
+    Marks alive, again, landing;  // running; taking a step again that was cut; a step up to an output or the end
+    Real ticks, wanted;           // length of the step, and of the next one if it is taken again
+    Real event, tries, cuts;      // contact at whose event the step is cut, corrections of it, cuts in all
+    Real key;                     // ticks for which the flows were formed
+    Event<L> *events;             // of each channel
+    Cell *spare;                  // rows and channels that a record puts aside
+    Channel<L> *spare_channel;
+    Real step, end, limit, output_interval, coarsest, finest, most_steps, stretch, stretch_at_rest;
+    int run[L::runs], output[L::runs];
+
+    void lay_out(Structure<L> &structure, const Batch &b, Arena &arena) {
+        s = &structure, problem = s->problem, batch = &b;
+        const int n = s->cells, channels = problem->channels, signals = problem->signals;
+        z.s = s, z.channels = channels, z.signals = signals, z.account = b.account || b.recorder;
+        Cell **rows[] = {&z.q, &z.p, &z.k, &z.q1, &z.p1, &z.k1, &z.r};
+        for (Cell **row : rows) *row = arena.take<Cell>(n);
+        scratch = arena.take<Plain>(long(n) * Inside<L>::ROWS), amplitude = arena.take<Plain>(n);
+        const long flow = long(s->composition.distinct) * n * 4;
+        tables = arena.take<Plain>(flow * problem->levels);
+        own = arena.take<Plain>(flow);
+        z.channel = arena.take<Channel<L>>(channels), z.signal = arena.take<Signal<L>>(signals);
+        z.block = arena.take<Number>(long(channels) * BLOCK_ARRAYS), z.late = arena.take<int>(channels);
+        events = arena.take<Event<L>>(channels);
+        spare = arena.take<Cell>(b.recorder ? 3l * n : 0), spare_channel = arena.take<Channel<L>>(b.recorder ? channels : 0);
+        totals.lay_out(*s, z, arena);
+        Channel<L> unused;
+        for (int j = 0; j < channels; ++j) {
+            Channel<L> &c = arena.base ? z.channel[j] : unused;
+            c.signal = arena.take<int>(signals), c.factor = arena.take<double>(signals);
+            c.row = arena.take<Cell>(n), c.P = arena.take<Number>(problem->law_numbers), c.M = arena.take<Number>(channels);
+        }
+    }
+
+    void begin() {
+        const int n = s->cells;
+        Cell *rows[] = {z.q, z.p, z.k, z.q1, z.p1, z.k1, z.r};
+        for (Cell *row : rows)
+            for (int i = 0; i < n; ++i) row[i] = Cell(0.0);
+        for (long i = 0; i < long(s->composition.distinct) * n * 4; ++i) own[i] = Plain(0.0);
+        for (long i = 0; i < long(s->composition.distinct) * n * 4 * problem->levels; ++i) tables[i] = Plain(0.0);
+        alive = again = landing = FromBits<Marks>::of(0);
+        Real *zeros[] = {&ticks, &wanted, &event, &tries, &cuts, &key, &step, &end, &limit, &output_interval, &coarsest, &finest,
+                         &most_steps, &stretch, &stretch_at_rest, &z.t};
+        for (Real *x : zeros) *x = Real(0.0);
+        z.tick = z.sign = z.parts = Real(1.0), z.h = z.gq = z.qr = z.next_gq = z.along_g = z.along_r = Number(0.0);
+        z.flows = own;
+        for (int i = 0; i < z.signals; ++i) {
+            Signal<L> &one = z.signal[i];
+            one.mean = one.amplitude = one.rate = one.phase = Number(0.0), one.period = Real(0.0);
+            one.begin(z.t, z.tick), one.set_length(s->composition, z.h);
+        }
+        for (int j = 0; j < z.channels; ++j) {
+            Channel<L> &c = z.channel[j];
+            c.law = problem->laws[j];
+            with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed; });
+            c.uses = 0;
+            for (int i = 0; i < z.signals; ++i)
+                if (problem->uses[j * z.signals + i] != 0.0) c.signal[c.uses] = i, c.factor[c.uses++] = problem->uses[j * z.signals + i];
+            for (int i = 0; i < n; ++i) c.row[i] = Cell(0.0);
+            for (int i = 0; i < problem->law_numbers; ++i) c.P[i] = Number(1.0);
+            for (int i = 0; i < z.channels; ++i) c.M[i] = Number(0.0);
+            c.rest = c.offset = c.x = c.y = c.f = c.first_f = c.v = c.d0 = c.r0 = c.d1 = c.r1 = Number(0.0);
+            c.closed = c.pressing = FromBits<Marks>::of(0), c.onset = c.safe = Real(0.0);
+            c.impulse = c.work = c.gross = c.lost = c.own_impulse = c.deepest = c.hardest = Number(0.0);
+            for (Number &x : c.sums) x = Number(0.0);
+            Event<L> &e = events[j];
+            e.flip = e.force = FromBits<Marks>::of(0), e.at_force = e.low = e.low_f = e.high = e.high_f = Real(0.0);
+        }
+        totals.clear();
+        unsigned fresh = 0;
+        for (int l = 0; l < L::runs; ++l) fresh |= unsigned(load(l)) << l;
+        start(fresh);
+    }
+
+    // Everything that a run needs to go on to the bit.
+    template <class F> void visit(F number) {
+        const int n = s->cells;
+        for (int i = 0; i < n; ++i) number(z.q[i]), number(z.p[i]), number(z.k[i]);
+        number(z.t), number(z.sign), number(z.gq), number(z.qr), number(stretch);
+        for (int j = 0; j < z.channels; ++j) {
+            Channel<L> &c = z.channel[j];
+            number(c.onset), number(c.safe), number(c.d0), number(c.r0), number(c.own_impulse), number(c.deepest), number(c.hardest);
+            Number closed = select(c.closed, Number(1.0), Number(0.0)), pressing = select(c.pressing, Number(1.0), Number(0.0));
+            number(closed), number(pressing);
+            c.closed = closed > Number(0.5), c.pressing = pressing > Number(0.5);
+            for (Number &x : c.sums) number(x);
+        }
+        totals.visit(number);
+    }
+    long saved_size() {
+        long size = 0;
+        visit([&](auto &x) { size += long(sizeof(x) / sizeof(double)); });
+        return size;
+    }
+
+    // --- runs begin -----------------------------------------------------------------------------------------------------
+    double of_run(int i, snapbeam::RunNumber k) const { return batch->run[long(i) * snapbeam::RUN_NUMBERS + k]; }
+
+    // The next run takes lane l; false if there is none.
+    bool load(int l) {
+        const int taken = __atomic_fetch_add(batch->next, 1, __ATOMIC_RELAXED);
+        const bool there = taken < batch->runs;
+        set_lane(alive, l, there), set_lane(again, l, false), set_lane(landing, l, false);
+        set_lane(z.h, l, 0.0), set_lane(ticks, l, 0.0), set_lane(key, l, -1.0);
+        if (!there) return false;
+        const int i = batch->order[taken], modes = problem->modes;
+        run[l] = i, output[l] = 0;
+        using namespace snapbeam;
+        set_lane(z.tick, l, of_run(i, TICK)), set_lane(step, l, of_run(i, STEP)), set_lane(end, l, of_run(i, END));
+        set_lane(output_interval, l, of_run(i, OUTPUT_INTERVAL)), set_lane(z.sign, l, of_run(i, WELL_SIGN));
+        set_lane(coarsest, l, of_run(i, COARSEST)), set_lane(finest, l, of_run(i, FINEST)), set_lane(most_steps, l, of_run(i, MAX_STEPS));
+        set_lane(stretch_at_rest, l, of_run(i, STRETCH)), set_lane(z.t, l, 0.0), set_lane(stretch, l, 0.0);
+        set_lane(z.parts, l, s->parts(of_run(i, STEP) * of_run(i, TICK)));
+        for (int k = 0; k < z.signals; ++k) {
+            const double *numbers = batch->signals + (long(i) * z.signals + k) * SIGNAL_NUMBERS;
+            Signal<L> &one = z.signal[k];
+            set_lane(one.mean, l, numbers[MEAN]), set_lane(one.amplitude, l, numbers[AMPLITUDE]), set_lane(one.rate, l, numbers[RATE]);
+            set_lane(one.phase, l, numbers[PHASE]), set_lane(one.period, l, numbers[PERIOD]);
+        }
+        for (int m = 0; m < modes; ++m) {
+            set_element<L>(z.q, s->place[m], l, batch->q[long(i) * modes + m]);
+            set_element<L>(z.p, s->place[m], l, batch->p[long(i) * modes + m]);
+        }
+        const double *rest = batch->rest + long(i) * (z.channels + 1);
+        const int *row_of = batch->row_of + long(i) * (z.channels + 1);
+        for (int j = 0; j < z.channels; ++j) {
+            Channel<L> &c = z.channel[j];
+            const double *row = batch->rows + long(row_of[j]) * modes;
+            for (int m = 0; m < modes; ++m) set_element<L>(c.row, s->place[m], l, row[m]);
+            for (int k = 0; k < problem->law_numbers; ++k)
+                set_lane(c.P[k], l, batch->numbers[(long(i) * z.channels + j) * problem->law_numbers + k]);
+            set_lane(c.rest, l, rest[j]), set_lane(c.offset, l, batch->offset[long(i) * z.channels + j]);
+            for (int k = 0; k < z.channels; ++k) {
+                const double *other = batch->rows + long(row_of[k]) * modes;
+                double product = 0.0;
+                for (int m = 0; m < modes; ++m) product += row[m] * other[m];
+                set_lane(c.M[k], l, product);
+            }
+            for (Number &x : c.sums) set_lane(x, l, 0.0);
+            Number *zeros[] = {&c.own_impulse, &c.deepest, &c.hardest, &c.d0, &c.r0};
+            for (Number *x : zeros) set_lane(*x, l, 0.0);
+            set_lane(c.safe, l, 0.0), set_lane(c.onset, l, 0.0), set_lane(c.closed, l, false), set_lane(c.pressing, l, false);
+        }
+        totals.load(*batch, i, l, batch->rows + long(row_of[z.channels]) * modes, rest[z.channels]);
+        // flows of the steps of every length
+        const int n = s->cells, distinct = s->composition.distinct;
+        for (int level = 0; level < problem->levels; ++level) {
+            const double h = of_run(i, STEP) / double(1l << level) * of_run(i, TICK);
+            for (int f = 0; f < distinct; ++f)
+                for (int m = 0; m < n; ++m) {
+                    Plain *to = tables + ((long(level) * distinct + f) * n + m) * 4;
+                    typename L::Coef a[4];
+                    set_flow(typename L::Coef(s->composition.flow[f] * h), s->sigma[m], s->omega[m], a);
+                    for (int x = 0; x < 4; ++x)
+                        if constexpr (L::runs > 1) set_lane(to[x], l, a[x]);
+                        else to[x] = a[x];
+                }
+        }
+        return true;
+    }
+
+    // First observation of runs that begin, or begin again from their state alone at an output.
+    void start(unsigned fresh, bool continued = false) {
+        if (!fresh) return;
+        const Marks which = FromBits<Marks>::of(fresh);
+        const int n = s->size();
+        begin_signals();
+        for (int j = 0; j < z.channels; ++j)
+            if (!z.channel[j].contact) z.channel[j].active = true;
+        for (int i = 0; i < n; ++i) z.q1[i] = z.q[i], z.p1[i] = z.p[i];
+        tension_at(z, z.q1, z.k1);
+        for (int i = 0; i < n; ++i) assign(which, z.k[i], z.k1[i]);
+        assign(which, stretch, Real(value(fma(Number(2.0), z.gq, z.qr))));
+        for (int j = 0; j < z.channels; ++j) {
+            Channel<L> &c = z.channel[j];
+            if (!c.contact) continue;
+            const Number d = penetration(z, c, z.q), r = signal_slope(z, c) - dot<L>(c.row, z.p, n);
+            if (continued) c.closed = c.closed & (c.pressing | (!which));  // what does not press begins again as apart
+            assign(which, c.d0, select(c.closed, d, continued ? min(d, Number(0.0)) : d)), assign(which, c.r0, r);
+            assign(which, c.safe, z.t);
+            if (continued) continue;
+            for (int l = 0; l < L::runs; ++l) {
+                if (!(fresh >> l & 1u)) continue;
+                const double since = batch->since[long(run[l]) * z.channels + j], depth = lane(value(d), l), rate = lane(value(r), l);
+                const bool closed = since == since ? since >= 0.0 : depth > 0.0 || (depth == 0.0 && rate > 0.0);
+                set_lane(c.closed, l, closed), set_lane(c.pressing, l, closed);
+                set_lane(c.onset, l, since > 0.0 ? -since : 0.0);
+                if (!closed && depth > 0.0) set_lane(c.d0, l, 0.0);
+                if (closed) set_lane(c.deepest, l, depth > 0.0 ? depth : 0.0);
+            }
+        }
+        if (!continued) totals.start(z, which);
+        if (!continued && batch->recorder && batch->recorder->marks[4]) {  // goes on from a state that was saved
+            const double *from = batch->recorder->saved;
+            visit([&](auto &x) { __builtin_memcpy(&x, from, sizeof(x)), from += sizeof(x) / sizeof(double); });
+        }
+    }
+
+    SNAPBEAM_FN void begin_signals() {
+        for (int i = 0; i < z.signals; ++i) z.signal[i].begin(z.t, z.tick);
+    }
+
+    // --- propose --------------------------------------------------------------------------------------------------------
+    SNAPBEAM_FN void propose() {
+        const Marks fresh = alive & (!again);
+        const int n = s->size();
+        begin_signals();
+        if (problem->shift) {  // modes about the well that the beam is near
+            const Marks crossed = fresh & (z.sign * totals.center.u * Real(problem->center_rest) < Real(0.0));
+            if (any(crossed)) {
+                for (int i = 0; i < n; ++i) assign(crossed, z.q[i], Cell(fma(Cell(-z.sign), Cell(s->shift[i]), z.q[i])));
+                assign(crossed, z.sign, -z.sign);
+                tension_at(z, z.q, z.k1);
+                for (int i = 0; i < n; ++i) assign(crossed, z.k[i], z.k1[i]);
+                assign(crossed, stretch, Real(value(fma(Number(2.0), z.gq, z.qr))));
+                totals.enter_well(z, crossed);
+            }
+        }
+        Real level = Real(0.0), reach = Real(STRETCH_LIMIT) * stretch_at_rest;
+        Marks far = (abs(stretch) > reach) & (stretch_at_rest > Real(0.0));
+        while (any(far)) {
+            far = far & (level < finest);
+            level += select(far, Real(1.0), Real(0.0)), reach += reach;
+            far = far & (abs(stretch) > reach);
+        }
+        for (int j = 0; j < z.channels; ++j) {
+            const Channel<L> &c = z.channel[j];
+            if (!c.contact || !any(c.closed)) continue;
+            Real want = Real(GRADING) * (z.t - c.onset);
+            const Real d = value(c.d0), r = value(c.r0);
+            want = select(r < Real(0.0), min(want, Real(-RELEASE) * max(d, Real(0.0)) / (r * z.tick)), want);
+            Real deeper = coarsest, length = step;
+            for (int i = 0; i < problem->levels - 1; ++i) length = select(Real(double(i)) < coarsest, Real(0.5) * length, length);
+            for (int i = 0; i < problem->levels - 1; ++i) {
+                const Marks more = (length > want) & (deeper < finest);
+                if (!any(more)) break;
+                length = select(more, Real(0.5) * length, length), deeper += select(more, Real(1.0), Real(0.0));
+            }
+            level = select(c.closed, max(level, deeper), level);
+        }
+        Real length = step;
+        for (int i = 0; i < problem->levels - 1; ++i) length = select(Real(double(i)) < level, Real(0.5) * length, length);
+        limit = min(limit_of_outputs(), end);
+        landing = fresh & (z.t + length >= limit);
+        length = select(landing, limit - z.t, length);
+        ticks = select(alive, select(again, wanted, length), Real(0.0));
+        z.h = Number(ticks * z.tick);
+        const Marks changed = alive & differ(ticks, key);
+        if (any(changed)) new_flows(changed, level, again | landing);
+    }
+    SNAPBEAM_FN Real limit_of_outputs() {
+        Real found = Real(0.0);
+        for (int l = 0; l < L::runs; ++l) set_lane(found, l, (output[l] + 1) * lane(output_interval, l));
+        return found;
+    }
+
+    SNAPBEAM_FN void new_flows(Marks changed, Real level, Marks odd) {
+        key = select(changed, ticks, key);
+        const long flow = long(s->composition.distinct) * s->size() * 4;
+        if (any(changed & odd)) form_flows(own, changed & odd);
+        if constexpr (L::runs == 1) {
+            z.flows = odd ? own : tables + long(level) * flow;
+        } else {
+            const unsigned usual = bits(changed & (!odd));
+            for (int l = 0; l < L::runs; ++l) {
+                if (!(usual >> l & 1u)) continue;
+                const Plain *from = tables + long(lane(level, l)) * flow;
+                for (long i = 0; i < flow; ++i) set_lane(own[i], l, lane(from[i], l));
+            }
+        }
+        for (int i = 0; i < z.signals; ++i) z.signal[i].set_length(s->composition, z.h);
+    }
+    SNAPBEAM_FN void form_flows(Plain *to, Marks which) {
+        for (int f = 0; f < s->composition.distinct; ++f)
+            for (int i = 0; i < s->size(); ++i, to += 4) {
+                Plain a[4];
+                set_flow(Plain(value(z.h) * Real(s->composition.flow[f])), Plain(s->sigma[i]), Plain(s->omega[i]), a);
+                for (int x = 0; x < 4; ++x) to[x] = select(which, a[x], to[x]);
+            }
+    }
+
+    // --- inspect --------------------------------------------------------------------------------------------------------
+    // Fraction of the step at which the gap of a contact closes; 2 where it does not.
+    Real closing(Channel<L> &c, Marks near) {
+        const Real rest = (z.sign - Real(1.0)) * value(c.rest);
+        Inside<L> inside;
+        inside.begin(z, scratch);
+        Real found = Real(2.0), d0 = min(value(c.d0), Real(0.0)), r0 = value(c.r0);
+        const int n = s->size();
+        begin_signals();
+        advance_signals(inside.part);
+        for (;;) {
+            const Marks within = near & (inside.share < inside.parts) & (found > Real(1.0));
+            if (!any(within)) break;
+            inside.advance(*s);
+            for (int i = 0; i < z.signals; ++i) z.signal[i].advance(z.signal[i].ahead_sine[0], z.signal[i].ahead_cosine[0]);
+            const Real d1 = value(c.offset) + value(signal_of(z, c)) - rest - value(dot<L>(c.row, inside.q, n));
+            const Real r1 = value(signal_slope(z, c)) - value(dot<L>(c.row, inside.p, n));
+            const Cubic<Real> gap(d0, r0, d1, r1, inside.part);
+            const Marks may = within & (crest(gap, r0, r1) > Real(0.0));
+            if (any(may)) {
+                const Real high = select(d1 > Real(0.0), Real(1.0), gap.summit());
+                found = select(may, (inside.share - Real(1.0) + root(gap, high)) / inside.parts, found);
+            }
+            d0 = min(d1, Real(0.0)), r0 = r1;
+        }
+        restore_signals();
+        return found;
+    }
+    // Signals at the end of the step are those of its end again after the motion inside it was followed.
+    SNAPBEAM_FN void advance_signals(Real part) {
+        for (int i = 0; i < z.signals; ++i) {
+            const Turn<Number> ahead = turn(Number(z.signal[i].rate * Number(part)));
+            z.signal[i].ahead_sine[0] = ahead.sine, z.signal[i].ahead_cosine[0] = ahead.cosine;
+        }
+    }
+    SNAPBEAM_FN void restore_signals() {
+        for (int i = 0; i < z.signals; ++i) {
+            const Turn<Number> ahead = turn(Number(z.signal[i].rate * z.h));
+            Signal<L> &one = z.signal[i];
+            one.sine = fma(one.sine0, ahead.cosine, one.cosine0 * ahead.sine), one.cosine = fma(one.cosine0, ahead.cosine, -(one.sine0 * ahead.sine));
+            one.set_length(s->composition, z.h);
+        }
+    }
+
+    // Open contacts that may close within the step.
+    SNAPBEAM_FN Marks may_close(Channel<L> &c, Marks open, bool touching) {
+        const int n = s->size();
+        Plain speed = Plain(0.0), doubt = Plain(0.0);
+        for (int i = 0; i < n; ++i) {
+            const Plain h = Plain(value(z.h)), weight = abs(value(c.row[i])), w = h * s->omega[i];
+            speed = fma(weight, amplitude[i], speed);
+            const Plain error = h * min(w * w * w * Plain(1.0 / 384.0), Plain(2.5) / max(w, Plain(1.0)));
+            doubt = fma(weight * error, amplitude[i], doubt);
+        }
+        const Real horizon = Real(TRUST) * step * z.tick, h = value(z.h), d0 = value(c.d0), d1 = value(c.d1);
+        Real tip = Real(0.0), tip_doubt = Real(0.0);
+        for (int i = 0; i < c.uses; ++i) {
+            const Signal<L> &one = z.signal[c.signal[i]];
+            const Real factor = Real(c.factor[i] < 0 ? -c.factor[i] : c.factor[i]), w = value(one.rate) * h, w2 = w * w;
+            tip = fma(factor, value(one.greatest_slope()), tip);
+            tip_doubt = fma(factor * abs(value(one.amplitude)), min(w2 * w2 * Real(1.0 / 384.0), Real(2.5)), tip_doubt);
+        }
+        const Real push = largest_push(z, c.row, horizon, amplitude, [&](int j) { return value(c.M[j]); });
+        const Real bound = fma(Real(MARGIN), L::total(speed), fma(push, horizon, tip));
+        const Real until = z.t + min(-d0 / bound, horizon) / z.tick;
+        // a bound that is not finite is unsafe
+        const Marks finite = bound < Real(NEVER);
+        assign(open, c.safe, select(finite & (!(until < z.t)), touching ? z.t : until, z.t));
+        const Real swing = Real(4.0 / 27.0) * h * (max(value(c.r0), Real(0.0)) + max(-value(c.r1), Real(0.0)));
+        const Real error = fma(Real(MARGIN), L::total(doubt), tip_doubt) + push * h * h * Real(1.0 / 64.0);
+        const Marks clear = finite & (max(d0, d1) + swing + error <= Real(0.0));
+        const Marks unreachable = finite & (z.t + ticks <= until);
+        return open & (((!clear) & (!unreachable)) | (d1 > Real(0.0)));
+    }
+
+    SNAPBEAM_FN void inspect() {
+        const int n = s->size();
+        Marks redo = FromBits<Marks>::of(0), broken = FromBits<Marks>::of(0);
+        bool touching = false;
+        for (int j = 0; j < z.channels; ++j) {
+            Channel<L> &c = z.channel[j];
+            if (!c.contact) {  // out of the range in which a law is valid
+                if (!c.timed) {
+                    const Number u = along(z, c, z.q1);
+                    const Number low_end = with_law(c.law, [&](auto law) { return law.low(c.P); });
+                    const Number high_end = with_law(c.law, [&](auto law) { return law.high(c.P); });
+                    broken = broken | (!((u > low_end) & (u < high_end)));
+                }
+                continue;
+            }
+            c.d1 = penetration(z, c, z.q1);
+            c.r1 = signal_slope(z, c) - dot<L>(c.row, z.p1, n);
+            touching |= any(alive & c.closed);
+        }
+        Real length = ticks, which = event;
+        bool have_amplitudes = false;
+        for (int j = 0; j < z.channels; ++j) {
+            Channel<L> &c = z.channel[j];
+            if (!c.contact) continue;
+            const Real d0 = value(c.d0), r0 = value(c.r0), d1 = value(c.d1), r1 = value(c.r1);
+            const Marks mine = again & (!differ(event, Real(double(j)))), others = alive & (!mine);
+            Real at = Real(NEVER);
+            Event<L> &e = events[j];
+            e.flip = mine, e.force = FromBits<Marks>::of(0);
+            if (c.lossy) {  // where the force of a closed contact changes its sign
+                const Marks active = c.pressing;
+                const Number raw = with_law(c.law, [&](auto law) { return law.force(max(c.d1, Number(0.0)), c.r1, c.P); });
+                const Real f1 = select(active, value(raw), -value(raw));  // positive: as it was
+                const Marks wrong = alive & c.closed & (f1 < Real(0.0)) & (d1 > Real(0.0));
+                const Marks cut_before = mine & c.closed & (!differ(e.at_force, Real(1.0)));
+                const Marks first = wrong & (!cut_before);
+                if (any(first)) {
+                    const Number before = with_law(c.law, [&](auto law) { return law.force(max(c.d0, Number(0.0)), c.r0, c.P); });
+                    const Real f0 = max(select(active, value(before), -value(before)), Real(0.0));
+                    e.low = select(first, Real(0.0), e.low), e.low_f = select(first, f0, e.low_f), e.high_f = select(first, f1, e.high_f);
+                    at = select(first, max(nearest(ticks * (f0 / (f0 - f1))), Real(1.0)), at);
+                    e.high = select(first, ticks, e.high);
+                    e.at_force = select(first, Real(1.0), e.at_force);
+                }
+                if (any(cut_before)) {  // regula falsi of Illinois between the ends of the bracket
+                    const Marks under = cut_before & (f1 > Real(0.0)), over = cut_before & (!(f1 > Real(0.0)));
+                    e.high_f = select(under, Real(0.5) * e.high_f, e.high_f), e.low_f = select(over, Real(0.5) * e.low_f, e.low_f);
+                    e.low = select(under, ticks, e.low), e.low_f = select(under, f1, e.low_f);
+                    e.high = select(over, ticks, e.high), e.high_f = select(over, f1, e.high_f);
+                    const Real next = nearest(e.low + (e.high - e.low) * (e.low_f / (e.low_f - e.high_f)));
+                    const Marks better = cut_before & (tries < Real(CORRECTIONS)) & (abs(next - ticks) > step * Real(1e-9)) & (next > e.low) & (next < e.high);
+                    at = select(better, next, at);
+                    e.flip = e.flip & (!cut_before);
+                    e.force = cut_before & (!better);
+                }
+            }
+            const Marks at_force = e.force | (mine & c.closed & (!differ(e.at_force, Real(1.0))));
+            const Marks on_gap = mine & (!at_force);
+            if (any(on_gap)) {  // did the step that was cut end at the zero of the gap?
+                const Marks right = (c.closed & (r1 < Real(0.0))) | ((!c.closed) & (r1 > Real(0.0)));
+                const Real better = ticks - nearest(d1 / (r1 * z.tick));
+                const Marks off = on_gap & right & differ(better, ticks) & (tries < Real(CORRECTIONS)) & (better > Real(0.0)) & (better < ticks + ticks);
+                at = select(off, better, at), e.flip = e.flip & (!off);
+            }
+            const Marks leaving = others & c.closed & (d1 <= Real(0.0)) & (!at_force);
+            if (any(leaving)) {
+                const Cubic<Real> gap(-max(d0, Real(0.0)), -r0, -d1, -r1, value(z.h));
+                const Marks cut = leaving & (d0 > Real(0.0)) & (d1 < Real(0.0));
+                const Real when = max(nearest(ticks * root(gap, Real(1.0))), Real(1.0));
+                const Marks shorter = cut & (when < ticks);
+                at = select(shorter, min(at, when), at);
+                e.at_force = select(shorter, Real(0.0), e.at_force);
+                e.flip = e.flip | (leaving & (!shorter));
+            }
+            const Marks open = others & (!c.closed);
+            const Marks unsafe = open & (!(z.t + ticks <= c.safe) | !(d1 <= Real(0.0)));
+            if (any(unsafe)) {
+                if (!have_amplitudes) amplitudes(z, amplitude), have_amplitudes = true;
+                const Marks near = may_close(c, unsafe, touching);
+                if (any(near)) {
+                    totals.sum[snapbeam::SAMPLED_STEPS] += select(near, Real(1.0), Real(0.0));
+                    Real found = closing(c, near);
+                    // a step that ends closed although nothing was seen inside it: at the zero of the cubic
+                    const Marks unseen = near & (found > Real(1.0)) & (d1 > Real(0.0));
+                    if (any(unseen)) found = select(unseen, root(Cubic<Real>(min(d0, Real(0.0)), r0, d1, r1, value(z.h)), Real(1.0)), found);
+                    const Real when = max(nearest(ticks * found), Real(1.0));
+                    const Marks hit = near & (found <= Real(1.0)), shorter = hit & (when < ticks);
+                    at = select(shorter, when, at);
+                    e.at_force = select(hit, Real(0.0), e.at_force);
+                    e.flip = e.flip | (hit & (!shorter));
+                }
+            }
+            const Marks sooner = (at < length) | (mine & (at < Real(NEVER)) & (!redo));
+            length = select(sooner, at, length), which = select(sooner, Real(double(j)), which), redo = redo | sooner;
+        }
+        totals.sum[snapbeam::TRIALS] += select(alive, Real(1.0), Real(0.0));
+        redo = redo & alive & (cuts < Real(double(MOST_CUTS))) & (!broken);
+        const Marks same = redo & again & (!differ(which, event));
+        tries = select(same, tries + Real(1.0), Real(0.0));
+        cuts = select(redo, cuts + Real(1.0), Real(0.0));
+        wanted = length, event = select(redo, which, Real(-1.0));
+        again = redo;
+        accept(alive & (!redo), broken);
+    }
+
+    // --- accept ---------------------------------------------------------------------------------------------------------
+    SNAPBEAM_FN void accept(Marks ok, Marks broken) {
+        if (!any(ok)) return;
+        const int n = s->size();
+        bool was_touching = false;
+        if (batch->recorder) {
+            record_inside(*this);
+            for (int j = 0; j < z.channels; ++j) was_touching |= z.channel[j].contact && lane(z.channel[j].closed, 0);
+        }
+        totals.add_step(z, ok, amplitude, scratch);
+        for (int i = 0; i < n; ++i) assign(ok, z.q[i], z.q1[i]), assign(ok, z.p[i], z.p1[i]), assign(ok, z.k[i], z.k1[i]);
+        z.t = select(ok, z.t + ticks, z.t);
+        assign(ok, stretch, Real(value(fma(Number(2.0), z.gq, z.qr))));
+        Marks changed = FromBits<Marks>::of(0);
+        for (int j = 0; j < z.channels; ++j) {
+            Channel<L> &c = z.channel[j];
+            if (!c.contact) continue;
+            const Event<L> &e = events[j];
+            const Marks off = ok & c.closed & e.flip, on = ok & (!c.closed) & e.flip, force = ok & e.force;
+            assign(ok, c.d0, c.d1), assign(ok, c.r0, c.r1);
+            if (!any(off | on | force)) continue;
+            const Marks ends = (off | force) & c.pressing, begins = on | (force & (!c.pressing));
+            if (any(ends)) close_impact(c, j, ends);
+            if (any(force)) {  // what is stored where the force ceases is lost, and is there again where it begins
+                const Number d = max(c.d1, Number(0.0)), stored = with_law(c.law, [&](auto law) { return law.potential(d, c.P); });
+                c.sums[snapbeam::LOST] += select(force, select(c.pressing, stored, -stored), Number(0.0));
+            }
+            c.pressing = (c.pressing & (!(off | force))) | begins;
+            c.closed = (c.closed & (!off)) | on;
+            assign(begins, c.onset, z.t);
+            assign(on | off, c.d0, Number(0.0));  // the gap at an event is zero
+            changed = changed | on | off | force;
+        }
+        if (any(changed))
+            for (int j = 0; j < z.channels; ++j) assign(changed, z.channel[j].safe, z.t);
+        if (problem->high) totals.add_energy(z, ok, value(z.h));
+        if (batch->recorder) record_end(*this, was_touching);
+        const Marks finite = abs(totals.center.u) < Real(1e9);
+        const Marks diverged = ok & (broken | (!finite));
+        const Marks early = ok & totals.decided(z);
+        const Marks spent = ok & (totals.sum[snapbeam::STEPS] >= most_steps);
+        const Marks reached = ok & (z.t >= min(limit, end));
+        if (any(diverged | early | spent | reached)) stop_at(bits(diverged), bits(early), bits(spent), bits(reached));
+    }
+
+    void close_impact(Channel<L> &c, int j, Marks off) {
+        using namespace snapbeam;
+        const Number zero = Number(0.0), peak = peak_of(c), lasted = Number((z.t - max(c.onset, Real(0.0))) * z.tick);
+        const Marks counts = off & (c.deepest > zero);
+        c.sums[IMPACTS] += select(counts, Number(1.0), zero);
+        c.sums[IMPULSE] += select(off, c.own_impulse, zero);
+        c.sums[CONTACT_TIME] += select(counts, lasted, zero);
+        assign(counts, c.sums[PEAK_FORCE], max(c.sums[PEAK_FORCE], peak));
+        assign(counts, c.sums[DEEPEST], max(c.sums[DEEPEST], c.deepest));
+        if (batch->recorder && any(counts)) {
+            Recorder &to = *batch->recorder;
+            double *row = to.impact_rows + to.marks[2]++ * OF_IMPACT;
+            row[IMPACT_CHANNEL] = j, row[IMPACT_ONSET] = lane(c.onset, 0) * lane(z.tick, 0);
+            row[IMPACT_DURATION] = (lane(z.t, 0) - lane(c.onset, 0)) * lane(z.tick, 0);
+            row[IMPACT_FORCE] = lane(value(peak), 0), row[IMPACT_IMPULSE] = lane(value(c.own_impulse), 0);
+        }
+        assign(off, c.deepest, zero), assign(off, c.hardest, zero), assign(off, c.own_impulse, zero);
+    }
+    SNAPBEAM_FN Number peak_of(const Channel<L> &c) const {
+        if (c.lossy) return c.hardest;
+        return with_law(c.law, [&](auto law) { return law.force(max(c.deepest, Number(0.0)), Number(0.0), c.P); });
+    }
+
+    // Runs at an output, at their end, or that stop before it.
+    __attribute__((noinline)) void stop_at(unsigned diverged, unsigned early, unsigned spent, unsigned reached) {
+        using namespace snapbeam;
+        unsigned fresh = 0, going_on = 0;
+        for (int l = 0; l < L::runs; ++l) {
+            const unsigned bit = 1u << l;
+            if (!((diverged | early | spent | reached) & bit)) continue;
+            const bool over = lane(z.t, l) >= lane(end, l) || (diverged & bit);
+            if (batch->outputs > output[l] && ((reached | early) & bit)) write_output(l);
+            int status = RUNNING;
+            if (diverged & bit) status = DIVERGED;
+            else if (early & bit) status = EARLY_STOP;
+            else if (over) status = OK;
+            else if (spent & bit) status = STEP_LIMIT;
+            if (status == RUNNING) {
+                going_on |= bit;
+                continue;
+            }
+            finish(l, status);
+            if (batch->recorder) set_lane(alive, l, false);
+            else fresh |= unsigned(load(l)) << l;
+        }
+        if (going_on) start(going_on, true);
+        if (fresh) start(fresh);
+    }
+
+    void write_output(int l) {
+        const int modes = problem->modes, width = 2 * modes + 1 + z.channels;
+        double *to = batch->states + (long(run[l]) * batch->outputs + output[l]++) * width;
+        for (int m = 0; m < modes; ++m) to[m] = element<L>(z.q, s->place[m], l), to[modes + m] = element<L>(z.p, s->place[m], l);
+        to[2 * modes] = lane(z.sign, l);
+        for (int j = 0; j < z.channels; ++j) {
+            const Channel<L> &c = z.channel[j];
+            to[2 * modes + 1 + j] = lane(Marks(c.closed & c.pressing), l) ? lane(z.t, l) - lane(c.onset, l) : -1.0;
+        }
+    }
+
+    void finish(int l, int status) {
+        using namespace snapbeam;
+        const Marks mine = FromBits<Marks>::of(1u << l);
+        totals.finish(z, mine);
+        for (int j = 0; j < z.channels; ++j) {
+            Channel<L> &c = z.channel[j];
+            const bool pressed = c.contact && lane(Marks(c.closed & c.pressing), l);
+            const bool goes_on = batch->outputs && !batch->recorder;
+            if (pressed && goes_on) {  // the run goes on elsewhere: what the contact gave so far
+                set_lane(c.sums[CONTACT_TIME], l, lane(value(c.sums[CONTACT_TIME]), l) + (lane(z.t, l) - (lane(c.onset, l) > 0.0 ? lane(c.onset, l) : 0.0)) * lane(z.tick, l));
+                set_lane(c.sums[IMPULSE], l, lane(value(c.sums[IMPULSE]), l) + lane(value(c.own_impulse), l));
+                assign(mine, c.sums[PEAK_FORCE], max(c.sums[PEAK_FORCE], peak_of(c)));
+            }
+            set_lane(c.sums[TOUCHING], l, pressed), set_lane(c.sums[ONSET], l, pressed ? lane(c.onset, l) : 0.0);
+            if (pressed && !goes_on) close_impact(c, j, mine);
+        }
+        write_statistics(l, status);
+        __atomic_fetch_add(batch->done, 1, __ATOMIC_RELAXED);
+    }
+    void write_statistics(int l, int status) {
+        using namespace snapbeam;
+        set_lane(totals.sum[STATUS], l, status), set_lane(totals.sum[TIME], l, lane(z.t, l));
+        if (status == EARLY_STOP) set_lane(totals.sum[EARLY_STOP_TIME], l, lane(z.t, l) * lane(z.tick, l));
+        for (int k = 0; k < STATISTICS; ++k) batch->statistics[long(run[l]) * STATISTICS + k] = lane(totals.sum[k], l);
+        for (int j = 0; j < z.channels; ++j)
+            for (int k = 0; k < OF_CHANNEL; ++k)
+                batch->of_channels[(long(run[l]) * z.channels + j) * OF_CHANNEL + k] = lane(value(z.channel[j].sums[k]), l);
+    }
+
+    // The runs at hand are left where they stand.
+    void interrupt() {
+        for (int l = 0; l < L::runs; ++l)
+            if (lane(alive, l)) write_statistics(l, snapbeam::RUNNING);
+        if (!batch->recorder) return;
+        double *to = batch->recorder->saved;
+        visit([&](auto &x) { __builtin_memcpy(to, &x, sizeof(x)), to += sizeof(x) / sizeof(double); });
+        batch->recorder->marks[4] = 1;
+    }
+};
+
+}  // namespace SNAPBEAM_SET
+
+#include "observers.hpp"
+
+namespace SNAPBEAM_SET {
+
+// Runs of one thread, until none is left or all are asked to stop.
+template <class L> void integrate(const Problem &problem, const Batch &batch) {
+    Structure<L> structure;
+    Group<L> group;
+    Arena measured{nullptr, 0};
+    structure.build(problem, measured), group.lay_out(structure, batch, measured);
+    char *memory = static_cast<char *>(__builtin_malloc(measured.used + 64));
+    Arena arena{memory + (64 - reinterpret_cast<unsigned long>(memory) % 64), 0};
+    structure.build(problem, arena), group.lay_out(structure, batch, arena);
+    group.begin();
+    long budget = batch.recorder ? batch.recorder->budget : 0;
+    while (any(group.alive)) {
+        if (*batch.stop || (batch.recorder && (budget-- <= 0 || !has_room(group)) && !any(group.again))) {
+            group.interrupt();
+            break;
+        }
+        group.propose();
+        take_step(group.z);
+        group.inspect();
+    }
+    __builtin_free(memory);
+}
+
+}  // namespace SNAPBEAM_SET

@@ -1,0 +1,135 @@
+// Inside a step: bounds that exclude an event, and the motion between the ends of a step.
+//
+// Until *safe* an open contact cannot close: its gap is larger than what the largest speed covers.  In a time up to a horizon
+//
+//   |(r.q)'| <= MARGIN sum_i |r_i| (p_i^2 + omega_i^2 q_i^2)^(1/2) + horizon (|r.k| + sum_j |M_rj| |f_j|_max),
+//
+// the first term for the free motion of the modes, the second for every force that acts: one that depends on time alone by its
+// amplitude, a force of position by its value and its stiffness, one of velocity by its damping.  Whenever a contact opens or closes,
+// or while one is closed, nothing is trusted beyond the step.  A bound that is not finite excludes nothing.
+//
+// Where the bound excludes nothing, the cubic through both ends of the step serves if it stays away from zero by more than its
+// error, |r_i| (omega_i h)^4/384 of the amplitude of each mode, at most 2.5 amplitudes.  Else the motion is followed with the
+// flows of the modes, in parts much shorter than the period of the fastest mode, under accelerations that vary linearly between
+// those of both ends.
+#pragma once
+#include "step.hpp"
+
+namespace SNAPBEAM_SET {
+
+constexpr double MARGIN = 1.25, TRUST = 8.0;
+// The motion inside a step, part after part.
+template <class L> struct Inside {
+    typedef typename L::Real Real;
+    typedef typename L::Plain Plain;
+    Plain *q, *p, *a, *change, *flow;
+    Real parts, part, half, share;
+
+    static constexpr int ROWS = 8;  // a flow has four
+    SNAPBEAM_FN void begin(const Runs<L> &z, Plain *memory) {
+        const Structure<L> &s = *z.s;
+        const int n = s.size();
+        q = memory, p = q + n, a = p + n, change = a + n, flow = change + n;
+        parts = z.parts;
+        for (int i = 0; i < n; ++i) q[i] = value(z.q[i]), p[i] = value(z.p[i]), a[i] = value(z.k[i]), change[i] = value(z.k1[i]);
+        for (int j = 0; j < z.channels; ++j) {
+            const Channel<L> &c = z.channel[j];
+            if (!c.active || c.law == AXIAL_LOAD) continue;
+            const Plain first = Plain(value(c.first_f)), last = Plain(value(c.f));
+            for (int i = 0; i < n; ++i) a[i] = fma(first, value(c.row[i]), a[i]), change[i] = fma(last, value(c.row[i]), change[i]);
+        }
+        const Real per = Real(1.0) / parts;
+        part = value(z.h) * per, half = Real(0.5) * part, share = Real(0.0);
+        for (int i = 0; i < n; ++i) {
+            change[i] = Plain(per) * (change[i] - a[i]);
+            set_flow(Plain(part), Plain(s.sigma[i]), Plain(s.omega[i]), flow + 4 * i);
+        }
+    }
+    SNAPBEAM_FN void advance(const Structure<L> &s) {  // half a kick, a flow, half a kick
+        const Plain first = Plain(half * share);
+        share += Real(1.0);
+        const Plain last = Plain(half * share), h = Plain(half);
+        for (int i = 0; i < s.size(); ++i) {
+            const Plain x = q[i], y = fma(h, a[i], fma(first, change[i], p[i]));
+            const Plain *f = flow + 4 * i;
+            q[i] = x + fma(f[0], x, f[1] * y);
+            p[i] = fma(h, a[i], fma(last, change[i], y + fma(f[3], y, f[2] * x)));
+        }
+    }
+    // Acceleration along a row.
+    template <class Row> SNAPBEAM_FN Real bend(const Structure<L> &s, const Row *row) const {
+        Plain sum = Plain(0.0);
+        for (int i = 0; i < s.size(); ++i) {
+            const Plain omega = Plain(s.omega[i]), sigma = Plain(s.sigma[i]);
+            const Plain own = fma(Plain(share), change[i], a[i]) - omega * omega * q[i] - Plain(2.0) * sigma * p[i];
+            sum = fma(Plain(value(row[i])), own, sum);
+        }
+        return L::total(sum);
+    }
+};
+
+// Acceleration along a row at the beginning (*last* false) or the end of a step.
+template <class L, class Row> SNAPBEAM_FN typename L::Real bend_at(const Runs<L> &z, const Row *row, bool last) {
+    typedef typename L::Plain Plain;
+    const Structure<L> &s = *z.s;
+    const typename L::Cell *q = last ? z.q1 : z.q, *p = last ? z.p1 : z.p, *k = last ? z.k1 : z.k;
+    Plain sum = Plain(0.0);
+    for (int i = 0; i < s.size(); ++i) {
+        const Plain omega = Plain(s.omega[i]), sigma = Plain(s.sigma[i]);
+        Plain own = value(k[i]) - omega * omega * value(q[i]) - Plain(2.0) * sigma * value(p[i]);
+        for (int j = 0; j < z.channels; ++j) {
+            const Channel<L> &c = z.channel[j];
+            if (c.active && c.law != AXIAL_LOAD) own = fma(Plain(value(last ? c.f : c.first_f)), value(c.row[i]), own);
+        }
+        sum = fma(Plain(value(row[i])), own, sum);
+    }
+    return L::total(sum);
+}
+
+// Amplitudes (p^2 + omega^2 q^2)^(1/2) of the modes at the beginning of the step.
+template <class L> SNAPBEAM_FN void amplitudes(const Runs<L> &z, typename L::Plain *amplitude) {
+    for (int i = 0; i < z.s->size(); ++i) {
+        const typename L::Plain oq = z.s->omega[i] * value(z.q[i]), p = value(z.p[i]);
+        amplitude[i] = sqrt(fma(p, p, oq * oq));
+    }
+}
+
+// Largest acceleration along a row that forces may have within a horizon (s); *row_of* j gives r.r_j.
+template <class L, class Row, class Product>
+SNAPBEAM_FN typename L::Real largest_push(const Runs<L> &z, const Row *row, typename L::Real horizon, const typename L::Plain *amplitude, Product product) {
+    typedef typename L::Real Real;
+    const int n = z.s->size();
+    Real push = max(abs(value(dot<L>(row, z.k, n))), abs(value(dot<L>(row, z.k1, n))));
+    for (int j = 0; j < z.channels; ++j) {
+        const Channel<L> &c = z.channel[j];
+        if (!c.active) continue;
+        Real most = max(abs(value(c.first_f)), abs(value(c.f)));
+        if (c.timed) {
+            most = Real(0.0);
+            for (int i = 0; i < c.uses; ++i) {
+                const Signal<L> &one = z.signal[c.signal[i]];
+                const Real size = abs(value(one.amplitude));
+                const Real own = c.law == BASE ? size * value(one.rate * one.rate) : size + abs(value(one.mean));
+                most = fma(Real(c.factor[i] < 0 ? -c.factor[i] : c.factor[i]), own, most);
+            }
+        } else if (!c.contact) {
+            typename L::Plain sum = typename L::Plain(0.0);
+            for (int i = 0; i < n; ++i) sum = fma(abs(value(c.row[i])), amplitude[i], sum);
+            const Real speed = L::total(sum);
+            const Real stiffness = with_law(c.law, [&](auto law) { return law.stiffness(value(c.x), c.P); });
+            const Real damping = with_law(c.law, [&](auto law) { return law.damping(value(c.x), speed, c.P); });
+            most += speed * (stiffness * horizon + damping);
+        } else {
+            most = Real(2.0) * most;
+        }
+        if (c.law == AXIAL_LOAD) {  // along g and along Gq, as much as q is at most
+            push += most * abs(value(dot<L>(row, z.s->g, n)));
+            push += most * abs(value(dot<L>(row, z.r, n)));
+        } else {
+            push = fma(abs(product(j)), most, push);
+        }
+    }
+    return push;
+}
+
+}  // namespace SNAPBEAM_SET

@@ -1,0 +1,19 @@
+// The kernels of one layout and one instruction set: compiled several times, with SNAPBEAM_SET, SNAPBEAM_WIDTH and SNAPBEAM_LAYOUT
+// set by the build.
+#include "control.hpp"
+
+namespace SNAPBEAM_SET {
+#if SNAPBEAM_LAYOUT == 0
+void runs_side_by_side(const Problem &problem, const Batch &batch) {
+    if (problem.modes == 1) integrate<RunLanes<SNAPBEAM_WIDTH, 1>>(problem, batch);
+    else integrate<RunLanes<SNAPBEAM_WIDTH>>(problem, batch);
+}
+#elif SNAPBEAM_LAYOUT == 1
+void modes_side_by_side(const Problem &problem, const Batch &batch) { integrate<ModeLanes<SNAPBEAM_WIDTH>>(problem, batch); }
+#else
+void run_by_run(const Problem &problem, const Batch &batch) {
+    if (problem.modes == 1) integrate<Thread<1>>(problem, batch);
+    else integrate<Thread<>>(problem, batch);
+}
+#endif
+}  // namespace SNAPBEAM_SET

@@ -1,0 +1,160 @@
+// Laws: the physics of a scalar force, once, for a number of any type.
+//
+// Of a contact, x is the penetration d > 0 and y its rate; of any other force, displacement u and velocity v along its row.  P
+// are the numbers of the law.  A law has
+//
+//   numbers                how many it has
+//   force(x, y, P)         force along the row: of a contact on the beam, away from the striker
+//   potential(x, P)        energy stored, J; the elastic part of the force is its derivative (of a contact), or minus that
+//   stiffness(x, P)        magnitude of the derivative of the elastic force by x, at most a bound of it
+//   damping(x, y, P)       magnitude of the derivative of the force by y, at most a bound of it for speeds up to |y|
+//   low(P), high(P)        displacements between which it is valid (of a force)
+//
+// contact: it acts while the contact is closed;  lossy: the force depends on y;  timed: the force is the channel's signal.
+#pragma once
+#include "number.hpp"
+
+namespace SNAPBEAM_SET {
+
+enum LawNumber : int {
+    HERTZ, POWER_LAW, LAYERED_HERTZ, HUNT_CROSSLEY, KELVIN_VOIGT,
+    LOCAL_SPRING, ELECTROSTATIC, MAGNETIC, QUADRATIC_DAMPING, COULOMB_FRICTION, LINEAR_DAMPING,
+    EXTERNAL_FORCE, BASE, AXIAL_LOAD, LAWS
+};
+
+template <int NUMBERS> struct ContactLaw {
+    static constexpr int numbers = NUMBERS;
+    static constexpr bool contact = true, lossy = false, timed = false;
+    template <class T> static SNAPBEAM_FN T damping(T, T, const T *) { return T(0.0); }
+    template <class T> static SNAPBEAM_FN T low(const T *) { return T(-INFINITY); }
+    template <class T> static SNAPBEAM_FN T high(const T *) { return T(INFINITY); }
+};
+template <int NUMBERS> struct ForceLaw {
+    static constexpr int numbers = NUMBERS;
+    static constexpr bool contact = false, lossy = false, timed = false;
+    template <class T> static SNAPBEAM_FN T force(T, T, const T *) { return T(0.0); }
+    template <class T> static SNAPBEAM_FN T potential(T, const T *) { return T(0.0); }
+    template <class T> static SNAPBEAM_FN T stiffness(T, const T *) { return T(0.0); }
+    template <class T> static SNAPBEAM_FN T damping(T, T, const T *) { return T(0.0); }
+    template <class T> static SNAPBEAM_FN T low(const T *) { return T(-INFINITY); }
+    template <class T> static SNAPBEAM_FN T high(const T *) { return T(INFINITY); }
+};
+
+struct Hertz : ContactLaw<1> {  // f = k d^(3/2)
+    template <class T> static SNAPBEAM_FN T force(T d, T, const T *P) { return P[0] * d * sqrt(d); }
+    template <class T> static SNAPBEAM_FN T potential(T d, const T *P) { return T(0.4) * P[0] * d * d * sqrt(d); }
+    template <class T> static SNAPBEAM_FN T stiffness(T d, const T *P) { return T(1.5) * P[0] * sqrt(d); }
+};
+struct PowerLaw : ContactLaw<2> {  // f = f_1 (d / 1 um)^n
+    template <class T> static SNAPBEAM_FN T force(T d, T, const T *P) { return P[0] * power(T(1e6) * d, P[1]); }
+    template <class T> static SNAPBEAM_FN T potential(T d, const T *P) { return force(d, d, P) * d / (P[1] + T(1.0)); }
+    template <class T> static SNAPBEAM_FN T stiffness(T d, const T *P) {
+        return T(1e6) * P[0] * P[1] * exp((P[1] - T(1.0)) * log(max(T(1e6) * d, T(1e-300))));
+    }
+};
+// Hertz's contact of stiffness k in series with a layer of stiffness k_l: d = (f/k)^(2/3) + (f/k_l)^(1/2).  With
+// d_l = s^3 and c = (k_l/k)^(2/3), d = s^3 (1 + c s), solved by Newton's method from above.
+struct LayeredHertz : ContactLaw<2> {
+    template <class T> static SNAPBEAM_FN T of_layer(T d, const T *P) {
+        const T c = power(P[1] / P[0], T(2.0 / 3.0)), positive = max(d, T(1e-300));
+        T s = min(power(positive, T(1.0 / 3.0)), power(positive / c, T(0.25)));
+        for (int i = 0; i < 7; ++i) s -= (s * s * s * (T(1.0) + c * s) - positive) / (s * s * (T(3.0) + T(4.0) * c * s));
+        return select(d > T(0.0), s * s * s, T(0.0));
+    }
+    template <class T> static SNAPBEAM_FN T force(T d, T, const T *P) {
+        const T layer = of_layer(d, P);
+        return P[1] * layer * layer;
+    }
+    template <class T> static SNAPBEAM_FN T potential(T d, const T *P) {
+        const T layer = of_layer(d, P);
+        return P[1] * layer * layer * (T(0.4) * (d - layer) + layer * T(1.0 / 3.0));
+    }
+    template <class T> static SNAPBEAM_FN T stiffness(T d, const T *P) {
+        const T layer = max(of_layer(d, P), T(1e-300));
+        return P[1] * layer * layer / ((d - layer) * T(1.0 / 1.5) + T(0.5) * layer);
+    }
+};
+struct HuntCrossley : Hertz {  // f = k d^(3/2) (1 + chi d')
+    static constexpr int numbers = 2;
+    static constexpr bool lossy = true;
+    template <class T> static SNAPBEAM_FN T force(T d, T y, const T *P) { return P[0] * d * sqrt(d) * fma(P[1], y, T(1.0)); }
+    template <class T> static SNAPBEAM_FN T damping(T d, T, const T *P) { return P[1] * P[0] * d * sqrt(d); }
+};
+struct KelvinVoigt : ContactLaw<2> {  // f = k d + c d'
+    static constexpr bool lossy = true;
+    template <class T> static SNAPBEAM_FN T force(T d, T y, const T *P) { return fma(P[0], d, P[1] * y); }
+    template <class T> static SNAPBEAM_FN T potential(T d, const T *P) { return T(0.5) * P[0] * d * d; }
+    template <class T> static SNAPBEAM_FN T stiffness(T, const T *P) { return P[0]; }
+    template <class T> static SNAPBEAM_FN T damping(T, T, const T *P) { return P[1]; }
+};
+
+struct LocalSpring : ForceLaw<2> {  // f = -(k + k_3 u^2) u
+    template <class T> static SNAPBEAM_FN T force(T u, T, const T *P) { return -(u * fma(P[1], u * u, P[0])); }
+    template <class T> static SNAPBEAM_FN T potential(T u, const T *P) { return u * u * fma(T(0.25) * P[1], u * u, T(0.5) * P[0]); }
+    template <class T> static SNAPBEAM_FN T stiffness(T u, const T *P) { return abs(P[0]) + T(3.0) * abs(P[1]) * u * u; }
+};
+// f = sign(g) a / (g - u)^2 towards a plate or magnet at g; P: a, g.
+struct Magnetic : ForceLaw<2> {
+    template <class T> static SNAPBEAM_FN T force(T u, T, const T *P) {
+        const T away = P[1] - u;
+        return select(P[1] > T(0.0), P[0], -P[0]) / (away * away);
+    }
+    template <class T> static SNAPBEAM_FN T potential(T u, const T *P) { return -(P[0] / abs(P[1] - u)); }
+    template <class T> static SNAPBEAM_FN T stiffness(T u, const T *P) {
+        const T away = abs(P[1] - u);
+        return T(2.0) * abs(P[0]) / (away * away * away);
+    }
+    template <class T> static SNAPBEAM_FN T low(const T *P) { return select(P[1] > T(0.0), T(-INFINITY), P[1]); }
+    template <class T> static SNAPBEAM_FN T high(const T *P) { return select(P[1] > T(0.0), P[1], T(INFINITY)); }
+};
+struct Electrostatic : ForceLaw<3> {  // the same with a = eps_0 A V^2 / 2; P: V, A, g
+    template <class T> struct Pull {
+        T P[2];
+        SNAPBEAM_FN explicit Pull(const T *given) {
+            P[0] = T(0.5 * 8.8541878188e-12) * given[1] * given[0] * given[0], P[1] = given[2];
+        }
+    };
+    template <class T> static SNAPBEAM_FN T force(T u, T v, const T *P) { return Magnetic::force(u, v, Pull<T>(P).P); }
+    template <class T> static SNAPBEAM_FN T potential(T u, const T *P) { return Magnetic::potential(u, Pull<T>(P).P); }
+    template <class T> static SNAPBEAM_FN T stiffness(T u, const T *P) { return Magnetic::stiffness(u, Pull<T>(P).P); }
+    template <class T> static SNAPBEAM_FN T low(const T *P) { return Magnetic::low(Pull<T>(P).P); }
+    template <class T> static SNAPBEAM_FN T high(const T *P) { return Magnetic::high(Pull<T>(P).P); }
+};
+struct QuadraticDamping : ForceLaw<1> {  // f = -c |v| v
+    static constexpr bool lossy = true;
+    template <class T> static SNAPBEAM_FN T force(T, T v, const T *P) { return -(P[0] * abs(v) * v); }
+    template <class T> static SNAPBEAM_FN T damping(T, T v, const T *P) { return T(2.0) * P[0] * abs(v); }
+};
+struct CoulombFriction : ForceLaw<2> {  // f = -F tanh(v / v_0)
+    static constexpr bool lossy = true;
+    template <class T> static SNAPBEAM_FN T force(T, T v, const T *P) { return -(P[0] * tanh(v / P[1])); }
+    template <class T> static SNAPBEAM_FN T damping(T, T, const T *P) { return P[0] / P[1]; }
+};
+struct LinearDamping : ForceLaw<1> {  // f = -c v, as of a circuit without inertia
+    static constexpr bool lossy = true;
+    template <class T> static SNAPBEAM_FN T force(T, T v, const T *P) { return -(P[0] * v); }
+    template <class T> static SNAPBEAM_FN T damping(T, T, const T *P) { return abs(P[0]); }
+};
+struct Timed : ForceLaw<0> {  // the signal of the channel: a force, the acceleration of a base, or an axial load
+    static constexpr bool timed = true;
+};
+
+// The one place that knows every law by its number: calls function(law).
+template <class F> SNAPBEAM_FN auto with_law(int number, F function) {
+    switch (number) {
+    case POWER_LAW: return function(PowerLaw());
+    case LAYERED_HERTZ: return function(LayeredHertz());
+    case HUNT_CROSSLEY: return function(HuntCrossley());
+    case KELVIN_VOIGT: return function(KelvinVoigt());
+    case LOCAL_SPRING: return function(LocalSpring());
+    case ELECTROSTATIC: return function(Electrostatic());
+    case MAGNETIC: return function(Magnetic());
+    case QUADRATIC_DAMPING: return function(QuadraticDamping());
+    case COULOMB_FRICTION: return function(CoulombFriction());
+    case LINEAR_DAMPING: return function(LinearDamping());
+    case EXTERNAL_FORCE: case BASE: case AXIAL_LOAD: return function(Timed());
+    default: return function(Hertz());
+    }
+}
+
+}  // namespace SNAPBEAM_SET

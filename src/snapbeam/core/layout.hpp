@@ -1,0 +1,84 @@
+// Layouts: what a number, a cell of a row of modes and a coefficient are, and how a row is summed.  Nothing else knows.
+//
+//                 Number        Cell          Coef
+//   RunLanes      W runs        W runs        double        W runs side by side, a cell a mode
+//   ModeLanes     double        W modes       W modes       one run, its modes side by side
+//   Thread        double        double        double        one run; a lane of RunLanes has the same bits
+//
+// Number and Cell may carry derivatives; Real and Plain are the same without them.  Tables, bounds, times and counters are Real.
+// FIXED is a number of modes that the compiler knows; 0: it does not.
+#pragma once
+#include "number.hpp"
+
+namespace SNAPBEAM_SET {
+
+template <int W, int FIXED = 0> struct RunLanes {
+    typedef Pack<W> Number;
+    typedef Pack<W> Real;
+    typedef Pack<W> Cell;
+    typedef Pack<W> Plain;
+    typedef double Coef;
+    typedef Mask<W> Marks;
+    static constexpr int runs = W, lanes = 1, fixed = FIXED;
+    static SNAPBEAM_FN Number total(Cell x) { return x; }
+    static SNAPBEAM_FN Cell mode(const Cell *row, int i) { return row[i]; }
+};
+
+template <int W> struct ModeLanes {
+    typedef double Number;
+    typedef double Real;
+    typedef Pack<W> Cell;
+    typedef Pack<W> Plain;
+    typedef Pack<W> Coef;
+    typedef bool Marks;
+    static constexpr int runs = 1, lanes = W, fixed = 0;
+    static SNAPBEAM_FN double total(Cell x) {
+        double s[W];
+        for (int l = 0; l < W; ++l) s[l] = x.v[l];
+        for (int half = W / 2; half > 0; half /= 2)
+            for (int l = 0; l < half; ++l) s[l] += s[l + half];
+        return s[0];
+    }
+    static SNAPBEAM_FN double mode(const Cell *row, int i) { return row[i / W].v[i % W]; }
+};
+
+template <int FIXED = 0> struct Thread {
+    typedef double Number;
+    typedef double Real;
+    typedef double Cell;
+    typedef double Plain;
+    typedef double Coef;
+    typedef bool Marks;
+    static constexpr int runs = 1, lanes = 1, fixed = FIXED;
+    static SNAPBEAM_FN double total(double x) { return x; }
+    static SNAPBEAM_FN double mode(const double *row, int i) { return row[i]; }
+};
+
+// Memory of a thread: laid out twice by the same text, first to measure it (base null), then to use it.
+struct Arena {
+    char *base;
+    long used;
+    template <class T> T *take(long count) {
+        used = (used + 63) / 64 * 64;
+        T *at = base ? reinterpret_cast<T *>(base + used) : nullptr;
+        used += count * long(sizeof(T));
+        return at;
+    }
+};
+
+// One mode of one run within rows of cells, as numbers: mode i of run l.
+template <class L> SNAPBEAM_FN double element(const typename L::Cell *row, int i, int l) {
+    if constexpr (L::lanes > 1) return row[i / L::lanes].v[i % L::lanes];
+    else return lane(row[i], l);
+}
+template <class L> SNAPBEAM_FN void set_element(typename L::Cell *row, int i, int l, double x) {
+    if constexpr (L::lanes > 1) set_lane(row[i / L::lanes], i % L::lanes, x);
+    else set_lane(row[i], l, x);
+}
+// Mode i of a row of coefficients.
+template <class L> SNAPBEAM_FN void set_coefficient(typename L::Coef *row, int i, double x) {
+    if constexpr (L::lanes > 1) set_lane(row[i / L::lanes], i % L::lanes, x);
+    else row[i] = x;
+}
+
+}  // namespace SNAPBEAM_SET

@@ -1,0 +1,354 @@
+// The Python module: mappings of arrays in, arrays out; threads, stop and progress; choice of the instruction set by cpuid.
+//
+// Every argument is checked here before a kernel starts: type, shape, finiteness, range.  A message names the argument.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <mutex>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
+
+#include "api.hpp"
+#include "laws.hpp"
+
+namespace nb = nanobind;
+using snapbeam::Batch;
+using snapbeam::Problem;
+using snapbeam::Recorder;
+
+// --- instruction sets ---------------------------------------------------------------------------------------------------
+#define SNAPBEAM_KERNELS(NAME)                                       \
+    namespace NAME {                                                 \
+    void runs_side_by_side(const Problem &, const Batch &);          \
+    void modes_side_by_side(const Problem &, const Batch &);         \
+    void run_by_run(const Problem &, const Batch &);                 \
+    }
+SNAPBEAM_FOR_SETS(SNAPBEAM_KERNELS)
+
+struct Set {
+    const char *name;
+    snapbeam::Kernel layouts[3];
+};
+
+static bool present(const std::string &set) {
+    if (set == "avx2" || set == "avx512") {
+#if defined(__x86_64__)
+        // __builtin_cpu_supports needs a runtime that not every compiler brings
+        unsigned a, b, c, d;
+        if (!__get_cpuid(1, &a, &b, &c, &d)) return false;
+        const bool fma = c >> 12 & 1u, saves = c >> 27 & 1u;
+        if (!fma || !saves) return false;
+        unsigned low, high;
+        __asm__ volatile("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
+        if (!__get_cpuid_count(7, 0, &a, &b, &c, &d)) return false;
+        const bool avx2 = b >> 5 & 1u, wide = (b >> 16 & 1u) && (b >> 17 & 1u) && (b >> 30 & 1u) && (b >> 31 & 1u);
+        return set == "avx2" ? avx2 && (low & 6u) == 6u : wide && (low & 0xe6u) == 0xe6u;
+#else
+        return false;
+#endif
+    }
+    return true;
+}
+
+static std::vector<Set> sets() {  // that this build and this processor have, best first
+    std::vector<Set> found;
+#define SNAPBEAM_SET_OF(NAME) \
+    if (present(#NAME)) found.push_back({#NAME, {NAME::runs_side_by_side, NAME::modes_side_by_side, NAME::run_by_run}});
+    SNAPBEAM_FOR_SETS(SNAPBEAM_SET_OF)
+    return found;
+}
+static const char *LAYOUTS[] = {"runs", "modes", "thread"};
+
+// --- arguments ----------------------------------------------------------------------------------------------------------
+static std::string shape_words(const std::vector<size_t> &shape) {
+    std::string words = "(";
+    for (size_t i = 0; i < shape.size(); ++i) words += (i ? ", " : "") + std::to_string(shape[i]);
+    return words + ")";
+}
+
+class Arguments {  // the arrays and numbers of one mapping
+  public:
+    Arguments(nb::dict given, const char *name) : given_(given), name_(name) {}
+
+    template <class T, bool WRITABLE = false> T *array(const char *key, const std::vector<size_t> &shape, bool finite = true) {
+        typedef nb::ndarray<std::conditional_t<WRITABLE, T, const T>, nb::c_contig, nb::device::cpu> Array;
+        if (!given_.contains(key)) throw nb::value_error((where(key) + "is missing").c_str());
+        Array found;
+        if (!nb::try_cast<Array>(given_[key], found, false))
+            throw nb::type_error((where(key) + "must be a contiguous array of " + (sizeof(T) == 8 ? "8" : "4") + "-byte numbers of the right kind").c_str());
+        std::vector<size_t> own;
+        for (size_t i = 0; i < found.ndim(); ++i) own.push_back(found.shape(i));
+        if (own != shape) throw nb::value_error((where(key) + "has shape " + shape_words(own) + "; must have shape " + shape_words(shape)).c_str());
+        if constexpr (std::is_floating_point_v<T>)
+            if (finite)
+                for (size_t i = 0; i < found.size(); ++i)
+                    if (!std::isfinite(found.data()[i])) throw nb::value_error((where(key) + "must be finite").c_str());
+        arrays_.push_back(nb::borrow(given_[key]));
+        return const_cast<T *>(found.data());
+    }
+    template <class T> T *optional(const char *key, const std::vector<size_t> &shape) {
+        return given_.contains(key) && !given_[key].is_none() ? array<T>(key, shape) : nullptr;
+    }
+    double number(const char *key, double low, double high) {
+        double found;
+        if (!given_.contains(key) || !nb::try_cast<double>(given_[key], found)) throw nb::type_error((where(key) + "must be a number").c_str());
+        if (!(found >= low && found <= high))
+            throw nb::value_error((where(key) + "= " + std::to_string(found) + ": must be in [" + std::to_string(low) + ", " + std::to_string(high) + "]").c_str());
+        return found;
+    }
+    int integer(const char *key, int low, int high) {
+        const double found = number(key, low, high);
+        if (found != std::floor(found)) throw nb::value_error((where(key) + "must be an integer").c_str());
+        return int(found);
+    }
+    size_t length(const char *key) {
+        if (!given_.contains(key)) throw nb::value_error((where(key) + "is missing").c_str());
+        const Py_ssize_t found = PyObject_Size(nb::object(given_[key]).ptr());
+        if (found < 0) throw nb::python_error();
+        return size_t(found);
+    }
+    std::string where(const char *key) const { return std::string(name_) + "['" + key + "'] "; }
+    [[noreturn]] void refuse(const char *key, const char *words) const { throw nb::value_error((where(key) + words).c_str()); }
+
+  private:
+    nb::dict given_;
+    const char *name_;
+    std::vector<nb::object> arrays_;
+};
+
+static Problem problem_of(Arguments &a) {
+    Problem p{};
+    const size_t n = a.length("omega"), channels = a.length("laws"), blocks = a.length("block_sizes");
+    if (n < 1 || n > 100000) a.refuse("omega", "must have 1 to 100000 modes");
+    p.modes = int(n), p.channels = int(channels), p.blocks = int(blocks);
+    p.omega = a.array<double>("omega", {n}), p.sigma = a.array<double>("sigma", {n});
+    p.G = a.array<double>("G", {n, n}), p.g = a.array<double>("g", {n}), p.gamma = a.number("gamma", 0.0, 1e300);
+    for (size_t i = 0; i < n; ++i)
+        if (p.omega[i] < 0.0 || p.sigma[i] < 0.0) a.refuse(p.omega[i] < 0.0 ? "omega" : "sigma", "must not be negative");
+    p.shift = a.optional<double>("shift", {n}), p.far_force = a.optional<double>("far_force", {n});
+    p.second = a.optional<double>("second", {n}), p.high = a.optional<double>("high", {n}), p.beam = a.array<double>("beam", {n});
+    p.lift = a.number("lift", -1e300, 1e300);
+    p.block_sizes = a.array<int>("block_sizes", {blocks});
+    size_t together = 0;
+    std::vector<size_t> block_of;
+    for (size_t b = 0; b < blocks; ++b) {
+        if (p.block_sizes[b] < 1 || size_t(p.block_sizes[b]) > n) a.refuse("block_sizes", "must be positive and add up to the modes");
+        for (int i = 0; i < p.block_sizes[b]; ++i) block_of.push_back(b);
+        together += size_t(p.block_sizes[b]);
+    }
+    if (together != n) a.refuse("block_sizes", "must be positive and add up to the modes");
+    for (size_t i = 0; i < n; ++i)
+        for (size_t j = 0; j < n; ++j)
+            if (block_of[i] != block_of[j] && p.G[i * n + j] != 0.0) a.refuse("G", "must be zero between modes of different blocks");
+    p.composition = a.integer("composition", 0, 2);
+    p.laws = a.array<int>("laws", {channels});
+    for (size_t j = 0; j < channels; ++j)
+        if (p.laws[j] < 0 || p.laws[j] >= plain::LAWS) a.refuse("laws", "must be numbers of laws");
+    p.signals = a.integer("signals", 0, 100000);
+    p.uses = a.array<double>("uses", {channels, size_t(p.signals)});
+    p.law_numbers = a.integer("law_numbers", 0, 64);
+    for (size_t j = 0; j < channels; ++j)
+        if (plain::with_law(p.laws[j], [](auto law) { return int(law.numbers); }) > p.law_numbers) a.refuse("law_numbers", "is less than a law has");
+    p.center = a.array<double>("center", {n}), p.center_rest = a.number("center_rest", -1e300, 1e300);
+    p.dividing_height = a.number("dividing_height", -1e300, 1e300);
+    p.levels = a.integer("levels", 1, 40), p.fewest_parts = a.integer("fewest_parts", 1, 256);
+    p.parts_per_decay = a.number("parts_per_decay", 0.0, 1e6);
+    return p;
+}
+
+struct Shared {  // what threads share
+    int next = 0, done = 0;
+    volatile int stop = 0;
+};
+
+static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
+    using namespace snapbeam;
+    Batch b{};
+    const size_t runs = a.length("run"), n = size_t(p.modes), channels = size_t(p.channels), rows = a.length("rows");
+    if (runs < 1 || runs > 2000000000) a.refuse("run", "must have a run");
+    b.runs = int(runs);
+    b.run = a.array<double>("run", {runs, RUN_NUMBERS}, false);
+    for (size_t i = 0; i < runs; ++i) {
+        const double *run = b.run + i * RUN_NUMBERS;
+        const double most = 9007199254740992.0;
+        const RunNumber whole[] = {STEP, END, OUTPUT_INTERVAL};
+        for (RunNumber k : whole)
+            if (!(run[k] >= 1.0 && run[k] <= most && run[k] == std::floor(run[k]))) a.refuse("run", "must count steps and ends in whole ticks, 1 to 2^53");
+        if (!(run[TICK] > 0.0 && run[TICK] < 1e300)) a.refuse("run", "must have a positive tick");
+        if (!(run[WELL_SIGN] == 1.0 || run[WELL_SIGN] == -1.0)) a.refuse("run", "must begin about one of the wells");
+        if (!(run[COARSEST] >= 0.0 && run[COARSEST] <= run[FINEST] && run[FINEST] < p.levels)) a.refuse("run", "must have 0 <= coarsest <= finest < levels");
+        if (std::fmod(run[STEP], std::ldexp(1.0, int(run[FINEST]))) != 0.0) a.refuse("run", "must have steps that halve to whole ticks");
+        if (!(run[MAX_STEPS] >= 1.0)) a.refuse("run", "must be allowed a step");
+        if (!(run[STRETCH] >= 0.0)) a.refuse("run", "must not have a negative stretch");
+    }
+    b.signals = a.array<double>("signals", {runs, size_t(p.signals), SIGNAL_NUMBERS});
+    b.numbers = a.array<double>("numbers", {runs, channels, size_t(p.law_numbers)});
+    b.offset = a.array<double>("offset", {runs, channels}), b.since = a.array<double>("since", {runs, channels}, false);
+    b.rows = a.array<double>("rows", {rows, n});
+    b.row_of = a.array<int>("row_of", {runs, channels + 1});
+    for (size_t i = 0; i < runs * (channels + 1); ++i)
+        if (b.row_of[i] < 0 || size_t(b.row_of[i]) >= rows) a.refuse("row_of", "must be numbers of rows");
+    b.rest = a.array<double>("rest", {runs, channels + 1});
+    b.q = a.array<double>("q", {runs, n}), b.p = a.array<double>("p", {runs, n});
+    b.order = a.array<int>("order", {runs});
+    std::vector<bool> seen(runs);
+    for (size_t i = 0; i < runs; ++i) {
+        if (b.order[i] < 0 || size_t(b.order[i]) >= runs || seen[size_t(b.order[i])]) a.refuse("order", "must name every run once");
+        seen[size_t(b.order[i])] = true;
+    }
+    b.outputs = a.integer("outputs", 0, 2000000000);
+    b.states = a.array<double, true>("states", {runs, size_t(b.outputs), 2 * n + 1 + channels}, false);
+    b.statistics = a.array<double, true>("statistics", {runs, STATISTICS}, false);
+    b.of_channels = a.array<double, true>("of_channels", {runs, channels, OF_CHANNEL}, false);
+    b.account = a.integer("account", 0, 1) != 0;
+    if (b.outputs)
+        for (size_t i = 0; i < runs; ++i) {
+            const double *run = b.run + i * RUN_NUMBERS;
+            if (std::ceil(run[END] / run[OUTPUT_INTERVAL]) > b.outputs) a.refuse("states", "has no room for every output");
+        }
+    b.stop = &shared.stop, b.next = &shared.next, b.done = &shared.done;
+    return b;
+}
+
+// --- calls --------------------------------------------------------------------------------------------------------------
+static const Set &set_named(const std::string &name, const std::vector<Set> &have) {
+    if (name.empty()) return have.front();
+    for (const Set &each : have)
+        if (name == each.name) return each;
+    throw nb::value_error(("instruction set '" + name + "' is not present").c_str());
+}
+static int layout_named(const std::string &name) {
+    for (int i = 0; i < 3; ++i)
+        if (name == LAYOUTS[i]) return i;
+    throw nb::value_error(("layout '" + name + "': must be 'runs', 'modes' or 'thread'").c_str());
+}
+
+// Run *work* in threads; ten times a second signals are heard and *progress* is called, which may raise.
+template <class Work> static void in_threads(int threads, Shared &shared, int runs, nb::object progress, Work work) {
+    std::mutex mutex;
+    std::condition_variable ended;
+    int left = threads;
+    std::vector<std::thread> pool;
+    try {
+        for (int i = 0; i < threads; ++i)
+            pool.emplace_back([&] {
+                work();
+                const std::lock_guard<std::mutex> lock(mutex);
+                --left;
+                ended.notify_one();
+            });
+    } catch (const std::system_error &) {  // no thread can start: those that did do the work, or this one
+        const std::lock_guard<std::mutex> lock(mutex);
+        left -= threads - int(pool.size());
+        if (pool.empty()) work();
+    }
+    bool raised = false;
+    {
+        nb::gil_scoped_release release;
+        std::unique_lock<std::mutex> lock(mutex);
+        while (left > 0) {
+            ended.wait_for(lock, std::chrono::milliseconds(100), [&] { return left == 0; });
+            if (left == 0 || raised) continue;
+            lock.unlock();
+            {
+                nb::gil_scoped_acquire acquire;
+                raised = PyErr_CheckSignals() != 0;
+                if (!raised && !progress.is_none()) {
+                    PyObject *result = PyObject_CallFunction(progress.ptr(), "ii", __atomic_load_n(&shared.done, __ATOMIC_RELAXED), runs);
+                    raised = result == nullptr;
+                    Py_XDECREF(result);
+                }
+                if (raised) shared.stop = 1;
+            }
+            lock.lock();
+        }
+    }
+    for (std::thread &each : pool) each.join();
+    if (raised) throw nb::python_error();
+}
+
+static void integrate(nb::dict problem, nb::dict batch, const std::string &layout, const std::string &set, int threads, nb::object progress) {
+    Arguments of_problem(problem, "problem"), of_batch(batch, "batch");
+    Shared shared;
+    const Problem p = problem_of(of_problem);
+    const Batch b = batch_of(of_batch, p, shared);
+    if (threads < 1 || threads > 4096) throw nb::value_error("threads: must be 1 to 4096");
+    const std::vector<Set> have = sets();
+    const snapbeam::Kernel kernel = set_named(set, have).layouts[layout_named(layout)];
+    in_threads(threads < b.runs ? threads : b.runs, shared, b.runs, progress, [&] { kernel(p, b); });
+}
+
+static void record(nb::dict problem, nb::dict batch, nb::dict recorder, const std::string &layout, const std::string &set) {
+    using namespace snapbeam;
+    Arguments of_problem(problem, "problem"), of_batch(batch, "batch"), of_recorder(recorder, "recorder");
+    Shared shared;
+    const Problem p = problem_of(of_problem);
+    Batch b = batch_of(of_batch, p, shared);
+    if (b.runs != 1) throw nb::value_error("batch: must be one run");
+    Recorder r{};
+    const size_t instants = of_recorder.length("times"), samples = of_recorder.length("rows"), impacts = of_recorder.length("impacts");
+    r.instants = int(instants), r.samples = int(samples), r.impacts = int(impacts);
+    if (samples < 4 || impacts < size_t(p.channels) + 1) throw nb::value_error("recorder: must have room for 4 samples and an impact of each channel");
+    r.times = of_recorder.array<double>("times", {instants});
+    for (size_t i = 1; i < instants; ++i)
+        if (r.times[i] < r.times[i - 1]) of_recorder.refuse("times", "must ascend");
+    r.in_contact = of_recorder.integer("in_contact", 0, 1) != 0;
+    r.rows = of_recorder.array<double, true>("rows", {samples, 2 * size_t(p.modes)}, false);
+    r.values = of_recorder.array<double, true>("values", {samples, size_t(OF_SAMPLE + CHANNEL_SAMPLE * p.channels)}, false);
+    r.impact_rows = of_recorder.array<double, true>("impacts", {impacts, OF_IMPACT}, false);
+    static_assert(sizeof(long) == 8 || sizeof(long) == 4);
+    r.marks = of_recorder.array<long, true>("marks", {5});
+    const std::vector<Set> have = sets();
+    const Set &chosen = set_named(set, have);
+    const int which = layout_named(layout);
+    const size_t saved = of_recorder.length("saved");
+    // as many numbers as any layout of any width holds of a run
+    const size_t wanted = (size_t(p.modes + 64) * 3 + size_t(p.channels) * (9 + OF_CHANNEL) + STATISTICS + 32) * 8;
+    if (saved < wanted) of_recorder.refuse("saved", "has no room for the state of a run");
+    r.saved = of_recorder.array<double, true>("saved", {saved}, false);
+    r.budget = long(of_recorder.number("budget", 1.0, 2e9));
+    b.recorder = &r;
+    in_threads(1, shared, 1, nb::none(), [&] { chosen.layouts[which](p, b); });
+}
+
+// Force, potential and bounds of a law at many points, from the same text as in a step.
+static void law_values(int law, nb::dict arrays) {
+    Arguments a(arrays, "arrays");
+    if (law < 0 || law >= plain::LAWS) throw nb::value_error("law: must be the number of a law");
+    const size_t count = a.length("x"), numbers = a.length("numbers");
+    const double *x = a.array<double>("x", {count}), *y = a.array<double>("y", {count}), *P = a.array<double>("numbers", {numbers});
+    double *force = a.array<double, true>("force", {count}, false), *potential = a.array<double, true>("potential", {count}, false);
+    double *stiffness = a.array<double, true>("stiffness", {count}, false), *damping = a.array<double, true>("damping", {count}, false);
+    plain::with_law(law, [&](auto each) {
+        if (int(numbers) < each.numbers) a.refuse("numbers", "has fewer numbers than the law");
+        for (size_t i = 0; i < count; ++i) {
+            force[i] = each.force(x[i], y[i], P), potential[i] = each.potential(x[i], P);
+            stiffness[i] = each.stiffness(x[i], P), damping[i] = each.damping(x[i], y[i], P);
+        }
+    });
+}
+
+NB_MODULE(_core, m) {
+    m.doc() = "The native core: integration of damped modes and scalar channels.";
+    m.def("integrate", &integrate, nb::arg("problem"), nb::arg("batch"), nb::arg("layout"), nb::arg("set"), nb::arg("threads"), nb::arg("progress").none());
+    m.def("record", &record, nb::arg("problem"), nb::arg("batch"), nb::arg("recorder"), nb::arg("layout"), nb::arg("set"));
+    m.def("law_values", &law_values, nb::arg("law"), nb::arg("arrays"));
+    m.def("instruction_sets", [] {
+        std::vector<std::string> names;
+        for (const Set &each : sets()) names.push_back(each.name);
+        return names;
+    });
+}

@@ -1,0 +1,311 @@
+// Numbers: a double, or a pack of W doubles with masks, with the same operations.
+//
+// Every operation of a lane of a pack is the operation of a double, in the same order, so that a run has the same bits alone and
+// among others.  For that, the compiler contracts no products and sums (-ffp-contract=off); fma(a, b, c) = a b + c is written
+// out: one rounding where the processor has it.
+//
+// Everything is in a namespace of its own for each instruction set (SNAPBEAM_SET), since the same templates are compiled several
+// times with different flags and the linker must not mix them.  Kernels use no part of the standard library but <math.h>.
+#pragma once
+
+#include <math.h>
+
+#ifndef SNAPBEAM_SET
+#define SNAPBEAM_SET plain
+#endif
+#if defined(__CUDACC__)
+#define SNAPBEAM_FN __host__ __device__ __forceinline__
+#elif defined(__GNUC__)
+#define SNAPBEAM_FN inline __attribute__((always_inline))
+#else
+#define SNAPBEAM_FN inline
+#endif
+#if defined(__GNUC__) && !defined(SNAPBEAM_ARRAYS)
+#define SNAPBEAM_VECTORS 1  // vector types of GCC and Clang; elsewhere packs are arrays
+#endif
+#if defined(SNAPBEAM_VECTORS) && (defined(__AVX512F__) || defined(__AVX2__))
+#include <immintrin.h>
+#endif
+
+namespace SNAPBEAM_SET {
+
+// --- packs and masks ----------------------------------------------------------------------------------------------------
+#if defined(SNAPBEAM_VECTORS)
+template <int W> struct Vectors {
+    typedef double Reals __attribute__((vector_size(8 * W)));
+    typedef long long Marks __attribute__((vector_size(8 * W)));
+};
+#define SNAPBEAM_BINARY(RESULT, NAME, FIELD, OPERATOR) \
+    friend SNAPBEAM_FN RESULT NAME(Pack a, Pack b) { RESULT r; r.FIELD = a.v OPERATOR b.v; return r; }
+#else
+template <int W> struct Vectors {
+    typedef double Reals[W];
+    typedef long long Marks[W];
+};
+#define SNAPBEAM_BINARY(RESULT, NAME, FIELD, OPERATOR)                              \
+    friend SNAPBEAM_FN RESULT NAME(Pack a, Pack b) {                                \
+        RESULT r;                                                                   \
+        for (int l = 0; l < W; ++l) r.set(l, a.v[l] OPERATOR b.v[l]);               \
+        return r;                                                                   \
+    }
+#endif
+
+template <int W> struct Mask {
+    typename Vectors<W>::Marks m;
+    SNAPBEAM_FN void set(int l, bool on) { m[l] = on ? -1 : 0; }
+#if defined(SNAPBEAM_VECTORS)
+    friend SNAPBEAM_FN Mask operator&(Mask a, Mask b) { return {a.m & b.m}; }
+    friend SNAPBEAM_FN Mask operator|(Mask a, Mask b) { return {a.m | b.m}; }
+    friend SNAPBEAM_FN Mask operator!(Mask a) { return {~a.m}; }
+#else
+    friend SNAPBEAM_FN Mask operator&(Mask a, Mask b) { for (int l = 0; l < W; ++l) a.m[l] &= b.m[l]; return a; }
+    friend SNAPBEAM_FN Mask operator|(Mask a, Mask b) { for (int l = 0; l < W; ++l) a.m[l] |= b.m[l]; return a; }
+    friend SNAPBEAM_FN Mask operator!(Mask a) { for (int l = 0; l < W; ++l) a.m[l] = ~a.m[l]; return a; }
+#endif
+};
+
+template <int W> struct Pack {
+    typename Vectors<W>::Reals v;
+    SNAPBEAM_FN Pack() = default;
+#if defined(SNAPBEAM_VECTORS)
+    SNAPBEAM_FN Pack(double x) : v(x - typename Vectors<W>::Reals{}) {}
+    friend SNAPBEAM_FN Pack operator-(Pack a) { a.v = -a.v; return a; }
+#else
+    SNAPBEAM_FN Pack(double x) { for (int l = 0; l < W; ++l) v[l] = x; }
+    friend SNAPBEAM_FN Pack operator-(Pack a) { for (int l = 0; l < W; ++l) a.v[l] = -a.v[l]; return a; }
+#endif
+    SNAPBEAM_FN void set(int l, double x) { v[l] = x; }
+    SNAPBEAM_BINARY(Pack, operator+, v, +)
+    SNAPBEAM_BINARY(Pack, operator-, v, -)
+    SNAPBEAM_BINARY(Pack, operator*, v, *)
+    SNAPBEAM_BINARY(Pack, operator/, v, /)
+    SNAPBEAM_BINARY(Mask<W>, operator<, m, <)
+    SNAPBEAM_BINARY(Mask<W>, operator>, m, >)
+    SNAPBEAM_BINARY(Mask<W>, operator<=, m, <=)
+    SNAPBEAM_BINARY(Mask<W>, operator>=, m, >=)
+    SNAPBEAM_BINARY(Mask<W>, differ, m, !=)
+    SNAPBEAM_FN Pack &operator+=(Pack b) { return *this = *this + b; }
+    SNAPBEAM_FN Pack &operator-=(Pack b) { return *this = *this - b; }
+    SNAPBEAM_FN Pack &operator*=(Pack b) { return *this = *this * b; }
+};
+#undef SNAPBEAM_BINARY
+
+SNAPBEAM_FN bool differ(double a, double b) { return a != b; }
+
+// --- choice -------------------------------------------------------------------------------------------------------------
+SNAPBEAM_FN double select(bool m, double a, double b) { return m ? a : b; }
+template <int W> SNAPBEAM_FN Pack<W> select(Mask<W> m, Pack<W> a, Pack<W> b) {
+    Pack<W> r;
+#if defined(SNAPBEAM_VECTORS)
+    r.v = m.m ? a.v : b.v;
+#else
+    for (int l = 0; l < W; ++l) r.v[l] = m.m[l] ? a.v[l] : b.v[l];
+#endif
+    return r;
+}
+template <int W> SNAPBEAM_FN Pack<W> select(bool m, Pack<W> a, Pack<W> b) { return m ? a : b; }
+template <class M, class T> SNAPBEAM_FN void assign(M m, T &to, T from) { to = select(m, from, to); }
+
+// --- masks as bits: which runs of a pack --------------------------------------------------------------------------------
+SNAPBEAM_FN unsigned bits(bool m) { return m; }
+template <int W> SNAPBEAM_FN unsigned bits(Mask<W> m) {
+#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
+    if constexpr (W == 8) return _mm512_cmplt_epi64_mask((__m512i)m.m, _mm512_setzero_si512());
+#endif
+#if defined(SNAPBEAM_VECTORS) && defined(__AVX2__)
+    if constexpr (W == 4) return unsigned(_mm256_movemask_pd((__m256d)m.m));
+#endif
+    unsigned b = 0;
+    for (int l = 0; l < W; ++l) b |= unsigned(m.m[l] != 0) << l;
+    return b;
+}
+template <class M> SNAPBEAM_FN bool any(M m) { return bits(m) != 0; }
+template <class M> struct FromBits;
+template <> struct FromBits<bool> { static SNAPBEAM_FN bool of(unsigned b) { return b & 1u; } };
+template <int W> struct FromBits<Mask<W>> {
+    static SNAPBEAM_FN Mask<W> of(unsigned b) {
+        Mask<W> m;
+        for (int l = 0; l < W; ++l) m.set(l, b >> l & 1u);
+        return m;
+    }
+};
+
+// --- one run of a pack --------------------------------------------------------------------------------------------------
+SNAPBEAM_FN double lane(double x, int) { return x; }
+template <int W> SNAPBEAM_FN double lane(const Pack<W> &x, int l) { return x.v[l]; }
+SNAPBEAM_FN void set_lane(double &x, int, double y) { x = y; }
+template <int W> SNAPBEAM_FN void set_lane(Pack<W> &x, int l, double y) { x.v[l] = y; }
+SNAPBEAM_FN bool lane(bool m, int) { return m; }
+template <int W> SNAPBEAM_FN bool lane(const Mask<W> &m, int l) { return m.m[l] != 0; }
+SNAPBEAM_FN void set_lane(bool &m, int, bool on) { m = on; }
+template <int W> SNAPBEAM_FN void set_lane(Mask<W> &m, int l, bool on) { m.set(l, on); }
+
+// The value of a number without its derivatives (numbers with derivatives overload it).
+SNAPBEAM_FN double value(double x) { return x; }
+template <int W> SNAPBEAM_FN Pack<W> value(Pack<W> x) { return x; }
+
+// --- functions ----------------------------------------------------------------------------------------------------------
+SNAPBEAM_FN double fma(double a, double b, double c) {
+#if defined(__FMA__) || defined(__ARM_FEATURE_FMA) || defined(__CUDACC__)
+    return __builtin_fma(a, b, c);
+#else
+    return a * b + c;
+#endif
+}
+template <int W> SNAPBEAM_FN Pack<W> fma(Pack<W> a, Pack<W> b, Pack<W> c) {
+    Pack<W> r;
+#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
+    if constexpr (W == 8) {
+        r.v = (typename Vectors<W>::Reals)_mm512_fmadd_pd((__m512d)a.v, (__m512d)b.v, (__m512d)c.v);
+        return r;
+    }
+#endif
+#if defined(SNAPBEAM_VECTORS) && defined(__FMA__)
+    if constexpr (W == 4) {
+        r.v = (typename Vectors<W>::Reals)_mm256_fmadd_pd((__m256d)a.v, (__m256d)b.v, (__m256d)c.v);
+        return r;
+    }
+#endif
+    for (int l = 0; l < W; ++l) r.v[l] = fma(a.v[l], b.v[l], c.v[l]);
+    return r;
+}
+// Products of what differs between the runs and what all share, as a row of modes has them.
+template <int W> SNAPBEAM_FN Pack<W> fma(double a, Pack<W> b, Pack<W> c) { return fma(Pack<W>(a), b, c); }
+template <int W> SNAPBEAM_FN Pack<W> fma(Pack<W> a, double b, Pack<W> c) { return fma(a, Pack<W>(b), c); }
+
+// A function of the C library, run by run.
+template <class F> SNAPBEAM_FN double each(double x, F f) { return f(x); }
+template <int W, class F> SNAPBEAM_FN Pack<W> each(Pack<W> x, F f) {
+    Pack<W> r;
+    for (int l = 0; l < W; ++l) r.v[l] = f(x.v[l]);
+    return r;
+}
+template <class T> SNAPBEAM_FN T max(T a, T b) { return select(a > b, a, b); }
+template <class T> SNAPBEAM_FN T min(T a, T b) { return select(a < b, a, b); }
+template <class T> SNAPBEAM_FN T abs(T a) { return select(a < T(0.0), -a, a); }
+SNAPBEAM_FN double sqrt(double x) { return __builtin_sqrt(x); }
+template <int W> SNAPBEAM_FN Pack<W> sqrt(Pack<W> x) {
+#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
+    if constexpr (W == 8) {
+        Pack<W> r;
+        r.v = (typename Vectors<W>::Reals)_mm512_sqrt_pd((__m512d)x.v);
+        return r;
+    }
+#endif
+#if defined(SNAPBEAM_VECTORS) && defined(__AVX2__)
+    if constexpr (W == 4) {
+        Pack<W> r;
+        r.v = (typename Vectors<W>::Reals)_mm256_sqrt_pd((__m256d)x.v);
+        return r;
+    }
+#endif
+    return each(x, [](double y) { return __builtin_sqrt(y); });
+}
+template <class T> SNAPBEAM_FN T exp(T x) { return each(x, [](double y) { return ::exp(y); }); }
+template <class T> SNAPBEAM_FN T log(T x) { return each(x, [](double y) { return ::log(y); }); }
+template <class T> SNAPBEAM_FN T tanh(T x) { return each(x, [](double y) { return ::tanh(y); }); }
+template <class T> SNAPBEAM_FN T power(T x, T n) { return select(x > T(0.0), exp(n * log(max(x, T(1e-300)))), T(0.0)); }
+
+// Nearest integer for |x| < 2^51; needs a compiler that does not reassociate.
+template <class T> SNAPBEAM_FN T nearest(T x) {
+    const double magic = 6755399441055744.0;
+    return (x + T(magic)) - T(magic);
+}
+// Remainder x - y floor(x/y) of integers below 2^53, 0 <= x, 0 < y.
+template <class T> SNAPBEAM_FN T remainder(T x, T y) {
+    T r = fma(-nearest(x / y), y, x);
+    r = select(r < T(0.0), r + y, r);
+    return select(r >= y, r - y, r);
+}
+
+template <class T> struct Turn { T sine, cosine, cosine_less_one; };
+
+// Sine, cosine and cosine - 1 by argument reduction in three steps and Taylor polynomials; within 3e-16 for |x| < 1e5.
+template <class T> SNAPBEAM_FN Turn<T> turn(T x) {
+    const T k = nearest(x * T(0.6366197723675814));
+    T r = fma(k, T(-1.5707963267341256), x);
+    r = fma(k, T(-6.077100506303966e-11), r);
+    r = fma(k, T(-2.0222662487959506e-21), r);
+    const T z = r * r;
+    T s = fma(z, T(2.811457254345521e-15), T(-7.647163731819816e-13));
+    s = fma(z, s, T(1.605904383682161e-10));
+    s = fma(z, s, T(-2.505210838544172e-08));
+    s = fma(z, s, T(2.755731922398589e-06));
+    s = fma(z, s, T(-1.984126984126984e-04));
+    s = fma(z, s, T(8.333333333333333e-03));
+    s = fma(z, s, T(-1.666666666666667e-01));
+    s = fma(z * r, s, r);
+    T c = fma(z, T(4.779477332387385e-14), T(-1.147074559772973e-11));
+    c = fma(z, c, T(2.087675698786810e-09));
+    c = fma(z, c, T(-2.755731922398589e-07));
+    c = fma(z, c, T(2.480158730158730e-05));
+    c = fma(z, c, T(-1.388888888888889e-03));
+    c = fma(z, c, T(4.166666666666666e-02));
+    c = fma(z, c, T(-0.5));
+    const T less = z * c;
+    c = less + T(1.0);
+    const T quadrant = k - T(4.0) * nearest(fma(k, T(0.25), T(-0.374)));
+    const auto odd = (abs(quadrant - T(2.0)) < T(1.5)) & (abs(quadrant - T(2.0)) > T(0.5));
+    T sine = select(odd, c, s), cosine = select(odd, s, c);
+    sine = select(quadrant > T(1.5), -sine, sine);
+    cosine = select(abs(quadrant - T(1.5)) < T(1.0), -cosine, cosine);
+    return {sine, cosine, select(quadrant < T(0.5), less, cosine - T(1.0))};
+}
+
+// exp(-x) - 1 for |x| <= 4, within 2e-14 of exp(-x).
+template <class T> SNAPBEAM_FN T decay_less_one(T x) {
+    const T y = x * T(-0.0625);
+    T e = fma(y, T(2.08767569878681e-09), T(2.505210838544172e-08));
+    e = fma(y, e, T(2.755731922398589e-07));
+    e = fma(y, e, T(2.755731922398589e-06));
+    e = fma(y, e, T(2.480158730158730e-05));
+    e = fma(y, e, T(1.984126984126984e-04));
+    e = fma(y, e, T(1.388888888888889e-03));
+    e = fma(y, e, T(8.333333333333333e-03));
+    e = fma(y, e, T(4.166666666666666e-02));
+    e = fma(y, e, T(1.666666666666667e-01));
+    e = fma(y, e, T(0.5));
+    e = fma(y, e, T(1.0));
+    e = y * e;
+    for (int i = 0; i < 4; ++i) e = e * (e + T(2.0));
+    return e;
+}
+
+// --- cubics -------------------------------------------------------------------------------------------------------------
+// The cubic through values u and rates v at both ends of an interval of length h; coefficients of the fraction s of it.
+template <class T> struct Cubic {
+    T c0, c1, c2, c3;
+    SNAPBEAM_FN Cubic(T u0, T v0, T u1, T v1, T h) : c0(u0), c1(v0 * h) {
+        const T rise = u1 - u0, v = v1 * h;
+        c2 = T(3.0) * rise - T(2.0) * c1 - v;
+        c3 = c1 + v - T(2.0) * rise;
+    }
+    SNAPBEAM_FN T at(T s) const { return fma(s, fma(s, fma(s, c3, c2), c1), c0); }
+    SNAPBEAM_FN T slope(T s) const { return fma(s, fma(s, T(3.0) * c3, T(2.0) * c2), c1); }
+    // Where the slope falls through zero; of use only where it is positive at 0 and negative at 1.
+    SNAPBEAM_FN T summit() const { return c1 / (sqrt(max(c2 * c2 - T(3.0) * c1 * c3, T(0.0))) - c2); }
+};
+
+// Maximum of a cubic: inside, where it rises at 0 and falls at 1, else at an end.
+template <class T> SNAPBEAM_FN T crest(const Cubic<T> &u, T v0, T v1) {
+    const auto turns = (v0 > T(0.0)) & (v1 < T(0.0));
+    const T ends = max(u.c0, u.at(T(1.0)));
+    if (!any(turns)) return ends;
+    return max(ends, select(turns, u.at(u.summit()), ends));
+}
+
+// First fraction in (0, high] at which a cubic that is not positive at 0 and positive at high becomes positive: Newton's method
+// between bounds.  Events are corrected on the true motion afterwards.
+template <class T> SNAPBEAM_FN T root(const Cubic<T> &u, T high) {
+    T low = T(0.0), x = T(0.5) * high;
+    for (int i = 0; i < 8; ++i) {
+        const T y = u.at(x);
+        const auto above = y > T(0.0);
+        high = select(above, x, high), low = select(above, low, x);
+        const T next = x - y / u.slope(x);
+        x = select((next > low) & (next < high), next, T(0.5) * (low + high));
+    }
+    return x;
+}
+
+}  // namespace SNAPBEAM_SET

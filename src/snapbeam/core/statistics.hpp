@@ -1,0 +1,328 @@
+// Statistics: what a run adds up over its steps.
+//
+// Two points are observed: the beam at the (first) striker, and its centre.  Between the ends of a step the cubic through values and
+// rates gives extremes and crossings.  Modes that swing within a step make it wrong by at most
+//
+//   |r_i| h (omega_i h)^3/384 A_i of the displacement, A_i the amplitude of p_i, and by |r_i| (omega_i h)^4/384 A_i of the velocity, a
+//   cubic through its own values and accelerations,
+//
+// and 2.5/(omega_i) and 2.5 of the amplitude.  Where this may raise an extreme, the motion is followed inside the step (events.hpp).
+//
+//   integral of u^2 = h (u_0^2 + u_1^2)/2 + h^2 (u_0 v_0 - u_1 v_1)/6: over equal steps the corrections cancel, and modes that
+//   swing fast within a step are averaged without bias;
+//   integral of v^2 = h (m^2 + a^2/3 + 3 b^2/5), m = (u_1 - u_0)/h, a = (v_1 - v_0)/2, b = (v_0 + v_1)/2 - m: order four for any
+//   factor of b^2, over many steps order six with 3/5.
+#pragma once
+#include "events.hpp"
+
+namespace SNAPBEAM_SET {
+
+// Value and rate of what is observed at the beginning of a step, and its extremes.
+template <class L> struct Observed {
+    typename L::Number u, v;
+};
+
+template <class L> struct Totals {
+    typedef typename L::Number Number;
+    typedef typename L::Real Real;
+    typedef typename L::Cell Cell;
+    typedef typename L::Plain Plain;
+    typedef typename L::Marks Marks;
+
+    const Structure<L> *s;
+    Cell *row;                 // of the displacement observed
+    Number rest;
+    Observed<L> point, center;
+    Real sum[snapbeam::STATISTICS];
+    Real late, decide_energy, decide_reach, decide_crossings;
+    Real modal_energy, high_energy, modal_power, high_power;  // where they were evaluated last
+
+    void lay_out(const Structure<L> &structure, const Runs<L> &, Arena &arena) {
+        s = &structure;
+        row = arena.take<Cell>(s->cells);
+    }
+    void clear() {
+        for (int i = 0; i < s->cells; ++i) row[i] = Cell(0.0);
+        rest = point.u = point.v = center.u = center.v = Number(0.0);
+        for (Real &x : sum) x = Real(0.0);
+        late = decide_energy = decide_reach = decide_crossings = Real(0.0);
+        modal_energy = high_energy = modal_power = high_power = Real(0.0);
+    }
+    template <class F> void visit(F number) {
+        number(point.u), number(point.v), number(center.u), number(center.v);
+        number(modal_energy), number(high_energy), number(modal_power), number(high_power);
+        for (Real &x : sum) number(x);
+    }
+    void load(const Batch &batch, int i, int l, const double *observed, double at_rest) {
+        using namespace snapbeam;
+        const double *run = batch.run + long(i) * RUN_NUMBERS;
+        for (int m = 0; m < s->problem->modes; ++m) set_element<L>(row, s->place[m], l, observed[m]);
+        set_lane(rest, l, at_rest), set_lane(late, l, run[LAST_QUARTER]);
+        set_lane(decide_energy, l, run[DECIDE_ENERGY]), set_lane(decide_reach, l, run[DECIDE_REACH]);
+        set_lane(decide_crossings, l, run[DECIDE_CROSSINGS]);
+        for (Real &x : sum) set_lane(x, l, 0.0);
+        set_lane(sum[LAST_CROSSING], l, NAN), set_lane(sum[EARLY_STOP_TIME], l, NAN);
+    }
+    SNAPBEAM_FN Number height(const Runs<L> &z, const Cell *q) const { return fma(z.sign, rest, dot<L>(row, q, s->size())); }
+    SNAPBEAM_FN Number center_height(const Runs<L> &z, const Cell *q) const {
+        return fma(z.sign, Number(s->problem->center_rest), dot<L>(s->center, q, s->size()));
+    }
+    void start(Runs<L> &z, Marks which) {
+        using namespace snapbeam;
+        const int n = s->size();
+        assign(which, point.u, height(z, z.q)), assign(which, point.v, dot<L>(row, z.p, n));
+        assign(which, center.u, center_height(z, z.q)), assign(which, center.v, dot<L>(s->center, z.p, n));
+        assign(which, sum[MIN_DISPLACEMENT], Real(value(point.u))), assign(which, sum[MAX_DISPLACEMENT], Real(value(point.u)));
+        assign(which, sum[MIN_CENTER], Real(value(center.u))), assign(which, sum[MAX_CENTER], Real(value(center.u)));
+        assign(which, sum[PEAK_VELOCITY], abs(value(point.v))), assign(which, sum[PEAK_CENTER_VELOCITY], abs(value(center.v)));
+        const Real from = value(center.u) - Real(s->problem->dividing_height);
+        assign(which, sum[SIDE], select(from > Real(0.0), Real(1.0), Real(-1.0)));
+        assign(which, sum[FIRST_ENERGY], energy(z, true));
+        enter_well(z, which);
+    }
+
+    // Energy of the state q, p; of the beam with local forces, and of what contacts store.
+    Real energy(Runs<L> &z, bool contacts) {
+        const int n = s->size();
+        Cell sum_of = Cell(0.0);
+        for (int i = 0; i < n; ++i) {
+            const Cell oq = s->omega[i] * z.q[i];
+            sum_of = fma(z.p[i], z.p[i], fma(oq, oq, sum_of));
+        }
+        const Number gq = z.gq, qr = z.qr, along_g = z.along_g, along_r = z.along_r;
+        tension(z, z.q, dot<L>(s->g, z.q, n));
+        Number all = fma(Number(0.5), L::total(sum_of), Number(s->problem->gamma) * z.qr * fma(Number(0.25), z.qr, z.gq));
+        z.gq = gq, z.qr = qr, z.along_g = along_g, z.along_r = along_r;
+        const Number there = Number(Real(0.5) * (Real(1.0) - z.sign));
+        if (s->problem->far_force) all += there * (Number(s->problem->lift) - dot<L>(s->far_force, z.q, n));
+        for (int j = 0; j < z.channels; ++j) {
+            const Channel<L> &c = z.channel[j];
+            if (c.timed || (c.contact && !contacts)) continue;
+            const Number x = c.contact ? max(c.d0, Number(0.0)) : along(z, c, z.q);
+            const Number stored = with_law(c.law, [&](auto law) { return law.potential(x, c.P); });
+            all += c.contact ? select(c.closed & c.pressing, stored, Number(0.0)) : stored;
+        }
+        return value(all);
+    }
+
+    // Energies of the modes of the beam about the nearest well, of the high ones, and their rates.
+    void modal(const Runs<L> &z, Real *found) {
+        Plain whole = Plain(0.0), high = Plain(0.0), power = Plain(0.0), high_power_of = Plain(0.0);
+        const Plain there = Plain(Real(0.5) * (Real(1.0) - z.sign));
+        for (int i = 0; i < s->size(); ++i) {
+            Plain q = value(z.q[i]), a = value(z.k[i]);
+            const Plain p = value(z.p[i]);
+            if (s->problem->second) q -= there * s->second[i];
+            for (int j = 0; j < z.channels; ++j) {
+                const Channel<L> &c = z.channel[j];
+                if (c.active && c.law != AXIAL_LOAD) a = fma(Plain(value(c.f)), value(c.row[i]), a);
+            }
+            const Plain oq = s->omega[i] * q, beam = Plain(s->beam[i]), up = Plain(s->high[i]);
+            const Plain e = Plain(0.5) * fma(p, p, oq * oq) * beam, rate = p * (a - Plain(2.0) * s->sigma[i] * p) * beam;
+            whole += e, power += rate;
+            high = fma(up, e, high), high_power_of = fma(up, rate, high_power_of);
+        }
+        found[0] = L::total(whole), found[1] = L::total(high), found[2] = L::total(power), found[3] = L::total(high_power_of);
+    }
+    void enter_well(const Runs<L> &z, Marks which) {
+        if (!s->problem->high) return;
+        Real now[4];
+        modal(z, now);
+        assign(which, modal_energy, now[0]), assign(which, high_energy, now[1]);
+        assign(which, modal_power, now[2]), assign(which, high_power, now[3]);
+    }
+    void add_energy(const Runs<L> &z, Marks ok, Real h) {
+        using namespace snapbeam;
+        Real now[4];
+        modal(z, now);
+        const Real half = Real(0.5) * h, twelfth = h * h * Real(1.0 / 12.0);
+        const Real whole = fma(half, modal_energy + now[0], twelfth * (modal_power - now[2]));
+        const Real high = fma(half, high_energy + now[1], twelfth * (high_power - now[3]));
+        sum[ENERGY_TIME] += select(ok, whole, Real(0.0)), sum[HIGH_ENERGY_TIME] += select(ok, high, Real(0.0));
+        assign(ok, modal_energy, now[0]), assign(ok, high_energy, now[1]);
+        assign(ok, modal_power, now[2]), assign(ok, high_power, now[3]);
+    }
+
+    SNAPBEAM_FN void widen(Marks ok, snapbeam::Statistic low, snapbeam::Statistic high, Real u0, Real v0, Real u1, Real v1, Real h) {
+        const Cubic<Real> up(u0, v0, u1, v1, h), down(-u0, -v0, -u1, -v1, h);
+        assign(ok, sum[high], max(sum[high], crest(up, v0, v1)));
+        assign(ok, sum[low], min(sum[low], -crest(down, -v0, -v1)));
+    }
+    // Largest speed on a cubic: at the ends, or where its slope has an extreme inside.
+    SNAPBEAM_FN Real fastest(Real u0, Real v0, Real u1, Real v1, Real h) {
+        const Cubic<Real> path(u0, v0, u1, v1, h);
+        const Real at = -path.c2 / (Real(3.0) * path.c3), inside = abs(path.slope(at)) / h;
+        return max(max(abs(v0), abs(v1)), select((at > Real(0.0)) & (at < Real(1.0)) & (h > Real(0.0)), inside, Real(0.0)));
+    }
+
+    // Zero crossings of the centre, from values relative to the height that divides the wells.
+    SNAPBEAM_FN void count_crossings(Marks ok, Real t, Real h, Real tick, Real c0, Real v0, Real c1, Real v1) {
+        using namespace snapbeam;
+        const Real side = sum[SIDE], zero = Real(0.0);
+        const Marks once = ok & (side * c1 < zero);
+        const Marks dips = ok & (!once) & (side * v0 < zero) & (side * v1 > zero);
+        if (!any(once | dips)) return;
+        const Cubic<Real> away(-side * c0, -side * v0, -side * c1, -side * v1, h);
+        const Marks twice = dips & (crest(away, -side * v0, -side * v1) > zero);
+        const Marks found = once | twice;
+        if (!any(found)) return;
+        const Cubic<Real> back(-side * c1, side * v1, -side * c0, side * v0, h);  // from the end: its last crossing is the first
+        const Real share = select(once, root(away, Real(1.0)), Real(1.0) - root(back, min(back.summit(), Real(1.0))));
+        const Real count = select(once, Real(1.0), Real(2.0)), when = fma(share, h, t * tick);
+        sum[CROSSINGS] += select(found, count, zero);
+        sum[LATE_CROSSINGS] += select(found & (when > late * tick), count, zero);
+        assign(found, sum[LAST_CROSSING], when);
+        assign(once, sum[SIDE], -side);
+    }
+
+    // The extremes of what is observed, followed inside the step.
+    void follow(const Runs<L> &z, Marks near, Plain *memory) {
+        using namespace snapbeam;
+        Inside<L> inside;
+        inside.begin(z, memory);
+        const int n = s->size();
+        Real u = value(point.u), v = value(point.v), a = inside.bend(*s, row), c = value(center.u), cv = value(center.v), ca = inside.bend(*s, s->center);
+        const Real point_rest = z.sign * value(rest), center_rest = z.sign * Real(s->problem->center_rest);
+        for (;;) {
+            const Marks within = near & (inside.share < inside.parts);
+            if (!any(within)) break;
+            inside.advance(*s);
+            const Real h = inside.part;
+            const Real u1 = point_rest + L::total(plain_dot(row, inside.q, n)), v1 = L::total(plain_dot(row, inside.p, n)), a1 = inside.bend(*s, row);
+            const Real c1 = center_rest + L::total(plain_dot(s->center, inside.q, n)), cv1 = L::total(plain_dot(s->center, inside.p, n)), ca1 = inside.bend(*s, s->center);
+            widen(within, MIN_DISPLACEMENT, MAX_DISPLACEMENT, u, v, u1, v1, h), widen(within, MIN_CENTER, MAX_CENTER, c, cv, c1, cv1, h);
+            speed_peak(within, PEAK_VELOCITY, v, a, v1, a1, h), speed_peak(within, PEAK_CENTER_VELOCITY, cv, ca, cv1, ca1, h);
+            u = u1, v = v1, a = a1, c = c1, cv = cv1, ca = ca1;
+        }
+    }
+    template <class Row> static SNAPBEAM_FN Plain plain_dot(const Row *one, const Plain *other, int n) {
+        Plain x = Plain(value(one[0])) * other[0];
+        for (int i = 1; i < n; ++i) x = fma(Plain(value(one[i])), other[i], x);
+        return x;
+    }
+    static SNAPBEAM_FN Real speed_on(Real v0, Real a0, Real v1, Real a1, Real h) {
+        const Cubic<Real> up(v0, a0, v1, a1, h), down(-v0, -a0, -v1, -a1, h);
+        return max(crest(up, a0, a1), crest(down, -a0, -a1));
+    }
+    SNAPBEAM_FN void speed_peak(Marks which, snapbeam::Statistic k, Real v0, Real a0, Real v1, Real a1, Real h) {
+        assign(which, sum[k], max(sum[k], speed_on(v0, a0, v1, a1, h)));
+    }
+
+    SNAPBEAM_FN void add_step(Runs<L> &z, Marks ok, Plain *amplitude, Plain *memory) {
+        using namespace snapbeam;
+        const int n = s->size();
+        const Real h = value(z.h), zero = Real(0.0);
+        sum[STEPS] += select(ok, Real(1.0), zero);
+        const Number end_u = height(z, z.q1), end_v = dot<L>(row, z.p1, n), end_c = center_height(z, z.q1), end_cv = dot<L>(s->center, z.p1, n);
+        const Real u0 = value(point.u), v0 = value(point.v), u1 = value(end_u), v1 = value(end_v);
+        const Real c0 = value(center.u), cv0 = value(center.v), c1 = value(end_c), cv1 = value(end_cv);
+        const Real level = Real(s->problem->dividing_height);
+        count_crossings(ok, z.t, h, z.tick, c0 - level, cv0, c1 - level, cv1);
+        widen(ok, MIN_DISPLACEMENT, MAX_DISPLACEMENT, u0, v0, u1, v1, h), widen(ok, MIN_CENTER, MAX_CENTER, c0, cv0, c1, cv1, h);
+        Real speed = fastest(u0, v0, u1, v1, h), center_speed = fastest(c0, cv0, c1, cv1, h);
+        Real doubt, speed_doubt, center_doubt, center_speed_doubt;
+        doubts(z, amplitude, doubt, speed_doubt, center_doubt, center_speed_doubt);
+        const Real slack = Real(1e-5), wider = Real(1.05);
+        const Marks higher = ok & ((fma(wider, speed, speed_doubt) > sum[PEAK_VELOCITY]) | (fma(wider, center_speed, center_speed_doubt) > sum[PEAK_CENTER_VELOCITY]));
+        if (any(higher)) {  // with the accelerations at both ends the error of a speed is of fourth order
+            speed = speed_on(v0, bend_at(z, row, false), v1, bend_at(z, row, true), h);
+            center_speed = speed_on(cv0, bend_at(z, s->center, false), cv1, bend_at(z, s->center, true), h);
+        }
+        Marks near = ok & ((speed + speed_doubt > sum[PEAK_VELOCITY]) & (speed_doubt > slack * sum[PEAK_VELOCITY]));
+        near = near | (ok & (center_speed + center_speed_doubt > sum[PEAK_CENTER_VELOCITY]) & (center_speed_doubt > slack * sum[PEAK_CENTER_VELOCITY]));
+        const Real span = sum[MAX_DISPLACEMENT] - sum[MIN_DISPLACEMENT], center_span = sum[MAX_CENTER] - sum[MIN_CENTER];
+        near = near | (ok & (doubt > slack * span) & ((max(u0, u1) + doubt > sum[MAX_DISPLACEMENT]) | (min(u0, u1) - doubt < sum[MIN_DISPLACEMENT])));
+        near = near | (ok & (center_doubt > slack * center_span) & ((max(c0, c1) + center_doubt > sum[MAX_CENTER]) | (min(c0, c1) - center_doubt < sum[MIN_CENTER])));
+        assign(ok & (!near), sum[PEAK_VELOCITY], max(sum[PEAK_VELOCITY], speed));
+        assign(ok & (!near), sum[PEAK_CENTER_VELOCITY], max(sum[PEAK_CENTER_VELOCITY], center_speed));
+        if (any(near)) {
+            follow(z, near, memory);
+            assign(near, sum[PEAK_VELOCITY], max(sum[PEAK_VELOCITY], abs(v1)));
+            assign(near, sum[PEAK_CENTER_VELOCITY], max(sum[PEAK_CENTER_VELOCITY], abs(cv1)));
+        }
+        sum[SQUARE_DISPLACEMENT] += select(ok, square(u0, v0, u1, v1, h), zero), sum[SQUARE_CENTER] += select(ok, square(c0, cv0, c1, cv1, h), zero);
+        sum[SQUARE_VELOCITY] += select(ok, square_of_rate(u0, v0, u1, v1, h), zero);
+        sum[SQUARE_CENTER_VELOCITY] += select(ok, square_of_rate(c0, cv0, c1, cv1, h), zero);
+        if (z.account) sum[DISSIPATED] += select(ok, value(z.dissipated), zero);
+        for (int j = 0; j < z.channels; ++j) add_channel(z, z.channel[j], ok);
+        assign(ok, point.u, end_u), assign(ok, point.v, end_v), assign(ok, center.u, end_c), assign(ok, center.v, end_cv);
+    }
+    SNAPBEAM_FN static Real square(Real u0, Real v0, Real u1, Real v1, Real h) {
+        return fma(Real(0.5) * h, fma(u0, u0, u1 * u1), h * h * Real(1.0 / 6.0) * (u0 * v0 - u1 * v1));
+    }
+    SNAPBEAM_FN static Real square_of_rate(Real u0, Real v0, Real u1, Real v1, Real h) {
+        const Real mean = select(h > Real(0.0), (u1 - u0) / h, Real(0.0)), a = Real(0.5) * (v1 - v0), b = Real(0.5) * (v0 + v1) - mean;
+        return h * fma(mean, mean, fma(Real(1.0 / 3.0) * a, a, Real(0.6) * b * b));
+    }
+    // Errors of the cubics, by the amplitudes of the modes.
+    SNAPBEAM_FN void doubts(const Runs<L> &z, Plain *amplitude, Real &u, Real &v, Real &c, Real &cv) {
+        amplitudes(z, amplitude);
+        Plain su = Plain(0.0), sv = Plain(0.0), sc = Plain(0.0), scv = Plain(0.0);
+        const Plain h = Plain(value(z.h));
+        for (int i = 0; i < s->size(); ++i) {
+            const Plain w = h * s->omega[i], w3 = w * w * w, once = Plain(1.0) / max(w, Plain(1.0));
+            const Plain of_u = h * min(w3 * Plain(1.0 / 384.0), Plain(2.5) * once) * amplitude[i];
+            const Plain of_v = min(w3 * w * Plain(1.0 / 384.0), Plain(2.5)) * amplitude[i];
+            const Plain at = abs(value(row[i])), middle = abs(Plain(s->center[i]));
+            su = fma(at, of_u, su), sv = fma(at, of_v, sv), sc = fma(middle, of_u, sc), scv = fma(middle, of_v, scv);
+        }
+        u = L::total(su), v = L::total(sv), c = L::total(sc), cv = L::total(scv);
+    }
+
+    SNAPBEAM_FN void add_channel(Runs<L> &z, Channel<L> &c, Marks ok) {
+        using namespace snapbeam;
+        const Number zero = Number(0.0);
+        if (!c.active) return;
+        Marks acts = ok;
+        if (c.contact) {
+            acts = ok & c.closed & c.pressing;
+            const Cubic<Number> depth(c.d0, c.r0, c.d1, c.r1, z.h);
+            assign(acts, c.deepest, max(c.deepest, max(max(c.d0, c.d1), zero)));
+            const auto turns = acts & (c.r0 > zero) & (c.r1 < zero);
+            if (any(turns)) assign(turns, c.deepest, max(c.deepest, summit(z, c)));
+            if (c.lossy && any(acts)) {  // the parabola through the force at both ends and in the middle
+                const Number half = Number(0.5), d = max(depth.at(half), zero), rate = depth.slope(half) / max(z.h, Number(1e-300));
+                const Number f0 = force_at(c, max(c.d0, zero), c.r0), f1 = force_at(c, max(c.d1, zero), c.r1), fm = force_at(c, d, rate);
+                const Number bend = f0 + f1 - Number(2.0) * fm, tilt = f1 - f0;
+                const auto top = (bend < zero) & (abs(tilt) < Number(-2.0) * bend);
+                const Number peak = max(max(f0, f1), select(top, fm - tilt * tilt / (Number(8.0) * bend), fm));
+                assign(acts, c.hardest, max(c.hardest, peak));
+            }
+            c.own_impulse += select(acts, c.impulse, zero);
+        }
+        c.sums[WORK] += select(acts, c.work, zero), c.sums[GROSS_WORK] += select(acts, c.gross, zero), c.sums[LOST] += select(acts, c.lost, zero);
+    }
+
+    // Largest penetration in a step in which it turns: where the rate, a cubic by its values and slopes, is zero.
+    Number summit(const Runs<L> &z, const Channel<L> &c) {
+        Number a0 = Number(-bend_at(z, c.row, false)), a1 = Number(-bend_at(z, c.row, true));
+        for (int i = 0; i < c.uses; ++i) {
+            const Signal<L> &one = z.signal[c.signal[i]];
+            a0 = fma(Number(c.factor[i]), one.acceleration_at_begin(), a0), a1 = fma(Number(c.factor[i]), one.acceleration(), a1);
+        }
+        const Cubic<Number> fall(-c.r0, -a0, -c.r1, -a1, z.h);
+        const Number at = root(fall, Number(1.0));
+        const Number mean = fma(at, fma(at, fma(at, Number(0.25) * fall.c3, Number(1.0 / 3.0) * fall.c2), Number(0.5) * fall.c1), fall.c0);
+        return max(c.d0, Number(0.0)) - z.h * at * mean;
+    }
+
+    // Runs whose class is certain: too many crossings in the last quarter, or too little energy to leave the other well.
+    SNAPBEAM_FN Marks decided(Runs<L> &z) {
+        using namespace snapbeam;
+        Marks found = (decide_crossings >= Real(0.0)) & (sum[LATE_CROSSINGS] > decide_crossings);
+        const Real steps = sum[STEPS], sixteenth = nearest(steps * Real(1.0 / 16.0)) * Real(16.0);
+        Marks asks = (decide_energy > Real(-1e300)) & (z.sign < Real(0.0)) & (!differ(steps, sixteenth));
+        asks = asks & (value(point.u) > decide_reach) & (value(center.u) > Real(s->problem->dividing_height));
+        for (int j = 0; j < z.channels; ++j)
+            if (z.channel[j].contact) asks = asks & (!z.channel[j].closed);
+        if (any(asks)) found = found | (asks & (energy(z, false) < decide_energy));
+        return found;
+    }
+    void finish(Runs<L> &z, Marks which) {
+        using namespace snapbeam;
+        assign(which, sum[ENERGY], energy(z, true));
+        assign(which, sum[DISPLACEMENT], Real(value(point.u))), assign(which, sum[CENTER], Real(value(center.u)));
+    }
+};
+
+}  // namespace SNAPBEAM_SET

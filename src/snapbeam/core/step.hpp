@@ -1,0 +1,363 @@
+// One step: kicks by the nonlinear forces and exact flows of the linear modes.
+//
+//   q' = p,   p' = -omega^2 q - 2 sigma p + k(q, t) + sum_j r_j f_j,
+//   k = along_g g + along_r Gq,   along_g = P(t) - gamma q.Gq,   along_r = P(t) - gamma (2 g.q + q.Gq),
+//
+//   S(h) = B(b_0 h) A(a_0 h) B(b_1 h) ... A(a_(s-1) h) B(b_s h),   A: flow of the modes,   B: kick, in which q does not change.
+//
+// P is the change of the axial load.  Forces that depend on velocities change within a kick.  Along their rows
+//
+//   v_i' = a_i + sum_j M_ij f_j(x_j, v_j),   a_i = r_i.k + sum over the other forces,   M_ij = r_i.r_j,
+//
+// an equation for these velocities alone: the classical method of Runge and Kutta in parts of the kick that resolve the damping.
+// One after the other such forces would leave an error of first order in h.
+//
+// Whether a contact is closed, and whether a lossy one presses, is fixed for a whole step (events.hpp finds where that changes).
+#pragma once
+#include "laws.hpp"
+#include "signals.hpp"
+
+namespace SNAPBEAM_SET {
+
+template <class L> struct Channel {
+    typedef typename L::Number Number;
+    typedef typename L::Real Real;
+    int law;
+    bool contact, lossy, timed, active;
+    int uses;                    // signals that it adds
+    int *signal;
+    double *factor;
+    typename L::Cell *row;       // r, of the runs at hand
+    Number *P, *M;               // numbers of the law; products with the rows of all channels
+    Number rest, offset;         // displacement in the first well; of a contact, penetration there with its signals at 0
+    // at a kick: x and y of the law, force; force of the first kick; penetration and rate at both ends
+    Number x, y, f, first_f, v;
+    Number d0, r0, d1, r1;
+    typename L::Marks closed, pressing;
+    Real onset, safe;            // tick of the onset; time until which the contact cannot close, ticks
+    // increments of the step, and sums of the run
+    Number impulse, work, gross, lost;
+    Number own_impulse, deepest, hardest;
+    Number sums[snapbeam::OF_CHANNEL];
+};
+
+template <class L> struct Runs {
+    typedef typename L::Number Number;
+    typedef typename L::Real Real;
+    typedef typename L::Cell Cell;
+    typedef typename L::Plain Plain;
+    const Structure<L> *s;
+    int channels, signals;
+    Channel<L> *channel;
+    Signal<L> *signal;
+    Cell *q, *p, *k, *q1, *p1, *k1, *r;   // state and acceleration by the tension at both ends; Gq at a kick
+    const Plain *flows;                   // (distinct flows, cells, 4) of the step
+    Number *block;                        // arrays of the velocity block
+    int *late;                            // channels of it
+    Real t, tick, sign;                   // sign: +1 about the first well, -1 about its mirror image
+    Real parts;                           // in which a step is followed inside
+    Number h;                             // s
+    Number gq, qr, next_gq, along_g, along_r, dissipated;
+    bool account;
+};
+
+constexpr int BLOCK_ARRAYS = 10;
+
+template <class L, class X, class Y> SNAPBEAM_FN typename L::Number dot(const X *a, const Y *b, int n) {
+    typename L::Cell s = a[0] * b[0];
+    for (int i = 1; i < n; ++i) s = fma(a[i], b[i], s);
+    return L::total(s);
+}
+
+// Rows at, ..., at + ROWS - 1 of r = Gq for columns of one block; returns their part of q.Gq.
+template <int ROWS, class L>
+SNAPBEAM_FN typename L::Cell product_rows(const Structure<L> &s, const typename L::Cell *q, typename L::Cell *r, int at, int from, int count) {
+    typedef typename L::Cell Cell;
+    constexpr int CHAINS = ROWS >= 4 ? 1 : ROWS == 2 ? 2 : 4;  // sums that do not wait for each other
+    Cell sum[CHAINS][ROWS];
+    for (auto &chain : sum)
+        for (auto &x : chain) x = Cell(0.0);
+    const typename L::Coef *G = s.G + long(from) * s.size() + at;
+    int j = 0;
+    for (; j + CHAINS <= count; j += CHAINS)
+        for (int k = 0; k < CHAINS; ++k, G += s.size())
+            for (int i = 0; i < ROWS; ++i) sum[k][i] = fma(G[i], Cell(L::mode(q, from + j + k)), sum[k][i]);
+    for (; j < count; ++j, G += s.size())
+        for (int i = 0; i < ROWS; ++i) sum[0][i] = fma(G[i], Cell(L::mode(q, from + j)), sum[0][i]);
+    Cell along = Cell(0.0);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int k = 1; k < CHAINS; ++k) sum[0][i] += sum[k][i];
+        r[at + i] = sum[0][i];
+        along = fma(sum[0][i], q[at + i], along);
+    }
+    return along;
+}
+
+// Sum of a channel's signals: displacement of a striker, force, load; acceleration of a base.
+template <class L> SNAPBEAM_FN typename L::Number signal_of(const Runs<L> &z, const Channel<L> &c) {
+    typename L::Number s = typename L::Number(0.0);
+    for (int i = 0; i < c.uses; ++i) {
+        const Signal<L> &one = z.signal[c.signal[i]];
+        s = fma(typename L::Number(c.factor[i]), c.law == BASE ? one.acceleration() : one.value_at(), s);
+    }
+    return s;
+}
+template <class L> SNAPBEAM_FN typename L::Number signal_slope(const Runs<L> &z, const Channel<L> &c) {
+    typename L::Number s = typename L::Number(0.0);
+    for (int i = 0; i < c.uses; ++i) s = fma(typename L::Number(c.factor[i]), z.signal[c.signal[i]].slope(), s);
+    return s;
+}
+
+// Tension at q, where g.q is known: r = Gq and the factors of the acceleration.
+template <class L> SNAPBEAM_FN void tension(Runs<L> &z, const typename L::Cell *q, typename L::Number gq) {
+    typedef typename L::Number Number;
+    const Structure<L> &s = *z.s;
+    typename L::Cell along = typename L::Cell(0.0);
+    if constexpr (L::fixed == 1) {
+        z.r[0] = s.G[0] * q[0];
+        along = z.r[0] * q[0];
+    } else {
+        for (int b = 0; b < s.problem->blocks; ++b) {
+            int i = s.first[b];
+            const int end = i + s.count[b], from = s.mode_first[b], count = s.mode_count[b];
+            for (; i + 8 <= end; i += 8) along += product_rows<8, L>(s, q, z.r, i, from, count);
+            for (; i + 4 <= end; i += 4) along += product_rows<4, L>(s, q, z.r, i, from, count);
+            for (; i + 2 <= end; i += 2) along += product_rows<2, L>(s, q, z.r, i, from, count);
+            if (i < end) along += product_rows<1, L>(s, q, z.r, i, from, count);
+        }
+    }
+    z.qr = L::total(along);
+    z.gq = z.sign * gq;
+    const Number gamma = Number(-s.problem->gamma);
+    z.along_g = gamma * z.qr, z.along_r = gamma * fma(Number(2.0), z.gq, z.qr);
+    for (int j = 0; j < z.channels; ++j)
+        if (z.channel[j].law == AXIAL_LOAD) {
+            z.channel[j].f = signal_of(z, z.channel[j]);
+            z.along_g += z.channel[j].f, z.along_r += z.channel[j].f;
+        }
+    z.along_g = z.along_g * z.sign;
+}
+template <class L> SNAPBEAM_FN void acceleration_row(const Runs<L> &z, typename L::Cell *k) {
+    typedef typename L::Cell Cell;
+    const Structure<L> &s = *z.s;
+    const Cell along_g = Cell(z.along_g), along_r = Cell(z.along_r);
+    for (int i = 0; i < s.size(); ++i) k[i] = fma(along_g, s.g[i], along_r * z.r[i]);
+    if (s.problem->far_force) {
+        const Cell there = Cell(0.5 * (typename L::Number(1.0) - z.sign));
+        for (int i = 0; i < s.size(); ++i) k[i] = fma(there, s.far_force[i], k[i]);
+    }
+}
+// The same at any state, from nothing.
+template <class L> SNAPBEAM_FN void tension_at(Runs<L> &z, const typename L::Cell *q, typename L::Cell *k) {
+    tension(z, q, dot<L>(z.s->g, q, z.s->size()));
+    acceleration_row(z, k);
+}
+
+// Displacement along the row of a channel, from the straight structure, or of a contact from the first well.
+template <class L> SNAPBEAM_FN typename L::Number along(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q) {
+    const auto moved = dot<L>(c.row, q, z.s->size());
+    return fma(c.contact ? z.sign - typename L::Real(1.0) : z.sign, c.rest, moved);
+}
+template <class L> SNAPBEAM_FN typename L::Number penetration(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q) {
+    return c.offset + signal_of(z, c) - along(z, c, q);
+}
+
+// Force of a channel at x and y; of a contact only while it is closed, and a lossy one presses.
+template <class L>
+SNAPBEAM_FN typename L::Number force_at(const Channel<L> &c, typename L::Number x, typename L::Number y) {
+    typedef typename L::Number Number;
+    const Number f = with_law(c.law, [&](auto law) { return law.force(c.contact ? max(x, Number(0.0)) : x, y, c.P); });
+    return c.contact ? select(c.closed & c.pressing, f, Number(0.0)) : f;
+}
+
+// Forces that depend on velocities, together; the impulses of a kick of *w* seconds go into p.
+template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number w, int count) {
+    typedef typename L::Number Number;
+    typedef typename L::Real Real;
+    const Structure<L> &s = *z.s;
+    const int n = s.size();
+    Number *v = z.block, *a = v + z.channels, *y = a + z.channels, *slope = y + z.channels, *change = slope + z.channels;
+    Number *f = change + z.channels, *impulse = f + z.channels, *lost = impulse + z.channels, *elastic = lost + z.channels;
+    Number *tip = elastic + z.channels;
+    Real decay = Real(0.0);
+    for (int i = 0; i < count; ++i) {
+        Channel<L> &c = z.channel[z.late[i]];
+        v[i] = dot<L>(c.row, z.p1, n), a[i] = dot<L>(c.row, z.k1, n);
+        for (int j = 0; j < z.channels; ++j) {
+            const Channel<L> &other = z.channel[j];
+            if (other.active && !other.lossy && other.law != AXIAL_LOAD) a[i] = fma(c.M[j], other.f, a[i]);
+        }
+        impulse[i] = lost[i] = Number(0.0);
+        tip[i] = c.contact ? signal_slope(z, c) : Number(0.0);
+        elastic[i] = c.contact ? force_at(c, c.x, Number(0.0)) : Number(0.0);
+        const Number fastest = abs(v[i]) + abs(tip[i]) + abs(w * a[i]);
+        const Number damping = with_law(c.law, [&](auto law) { return law.damping(c.contact ? max(c.x, Number(0.0)) : c.x, fastest, c.P); });
+        decay += value(c.M[z.late[i]] * (c.contact ? select(c.closed & c.pressing, damping, Number(0.0)) : damping));
+    }
+    Real parts = nearest(decay * abs(value(w)) * Real(s.problem->parts_per_decay) + Real(0.5));
+    parts = min(max(parts, Real(double(s.problem->fewest_parts))), Real(256.0));
+    const Number h = w / Number(parts);
+    const double ahead[4] = {0.0, 0.5, 0.5, 1.0}, share[4] = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6};
+    for (int part = 0;; ++part) {
+        const auto within = Real(double(part)) < parts;
+        if (!any(within)) break;
+        const Number step = select(within, h, Number(0.0));
+        for (int i = 0; i < count; ++i) change[i] = slope[i] = Number(0.0);
+        for (int stage = 0; stage < 4; ++stage) {
+            for (int i = 0; i < count; ++i) {
+                const Channel<L> &c = z.channel[z.late[i]];
+                const Number own = fma(Number(ahead[stage]) * step, slope[i], v[i]);
+                y[i] = c.contact ? tip[i] - own : own;
+                f[i] = force_at(c, c.x, y[i]);
+            }
+            const Number weight = Number(share[stage]) * step;
+            for (int i = 0; i < count; ++i) {
+                const Channel<L> &c = z.channel[z.late[i]];
+                slope[i] = a[i];
+                for (int j = 0; j < count; ++j) slope[i] = fma(c.M[z.late[j]], f[j], slope[i]);
+                change[i] = fma(weight, slope[i], change[i]);
+                impulse[i] = fma(weight, f[i], impulse[i]);
+                lost[i] = fma(weight, c.contact ? (f[i] - elastic[i]) * y[i] : -(f[i] * y[i]), lost[i]);
+            }
+        }
+        for (int i = 0; i < count; ++i) v[i] += change[i];
+    }
+    for (int i = 0; i < count; ++i) {
+        Channel<L> &c = z.channel[z.late[i]];
+        c.f = select(differ(w, Number(0.0)), impulse[i] / w, Number(0.0));
+        c.lost += lost[i];
+        for (int m = 0; m < n; ++m) z.p1[m] = fma(typename L::Cell(impulse[i]), c.row[m], z.p1[m]);
+    }
+}
+
+// Work of what depends on time alone: a force that is constant in the kick, times the mean velocity along its row.
+template <class L> SNAPBEAM_FN void timed_work(Runs<L> &z, Channel<L> &c, typename L::Number w) {
+    typedef typename L::Number Number;
+    const Structure<L> &s = *z.s;
+    const int n = s.size();
+    Number a = Number(0.0);
+    if (c.law == AXIAL_LOAD) {
+        a = z.sign * dot<L>(s.g, z.k1, n) + dot<L>(z.r, z.k1, n);
+        for (int i = 0; i < z.channels; ++i) {
+            const Channel<L> &other = z.channel[i];
+            if (!other.active || other.law == AXIAL_LOAD) continue;
+            a = fma(other.f, z.sign * dot<L>(s.g, other.row, n) + dot<L>(z.r, other.row, n), a);
+        }
+    } else {
+        a = dot<L>(c.row, z.k1, n);
+        for (int i = 0; i < z.channels; ++i)
+            if (z.channel[i].active && z.channel[i].law != AXIAL_LOAD) a = fma(c.M[i], z.channel[i].f, a);
+    }
+    const Number work = w * c.f * fma(Number(0.5) * w, a, c.v);
+    c.work += work, c.gross += abs(work);
+}
+
+template <class L> SNAPBEAM_FN void begin_step(Runs<L> &z) {
+    typedef typename L::Number Number;
+    for (int i = 0; i < z.s->size(); ++i) z.q1[i] = z.q[i], z.p1[i] = z.p[i], z.k1[i] = z.k[i];
+    z.dissipated = Number(0.0);
+    for (int i = 0; i < z.signals; ++i) z.signal[i].sine = z.signal[i].sine0, z.signal[i].cosine = z.signal[i].cosine0;
+    for (int j = 0; j < z.channels; ++j) {
+        Channel<L> &c = z.channel[j];
+        c.impulse = c.work = c.gross = c.lost = Number(0.0);
+        c.active = !c.contact || any(c.closed);
+        if (!(c.law == AXIAL_LOAD)) c.f = c.first_f = Number(0.0);
+    }
+}
+
+template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
+    typedef typename L::Number Number;
+    typedef typename L::Cell Cell;
+    const Structure<L> &s = *z.s;
+    const int n = s.size();
+    const bool last = stage == s.composition.flows;
+    const Number w = Number(s.composition.kick_weight(stage)) * z.h;
+    int late = 0;
+    bool timed = false;
+    for (int j = 0; j < z.channels; ++j) {
+        const Channel<L> &c = z.channel[j];
+        if (c.active && c.lossy) z.late[late++] = j;
+        timed |= c.timed;
+    }
+    // is the row of accelerations needed, or do its two factors serve?
+    const bool whole = stage == 0 || last || late || timed || s.problem->far_force;
+    if (stage > 0) {
+        tension(z, z.q1, z.next_gq);
+        if (whole) acceleration_row(z, z.k1);
+    }
+    for (int j = 0; j < z.channels; ++j) {
+        Channel<L> &c = z.channel[j];
+        if (!c.active) continue;
+        if (c.timed) {
+            if (c.law == AXIAL_LOAD) {
+                if (stage == 0) tension(z, z.q1, dot<L>(s.g, z.q1, n));  // forms r
+                c.v = fma(z.sign, dot<L>(s.g, z.p1, n), dot<L>(z.r, z.p1, n));
+            } else {
+                c.f = signal_of(z, c), c.v = dot<L>(c.row, z.p1, n);
+            }
+        } else {
+            c.x = c.contact ? penetration(z, c, z.q1) : along(z, c, z.q1);
+            if (!c.lossy) c.f = force_at(c, c.x, Number(0.0));
+        }
+    }
+    if (late) velocity_kick(z, w, late);
+    for (int j = 0; j < z.channels; ++j) {
+        Channel<L> &c = z.channel[j];
+        if (!c.active) continue;
+        if (stage == 0) c.first_f = c.f;
+        if (c.timed) timed_work(z, c, w);
+        if (c.contact) {
+            const Number push = w * c.f, power = push * signal_slope(z, c);
+            c.impulse += push, c.work += power, c.gross += abs(power);
+        }
+    }
+    for (int j = 0; j < z.channels; ++j) {
+        Channel<L> &c = z.channel[j];
+        if (!c.active || c.lossy || c.law == AXIAL_LOAD) continue;
+        const Cell push = Cell(w * c.f);
+        for (int i = 0; i < n; ++i) z.p1[i] = fma(push, c.row[i], z.p1[i]);
+    }
+    const Cell weight = Cell(w);
+    if (last) {
+        for (int i = 0; i < n; ++i) z.p1[i] = fma(weight, z.k1[i], z.p1[i]);
+        return;
+    }
+    const int which = s.composition.which_flow(stage);
+    const typename L::Plain *a = z.flows + long(which) * n * 4;
+    const Cell by_g = Cell(w * z.along_g), by_r = Cell(w * z.along_r);
+    Cell before = Cell(0.0), after = Cell(0.0), gq = Cell(0.0);
+    for (int i = 0; i < n; ++i, a += 4) {
+        const Cell q = z.q1[i], p = whole ? fma(weight, z.k1[i], z.p1[i]) : fma(by_g, s.g[i], fma(by_r, z.r[i], z.p1[i]));
+        const Cell q1 = q + fma(a[0], q, a[1] * p), p1 = p + fma(a[3], p, a[2] * q);
+        if (z.account) {
+            const Cell oq = s.omega[i] * q, oq1 = s.omega[i] * q1;
+            before = fma(p, p, fma(oq, oq, before)), after = fma(p1, p1, fma(oq1, oq1, after));
+        }
+        gq = fma(s.g[i], q1, gq);
+        z.q1[i] = q1, z.p1[i] = p1;
+    }
+    z.next_gq = L::total(gq);
+    if (z.account) z.dissipated = fma(Number(0.5), L::total(before - after), z.dissipated);
+    for (int i = 0; i < z.signals; ++i) z.signal[i].advance(z.signal[i].ahead_sine[which], z.signal[i].ahead_cosine[which]);
+}
+
+// The whole step from q, p, k to q1, p1, k1; rows of a length that the compiler knows stay in registers.
+template <class L> SNAPBEAM_FN void take_step(Runs<L> &outer) {
+    begin_step(outer);
+    const int flows = outer.s->composition.flows;
+    if constexpr (L::fixed > 0) {
+        typedef typename L::Cell Cell;
+        constexpr int N = L::fixed;
+        Cell q[N], p[N], k[N], r[N];
+        Runs<L> z = outer;
+        z.q1 = q, z.p1 = p, z.k1 = k, z.r = r;
+        for (int i = 0; i < N; ++i) q[i] = outer.q1[i], p[i] = outer.p1[i], k[i] = outer.k1[i], r[i] = Cell(0.0);
+        for (int stage = 0; stage <= flows; ++stage) take_stage(z, stage);
+        for (int i = 0; i < N; ++i) outer.q1[i] = q[i], outer.p1[i] = p[i], outer.k1[i] = k[i], outer.r[i] = r[i];
+        outer.gq = z.gq, outer.qr = z.qr, outer.next_gq = z.next_gq, outer.dissipated = z.dissipated;
+    } else {
+        for (int stage = 0; stage <= flows; ++stage) take_stage(outer, stage);
+    }
+}
+
+}  // namespace SNAPBEAM_SET

@@ -1,0 +1,124 @@
+// The structure as a layout holds it: linear modes, the tension that couples them, and the flows of the modes.
+//
+//   A(t): (q, p) -> (q, p)(t),   q'' + 2 sigma q' + omega^2 q = 0,   D^2 = omega^2 - sigma^2,
+//
+//   A = e^(-sigma t) [cos Dt + sigma sin(Dt)/D,   sin(Dt)/D;   -omega^2 sin(Dt)/D,   cos Dt - sigma sin(Dt)/D].
+//
+// The diagonal of A is stored less one: a slow mode hardly moves within a step.
+#pragma once
+#include "api.hpp"
+#include "layout.hpp"
+
+namespace SNAPBEAM_SET {
+using snapbeam::Batch;
+using snapbeam::Problem;
+using snapbeam::Recorder;
+
+// Compositions S(h) = B(b_0 h) A(a_0 h) B(b_1 h) ... A(a_(s-1) h) B(b_s h) of kicks B and flows A, symmetric, of Blanes and Moan,
+// J. Comput. Appl. Math. 142 (2002) 313-330: SRKN_6^b of order 4 and SRKN_11^b of order 6 (Table 3; order 4 holds for kicks that
+// depend on the velocity too, order 6 does not), and S_10 of order 6 (Table 2), which asks nothing of its parts.
+constexpr int MOST_FLOWS = 11, MOST_DISTINCT = 6;
+struct Composition {
+    int flows, distinct;
+    double flow[MOST_DISTINCT], kick[MOST_DISTINCT];  // first halves
+    SNAPBEAM_FN int which_flow(int i) const { return i < flows - 1 - i ? i : flows - 1 - i; }
+    SNAPBEAM_FN double kick_weight(int i) const { return kick[i < flows - i ? i : flows - i]; }
+};
+SNAPBEAM_FN Composition composition_of(int number) {
+    if (number == 1)
+        return {11, 6,
+                {0.123229775946271, 0.290553797799558, -0.127049212625417, -0.246331761062075, 0.357208872795928,
+                 1 - 2 * (0.123229775946271 + 0.290553797799558 - 0.127049212625417 - 0.246331761062075 + 0.357208872795928)},
+                {0.0414649985182624, 0.198128671918067, -0.0400061921041533, 0.0752539843015807, -0.0115113874206879,
+                 0.5 - (0.0414649985182624 + 0.198128671918067 - 0.0400061921041533 + 0.0752539843015807 - 0.0115113874206879)}};
+    if (number == 2)
+        return {10, 5,
+                {0.148816447901042, -0.132385865767784, 0.067307604692185, 0.432666402578175,
+                 0.5 - (0.148816447901042 - 0.132385865767784 + 0.067307604692185 + 0.432666402578175), 0},
+                {0.0502627644003922, 0.413514300428344, 0.0450798897943977, -0.188054853819569, 0.541960678450780,
+                 1 - 2 * (0.0502627644003922 + 0.413514300428344 + 0.0450798897943977 - 0.188054853819569 + 0.541960678450780)}};
+    return {6, 3,
+            {0.245298957184271, 0.604872665711080, 0.5 - (0.245298957184271 + 0.604872665711080), 0, 0, 0},
+            {0.0829844064174052, 0.396309801498368, -0.0390563049223486,
+             1 - 2 * (0.0829844064174052 + 0.396309801498368 - 0.0390563049223486), 0, 0}};
+}
+
+constexpr int FEWEST_PARTS = 8, PARTS_PER_TURN = 12;
+
+// The four numbers of the flow of a mode over a time.
+template <class T> SNAPBEAM_FN void set_flow(T time, T sigma, T omega, T *a) {
+    const T omega2 = omega * omega, square = fma(sigma, -sigma, omega2), damped = sqrt(max(square, T(1e-200)));
+    const Turn<T> w = turn(time * damped);
+    T over = w.sine / damped, cosine_less = w.cosine_less_one, less = decay_less_one(time * sigma);
+    const auto fast = abs(time * sigma) > T(4.0), creeping = square < T(0.0);
+    if (any(fast)) less = select(fast, each(time * sigma, [](double x) { return ::expm1(-x); }), less);
+    if (any(creeping)) {  // overdamped: cosh and sinh in place of cos and sin
+        const T rate = sqrt(max(-square, T(0.0))), half = each(T(0.5) * rate * time, [](double x) { return ::sinh(x); });
+        over = select(creeping, each(rate * time, [](double x) { return ::sinh(x); }) / rate, over);
+        cosine_less = select(creeping, T(2.0) * half * half, cosine_less);
+    }
+    const T decay = less + T(1.0), ds = sigma * over;
+    a[0] = fma(decay, cosine_less + ds, less);
+    a[1] = decay * over;
+    a[2] = -(omega2 * a[1]);
+    a[3] = fma(decay, cosine_less - ds, less);
+}
+
+template <class L> struct Structure {
+    typedef typename L::Coef Coef;
+    const Problem *problem;
+    Composition composition;
+    int cells, padded;
+    double fastest;                                // angular frequency
+    int *first, *count, *mode_first, *mode_count;  // of each block: cells and modes
+    int *place;                                    // of each mode in the padded order
+    Coef *omega, *sigma, *g, *G, *shift, *far_force, *center, *high, *beam, *second;
+
+    SNAPBEAM_FN int size() const { return L::fixed ? L::fixed : cells; }
+
+    void build(const Problem &p, Arena &arena) {
+        problem = &p;
+        composition = composition_of(p.composition);
+        cells = 0;
+        for (int b = 0; b < p.blocks; ++b) cells += (p.block_sizes[b] + L::lanes - 1) / L::lanes;
+        padded = cells * L::lanes;
+        first = arena.take<int>(p.blocks), count = arena.take<int>(p.blocks);
+        mode_first = arena.take<int>(p.blocks), mode_count = arena.take<int>(p.blocks), place = arena.take<int>(p.modes);
+        Coef **rows[] = {&omega, &sigma, &g, &shift, &far_force, &center, &high, &beam, &second};
+        for (Coef **row : rows) *row = arena.take<Coef>(cells);
+        G = arena.take<Coef>(long(cells) * padded);
+        if (!arena.base) return;
+        int cell = 0, mode = 0;
+        for (int b = 0; b < p.blocks; ++b) {
+            first[b] = cell, mode_first[b] = cell * L::lanes, mode_count[b] = p.block_sizes[b];
+            count[b] = (p.block_sizes[b] + L::lanes - 1) / L::lanes;
+            for (int i = 0; i < p.block_sizes[b]; ++i) place[mode++] = mode_first[b] + i;
+            cell += count[b];
+        }
+        for (int i = 0; i < padded; ++i) {
+            for (Coef **row : rows) set_coefficient<L>(*row, i, 0.0);
+            set_coefficient<L>(omega, i, 1.0);
+            for (int j = 0; j < padded; ++j) set_coefficient<L>(G + long(j) * cells, i, 0.0);
+        }
+        fastest = 0.0;
+        for (int i = 0; i < p.modes; ++i) {
+            const int at = place[i];
+            set_coefficient<L>(omega, at, p.omega[i]), set_coefficient<L>(sigma, at, p.sigma[i]);
+            set_coefficient<L>(g, at, p.g[i]), set_coefficient<L>(center, at, p.center[i]);
+            if (p.shift) set_coefficient<L>(shift, at, p.shift[i]);
+            if (p.far_force) set_coefficient<L>(far_force, at, p.far_force[i]);
+            set_coefficient<L>(beam, at, p.beam[i]);
+            if (p.second) set_coefficient<L>(second, at, p.second[i]);
+            if (p.high) set_coefficient<L>(high, at, p.high[i]);
+            fastest = p.omega[i] > fastest ? p.omega[i] : fastest;
+            for (int j = 0; j < p.modes; ++j) set_coefficient<L>(G + long(place[j]) * cells, at, p.G[long(i) * p.modes + j]);
+        }
+    }
+    // Parts in which a step of a run is followed inside: a flight step's, whatever the step.
+    double parts(double flight_step) const {
+        const double count = double(int(PARTS_PER_TURN * fastest * flight_step / 6.283185307179586) + 1);
+        return count < FEWEST_PARTS ? FEWEST_PARTS : count;
+    }
+};
+
+}  // namespace SNAPBEAM_SET

@@ -1,0 +1,215 @@
+"""Channels of a system for the native core: a row, a law and signals for everything that acts on the modes.
+
+    q_i'' + 2 zeta_i omega_i q_i' + omega_i^2 q_i = tension + sum_j r_ij f_j(u_j, v_j, t),    u_j = u_j0 + r_j . q
+
+A contact, a local force, an external force, the base and the axial load are channels; the motion of a striker, the base, a load or
+a force is a signal.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.contact.base import ContactLaw
+from snapbeam.model.contact.hertz import HertzContact
+from snapbeam.model.contact.hunt_crossley import HuntCrossley
+from snapbeam.model.contact.kelvin_voigt import KelvinVoigt
+from snapbeam.model.contact.layered_hertz import LayeredHertz
+from snapbeam.model.contact.power_law import PowerLaw
+from snapbeam.model.drive.base import HORIZON, Drive
+from snapbeam.model.drive.fixed_stop import FixedStop
+from snapbeam.model.drive.sine import Sine
+from snapbeam.model.external_force import ConstantForce, HarmonicForce
+from snapbeam.model.local_force import (
+    CoulombFriction,
+    ElectrostaticForce,
+    LocalSpring,
+    MagneticForce,
+    QuadraticDamping,
+)
+from snapbeam.model.quantity import section_of, split_name
+from snapbeam.model.system import System
+from snapbeam.solver.further_contacts import LAW, OFFSET, REST, SINCE
+from snapbeam.util.validation import InputError
+
+_Array = NDArray[np.float64]
+
+LAWS: dict[type, tuple[int, tuple[str, ...]]] = {
+    HertzContact: (0, ("stiffness",)),
+    PowerLaw: (1, ("force_at_1um", "exponent")),
+    LayeredHertz: (2, ("stiffness", "layer_stiffness")),
+    HuntCrossley: (3, ("stiffness", "damping_factor")),
+    KelvinVoigt: (4, ("linear_stiffness", "linear_damping")),
+    LocalSpring: (5, ("stiffness", "cubic_stiffness")),
+    ElectrostaticForce: (6, ("voltage", "area", "gap")),
+    MagneticForce: (7, ("strength", "gap")),
+    QuadraticDamping: (8, ("coefficient",)),
+    CoulombFriction: (9, ("friction_force", "smoothing_velocity")),
+}
+"""Number of each law in ``core/laws.hpp``, and the names of its numbers in their order there."""
+EXTERNAL_FORCE, BASE, AXIAL_LOAD = 11, 12, 13
+LAW_NUMBERS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """Everything that acts on the modes of many runs."""
+
+    laws: NDArray[np.int32]
+    """Shape (channels,): contacts first, the first striker's before the others."""
+    contacts: int
+    uses: _Array
+    """Factor of each signal in each channel, shape (channels, signals)."""
+    signals: _Array
+    """Mean, amplitude, rate, phase and period in ticks, shape (runs, signals, 5)."""
+    numbers: _Array
+    """Numbers of the laws, shape (runs, channels, LAW_NUMBERS)."""
+    offset: _Array
+    """Penetration in the first well with all signals at zero, shape (runs, channels)."""
+    since: _Array
+    """Seconds in contact at the start, -1: apart, NaN: the penetration decides; shape (runs, channels)."""
+    rows: _Array
+    """Shape (rows, N)."""
+    row_of: NDArray[np.int32]
+    """Row of each channel, then that of the displacement observed, shape (runs, channels + 1)."""
+    rest: _Array
+    """Displacement along these rows in the first well, shape (runs, channels + 1)."""
+
+
+class _Builder:
+    """Channels and signals, one after the other."""
+
+    def __init__(self, runs: int) -> None:
+        self.runs = runs
+        self.laws: list[int] = []
+        self.numbers: list[_Array] = []
+        self.offset: list[_Array] = []
+        self.since: list[_Array] = []
+        self.rows: list[_Array] = []
+        self.row_of: list[NDArray[np.int64]] = []
+        self.rest: list[_Array] = []
+        self.uses: list[dict[str, float]] = []
+        self.signals: dict[str, _Array] = {}
+
+    def add(self, law: int, rows: _Array, which: Any, rest: Any, uses: dict[str, float], numbers: Any = (), offset: Any = 0.0, since: Any = -1.0) -> None:  # fmt: skip
+        """Add a channel: its law, rows and which of them each run has, and the factors of its signals."""
+        of_law = np.zeros((self.runs, LAW_NUMBERS))
+        for k, value in enumerate(numbers):
+            of_law[:, k] = value
+        self.laws.append(law)
+        self.numbers.append(of_law)
+        self.place(rows, which, rest)
+        self.uses.append(uses)
+        self.offset.append(np.broadcast_to(np.asarray(offset, float), self.runs))
+        self.since.append(np.broadcast_to(np.asarray(since, float), self.runs))
+
+    def place(self, rows: _Array, which: Any, rest: Any) -> None:
+        """Add rows, and which of them each run has."""
+        first = sum(len(each) for each in self.rows)
+        self.rows.append(np.atleast_2d(rows))
+        self.row_of.append(np.broadcast_to(np.asarray(which) + first, self.runs))
+        self.rest.append(np.broadcast_to(np.asarray(rest, float), self.runs))
+
+    def built(self, contacts: int) -> Channels:
+        """Everything as arrays."""
+        names, shape = list(self.signals), (len(self.laws), self.runs)
+        uses = np.zeros((len(self.laws), len(names)))
+        for j, each in enumerate(self.uses):
+            for name, factor in each.items():
+                uses[j, names.index(name)] = factor
+        signals = np.stack([self.signals[name] for name in names], axis=1) if names else np.zeros((self.runs, 0, 5))
+        return Channels(
+            np.array(self.laws, np.int32), contacts, uses, signals,
+            np.stack(self.numbers, axis=1) if self.laws else np.zeros((self.runs, 0, LAW_NUMBERS)),
+            np.array(self.offset).reshape(shape).T.copy(), np.array(self.since).reshape(shape).T.copy(),
+            np.concatenate(self.rows), np.array(self.row_of).T.astype(np.int32), np.array(self.rest).T.copy(),
+        )  # fmt: skip
+
+
+def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) -> Channels:
+    """Return the channels of an ensemble.
+
+    Raises
+    ------
+    InputError
+        If the native core does not have a part of the system.
+    """
+    structure, table, runs = ensemble.structure, ensemble.runs, ensemble.size
+    built = _Builder(runs)
+    if structure.circuits:
+        raise InputError("harvester: is not integrated by engine = 'native'; use engine = 'cpu'")
+    for section, drive in _motions(system):
+        built.signals[section] = _signal(system, ensemble, columns, section, drive)
+    base = system.base_excitation
+    up = 1.0 if base is None or base.direction == "up" else -1.0
+    for number, contact in enumerate(system.contacts, 1):
+        law, names = _law(type(contact.law), f"{section_of('contact', number)}.law")
+        uses = {section_of("drive", number): 1.0}
+        if base is not None and not base.striker_on_base:
+            uses["base_excitation"] = -up if contact.striker.side == "below" else up
+        if number == 1:
+            values = [columns[f"contact.{name}"] for name in names]
+            built.add(law, ensemble.contact_rows, table["contact_row"], table["rest_contact"], uses, values, table["offset"], table["contact_time"])  # fmt: skip
+            continue
+        own = ensemble.others.numbers[:, number - 2]
+        order = type(contact.law).numbers_type()._fields
+        values = [own[:, LAW + order.index(name)] for name in names]
+        built.add(law, ensemble.others.rows, ensemble.others.places[:, number - 2], own[:, REST], uses, values, own[:, OFFSET], own[:, SINCE])  # fmt: skip
+    for force, row in zip(system.local_forces, structure.local_forces, strict=True):
+        law, names = _law(type(force), f"force {type(force).__name__}")
+        built.add(law, row.row, 0, row.rest, {}, [getattr(force.numbers, name) for name in names])
+    sections = [section for section, _ in system.moving if section.startswith("force")]
+    for section, external in zip(sections, structure.force_rows, strict=True):
+        built.add(EXTERNAL_FORCE, external, 0, 0.0, {section: 1.0})
+    if base is not None:
+        built.add(BASE, structure.base_load, 0, 0.0, {"base_excitation": up})
+    if system.axial_load is not None:
+        built.add(AXIAL_LOAD, np.zeros(structure.omega.size), 0, 0.0, {"axial_load": 1.0})
+    observed = np.array([structure.row_of_beam(row) for row in ensemble.contact_rows])
+    built.place(observed, table["contact_row"], table["rest_contact"])
+    return built.built(len(system.contacts))
+
+
+def _law(kind: type, words: str) -> tuple[int, tuple[str, ...]]:
+    if kind not in LAWS:
+        names = ", ".join(each.__name__ for each in LAWS if issubclass(each, ContactLaw) == issubclass(kind, ContactLaw))
+        raise InputError(f"{words}: {kind.__name__} is not integrated by engine = 'native', which has {names}; use engine = 'cpu'")
+    return LAWS[kind]
+
+
+def _motions(system: System) -> list[tuple[str, Drive]]:
+    """Every motion by section; a stop at rest too."""
+    found = [(section_of("drive", number), each.striker.drive) for number, each in enumerate(system.contacts, 1)]
+    return found + [each for each in system.moving if not each[0].startswith("drive")]
+
+
+def _signal(system: System, ensemble: Any, columns: Mapping[str, _Array], section: str, drive: Drive) -> _Array:
+    """Mean, amplitude, rate, phase and period of a motion, shape (runs, 5)."""
+    runs = ensemble.size
+    numbers = np.zeros((runs, 5))
+    if isinstance(drive, FixedStop):
+        return numbers
+    own = {field: values for name, values in columns.items() for of, field in [split_name(name)] if of == section} or {"": np.zeros(runs)}
+    if isinstance(drive, ConstantForce):
+        numbers[:, 0] = own["force"]
+        return numbers
+    kind = drive.integrated_as or type(drive)
+    if not (kind.harmonic or issubclass(kind, (Sine, HarmonicForce))):
+        raise InputError(f"{section}: {type(drive).__name__} is not integrated by engine = 'native', which has sines and constants; use engine = 'cpu'")
+    found = drive.numbers(own, system.scale)
+    numbers[:, 0] = own.get("mean", 0.0)
+    numbers[:, 1], numbers[:, 2] = found["amplitude"], found["omega"]
+    table = ensemble.runs
+    if len(system.moving) < 2:
+        numbers[:, 3], numbers[:, 4] = table["phase"], table["period"]
+    else:
+        clock = ensemble.drive_numbers[:, ensemble.drive.number_names.index("omega")]
+        assert HORIZON
+        numbers[:, 3] = own.get("phase", 0.0) + np.fmod(numbers[:, 2] * (table["phase"] / clock), 2.0 * math.pi)
+    return numbers

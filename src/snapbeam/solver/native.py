@@ -1,0 +1,315 @@
+"""Driver of the native core: an ensemble as arrays, integrated in threads, read as accumulators and states."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from snapbeam import _core
+from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LAW_NUMBERS, Channels
+from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.statistics import (
+    OTHER_IMPACTS,
+    OTHER_IMPULSE,
+    OTHER_PEAK,
+    OTHER_WORK,
+    Last,
+    OutputStates,
+    Recorded,
+    empty_accumulators,
+)
+from snapbeam.solver.terms import WORKS
+from snapbeam.util.status_codes import RunStatus
+from snapbeam.util.validation import InputError
+
+_Array = NDArray[np.float64]
+Progress = Callable[[int, int], object]
+
+RUN = (
+    "tick", "step", "end", "output_interval", "last_quarter", "well_sign", "min_contact_halvings", "max_halvings", "decide_energy",
+    "decide_reach", "decide_crossings", "max_steps", "stretch",
+)  # fmt: skip
+"""Numbers of a run, in the order of ``core/api.hpp: RunNumber``."""
+STATISTICS = (
+    "status", "time", "side", "zero_crossings", "zero_crossings_last_quarter", "last_zero_crossing", "steps", "trials",
+    "sampled_steps", "min_displacement", "max_displacement", "min_center", "max_center", "peak_velocity",
+    "peak_midspan_velocity", "square_displacement", "square_center", "square_velocity", "square_midspan_velocity",
+    "energy_time", "high_energy_time", "dissipated", "first_energy", "energy", "displacement", "center", "early_stop_time",
+)  # fmt: skip
+OF_CHANNEL = ("impacts", "impulse", "work", "gross_work", "lost", "peak_force", "deepest", "contact_time", "touching", "onset")
+STATUS = (RunStatus.OK, RunStatus.EARLY_STOP, RunStatus.INTERRUPTED, RunStatus.DIVERGED, RunStatus.STEP_LIMIT)
+"""Status of a run by its number in the core."""
+OF_SAMPLE, CHANNEL_SAMPLE = 3, 5
+"""Numbers of a sample, and of each channel in it."""
+FEW_MODES = 12
+"""Modes up to which runs are integrated side by side."""
+_MOST_TICKS = 2.0**52
+_FINER = 16
+"""Halvings of a tick, at most: events lie on ticks."""
+_PARTS = {4: (1, 4.0), 6: (2, 8.0)}
+"""Parts of a kick, at least, and over the time in which damping stops a motion, by the order of the composition."""
+_SAMPLES, _IMPACTS, _BUDGET = 20_000, 4096, 200_000
+"""Room for samples and impacts, and steps, of one piece of a recorded run."""
+
+
+def layout_of(ensemble: Ensemble) -> str:
+    """The layout of a structure: few modes in lanes of runs, a single run as a thread with the same bits."""
+    if ensemble.structure.omega.size > FEW_MODES:
+        return "modes"
+    return "runs" if ensemble.size > 1 else "thread"
+
+
+class _Arrays:
+    """An ensemble as the arrays of the core."""
+
+    def __init__(self, ensemble: Ensemble) -> None:
+        channels, structure = ensemble.channels, ensemble.structure
+        assert channels is not None
+        self.ensemble, self.channels = ensemble, channels
+        coupled = structure.coupling != 0.0
+        count, label = connected_components(coupled, directed=False)
+        self.order = np.argsort(label, kind="stable")
+        sizes = np.bincount(label, minlength=count).astype(np.int32)
+        n, modes = structure.omega.size, structure.equilibrium.size
+        finest = int(ensemble.max_halvings)
+        lossy = bool(np.isin(channels.laws, (3, 4, 8, 9, 10)).any())
+        fewest, per_decay = _PARTS[ensemble.order]
+        wells = structure.unequal_wells
+        has_two = structure.stretch > 0.0
+        high = structure.high_modes(ensemble.high_omega)
+
+        def row(values: Any) -> _Array:
+            return np.ascontiguousarray(np.asarray(values, dtype=float)[..., self.order])
+
+        self.row = row
+        self.problem = {
+            "omega": row(structure.omega),
+            "sigma": row(structure.damping_ratio * structure.omega),
+            "G": np.ascontiguousarray(structure.coupling[np.ix_(self.order, self.order)]),
+            "g": row(structure.well),
+            "gamma": float(structure.nonlinear_stiffness),
+            "shift": row(structure.shift) if has_two else None,
+            "far_force": row(wells.force) if has_two and wells is not None else None,
+            "second": row(wells.second) if has_two and wells is not None else None,
+            "high": row(high) if high.any() else None,
+            "beam": row(np.arange(n) < modes),
+            "lift": float(wells.lift) if has_two and wells is not None else 0.0,
+            "block_sizes": sizes,
+            "composition": 0 if ensemble.order == 4 else 2 if lossy else 1,
+            "laws": channels.laws,
+            "signals": channels.signals.shape[1],
+            "uses": channels.uses,
+            "law_numbers": LAW_NUMBERS,
+            "center": row(structure.center),
+            "center_rest": float(structure.center_rest),
+            "dividing_height": float(structure.dividing_height),
+            "levels": finest + 1,
+            "fewest_parts": fewest,
+            "parts_per_decay": per_decay,
+        }
+        table = ensemble.runs
+        # finer ticks than those of the table, so that an event lies on one to rounding
+        longest = float(np.maximum(table["end"], 1).max())
+        finer = 2.0 ** max(0, min(_FINER, math.floor(math.log2(_MOST_TICKS / longest))))
+        self.finer = finer
+        run = np.zeros((ensemble.size, len(RUN)))
+        for k, name in enumerate(RUN):
+            if name in (table.dtype.names or ()):
+                run[:, k] = table[name]
+        for name in ("step", "end", "output_interval", "last_quarter"):
+            run[:, RUN.index(name)] *= finer
+        run[:, RUN.index("tick")] /= finer
+        run[:, RUN.index("output_interval")] = np.minimum(run[:, RUN.index("output_interval")], run[:, RUN.index("end")])
+        run[:, RUN.index("max_steps")] = ensemble.max_steps
+        run[:, RUN.index("stretch")] = structure.stretch
+        signals = channels.signals.copy()
+        signals[:, :, 4] *= finer
+        signals[signals[:, :, 4] > _MOST_TICKS, 4] = 0.0
+        self.run = run
+        ticks = np.rint(channels.since / run[:, :1])
+        start = table["start_row"]
+        self.batch: dict[str, Any] = {
+            "run": run,
+            "signals": signals,
+            "numbers": channels.numbers,
+            "offset": channels.offset,
+            "since": np.where(channels.since >= 0.0, ticks, channels.since),
+            "rows": row(channels.rows),
+            "row_of": channels.row_of,
+            "rest": channels.rest,
+            "q": row(ensemble.starts[start, 0]),
+            "p": row(ensemble.starts[start, 1]),
+            "order": np.argsort(-ensemble.work, kind="stable").astype(np.int32),
+            "outputs": 0,
+            "states": np.zeros((ensemble.size, 0, 2 * n + 1 + channels.laws.size)),
+            "statistics": np.full((ensemble.size, len(STATISTICS)), np.nan),
+            "of_channels": np.zeros((ensemble.size, channels.laws.size, len(OF_CHANNEL))),
+            "account": 0,
+        }
+        self.batch["statistics"][:, 0] = -1.0
+
+    def accumulators(self) -> NDArray[Any]:
+        """The records of the runs."""
+        statistics, of_channels = self.batch["statistics"], self.batch["of_channels"]
+        channels = self.channels
+        further = max(0, channels.contacts - 1)
+        found = empty_accumulators(self.ensemble.size, further)
+        begun = statistics[:, 0] >= 0.0
+        for k, name in enumerate(STATISTICS):
+            if name in (found.dtype.names or ()) and name not in ("status", "time"):
+                found[name][begun] = statistics[begun, k]
+        found["status"][begun] = np.array(STATUS, dtype=np.int64)[statistics[begun, 0].astype(int)]
+        found["time"][begun] = np.rint(statistics[begun, 1] / self.finer)
+        contacts = {name: of_channels[:, : channels.contacts, k] for k, name in enumerate(OF_CHANNEL)}
+        for name, column in (("impacts", "impacts"), ("total_impulse", "impulse"), ("work", "work"), ("lost", "lost"), ("contact_time", "contact_time")):  # fmt: skip
+            found[name] = contacts[column].sum(axis=1)
+        if channels.contacts:
+            found["peak_force"], found["touching"] = contacts["peak_force"][:, 0], contacts["touching"][:, 0]
+            found["onset"] = np.rint(contacts["onset"][:, 0] / self.finer)
+        if further:
+            for column, name in ((OTHER_IMPACTS, "impacts"), (OTHER_PEAK, "peak_force"), (OTHER_IMPULSE, "impulse"), (OTHER_WORK, "work")):  # fmt: skip
+                found["others"][:, :, column] = contacts[name][:, 1:]
+        works = OF_CHANNEL.index("work"), OF_CHANNEL.index("gross_work"), OF_CHANNEL.index("lost")
+        found["gross_work"] = of_channels[:, :, works[1]].sum(axis=1)
+        for j, law in enumerate(channels.laws.tolist()):
+            if j >= channels.contacts:
+                found[_work_of(law)] += of_channels[:, j, works[0]] - of_channels[:, j, works[2]]
+        if self.batch["account"]:
+            found["dissipated"] += found["lost"]
+        return found
+
+
+def _work_of(law: int) -> str:
+    """The accumulator of the work of a channel that is no contact."""
+    return {EXTERNAL_FORCE: "force_work", BASE: "base_work", AXIAL_LOAD: "load_work"}.get(law, "local_force_work")
+
+
+def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) -> None:
+    from snapbeam.solver.cpu.driver import usable_cores
+
+    layout = os.environ.get("SNAPBEAM_LAYOUT") or layout_of(arrays.ensemble)
+    if progress is not None:
+        progress(0, arrays.ensemble.size)
+    _core.integrate(
+        arrays.problem, arrays.batch, layout, os.environ.get("SNAPBEAM_SET", ""), threads or usable_cores(), progress
+    )
+    if progress is not None:
+        progress(arrays.ensemble.size, arrays.ensemble.size)
+
+
+def run_ensemble(ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None) -> NDArray[Any]:
+    """Integrate every run of an ensemble; returns a record of accumulators a run."""
+    arrays = _Arrays(ensemble)
+    _integrate(arrays, threads, progress)
+    return arrays.accumulators()
+
+
+def integrate_with_output_states(
+    ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None
+) -> OutputStates:
+    """Integrate as :func:`run_ensemble`, with the states at every output time."""
+    arrays = _Arrays(ensemble)
+    outputs = int(-(-ensemble.runs["end"][0] // ensemble.runs["output_interval"][0]))
+    n = ensemble.structure.omega.size
+    arrays.batch["outputs"] = outputs
+    states = np.full((ensemble.size, outputs, 2 * n + 1 + arrays.channels.laws.size), np.nan)
+    arrays.batch["states"] = states
+    _integrate(arrays, threads, progress)
+    q, p = np.empty((ensemble.size, outputs, n)), np.empty((ensemble.size, outputs, n))
+    q[..., arrays.order], p[..., arrays.order] = states[..., :n], states[..., n : 2 * n]
+    ticks = states[..., 2 * n + 1 : 2 * n + 1 + max(1, arrays.channels.contacts)]
+    if not arrays.channels.contacts:
+        ticks = np.full((ensemble.size, outputs, 1), -1.0)
+    return OutputStates(arrays.accumulators(), q, p, states[..., 2 * n], np.where(ticks > 0.0, ticks / arrays.finer, ticks))
+
+
+def integrate_tangents(*_: Any, **__: Any) -> Any:
+    """Refuse: tangents are integrated by the CPU engine."""
+    raise InputError("engine = 'native': does not integrate tangents; use engine = 'cpu'")
+
+
+def record(
+    ensemble: Ensemble, times: _Array, in_contact: bool, progress: Callable[[float], object] | None = None
+) -> Iterator[Recorded]:
+    """Integrate the one run of an ensemble once, and return its records, one part after the other."""
+    arrays, n = _Arrays(ensemble), ensemble.structure.omega.size
+    channels: Channels = arrays.channels
+    arrays.batch["account"], arrays.batch["outputs"] = 1, 1
+    arrays.batch["run"][:, RUN.index("output_interval")] = arrays.batch["run"][:, RUN.index("end")]
+    count = channels.laws.size
+    arrays.batch["states"] = np.full((1, 1, 2 * n + 1 + count), np.nan)
+    # one step may hold many instants
+    samples = _SAMPLES
+    saved = np.zeros((3 * (n + 64) + count * (9 + len(OF_CHANNEL)) + len(STATISTICS) + 32) * 8)
+    recorder = {
+        "times": np.ascontiguousarray(times, dtype=float),
+        "in_contact": int(in_contact),
+        "rows": np.empty((samples, 2 * n)),
+        "values": np.empty((samples, OF_SAMPLE + CHANNEL_SAMPLE * count)),
+        "impacts": np.empty((_IMPACTS + count, 5)),
+        "marks": np.zeros(5, dtype=np.dtype("l")),
+        "saved": saved,
+        "budget": _BUDGET,
+    }
+    layout = "modes" if n > FEW_MODES else "thread"
+    layout = os.environ.get("SNAPBEAM_LAYOUT") or layout
+    while True:
+        _core.record(arrays.problem, arrays.batch, recorder, layout, os.environ.get("SNAPBEAM_SET", ""))
+        marks = recorder["marks"]
+        accumulators = arrays.accumulators()
+        held, impacts = int(marks[1]), int(marks[2])
+        running = accumulators["status"][0] == RunStatus.INTERRUPTED
+        yield _recorded(arrays, recorder, held, impacts, accumulators)
+        if progress is not None:
+            progress(float(accumulators["time"][0]) / float(ensemble.runs["end"][0]))
+        if not running:
+            return
+        marks[1] = marks[2] = 0
+
+
+def _recorded(arrays: _Arrays, recorder: Any, held: int, impacts: int, accumulators: NDArray[Any]) -> Recorded:
+    n, channels = arrays.ensemble.structure.omega.size, arrays.channels
+    rows, values = recorder["rows"][:held], recorder["values"][:held]
+    q, p = np.empty((held, n)), np.empty((held, n))
+    q[:, arrays.order], p[:, arrays.order] = rows[:, :n], rows[:, n:]
+    own = values[:, OF_SAMPLE:].reshape(held, -1, CHANNEL_SAMPLE)
+    contacts, others = own[:, : channels.contacts], own[:, channels.contacts :]
+    found = np.zeros((held, 7 + len(WORKS)))
+    if channels.contacts:
+        found[:, 0], found[:, 1] = contacts[:, 0, 0], contacts[:, 0, 1]
+    else:
+        found[:, 0] = -1e30
+    found[:, 2] = values[:, 1]
+    found[:, 3], found[:, 4] = contacts[:, :, 2].sum(axis=1), contacts[:, :, 3].sum(axis=1)
+    found[:, 6] = contacts[:, :, 4].sum(axis=1)
+    found[:, 5] = values[:, 2] + found[:, 6]
+    for j, law in enumerate(channels.laws[channels.contacts :].tolist()):
+        found[:, 7 + list(WORKS).index(_work_of(law))] += others[:, j, 3] - others[:, j, 4]
+    table = recorder["impacts"][:impacts]
+    table = np.concatenate((table[:, 1:], table[:, :1] + 1.0), axis=1) if channels.contacts > 1 else table[:, 1:].copy()
+    state = _last(arrays, recorder, accumulators)
+    return Recorded(values[:, 0].copy(), q, p, found, table, accumulators, state)
+
+
+def _last(arrays: _Arrays, recorder: Any, accumulators: NDArray[Any]) -> Last:
+    """Final state of the run."""
+    n, contacts = arrays.ensemble.structure.omega.size, max(1, arrays.channels.contacts)
+    final = arrays.batch["states"]
+    q, p = np.zeros(n), np.zeros(n)
+    if not np.isfinite(final).all():
+        return Last(q, p, 1, np.full(contacts, -1.0))
+    q[arrays.order], p[arrays.order] = final[0, 0, :n], final[0, 0, n : 2 * n]
+    ticks = final[0, 0, 2 * n + 1 : 2 * n + 1 + contacts] if arrays.channels.contacts else np.full(1, -1.0)
+    return Last(q, p, int(final[0, 0, 2 * n]), np.where(ticks > 0.0, ticks / arrays.finer, ticks))
+
+
+def with_channels(ensemble: Ensemble, channels: Channels) -> Ensemble:
+    """The ensemble with its channels."""
+    return dataclasses.replace(ensemble, channels=channels)
