@@ -649,22 +649,35 @@ namespace SNAPBEAM_SET {
 // Runs of one thread, until none is left or all are asked to stop.
 template <class L> void integrate(const Problem &problem, const Batch &batch) {
     Structure<L> structure;
-    Group<L> group;
+    Group<L> groups[L::together];
     Arena measured{nullptr, 0};
-    structure.build(problem, measured), group.lay_out(structure, batch, measured);
+    structure.build(problem, measured);
+    for (Group<L> &group : groups) group.lay_out(structure, batch, measured);
     char *memory = static_cast<char *>(__builtin_malloc(measured.used + 64));
     Arena arena{memory + (64 - reinterpret_cast<unsigned long>(memory) % 64), 0};
-    structure.build(problem, arena), group.lay_out(structure, batch, arena);
-    group.begin();
+    structure.build(problem, arena);
+    for (Group<L> &group : groups) group.lay_out(structure, batch, arena);
+    for (Group<L> &group : groups) group.begin();
     long budget = batch.recorder ? batch.recorder->budget : 0;
-    while (any(group.alive)) {
-        if (*batch.stop || (batch.recorder && (budget-- <= 0 || !has_room(group)) && !any(group.again))) {
-            group.interrupt();
+    for (;;) {
+        Group<L> *live[L::together];
+        int count = 0;
+        for (Group<L> &group : groups)
+            if (any(group.alive)) live[count++] = &group;
+        if (!count) break;
+        if (*batch.stop || (batch.recorder && (budget-- <= 0 || !has_room(*live[0])))) {
+            for (int i = 0; i < count; ++i) live[i]->interrupt();
             break;
         }
-        group.propose();
-        take_step(group.z);
-        group.inspect();
+        for (int i = 0; i < count; ++i) live[i]->propose();
+        if (count == 1) {
+            take_step(live[0]->z);
+        } else {
+            for (int i = 0; i < count; ++i) begin_step(live[i]->z);
+            for (int stage = 0; stage <= structure.composition.flows; ++stage)
+                for (int i = 0; i < count; ++i) take_stage(live[i]->z, stage);
+        }
+        for (int i = 0; i < count; ++i) live[i]->inspect();
     }
     __builtin_free(memory);
 }

@@ -7,6 +7,7 @@
 //
 // Number and Cell may carry derivatives; Real and Plain are the same without them.  Tables, bounds, times and counters are Real.
 // FIXED is a number of modes that the compiler knows; 0: it does not.
+// *together* runs (or packs of them) take turns, a stage each, so that the processor always has work that does not wait.
 #pragma once
 #include "number.hpp"
 
@@ -19,7 +20,7 @@ template <int W, int FIXED = 0> struct RunLanes {
     typedef Pack<W> Plain;
     typedef double Coef;
     typedef Mask<W> Marks;
-    static constexpr int runs = W, lanes = 1, fixed = FIXED;
+    static constexpr int runs = W, lanes = 1, fixed = FIXED, together = 1;
     static SNAPBEAM_FN Number total(Cell x) { return x; }
     static SNAPBEAM_FN Cell mode(const Cell *row, int i) { return row[i]; }
 };
@@ -31,15 +32,30 @@ template <int W> struct ModeLanes {
     typedef Pack<W> Plain;
     typedef Pack<W> Coef;
     typedef bool Marks;
-    static constexpr int runs = 1, lanes = W, fixed = 0;
+    static constexpr int runs = 1, lanes = W, fixed = 0, together = 2;
     static SNAPBEAM_FN double total(Cell x) {
+#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
+        if constexpr (W == 8) {
+            const __m512d v = (__m512d)x.v;
+            const __m256d half = _mm256_add_pd(_mm512_castpd512_pd256(v), _mm512_extractf64x4_pd(v, 1));
+            const __m128d pair = _mm_add_pd(_mm256_castpd256_pd128(half), _mm256_extractf128_pd(half, 1));
+            return pair[0] + pair[1];
+        }
+#endif
+#if defined(SNAPBEAM_VECTORS) && defined(__AVX2__)
+        if constexpr (W == 4) {
+            const __m256d v = (__m256d)x.v;
+            const __m128d pair = _mm_add_pd(_mm256_castpd256_pd128(v), _mm256_extractf128_pd(v, 1));
+            return pair[0] + pair[1];
+        }
+#endif
         double s[W];
         for (int l = 0; l < W; ++l) s[l] = x.v[l];
         for (int half = W / 2; half > 0; half /= 2)
             for (int l = 0; l < half; ++l) s[l] += s[l + half];
         return s[0];
     }
-    static SNAPBEAM_FN double mode(const Cell *row, int i) { return row[i / W].v[i % W]; }
+    static SNAPBEAM_FN double mode(const Cell *row, int i) { return reinterpret_cast<const double *>(row)[i]; }
 };
 
 template <int FIXED = 0> struct Thread {
@@ -49,7 +65,7 @@ template <int FIXED = 0> struct Thread {
     typedef double Plain;
     typedef double Coef;
     typedef bool Marks;
-    static constexpr int runs = 1, lanes = 1, fixed = FIXED;
+    static constexpr int runs = 1, lanes = 1, fixed = FIXED, together = 1;
     static SNAPBEAM_FN double total(double x) { return x; }
     static SNAPBEAM_FN double mode(const double *row, int i) { return row[i]; }
 };

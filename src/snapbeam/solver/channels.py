@@ -128,7 +128,7 @@ class _Builder:
             np.array(self.laws, np.int32), contacts, uses, signals,
             np.stack(self.numbers, axis=1) if self.laws else np.zeros((self.runs, 0, LAW_NUMBERS)),
             np.array(self.offset).reshape(shape).T.copy(), np.array(self.since).reshape(shape).T.copy(),
-            np.concatenate(self.rows), np.array(self.row_of).T.astype(np.int32), np.array(self.rest).T.copy(),
+            np.concatenate(self.rows), np.ascontiguousarray(np.array(self.row_of, np.int32).T), np.array(self.rest).T.copy(),
         )  # fmt: skip
 
 
