@@ -88,16 +88,16 @@ template <class L> struct Group {
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
             c.law = problem->laws[j];
-            with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed; });
+            with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed, c.affine = law.affine; });
             c.uses = 0;
             for (int i = 0; i < z.signals; ++i)
                 if (problem->uses[j * z.signals + i] != 0.0) c.signal[c.uses] = i, c.factor[c.uses++] = problem->uses[j * z.signals + i];
             for (int i = 0; i < n; ++i) c.row[i] = Cell(0.0);
             for (int i = 0; i < problem->law_numbers; ++i) c.P[i] = Number(1.0);
             for (int i = 0; i < z.channels; ++i) c.M[i] = Number(0.0);
-            c.rest = c.offset = c.x = c.y = c.f = c.first_f = c.v = c.d0 = c.r0 = c.d1 = c.r1 = Number(0.0);
+            c.rest = c.offset = c.early = c.x = c.y = c.f = c.first_f = c.v = c.d0 = c.r0 = c.d1 = c.r1 = Number(0.0);
             c.closed = c.pressing = FromBits<Marks>::of(0), c.onset = c.safe = Real(0.0);
-            c.impulse = c.work = c.gross = c.lost = c.own_impulse = c.deepest = c.hardest = Number(0.0);
+            c.impulse = c.work = c.lost = c.own_impulse = c.deepest = c.hardest = Number(0.0);
             for (Number &x : c.sums) x = Number(0.0);
             Event<L> &e = events[j];
             e.flip = e.force = FromBits<Marks>::of(0), e.at_force = e.low = e.low_f = e.high = e.high_f = Real(0.0);
@@ -421,13 +421,13 @@ template <class L> struct Group {
             e.flip = mine, e.force = FromBits<Marks>::of(0);
             if (c.lossy) {  // where the force of a closed contact changes its sign
                 const Marks active = c.pressing;
-                const Number raw = with_law(c.law, [&](auto law) { return law.force(max(c.d1, Number(0.0)), c.r1, c.P); });
+                const Number raw = with_law(c.law, [&](auto law) { return law.pressing(max(c.d1, Number(0.0)), c.r1, c.P); });
                 const Real f1 = select(active, value(raw), -value(raw));  // positive: as it was
-                const Marks wrong = alive & c.closed & (f1 < Real(0.0)) & (d1 > Real(0.0));
+                const Marks wrong = alive & c.closed & (f1 < Real(0.0)) & (active | (d1 > Real(0.0)));
                 const Marks cut_before = mine & c.closed & (!differ(e.at_force, Real(1.0)));
                 const Marks first = wrong & (!cut_before);
                 if (any(first)) {
-                    const Number before = with_law(c.law, [&](auto law) { return law.force(max(c.d0, Number(0.0)), c.r0, c.P); });
+                    const Number before = with_law(c.law, [&](auto law) { return law.pressing(max(c.d0, Number(0.0)), c.r0, c.P); });
                     const Real f0 = max(select(active, value(before), -value(before)), Real(0.0));
                     e.low = select(first, Real(0.0), e.low), e.low_f = select(first, f0, e.low_f), e.high_f = select(first, f1, e.high_f);
                     at = select(first, max(nearest(ticks * (f0 / (f0 - f1))), Real(1.0)), at);
@@ -459,10 +459,10 @@ template <class L> struct Group {
                 const Cubic<Real> gap(-max(d0, Real(0.0)), -r0, -d1, -r1, value(z.h));
                 const Marks cut = leaving & (d0 > Real(0.0)) & (d1 < Real(0.0));
                 const Real when = max(nearest(ticks * root(gap, Real(1.0))), Real(1.0));
-                const Marks shorter = cut & (when < ticks);
-                at = select(shorter, min(at, when), at);
+                const Marks shorter = cut & (when < min(ticks, at));
+                at = select(shorter, when, at);
                 e.at_force = select(shorter, Real(0.0), e.at_force);
-                e.flip = e.flip | (leaving & (!shorter));
+                e.flip = e.flip | (leaving & (!shorter) & (at >= ticks));
             }
             const Marks open = others & (!c.closed);
             const Marks unsafe = open & (!(z.t + ticks <= c.safe) | !(d1 <= Real(0.0)));

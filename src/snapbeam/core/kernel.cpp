@@ -3,13 +3,22 @@
 #include "control.hpp"
 
 namespace SNAPBEAM_SET {
+#if SNAPBEAM_LAYOUT < 2
+static bool halves(const Problem &problem, int modes) {  // symmetric and antisymmetric modes, as many of each
+    return problem.modes == modes && problem.blocks == 2 && problem.block_sizes[0] == problem.block_sizes[1];
+}
+#endif
 #if SNAPBEAM_LAYOUT == 0
 void runs_side_by_side(const Problem &problem, const Batch &batch) {
     if (problem.modes == 1) integrate<RunLanes<SNAPBEAM_WIDTH, 1>>(problem, batch);
+    else if (halves(problem, 8)) integrate<RunLanes<SNAPBEAM_WIDTH, 8>>(problem, batch);
     else integrate<RunLanes<SNAPBEAM_WIDTH>>(problem, batch);
 }
 #elif SNAPBEAM_LAYOUT == 1
-void modes_side_by_side(const Problem &problem, const Batch &batch) { integrate<ModeLanes<SNAPBEAM_WIDTH>>(problem, batch); }
+void modes_side_by_side(const Problem &problem, const Batch &batch) {
+    if (halves(problem, 32)) integrate<ModeLanes<SNAPBEAM_WIDTH, 32 / SNAPBEAM_WIDTH>>(problem, batch);
+    else integrate<ModeLanes<SNAPBEAM_WIDTH>>(problem, batch);
+}
 #else
 void run_by_run(const Problem &problem, const Batch &batch) {
     if (problem.modes == 1) integrate<Thread<1>>(problem, batch);

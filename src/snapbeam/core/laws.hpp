@@ -8,9 +8,10 @@
 //   potential(x, P)        energy stored, J; the elastic part of the force is its derivative (of a contact), or minus that
 //   stiffness(x, P)        magnitude of the derivative of the elastic force by x, at most a bound of it
 //   damping(x, y, P)       magnitude of the derivative of the force by y, at most a bound of it for speeds up to |y|
+//   pressing(x, y, P)      of a lossy contact: what has the sign of the force, smooth down to x = 0
 //   low(P), high(P)        displacements between which it is valid (of a force)
 //
-// contact: it acts while the contact is closed;  lossy: the force depends on y;  timed: the force is the channel's signal.
+// affine: the force is linear in y;  contact: it acts while the contact is closed;  lossy: the force depends on y;  timed: the force is the channel's signal.
 #pragma once
 #include "number.hpp"
 
@@ -24,18 +25,20 @@ enum LawNumber : int {
 
 template <int NUMBERS> struct ContactLaw {
     static constexpr int numbers = NUMBERS;
-    static constexpr bool contact = true, lossy = false, timed = false;
+    static constexpr bool contact = true, lossy = false, timed = false, affine = true;
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *) { return T(0.0); }
+    template <class T> static SNAPBEAM_FN T pressing(T, T, const T *) { return T(1.0); }
     template <class T> static SNAPBEAM_FN T low(const T *) { return T(-INFINITY); }
     template <class T> static SNAPBEAM_FN T high(const T *) { return T(INFINITY); }
 };
 template <int NUMBERS> struct ForceLaw {
     static constexpr int numbers = NUMBERS;
-    static constexpr bool contact = false, lossy = false, timed = false;
+    static constexpr bool contact = false, lossy = false, timed = false, affine = false;
     template <class T> static SNAPBEAM_FN T force(T, T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T potential(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T stiffness(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *) { return T(0.0); }
+    template <class T> static SNAPBEAM_FN T pressing(T, T, const T *) { return T(1.0); }
     template <class T> static SNAPBEAM_FN T low(const T *) { return T(-INFINITY); }
     template <class T> static SNAPBEAM_FN T high(const T *) { return T(INFINITY); }
 };
@@ -77,12 +80,14 @@ struct LayeredHertz : ContactLaw<2> {
 struct HuntCrossley : Hertz {  // f = k d^(3/2) (1 + chi d')
     static constexpr int numbers = 2;
     static constexpr bool lossy = true;
+    template <class T> static SNAPBEAM_FN T pressing(T, T y, const T *P) { return fma(P[1], y, T(1.0)); }
     template <class T> static SNAPBEAM_FN T force(T d, T y, const T *P) { return P[0] * d * sqrt(d) * fma(P[1], y, T(1.0)); }
     template <class T> static SNAPBEAM_FN T damping(T d, T, const T *P) { return P[1] * P[0] * d * sqrt(d); }
 };
 struct KelvinVoigt : ContactLaw<2> {  // f = k d + c d'
     static constexpr bool lossy = true;
     template <class T> static SNAPBEAM_FN T force(T d, T y, const T *P) { return fma(P[0], d, P[1] * y); }
+    template <class T> static SNAPBEAM_FN T pressing(T d, T y, const T *P) { return force(d, y, P); }
     template <class T> static SNAPBEAM_FN T potential(T d, const T *P) { return T(0.5) * P[0] * d * d; }
     template <class T> static SNAPBEAM_FN T stiffness(T, const T *P) { return P[0]; }
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *P) { return P[1]; }
@@ -131,7 +136,7 @@ struct CoulombFriction : ForceLaw<2> {  // f = -F tanh(v / v_0)
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *P) { return P[0] / P[1]; }
 };
 struct LinearDamping : ForceLaw<1> {  // f = -c v, as of a circuit without inertia
-    static constexpr bool lossy = true;
+    static constexpr bool lossy = true, affine = true;
     template <class T> static SNAPBEAM_FN T force(T, T v, const T *P) { return -(P[0] * v); }
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *P) { return abs(P[0]); }
 };

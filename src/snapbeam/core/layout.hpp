@@ -6,7 +6,7 @@
 //   Thread        double        double        double        one run; a lane of RunLanes has the same bits
 //
 // Number and Cell may carry derivatives; Real and Plain are the same without them.  Tables, bounds, times and counters are Real.
-// FIXED is a number of modes that the compiler knows; 0: it does not.
+// FIXED is a number of cells that the compiler knows, of two blocks of equal size if it is more than 1; 0: it does not.
 // *together* runs (or packs of them) take turns, a stage each, so that the processor always has work that does not wait.
 #pragma once
 #include "number.hpp"
@@ -25,14 +25,14 @@ template <int W, int FIXED = 0> struct RunLanes {
     static SNAPBEAM_FN Cell mode(const Cell *row, int i) { return row[i]; }
 };
 
-template <int W> struct ModeLanes {
+template <int W, int FIXED = 0> struct ModeLanes {
     typedef double Number;
     typedef double Real;
     typedef Pack<W> Cell;
     typedef Pack<W> Plain;
     typedef Pack<W> Coef;
     typedef bool Marks;
-    static constexpr int runs = 1, lanes = W, fixed = 0, together = 2;
+    static constexpr int runs = 1, lanes = W, fixed = FIXED, together = 2;
     static SNAPBEAM_FN double total(Cell x) {
 #if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
         if constexpr (W == 8) {

@@ -9,7 +9,11 @@ namespace SNAPBEAM_SET {
 // Room for what a step may add: instants, the end of a step in contact, an impact of each channel.
 template <class L> bool has_room(const Group<L> &run) {
     const Recorder &to = *run.batch->recorder;
-    return to.marks[1] + 2 <= to.samples && to.marks[2] + run.z.channels <= to.impacts;
+    const double until = (lane(run.z.t, 0) + lane(run.step, 0)) * lane(run.z.tick, 0) * (1.0 + 1e-12);
+    long instants = 0;
+    for (long i = to.marks[0]; i < to.instants && to.times[i] <= until && to.marks[1] + instants < to.samples; ++i) ++instants;
+    if (lane(run.z.t, 0) + lane(run.step, 0) >= lane(run.end, 0)) instants = to.instants - to.marks[0];
+    return to.marks[1] + instants + 2 <= to.samples && to.marks[2] + run.z.channels <= to.impacts;
 }
 
 // One sample of the state in q1, p1 at a time (s), with increments *within* a step that is not accepted yet.
@@ -41,7 +45,7 @@ template <class L> void write_sample(Group<L> &run, double time, bool within) {
         const auto pressed = max(x, typename L::Number(0.0));
         const auto stored = c.timed ? typename L::Number(0.0) : with_law(c.law, [&](auto law) { return law.potential(c.contact ? pressed : x, c.P); });
         own[SAMPLE_DEPTH] = lane(value(x), 0);
-        own[SAMPLE_FORCE] = lane(value(c.timed ? signal_of(z, c) : force_at(c, x, y)), 0);
+        own[SAMPLE_FORCE] = c.contact && !(lane(value(x), 0) > 0.0) ? 0.0 : lane(value(c.timed ? signal_of(z, c) : force_at(c, x, y)), 0);
         own[SAMPLE_POTENTIAL] = c.contact && !lane(typename L::Marks(c.closed & c.pressing), 0) ? 0.0 : lane(value(stored), 0);
         own[SAMPLE_WORK] = lane(value(c.sums[WORK]), 0) + share * lane(value(c.work), 0);
         own[SAMPLE_LOST] = lane(value(c.sums[LOST]), 0) + share * lane(value(c.lost), 0);

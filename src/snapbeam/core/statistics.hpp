@@ -290,7 +290,7 @@ template <class L> struct Totals {
             }
             c.own_impulse += select(acts, c.impulse, zero);
         }
-        c.sums[WORK] += select(acts, c.work, zero), c.sums[GROSS_WORK] += select(acts, c.gross, zero), c.sums[LOST] += select(acts, c.lost, zero);
+        c.sums[WORK] += select(acts, c.work, zero), c.sums[GROSS_WORK] += select(acts, abs(c.work), zero), c.sums[LOST] += select(acts, c.lost, zero);
     }
 
     // Largest penetration in a step in which it turns: where the rate, a cubic by its values and slopes, is zero.

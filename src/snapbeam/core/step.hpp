@@ -10,7 +10,10 @@
 //   v_i' = a_i + sum_j M_ij f_j(x_j, v_j),   a_i = r_i.k + sum over the other forces,   M_ij = r_i.r_j,
 //
 // an equation for these velocities alone: the classical method of Runge and Kutta in parts of the kick that resolve the damping.
-// One after the other such forces would leave an error of first order in h.
+// One after the other such forces would leave an error of first order in h.  One alone that is linear in v, f = f_e + B y with
+// y' = -(a + M f) and x = M B t, is exact:
+//
+//   y(t) = y_0 e^(-x) - (a + M f_e) t phi_1(x),   phi_1 = (1 - e^(-x))/x,   phi_2 = (1 - phi_1)/x,   phi_3 = (1/2 - phi_2)/x.
 //
 // Whether a contact is closed, and whether a lossy one presses, is fixed for a whole step (events.hpp finds where that changes).
 #pragma once
@@ -23,7 +26,7 @@ template <class L> struct Channel {
     typedef typename L::Number Number;
     typedef typename L::Real Real;
     int law;
-    bool contact, lossy, timed, active;
+    bool contact, lossy, timed, affine, active;
     int uses;                    // signals that it adds
     int *signal;
     double *factor;
@@ -32,11 +35,12 @@ template <class L> struct Channel {
     Number rest, offset;         // displacement in the first well; of a contact, penetration there with its signals at 0
     // at a kick: x and y of the law, force; force of the first kick; penetration and rate at both ends
     Number x, y, f, first_f, v;
+    Number early;                // of a lossy channel 2/w^2 times the integral of (w - t) f over a kick of w: f if it is constant
     Number d0, r0, d1, r1;
     typename L::Marks closed, pressing;
     Real onset, safe;            // tick of the onset; time until which the contact cannot close, ticks
     // increments of the step, and sums of the run
-    Number impulse, work, gross, lost;
+    Number impulse, work, lost;
     Number own_impulse, deepest, hardest;
     Number sums[snapbeam::OF_CHANNEL];
 };
@@ -61,7 +65,7 @@ template <class L> struct Runs {
     bool account;
 };
 
-constexpr int BLOCK_ARRAYS = 10;
+constexpr int BLOCK_ARRAYS = 11;
 
 template <class L, class X, class Y> SNAPBEAM_FN typename L::Number dot(const X *a, const Y *b, int n) {
     typename L::Cell s = a[0] * b[0];
@@ -117,9 +121,12 @@ template <class L> SNAPBEAM_FN void tension(Runs<L> &z, const typename L::Cell *
         z.r[0] = s.G[0] * q[0];
         along = z.r[0] * q[0];
     } else {
-        for (int b = 0; b < s.problem->blocks; ++b) {
-            int i = s.first[b];
-            const int end = i + s.count[b], from = s.mode_first[b], count = s.mode_count[b];
+        constexpr int HALF = L::fixed / 2;
+        const int blocks = L::fixed ? 2 : s.problem->blocks;
+        for (int b = 0; b < blocks; ++b) {
+            int i = L::fixed ? b * HALF : s.first[b];
+            const int end = i + (L::fixed ? HALF : s.count[b]);
+            const int from = L::fixed ? b * HALF * L::lanes : s.mode_first[b], count = L::fixed ? HALF * L::lanes : s.mode_count[b];
             for (; i + 8 <= end; i += 8) along += product_rows<8, L>(s, q, z.r, i, from, count);
             for (; i + 4 <= end; i += 4) along += product_rows<4, L>(s, q, z.r, i, from, count);
             for (; i + 2 <= end; i += 2) along += product_rows<2, L>(s, q, z.r, i, from, count);
@@ -170,6 +177,43 @@ SNAPBEAM_FN typename L::Number force_at(const Channel<L> &c, typename L::Number 
     return c.contact ? select(c.closed & c.pressing, f, Number(0.0)) : f;
 }
 
+// phi_1, phi_2, phi_3 for |x| <= 1.
+template <class T> struct Phi {
+    T one, two, three;
+    SNAPBEAM_FN explicit Phi(T x) {
+        const T z = -x;
+        T s = T(1.0 / 1307674368000.0);  // 1/15!
+        for (int k = 14; k >= 3; --k) s = fma(s, z, T(RECIPROCAL_FACTORIAL[k]));
+        three = s, two = fma(s, z, T(0.5)), one = fma(two, z, T(1.0));
+    }
+    static constexpr double RECIPROCAL_FACTORIAL[15] = {
+        1.0, 1.0, 1.0 / 2, 1.0 / 6, 1.0 / 24, 1.0 / 120, 1.0 / 720, 1.0 / 5040, 1.0 / 40320, 1.0 / 362880, 1.0 / 3628800,
+        1.0 / 39916800, 1.0 / 479001600, 1.0 / 6227020800.0, 1.0 / 87178291200.0};
+};
+
+// One force that is linear in the velocity, exactly; *a* and *v* along its row, where |M B w| <= 1.
+template <class L>
+SNAPBEAM_FN void affine_kick(const Channel<L> &c, typename L::Number w, typename L::Number M, typename L::Number a, typename L::Number v,
+                             typename L::Number tip, typename L::Number *impulse, typename L::Number *twice, typename L::Number *lost) {
+    typedef typename L::Number Number;
+    const Number side = c.contact ? Number(1.0) : Number(-1.0), y0 = c.contact ? tip - v : v;
+    const Number f0 = force_at(c, c.x, y0), elastic = force_at(c, c.x, Number(0.0));
+    const Number B = side * (force_at(c, c.x, Number(1.0)) - elastic), decay = M * B, x = decay * w;  // f = f_e + side B y
+    const Phi<Number> phi(x);
+    // f' = -B a - M B f, of a contact and of a force alike
+    *impulse = w * fma(f0, phi.one, -(B * a * w * phi.two));
+    *twice = w * w * fma(f0, phi.two, -(B * a * w * phi.three));
+    // the power lost, B y^2, by Gauss's rule of three points
+    const Number drive = -side * fma(M, elastic, a);  // y' = drive - M B y
+    const double at[3] = {0.1127016653792583, 0.5, 0.8872983346207417}, share[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+    *lost = Number(0.0);
+    for (int i = 0; i < 3; ++i) {
+        const Number t = Number(at[i]) * w, xt = decay * t, one = Phi<Number>(xt).one;
+        const Number y = fma(y0, fma(-xt, one, Number(1.0)), drive * t * one);
+        *lost = fma(Number(share[i]) * w, B * y * y, *lost);
+    }
+}
+
 // Forces that depend on velocities, together; the impulses of a kick of *w* seconds go into p.
 template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number w, int count) {
     typedef typename L::Number Number;
@@ -178,7 +222,7 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
     const int n = s.size();
     Number *v = z.block, *a = v + z.channels, *y = a + z.channels, *slope = y + z.channels, *change = slope + z.channels;
     Number *f = change + z.channels, *impulse = f + z.channels, *lost = impulse + z.channels, *elastic = lost + z.channels;
-    Number *tip = elastic + z.channels;
+    Number *tip = elastic + z.channels, *twice = tip + z.channels;
     Real decay = Real(0.0);
     for (int i = 0; i < count; ++i) {
         Channel<L> &c = z.channel[z.late[i]];
@@ -187,22 +231,29 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
             const Channel<L> &other = z.channel[j];
             if (other.active && !other.lossy && other.law != AXIAL_LOAD) a[i] = fma(c.M[j], other.f, a[i]);
         }
-        impulse[i] = lost[i] = Number(0.0);
+        impulse[i] = lost[i] = twice[i] = Number(0.0);
         tip[i] = c.contact ? signal_slope(z, c) : Number(0.0);
         elastic[i] = c.contact ? force_at(c, c.x, Number(0.0)) : Number(0.0);
         const Number fastest = abs(v[i]) + abs(tip[i]) + abs(w * a[i]);
         const Number damping = with_law(c.law, [&](auto law) { return law.damping(c.contact ? max(c.x, Number(0.0)) : c.x, fastest, c.P); });
         decay += value(c.M[z.late[i]] * (c.contact ? select(c.closed & c.pressing, damping, Number(0.0)) : damping));
     }
+    const bool alone = count == 1 && z.channel[z.late[0]].affine;
+    const auto exact = decay * abs(value(w)) <= Real(alone ? 1.0 : -1.0);
+    Number exact_impulse = Number(0.0), exact_twice = Number(0.0), exact_lost = Number(0.0);
+    if (alone) {
+        const Channel<L> &c = z.channel[z.late[0]];
+        affine_kick(c, w, c.M[z.late[0]], a[0], v[0], tip[0], &exact_impulse, &exact_twice, &exact_lost);
+    }
     Real parts = nearest(decay * abs(value(w)) * Real(s.problem->parts_per_decay) + Real(0.5));
     parts = min(max(parts, Real(double(s.problem->fewest_parts))), Real(256.0));
     const Number h = w / Number(parts);
     const double ahead[4] = {0.0, 0.5, 0.5, 1.0}, share[4] = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6};
     for (int part = 0;; ++part) {
-        const auto within = Real(double(part)) < parts;
+        const auto within = (Real(double(part)) < parts) & (!exact);
         if (!any(within)) break;
         const Number step = select(within, h, Number(0.0));
-        for (int i = 0; i < count; ++i) change[i] = slope[i] = Number(0.0);
+        for (int i = 0; i < count; ++i) change[i] = slope[i] = Number(0.0), twice[i] = fma(step, impulse[i], twice[i]);
         for (int stage = 0; stage < 4; ++stage) {
             for (int i = 0; i < count; ++i) {
                 const Channel<L> &c = z.channel[z.late[i]];
@@ -217,6 +268,7 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
                 for (int j = 0; j < count; ++j) slope[i] = fma(c.M[z.late[j]], f[j], slope[i]);
                 change[i] = fma(weight, slope[i], change[i]);
                 impulse[i] = fma(weight, f[i], impulse[i]);
+                if (stage < 3) twice[i] = fma(step * step * Number(1.0 / 6.0), f[i], twice[i]);
                 lost[i] = fma(weight, c.contact ? (f[i] - elastic[i]) * y[i] : -(f[i] * y[i]), lost[i]);
             }
         }
@@ -224,7 +276,9 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
     }
     for (int i = 0; i < count; ++i) {
         Channel<L> &c = z.channel[z.late[i]];
+        if (alone) assign(exact, impulse[i], exact_impulse), assign(exact, twice[i], exact_twice), assign(exact, lost[i], exact_lost);
         c.f = select(differ(w, Number(0.0)), impulse[i] / w, Number(0.0));
+        c.early = select(differ(w, Number(0.0)), Number(2.0) * twice[i] / (w * w), Number(0.0));
         c.lost += lost[i];
         for (int m = 0; m < n; ++m) z.p1[m] = fma(typename L::Cell(impulse[i]), c.row[m], z.p1[m]);
     }
@@ -241,15 +295,14 @@ template <class L> SNAPBEAM_FN void timed_work(Runs<L> &z, Channel<L> &c, typena
         for (int i = 0; i < z.channels; ++i) {
             const Channel<L> &other = z.channel[i];
             if (!other.active || other.law == AXIAL_LOAD) continue;
-            a = fma(other.f, z.sign * dot<L>(s.g, other.row, n) + dot<L>(z.r, other.row, n), a);
+            a = fma(other.lossy ? other.early : other.f, z.sign * dot<L>(s.g, other.row, n) + dot<L>(z.r, other.row, n), a);
         }
     } else {
         a = dot<L>(c.row, z.k1, n);
         for (int i = 0; i < z.channels; ++i)
-            if (z.channel[i].active && z.channel[i].law != AXIAL_LOAD) a = fma(c.M[i], z.channel[i].f, a);
+            if (z.channel[i].active && z.channel[i].law != AXIAL_LOAD) a = fma(c.M[i], z.channel[i].lossy ? z.channel[i].early : z.channel[i].f, a);
     }
-    const Number work = w * c.f * fma(Number(0.5) * w, a, c.v);
-    c.work += work, c.gross += abs(work);
+    c.work += w * c.f * fma(Number(0.5) * w, a, c.v);
 }
 
 template <class L> SNAPBEAM_FN void begin_step(Runs<L> &z) {
@@ -259,7 +312,7 @@ template <class L> SNAPBEAM_FN void begin_step(Runs<L> &z) {
     for (int i = 0; i < z.signals; ++i) z.signal[i].sine = z.signal[i].sine0, z.signal[i].cosine = z.signal[i].cosine0;
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
-        c.impulse = c.work = c.gross = c.lost = Number(0.0);
+        c.impulse = c.work = c.lost = Number(0.0);
         c.active = !c.contact || any(c.closed);
         if (!(c.law == AXIAL_LOAD)) c.f = c.first_f = Number(0.0);
     }
@@ -279,11 +332,10 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
         if (c.active && c.lossy) z.late[late++] = j;
         timed |= c.timed;
     }
-    // is the row of accelerations needed, or do its two factors serve?
-    const bool whole = stage == 0 || last || late || timed || s.problem->far_force;
+    // Within a step the two factors of the acceleration serve, whatever the neighbours of a run need the row for.
     if (stage > 0) {
         tension(z, z.q1, z.next_gq);
-        if (whole) acceleration_row(z, z.k1);
+        if (last || late || timed) acceleration_row(z, z.k1);
     }
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
@@ -307,8 +359,8 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
         if (stage == 0) c.first_f = c.f;
         if (c.timed) timed_work(z, c, w);
         if (c.contact) {
-            const Number push = w * c.f, power = push * signal_slope(z, c);
-            c.impulse += push, c.work += power, c.gross += abs(power);
+            const Number push = w * c.f;
+            c.impulse += push, c.work = fma(push, signal_slope(z, c), c.work);
         }
     }
     for (int j = 0; j < z.channels; ++j) {
@@ -325,9 +377,13 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
     const int which = s.composition.which_flow(stage);
     const typename L::Plain *a = z.flows + long(which) * n * 4;
     const Cell by_g = Cell(w * z.along_g), by_r = Cell(w * z.along_r);
+    if (stage && s.problem->far_force) {
+        const Cell there = Cell(w * (Number(0.5) * (Number(1.0) - z.sign)));
+        for (int i = 0; i < n; ++i) z.p1[i] = fma(there, s.far_force[i], z.p1[i]);
+    }
     Cell before = Cell(0.0), after = Cell(0.0), gq = Cell(0.0);
     for (int i = 0; i < n; ++i, a += 4) {
-        const Cell q = z.q1[i], p = whole ? fma(weight, z.k1[i], z.p1[i]) : fma(by_g, s.g[i], fma(by_r, z.r[i], z.p1[i]));
+        const Cell q = z.q1[i], p = stage ? fma(by_g, s.g[i], fma(by_r, z.r[i], z.p1[i])) : fma(weight, z.k1[i], z.p1[i]);
         const Cell q1 = q + fma(a[0], q, a[1] * p), p1 = p + fma(a[3], p, a[2] * q);
         if (z.account) {
             const Cell oq = s.omega[i] * q, oq1 = s.omega[i] * q1;
@@ -345,7 +401,7 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
 template <class L> SNAPBEAM_FN void take_step(Runs<L> &outer) {
     begin_step(outer);
     const int flows = outer.s->composition.flows;
-    if constexpr (L::fixed > 0) {
+    if constexpr (L::fixed > 0 && L::together == 1) {
         typedef typename L::Cell Cell;
         constexpr int N = L::fixed;
         Cell q[N], p[N], k[N], r[N];

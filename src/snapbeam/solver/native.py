@@ -53,7 +53,7 @@ FEW_MODES = 12
 _MOST_TICKS = 2.0**52
 _FINER = 16
 """Halvings of a tick, at most: events lie on ticks."""
-_PARTS = {4: (1, 4.0), 6: (2, 8.0)}
+_PARTS = {4: (4, 8.0), 6: (4, 16.0)}
 """Parts of a kick, at least, and over the time in which damping stops a motion, by the order of the composition."""
 _SAMPLES, _IMPACTS, _BUDGET = 20_000, 4096, 200_000
 """Room for samples and impacts, and steps, of one piece of a recorded run."""
@@ -246,7 +246,9 @@ def record(
     count = channels.laws.size
     arrays.batch["states"] = np.full((1, 1, 2 * n + 1 + count), np.nan)
     # one step may hold many instants
-    samples = _SAMPLES
+    span = 2.0 * float(ensemble.step_times[0])
+    most = int((np.searchsorted(times, times + span, side="right") - np.arange(times.size)).max(initial=0))
+    samples = max(_SAMPLES, most + 8)
     saved = np.zeros((3 * (n + 64) + count * (9 + len(OF_CHANNEL)) + len(STATISTICS) + 32) * 8)
     recorder = {
         "times": np.ascontiguousarray(times, dtype=float),
