@@ -450,8 +450,8 @@ template <class L> struct Group {
             const Marks on_gap = mine & (!at_force);
             if (any(on_gap)) {  // did the step that was cut end at the zero of the gap?
                 const Marks right = (c.closed & (r1 < Real(0.0))) | ((!c.closed) & (r1 > Real(0.0)));
-                const Real better = ticks - nearest(d1 / (r1 * z.tick));
-                const Marks off = on_gap & right & differ(better, ticks) & (tries < Real(CORRECTIONS)) & (better > Real(0.0)) & (better < ticks + ticks);
+                const Real better = max(ticks - nearest(d1 / (r1 * z.tick)), Real(1.0));
+                const Marks off = on_gap & right & differ(better, ticks) & (tries < Real(CORRECTIONS)) & (better < ticks + ticks);
                 at = select(off, better, at), e.flip = e.flip & (!off);
             }
             const Marks leaving = others & c.closed & (d1 <= Real(0.0)) & (!at_force);
