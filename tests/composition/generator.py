@@ -22,7 +22,7 @@ from snapbeam.model.contact.base import LAWS
 from snapbeam.model.local_force import LOCAL_FORCES
 from snapbeam.model.quantity import quantities
 
-__all__ = ["Composition", "Features", "composed", "features_of"]
+__all__ = ["Composition", "Features", "composed", "features_of", "native_features"]
 
 Array = NDArray[np.float64]
 Rng = np.random.Generator
@@ -125,6 +125,39 @@ def features_of(seed: int) -> Features:
     if not (moves or features.started):
         return dataclasses.replace(features, started=True)
     return features
+
+
+NATIVE_LAWS = ("hertz", "power", "layer", "hunt_crossley", "kelvin_voigt")
+NATIVE_DRIVES = ("sine", "sine", "displacement_sine", "acceleration_sine", "fixed")
+NATIVE_LOCAL = (*KNOWN_FORCES, "coulomb_friction")
+
+
+def native_features(seed: int) -> Features:
+    """The parts that a seed draws of those that the native core has; nothing is compiled, so that no seeds share them."""
+    rng = np.random.default_rng([seed, 77])
+
+    def some(names: Any, *weights: float) -> tuple[str, ...]:
+        count = int(rng.choice(len(weights), p=np.array(weights) / sum(weights)))
+        return tuple(str(name) for name in rng.choice(list(names), count))
+
+    modes = int(rng.integers(1, 7)) if rng.random() < 0.9 else int(rng.choice([8, 12, 20, 32]))
+    count = int(rng.choice(5, p=[0.1, 0.4, 0.25, 0.15, 0.1]))
+    contacts = tuple(
+        (str(rng.choice(NATIVE_LAWS)), str(rng.choice(NATIVE_DRIVES)), bool(rng.random() < 0.15))
+        for _ in range(count)
+    )
+    moves = any(drive != "fixed" for _, drive, _ in contacts)
+    return Features(
+        modes=modes,
+        contacts=contacts,
+        base=str(rng.choice(["acceleration_sine", "displacement_sine"])) if rng.random() < 0.35 else None,
+        carried=bool(rng.random() < 0.7),
+        external=some(("harmonic_force", "constant_force"), 0.6, 0.3, 0.1),
+        local=some(NATIVE_LOCAL, 0.5, 0.25, 0.15, 0.1),
+        load="sine" if rng.random() < 0.25 else None,
+        uneven=bool(rng.random() < 0.3),
+        started=bool(rng.random() < 0.2) or not moves,
+    )
 
 
 # ----------------------------------------------------------------------------------------------------

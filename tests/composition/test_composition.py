@@ -115,7 +115,9 @@ def recorded(composition: Composition, run: sb.Run) -> Array:
     return np.concatenate(found, axis=1)
 
 
-def checked(seed: int, features: Features | None = None, levels: tuple[str, ...] = ("reference",)) -> Report:
+def checked(
+    seed: int, features: Features | None = None, levels: tuple[str, ...] = ("reference",), engine: str = "cpu"
+) -> Report:
     """Compare one system with the reference; failures are listed in the report."""
     report = Report(seed)
     try:
@@ -124,7 +126,9 @@ def checked(seed: int, features: Features | None = None, levels: tuple[str, ...]
         cycles, end = lasting(system)
         times = np.linspace(0.0, end, 121)[1:] * (1.0 - 1e-9)
         runs = {
-            level: sb.simulate(system, sb.Integration(cycles=cycles, accuracy=level), sample_times=times)
+            level: sb.simulate(
+                system, sb.Integration(cycles=cycles, accuracy=level, engine=engine), sample_times=times
+            )
             for level in levels
         }
     except InputError as error:
@@ -163,7 +167,7 @@ def checked(seed: int, features: Features | None = None, levels: tuple[str, ...]
             check_voltages(composition, truth, run, within, LIMIT[level], amplified, report)
     if composition.mirrors:
         level, run = next(iter(runs.items()))
-        check_mirror(composition, cycles, times, level, run, amplified, report)
+        check_mirror(composition, cycles, times, level, run, amplified, report, engine)
     return report
 
 
@@ -194,10 +198,12 @@ def check_mirror(
     run: sb.Run,
     amplified: Array,
     report: Report,
+    engine: str = "cpu",
 ) -> None:
     """Compare the run of the mirror image: to the last bit where its numbers differ by signs only."""
     image = composed(report.seed, composition.features, mirror=True)
-    found = sb.simulate(image.system, sb.Integration(cycles=cycles, accuracy=level), sample_times=times)
+    how = sb.Integration(cycles=cycles, accuracy=level, engine=engine)
+    found = sb.simulate(image.system, how, sample_times=times)
     one, other = run.dataset["modal_amplitude"].values, found.dataset["modal_amplitude"].values
     if composition.exact_mirror:
         if not np.array_equal(one, -other):

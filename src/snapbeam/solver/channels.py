@@ -123,7 +123,9 @@ class _Builder:
         for j, each in enumerate(self.uses):
             for name, factor in each.items():
                 uses[j, names.index(name)] = factor
-        signals = np.stack([self.signals[name] for name in names], axis=1) if names else np.zeros((self.runs, 0, 5))
+        signals = (
+            np.stack([self.signals[name] for name in names], axis=1) if names else np.zeros((self.runs, 0, 5))
+        )
         return Channels(
             np.array(self.laws, np.int32), contacts, uses, signals,
             np.stack(self.numbers, axis=1) if self.laws else np.zeros((self.runs, 0, LAW_NUMBERS)),
@@ -178,30 +180,42 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
 
 def _law(kind: type, words: str) -> tuple[int, tuple[str, ...]]:
     if kind not in LAWS:
-        names = ", ".join(each.__name__ for each in LAWS if issubclass(each, ContactLaw) == issubclass(kind, ContactLaw))
-        raise InputError(f"{words}: {kind.__name__} is not integrated by engine = 'native', which has {names}; use engine = 'cpu'")
+        names = ", ".join(
+            each.__name__ for each in LAWS if issubclass(each, ContactLaw) == issubclass(kind, ContactLaw)
+        )
+        raise InputError(
+            f"{words}: {kind.__name__} is not integrated by engine = 'native', which has {names}; use engine = 'cpu'"
+        )
     return LAWS[kind]
 
 
 def _motions(system: System) -> list[tuple[str, Drive]]:
     """Every motion by section; a stop at rest too."""
-    found = [(section_of("drive", number), each.striker.drive) for number, each in enumerate(system.contacts, 1)]
+    found = [
+        (section_of("drive", number), each.striker.drive) for number, each in enumerate(system.contacts, 1)
+    ]
     return found + [each for each in system.moving if not each[0].startswith("drive")]
 
 
-def _signal(system: System, ensemble: Any, columns: Mapping[str, _Array], section: str, drive: Drive) -> _Array:
+def _signal(
+    system: System, ensemble: Any, columns: Mapping[str, _Array], section: str, drive: Drive
+) -> _Array:
     """Mean, amplitude, rate, phase and period of a motion, shape (runs, 5)."""
     runs = ensemble.size
     numbers = np.zeros((runs, 5))
     if isinstance(drive, FixedStop):
         return numbers
-    own = {field: values for name, values in columns.items() for of, field in [split_name(name)] if of == section} or {"": np.zeros(runs)}
+    own = {
+        field: values for name, values in columns.items() for of, field in [split_name(name)] if of == section
+    } or {"": np.zeros(runs)}
     if isinstance(drive, ConstantForce):
         numbers[:, 0] = own["force"]
         return numbers
     kind = drive.integrated_as or type(drive)
     if not (kind.harmonic or issubclass(kind, (Sine, HarmonicForce))):
-        raise InputError(f"{section}: {type(drive).__name__} is not integrated by engine = 'native', which has sines and constants; use engine = 'cpu'")
+        raise InputError(
+            f"{section}: {type(drive).__name__} is not integrated by engine = 'native', which has sines and constants; use engine = 'cpu'"
+        )
     found = drive.numbers(own, system.scale)
     numbers[:, 0] = own.get("mean", 0.0)
     numbers[:, 1], numbers[:, 2] = found["amplitude"], found["omega"]
@@ -211,5 +225,7 @@ def _signal(system: System, ensemble: Any, columns: Mapping[str, _Array], sectio
     else:
         clock = ensemble.drive_numbers[:, ensemble.drive.number_names.index("omega")]
         assert HORIZON
-        numbers[:, 3] = own.get("phase", 0.0) + np.fmod(numbers[:, 2] * (table["phase"] / clock), 2.0 * math.pi)
+        numbers[:, 3] = own.get("phase", 0.0) + np.fmod(
+            numbers[:, 2] * (table["phase"] / clock), 2.0 * math.pi
+        )
     return numbers

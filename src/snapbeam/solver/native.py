@@ -43,7 +43,18 @@ STATISTICS = (
     "peak_midspan_velocity", "square_displacement", "square_center", "square_velocity", "square_midspan_velocity",
     "energy_time", "high_energy_time", "dissipated", "first_energy", "energy", "displacement", "center", "early_stop_time",
 )  # fmt: skip
-OF_CHANNEL = ("impacts", "impulse", "work", "gross_work", "lost", "peak_force", "deepest", "contact_time", "touching", "onset")
+OF_CHANNEL = (
+    "impacts",
+    "impulse",
+    "work",
+    "gross_work",
+    "lost",
+    "peak_force",
+    "deepest",
+    "contact_time",
+    "touching",
+    "onset",
+)
 STATUS = (RunStatus.OK, RunStatus.EARLY_STOP, RunStatus.INTERRUPTED, RunStatus.DIVERGED, RunStatus.STEP_LIMIT)
 """Status of a run by its number in the core."""
 OF_SAMPLE, CHANNEL_SAMPLE = 3, 5
@@ -126,7 +137,9 @@ class _Arrays:
         for name in ("step", "end", "output_interval", "last_quarter"):
             run[:, RUN.index(name)] *= finer
         run[:, RUN.index("tick")] /= finer
-        run[:, RUN.index("output_interval")] = np.minimum(run[:, RUN.index("output_interval")], run[:, RUN.index("end")])
+        run[:, RUN.index("output_interval")] = np.minimum(
+            run[:, RUN.index("output_interval")], run[:, RUN.index("end")]
+        )
         run[:, RUN.index("max_steps")] = ensemble.max_steps
         run[:, RUN.index("stretch")] = structure.stretch
         signals = channels.signals.copy()
@@ -188,7 +201,9 @@ class _Arrays:
 
 def _work_of(law: int) -> str:
     """The accumulator of the work of a channel that is no contact."""
-    return {EXTERNAL_FORCE: "force_work", BASE: "base_work", AXIAL_LOAD: "load_work"}.get(law, "local_force_work")
+    return {EXTERNAL_FORCE: "force_work", BASE: "base_work", AXIAL_LOAD: "load_work"}.get(
+        law, "local_force_work"
+    )
 
 
 def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) -> None:
@@ -198,13 +213,20 @@ def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) 
     if progress is not None:
         progress(0, arrays.ensemble.size)
     _core.integrate(
-        arrays.problem, arrays.batch, layout, os.environ.get("SNAPBEAM_SET", ""), threads or usable_cores(), progress
+        arrays.problem,
+        arrays.batch,
+        layout,
+        os.environ.get("SNAPBEAM_SET", ""),
+        threads or usable_cores(),
+        progress,
     )
     if progress is not None:
         progress(arrays.ensemble.size, arrays.ensemble.size)
 
 
-def run_ensemble(ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None) -> NDArray[Any]:
+def run_ensemble(
+    ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None
+) -> NDArray[Any]:
     """Integrate every run of an ensemble; returns a record of accumulators a run."""
     arrays = _Arrays(ensemble)
     _integrate(arrays, threads, progress)
@@ -227,7 +249,9 @@ def integrate_with_output_states(
     ticks = states[..., 2 * n + 1 : 2 * n + 1 + max(1, arrays.channels.contacts)]
     if not arrays.channels.contacts:
         ticks = np.full((ensemble.size, outputs, 1), -1.0)
-    return OutputStates(arrays.accumulators(), q, p, states[..., 2 * n], np.where(ticks > 0.0, ticks / arrays.finer, ticks))
+    return OutputStates(
+        arrays.accumulators(), q, p, states[..., 2 * n], np.where(ticks > 0.0, ticks / arrays.finer, ticks)
+    )
 
 
 def integrate_tangents(*_: Any, **__: Any) -> Any:
@@ -276,7 +300,9 @@ def record(
         marks[1] = marks[2] = 0
 
 
-def _recorded(arrays: _Arrays, recorder: Any, held: int, impacts: int, accumulators: NDArray[Any]) -> Recorded:
+def _recorded(
+    arrays: _Arrays, recorder: Any, held: int, impacts: int, accumulators: NDArray[Any]
+) -> Recorded:
     n, channels = arrays.ensemble.structure.omega.size, arrays.channels
     rows, values = recorder["rows"][:held], recorder["values"][:held]
     q, p = np.empty((held, n)), np.empty((held, n))
@@ -295,7 +321,11 @@ def _recorded(arrays: _Arrays, recorder: Any, held: int, impacts: int, accumulat
     for j, law in enumerate(channels.laws[channels.contacts :].tolist()):
         found[:, 7 + list(WORKS).index(_work_of(law))] += others[:, j, 3] - others[:, j, 4]
     table = recorder["impacts"][:impacts]
-    table = np.concatenate((table[:, 1:], table[:, :1] + 1.0), axis=1) if channels.contacts > 1 else table[:, 1:].copy()
+    table = (
+        np.concatenate((table[:, 1:], table[:, :1] + 1.0), axis=1)
+        if channels.contacts > 1
+        else table[:, 1:].copy()
+    )
     state = _last(arrays, recorder, accumulators)
     return Recorded(values[:, 0].copy(), q, p, found, table, accumulators, state)
 

@@ -1,0 +1,31 @@
+"""The native core on random systems of the parts it has, against the independent reference; nothing is compiled.
+
+``SNAPBEAM_COMPOSITIONS=100 pytest tests/composition/test_native.py -m slow`` tests 100 seeds in place of 1,000.
+"""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from generator import native_features
+from test_composition import CHUNK, checked, judge
+
+COUNT = int(os.environ.get("SNAPBEAM_COMPOSITIONS", "1000"))
+
+
+def reports(seeds):
+    return [
+        checked(seed, native_features(seed), ("reference", "standard"), engine="native") for seed in seeds
+    ]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_systems(seed):
+    judge(reports([seed]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(8, COUNT, CHUNK))
+def test_many_random_systems(first):
+    judge(reports(range(first, min(first + CHUNK, COUNT))))

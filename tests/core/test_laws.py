@@ -1,0 +1,69 @@
+"""Laws in the core against those of the model: numbers by name, force, potential, slope and damping."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam import _core
+from snapbeam.solver.channels import LAW_NUMBERS, LAWS
+
+MADE = {
+    sb.HertzContact: sb.HertzContact(3.3e8),
+    sb.PowerLaw: sb.PowerLaw(0.7, 2.3),
+    sb.LayeredHertz: sb.LayeredHertz(4e8, 2e12),
+    sb.HuntCrossley: sb.HuntCrossley(2e8, 3.1),
+    sb.KelvinVoigt: sb.KelvinVoigt(3e5, 1.7),
+    sb.LocalSpring: sb.LocalSpring(stiffness=30.0, cubic_stiffness=4e7),
+    sb.ElectrostaticForce: sb.ElectrostaticForce(voltage=30.0, area=2e-4, gap=-1.1e-3),
+    sb.MagneticForce: sb.MagneticForce(strength=-4e-9, gap=9e-4),
+    sb.QuadraticDamping: sb.QuadraticDamping(coefficient=0.3),
+    sb.CoulombFriction: sb.CoulombFriction(friction_force=2e-3, smoothing_velocity=0.03),
+}
+SPEEDS = (-0.4, -0.01, 0.0, 0.2)
+
+
+def values(law, numbers, x, y):
+    found = {name: np.empty(x.size) for name in ("force", "potential", "stiffness", "damping")}
+    padded = np.zeros(LAW_NUMBERS)
+    padded[: len(numbers)] = numbers
+    _core.law_values(law, {"x": x, "y": y, "numbers": padded, **found})
+    return found
+
+
+@pytest.mark.parametrize("kind", LAWS, ids=lambda kind: kind.__name__)
+def test_law(kind):
+    assert set(MADE) == set(LAWS)
+    law, (number, names) = MADE[kind], LAWS[kind]
+    contact = isinstance(law, sb.ContactLaw)
+    held = law.numbers() if contact else law.numbers
+    x = np.geomspace(1e-9, 1e-5, 9) if contact else np.linspace(-5e-4, 5e-4, 9)
+    for speed in SPEEDS:
+        found = values(number, [getattr(held, name) for name in names], x, np.full(x.size, speed))
+        if contact:
+            loss = [kind.damping_coefficient(held, d) for d in x] if law.rate_dependent else np.zeros(x.size)
+            force = [kind.force(held, d) + c * speed for d, c in zip(x, loss, strict=True)]
+            np.testing.assert_allclose(found["stiffness"], [kind.slope(held, d) for d in x], rtol=1e-12)
+            np.testing.assert_allclose(found["damping"], loss, rtol=1e-12)
+        else:
+            loss = [kind.damping_force(held, u, speed) for u in x]
+            force = [kind.force(held, u) + f for u, f in zip(x, loss, strict=True)]
+            steep = np.abs([kind.damping_coefficient(held, u, speed) for u in x])
+            assert (found["damping"] >= steep * (1.0 - 1e-12)).all()
+        np.testing.assert_allclose(found["force"], force, rtol=1e-12, atol=1e-300)
+        np.testing.assert_allclose(
+            found["potential"], [kind.energy(held, u) for u in x], rtol=1e-12, atol=1e-300
+        )
+
+
+@pytest.mark.parametrize(
+    "kind", [kind for kind in LAWS if issubclass(kind, sb.LocalForce)], ids=lambda kind: kind.__name__
+)
+def test_the_stiffness_bounds_the_slope_of_the_force(kind):
+    law, (number, names) = MADE[kind], LAWS[kind]
+    numbers = [getattr(law.numbers, name) for name in names]
+    x = np.linspace(-6e-4, 6e-4, 101)
+    found, moved = (values(number, numbers, x + dx, np.zeros(x.size)) for dx in (0.0, 1e-9))
+    slope = np.abs(moved["force"] - found["force"]) / 1e-9
+    assert (slope <= found["stiffness"] * (1.0 + 1e-3) + 1e-9).all()
