@@ -64,8 +64,8 @@ def test_every_field_is_checked(which, name):
     ("column", "value"),
     [
         ("tick", 0.0), ("tick", -1.0), ("tick", np.nan), ("step", 0.5), ("step", np.inf), ("step", 3.0), ("end", 0.0), ("end", 1e300),
-        ("output_interval", 0.0), ("well_sign", 0.5), ("min_contact_halvings", -1.0), ("min_contact_halvings", 99.0),
-        ("max_halvings", 99.0), ("max_steps", 0.0), ("max_steps", np.nan), ("stretch", -1.0),
+        ("output_interval", 0.0), ("well_sign", 0.5), ("contact_step", 0.0), ("contact_step", 1e15), ("contact_step", 3.0),
+        ("halvings", -1.0), ("halvings", 99.0), ("max_steps", 0.0), ("max_steps", np.nan), ("stretch", -1.0),
     ],
 )  # fmt: skip
 def test_numbers_of_a_run_are_checked(column, value):

@@ -28,14 +28,14 @@ struct Problem {
     const double *second;         // the second well about the mirror image, as q; null: the mirror image itself
     double center_rest;           // displacement of the centre in the first well
     double dividing_height;       // displacement of the centre that divides the wells
-    int levels;                   // lengths of steps: step / 2^0 ... step / 2^(levels - 1)
+    int levels;                   // lengths of steps: the flight step, the contact step and its halves
     int fewest_parts;             // parts of a kick in which forces of the velocity are integrated, at least
     double parts_per_decay;       // and parts over the time in which the damping stops the motion along a row
 };
 
-// Numbers of a run.
+// Numbers of a run.  STEP is the flight step, CONTACT_STEP the longest step in contact, which is halved up to HALVINGS times.
 enum RunNumber : int {
-    TICK, STEP, END, OUTPUT_INTERVAL, LAST_QUARTER, WELL_SIGN, COARSEST, FINEST, DECIDE_ENERGY, DECIDE_REACH, DECIDE_CROSSINGS,
+    TICK, STEP, END, OUTPUT_INTERVAL, LAST_QUARTER, WELL_SIGN, CONTACT_STEP, HALVINGS, DECIDE_ENERGY, DECIDE_REACH, DECIDE_CROSSINGS,
     MAX_STEPS, STRETCH, RUN_NUMBERS
 };
 // Numbers of a signal: mean + amplitude sin(rate t + phase); its period in ticks, 0 if it has none.

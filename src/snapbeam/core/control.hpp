@@ -41,7 +41,7 @@ template <class L> struct Group {
     Event<L> *events;             // of each channel
     Cell *spare;                  // rows and channels that a record puts aside
     Channel<L> *spare_channel;
-    Real step, end, limit, output_interval, coarsest, finest, most_steps, stretch, stretch_at_rest;
+    Real step, contact_step, end, limit, output_interval, halvings, most_steps, stretch, stretch_at_rest;
     int run[L::runs], output[L::runs];
 
     void lay_out(Structure<L> &structure, const Batch &b, Arena &arena) {
@@ -75,7 +75,7 @@ template <class L> struct Group {
         for (long i = 0; i < long(s->composition.distinct) * n * 4; ++i) own[i] = Plain(0.0);
         for (long i = 0; i < long(s->composition.distinct) * n * 4 * problem->levels; ++i) tables[i] = Plain(0.0);
         alive = again = landing = FromBits<Marks>::of(0);
-        Real *zeros[] = {&ticks, &wanted, &event, &tries, &cuts, &key, &step, &end, &limit, &output_interval, &coarsest, &finest,
+        Real *zeros[] = {&ticks, &wanted, &event, &tries, &cuts, &key, &step, &end, &limit, &output_interval, &contact_step, &halvings,
                          &most_steps, &stretch, &stretch_at_rest, &z.t};
         for (Real *x : zeros) *x = Real(0.0);
         z.tick = z.sign = z.parts = Real(1.0), z.h = z.gq = z.qr = z.next_gq = z.along_g = z.along_r = Number(0.0);
@@ -144,7 +144,7 @@ template <class L> struct Group {
         using namespace snapbeam;
         set_lane(z.tick, l, of_run(i, TICK)), set_lane(step, l, of_run(i, STEP)), set_lane(end, l, of_run(i, END));
         set_lane(output_interval, l, of_run(i, OUTPUT_INTERVAL)), set_lane(z.sign, l, of_run(i, WELL_SIGN));
-        set_lane(coarsest, l, of_run(i, COARSEST)), set_lane(finest, l, of_run(i, FINEST)), set_lane(most_steps, l, of_run(i, MAX_STEPS));
+        set_lane(contact_step, l, of_run(i, CONTACT_STEP)), set_lane(halvings, l, of_run(i, HALVINGS)), set_lane(most_steps, l, of_run(i, MAX_STEPS));
         set_lane(stretch_at_rest, l, of_run(i, STRETCH)), set_lane(z.t, l, 0.0), set_lane(stretch, l, 0.0);
         set_lane(z.parts, l, s->parts(of_run(i, STEP) * of_run(i, TICK)));
         for (int k = 0; k < z.signals; ++k) {
@@ -181,7 +181,7 @@ template <class L> struct Group {
         // flows of the steps of every length
         const int n = s->cells, distinct = s->composition.distinct;
         for (int level = 0; level < problem->levels; ++level) {
-            const double h = of_run(i, STEP) / double(1l << level) * of_run(i, TICK);
+            const double h = (level ? of_run(i, CONTACT_STEP) / double(1l << (level - 1)) : of_run(i, STEP)) * of_run(i, TICK);
             for (int f = 0; f < distinct; ++f)
                 for (int m = 0; m < n; ++m) {
                     Plain *to = tables + ((long(level) * distinct + f) * n + m) * 4;
@@ -252,30 +252,27 @@ template <class L> struct Group {
                 totals.enter_well(z, crossed);
             }
         }
-        Real level = Real(0.0), reach = Real(STRETCH_LIMIT) * stretch_at_rest;
+        // the longest step that is wanted, in ticks, and the first level whose steps are not longer
+        Real want = step, reach = Real(STRETCH_LIMIT) * stretch_at_rest;
         Marks far = (abs(stretch) > reach) & (stretch_at_rest > Real(0.0));
-        while (any(far)) {
-            far = far & (level < finest);
-            level += select(far, Real(1.0), Real(0.0)), reach += reach;
+        for (int i = 0; i < problem->levels && any(far); ++i) {
+            want = select(far, Real(0.5) * want, want), reach += reach;
             far = far & (abs(stretch) > reach);
         }
         for (int j = 0; j < z.channels; ++j) {
             const Channel<L> &c = z.channel[j];
             if (!c.contact || !any(c.closed)) continue;
-            Real want = Real(GRADING) * (z.t - c.onset);
             const Real d = value(c.d0), r = value(c.r0);
-            want = select(r < Real(0.0), min(want, Real(-RELEASE) * max(d, Real(0.0)) / (r * z.tick)), want);
-            Real deeper = coarsest, length = step;
-            for (int i = 0; i < problem->levels - 1; ++i) length = select(Real(double(i)) < coarsest, Real(0.5) * length, length);
-            for (int i = 0; i < problem->levels - 1; ++i) {
-                const Marks more = (length > want) & (deeper < finest);
-                if (!any(more)) break;
-                length = select(more, Real(0.5) * length, length), deeper += select(more, Real(1.0), Real(0.0));
-            }
-            level = select(c.closed, max(level, deeper), level);
+            Real own = min(Real(GRADING) * (z.t - c.onset), contact_step);
+            own = select(r < Real(0.0), min(own, Real(-RELEASE) * max(d, Real(0.0)) / (r * z.tick)), own);
+            want = select(c.closed, min(want, own), want);
         }
-        Real length = step;
-        for (int i = 0; i < problem->levels - 1; ++i) length = select(Real(double(i)) < level, Real(0.5) * length, length);
+        Real level = Real(0.0), length = step, next = contact_step;
+        for (int i = 0; i < problem->levels - 1; ++i) {
+            const Marks more = (length > want) & (level <= halvings);
+            if (!any(more)) break;
+            length = select(more, next, length), next = select(more, Real(0.5) * next, next), level += select(more, Real(1.0), Real(0.0));
+        }
         limit = min(limit_of_outputs(), end);
         landing = fresh & (z.t + length >= limit);
         length = select(landing, limit - z.t, length);

@@ -164,7 +164,7 @@ static Problem problem_of(Arguments &a) {
         if (plain::with_law(p.laws[j], [](auto law) { return int(law.numbers); }) > p.law_numbers) a.refuse("law_numbers", "is less than a law has");
     p.center = a.array<double>("center", {n}), p.center_rest = a.number("center_rest", -1e300, 1e300);
     p.dividing_height = a.number("dividing_height", -1e300, 1e300);
-    p.levels = a.integer("levels", 1, 40), p.fewest_parts = a.integer("fewest_parts", 1, 256);
+    p.levels = a.integer("levels", 2, 40), p.fewest_parts = a.integer("fewest_parts", 1, 256);
     p.parts_per_decay = a.number("parts_per_decay", 0.0, 1e6);
     return p;
 }
@@ -189,8 +189,9 @@ static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
             if (!(run[k] >= 1.0 && run[k] <= most && run[k] == std::floor(run[k]))) a.refuse("run", "must count steps and ends in whole ticks, 1 to 2^53");
         if (!(run[TICK] > 0.0 && run[TICK] < 1e300)) a.refuse("run", "must have a positive tick");
         if (!(run[WELL_SIGN] == 1.0 || run[WELL_SIGN] == -1.0)) a.refuse("run", "must begin about one of the wells");
-        if (!(run[COARSEST] >= 0.0 && run[COARSEST] <= run[FINEST] && run[FINEST] < p.levels)) a.refuse("run", "must have 0 <= coarsest <= finest < levels");
-        if (std::fmod(run[STEP], std::ldexp(1.0, int(run[FINEST]))) != 0.0) a.refuse("run", "must have steps that halve to whole ticks");
+        if (!(run[HALVINGS] >= 0.0 && run[HALVINGS] <= p.levels - 2)) a.refuse("run", "must have 0 <= halvings <= levels - 2");
+        if (!(run[CONTACT_STEP] >= 1.0 && run[CONTACT_STEP] <= run[STEP])) a.refuse("run", "must have contact steps of 1 tick to a flight step");
+        if (std::fmod(run[CONTACT_STEP], std::ldexp(1.0, int(run[HALVINGS]))) != 0.0) a.refuse("run", "must have contact steps that halve to whole ticks");
         if (!(run[MAX_STEPS] >= 1.0)) a.refuse("run", "must be allowed a step");
         if (!(run[STRETCH] >= 0.0)) a.refuse("run", "must not have a negative stretch");
     }

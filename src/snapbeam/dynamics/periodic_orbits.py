@@ -17,7 +17,7 @@ from snapbeam.model.system import System
 from snapbeam.simulation.advance import differences
 from snapbeam.simulation.run import Run
 from snapbeam.simulation.simulate import simulate
-from snapbeam.solver.cpu.driver import usable_cores
+from snapbeam.util.cores import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, tell, to_json
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import (

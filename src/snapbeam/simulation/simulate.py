@@ -24,12 +24,12 @@ from snapbeam.simulation.states import states_of
 from snapbeam.simulation.summary import RunSummary
 from snapbeam.simulation.tolerance import ErrorEstimate, steps_for
 from snapbeam.solver.assemble import make_ensemble, plans_of, run_columns
-from snapbeam.solver.cpu.driver import usable_cores
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.registry import engine_of
 from snapbeam.solver.statistics import Recorded, lost_in_circuits, rounding_energy, statistics_of
 from snapbeam.solver.step_size import Plan
 from snapbeam.solver.terms import WORKS
+from snapbeam.util.cores import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, counting, sharing, tell
 from snapbeam.util.interrupts import raise_held
 from snapbeam.util.provenance import array_hash, made_by

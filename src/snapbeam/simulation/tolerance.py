@@ -173,7 +173,7 @@ def steps_for(system: System, integration: Integration) -> tuple[Plan, ErrorEsti
         for level in ACCURACIES
     }
     refinements = _FINE if limit < _CHEAP else (*_ROUGH, *_FINE[1:])
-    levels = [steps[level]._replace(step=length * steps[level].step) for level, length in refinements]
+    levels = [steps[level].scaled(length) for level, length in refinements]
     times = _instants(system, make_ensemble(system, whole, plan=steps["standard"]))
     coarse = _watch(system, make_ensemble(system, whole, plan=levels[0]), times)
     for plan in levels[1:]:

@@ -366,7 +366,7 @@ def make_ensemble(
     )  # fmt: skip
     plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
     if step_factor != 1.0:
-        plans = [each._replace(step=step_factor * each.step) for each in plans]
+        plans = [each.scaled(step_factor) for each in plans]
     _require_clock(system, state)
     driven = driven_of(system, columns, runs)
     table = np.zeros(runs, dtype=RUN)
@@ -496,7 +496,7 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     if further:
         plans = [_serving(each) for each in zip(plans, *further, strict=True)]
     if integration.step is None and plans[0].order == 6 and _depends_on_velocity(system):
-        plans = [each._replace(step=_GENERAL * each.step) for each in plans]
+        plans = [each.scaled(_GENERAL) for each in plans]
     if integration.step is None and any(_is_around(section) for section, _ in system.moving):
         fastest = fastest_of(system, columns, len(plans))
         plans = [
@@ -523,7 +523,9 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     more = max(0, math.ceil(0.5 * math.log2(1.0 + mass / min(masses)) - 1e-9))
     return [
         each._replace(
-            min_contact_halvings=each.min_contact_halvings + more, max_halvings=each.max_halvings + more
+            min_contact_halvings=each.min_contact_halvings + more,
+            max_halvings=each.max_halvings + more,
+            contact=each.contact * 0.5**more,
         )
         for each in plans
     ]
@@ -594,6 +596,7 @@ def _serving(plans: Sequence[Plan]) -> Plan:
         step=step,
         min_contact_halvings=max(0, min_contact_halvings),
         max_halvings=max(0, min_contact_halvings, max_halvings),
+        contact=min(each.contact for each in plans),
     )
 
 
@@ -608,10 +611,12 @@ def _plans_of(
     contact = contact or system.contact_law
     known = () if contact is None else quantities(type(contact))
     of_contact = {name: columns[at] for name in known if (at := f"{section}.{name}") in columns}
-    step, accuracy = integration.step, integration.accuracy
+    step, accuracy, native = integration.step, integration.accuracy, is_native(integration.engine)
     runs = next(iter(columns.values())).size if columns else 1
     if contact is None or not of_contact:
-        return [choose_base_step(_struck(system), contact, step=step, accuracy=accuracy)] * runs
+        return [
+            choose_base_step(_struck(system), contact, step=step, accuracy=accuracy, native=native)
+        ] * runs
     table = np.stack(list(of_contact.values()), axis=1)
     different, which = np.unique(table, axis=0, return_inverse=True)
     plans = [
@@ -620,6 +625,7 @@ def _plans_of(
             dataclasses.replace(contact, **dict(zip(of_contact, map(float, row), strict=True))),  # type: ignore[type-var]
             step=step,
             accuracy=accuracy,
+            native=native,
         )
         for row in different
     ]

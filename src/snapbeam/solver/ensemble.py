@@ -23,6 +23,7 @@ _REALS = (
     "decide_reach",  # highest future position of the tip, or 0 if that is higher
     "contact_time",  # s since the present contact began; negative: apart; NaN: the penetration decides
     "lowest",  # height of a flight that is too low to be resolved, m
+    "contact_step",  # longest step in contact, s
     "well_sign",  # +1 if q and p are counted from the first well, -1 from the other
 )
 _INTEGERS = (

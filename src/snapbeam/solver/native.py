@@ -33,7 +33,7 @@ _Array = NDArray[np.float64]
 Progress = Callable[[int, int], object]
 
 RUN = (
-    "tick", "step", "end", "output_interval", "last_quarter", "well_sign", "min_contact_halvings", "max_halvings", "decide_energy",
+    "tick", "step", "end", "output_interval", "last_quarter", "well_sign", "contact_step", "halvings", "decide_energy",
     "decide_reach", "decide_crossings", "max_steps", "stretch",
 )  # fmt: skip
 """Numbers of a run, in the order of ``core/api.hpp: RunNumber``."""
@@ -89,7 +89,7 @@ class _Arrays:
         self.order = np.argsort(label, kind="stable")
         sizes = np.bincount(label, minlength=count).astype(np.int32)
         n, modes = structure.omega.size, structure.equilibrium.size
-        finest = int(ensemble.max_halvings)
+        halvings = (ensemble.runs["max_halvings"] - ensemble.runs["min_contact_halvings"]).astype(float)
         lossy = bool(np.isin(channels.laws, (3, 4, 8, 9, 10)).any())
         fewest, per_decay = _PARTS[ensemble.order]
         wells = structure.unequal_wells
@@ -121,7 +121,7 @@ class _Arrays:
             "center": row(structure.center),
             "center_rest": float(structure.center_rest),
             "dividing_height": float(structure.dividing_height),
-            "levels": finest + 1,
+            "levels": int(halvings.max()) + 2,
             "fewest_parts": fewest,
             "parts_per_decay": per_decay,
         }
@@ -140,6 +140,10 @@ class _Arrays:
         run[:, RUN.index("output_interval")] = np.minimum(
             run[:, RUN.index("output_interval")], run[:, RUN.index("end")]
         )
+        least = 2.0**halvings
+        contact = np.minimum(table["contact_step"] / (table["tick"] / finer), run[:, RUN.index("step")])
+        run[:, RUN.index("contact_step")] = least * np.maximum(np.floor(contact / least), 1.0)
+        run[:, RUN.index("halvings")] = halvings
         run[:, RUN.index("max_steps")] = ensemble.max_steps
         run[:, RUN.index("stretch")] = structure.stretch
         signals = channels.signals.copy()
@@ -207,7 +211,7 @@ def _work_of(law: int) -> str:
 
 
 def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) -> None:
-    from snapbeam.solver.cpu.driver import usable_cores
+    from snapbeam.util.cores import usable_cores
 
     layout = os.environ.get("SNAPBEAM_LAYOUT") or layout_of(arrays.ensemble)
     if progress is not None:

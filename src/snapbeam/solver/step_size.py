@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
+from snapbeam import _core
 from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.drive.base import HORIZON
 from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.integration import ACCURACIES, Integration
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
-from snapbeam.solver.compilation import kernel
 from snapbeam.solver.splitting import COMPOSITIONS
 from snapbeam.solver.structure import Structure, structure_of
+from snapbeam.util.cores import usable_cores
 from snapbeam.util.validation import InputError, choice, positive
 
 _Array = NDArray[np.float64]
@@ -62,6 +65,7 @@ _MOST_DECAY = 1.8
 _CONTACT_SHARE = {"standard": 1.0 / 8.0, "reference": 1.0 / 32.0}
 _CONTACT_SPEED = 0.2
 _HALVINGS = {4: 4, 6: 10}
+_LONGER, _NATIVE_HALVINGS = 10.0, 3
 _MOST_HALVINGS = {"standard": 5, "reference": 7}
 _CONTACT_TURN = math.pi
 """Maximum phase of the fastest mode in the longest contact step, rad; beyond half a turn, kicks are in resonance."""
@@ -81,7 +85,9 @@ _HOUR = 3600.0
 # counted in the relative change of velocity at the start that would have done as much.
 
 
-def flight_step(model: ReducedModel, order: int, limit: float, impact: float = math.inf) -> float:
+def flight_step(
+    model: ReducedModel, order: int, limit: float, impact: float = math.inf, resonances: bool = False
+) -> float:
     """The longest step in free flight, s, that serves a structure.
 
     Parameters
@@ -95,6 +101,8 @@ def flight_step(model: ReducedModel, order: int, limit: float, impact: float = m
     impact : float
         Duration of an impact, s: the impulses that are tried last no longer, and of impacts shorter than 1/150 of the
         period the limit is less in proportion.
+    resonances : bool
+        Shorten the step until no motion grows at any tension that is held fixed.
     """
     period = 1.0 / model.reference_frequency
     limit *= min(1.0, impact / (_SHORT_IMPACT * period))
@@ -103,15 +111,66 @@ def flight_step(model: ReducedModel, order: int, limit: float, impact: float = m
     structure = structure_of(model, "below")
     places = model.beam if model.contact_shape is None else model.contact_shape.tobytes()
     longest = min(impact / period, max(duration for _, duration, *_ in _STARTS))
-    key = (structure.hash, order, limit, period, model.length_scale, places, longest)
+    key = (structure.hash, order, limit, period, model.length_scale, places, longest, resonances)
     if key not in _CHOSEN:
         chosen = period / _Bench(structure, order, longest).fewest(limit)
         if not structure.wells_are_mirror_images:
             chosen = min(chosen, period / _Bench(structure, order, longest, far=True).fewest(limit))
+        while resonances and chosen > period / _MOST and growth(structure, order, chosen) > _MOST_GROWTH:
+            chosen *= 0.97
         _CHOSEN[key] = chosen
         while len(_CHOSEN) > _MOST_CHOSEN:
             _CHOSEN.popitem(last=False)
     return _CHOSEN[key]
+
+
+_TENSIONS = np.concatenate((np.geomspace(0.02, 0.5, 8), np.linspace(0.75, 8.0, 16)))
+"""Changes of the tension, over what the well has beyond the critical load; 8 is that of three times the amplitude of the well."""
+_MOST_GROWTH = 0.05
+"""Growth of a motion at fixed tension, by its logarithm in a period of the first mode, that counts as none."""
+_SQUARINGS = 14
+
+
+def growth(structure: Structure, order: int, step: float) -> float:
+    """Largest growth of a motion with steps of a length (s) at fixed tension, by its logarithm in a period of the first mode.
+
+    With the tension changed by tau and held, p' = -omega^2 q - 2 sigma p - tau G q is stable; steps in which kicks
+    and flows come in resonance let modes grow.  The spectral radius of a step is that of a high power of it.
+    """
+    kept = slice(0, _MOST_MODES)
+    omega, coupling = structure.omega[kept], structure.coupling[kept, kept]
+    damping, n = (structure.damping_ratio * structure.omega)[kept], omega.size
+    stretch = structure.nonlinear_stiffness * structure.stretch
+    if stretch <= 0.0 or (omega <= 0.0).any():
+        return 0.0
+    composition = COMPOSITIONS[order]
+    root = np.sqrt((omega**2 - damping**2).astype(np.complex128))
+    # in the coordinates omega q and p, in which the flow of a mode is a turn
+    state = np.tile(np.eye(2 * n), (_TENSIONS.size, 1, 1))
+    q, p = state[:, :n], state[:, n:]
+    pull = -stretch * (coupling / omega) * _TENSIONS[:, None, None]
+    for i, kick in enumerate(composition.kick):
+        p = p + kick * step * (pull @ q)
+        if i < composition.flow.size:
+            time = composition.flow[i] * step
+            sine, cosine, decay = (
+                (np.sin(root * time) / root).real,
+                np.cos(root * time).real,
+                np.exp(-damping * time),
+            )
+            a = [
+                decay * (cosine + damping * sine),
+                decay * sine * omega,
+                -decay * sine * omega,
+                decay * (cosine - damping * sine),
+            ]
+            q, p = (a[0][:, None] * q + a[1][:, None] * p, a[2][:, None] * q + a[3][:, None] * p)
+    power, logarithm = np.concatenate((q, p), axis=1), np.zeros(_TENSIONS.size)
+    for _ in range(_SQUARINGS):
+        power = power @ power
+        size = np.abs(power).max(axis=(1, 2))
+        power, logarithm = power / size[:, None, None], 2.0 * logarithm + np.log(size)
+    return float(logarithm.max()) / 2.0**_SQUARINGS * 2.0 * math.pi / (omega[0] * step)
 
 
 class _Bench:
@@ -131,7 +190,7 @@ class _Bench:
             structure.omega[lowest],
             (structure.damping_ratio * structure.omega)[lowest],
         )
-        self.columns = np.array(structure.coupling[lowest, lowest].T, order="C")
+        self.coupling = structure.coupling[lowest, lowest]
         self.well = structure.well[lowest]
         self.rest = self.force = np.zeros(self.omega.size)
         if far:
@@ -157,43 +216,39 @@ class _Bench:
             lasting = min(duration, impact) * self.period
             velocity = impulse_shape / (1.0 + (self.omega * lasting / math.pi) ** 2)
             self.starts.append(velocity * math.sqrt(2.0 * energy * barrier / (velocity @ velocity)))
+        # modes that the tension couples follow each other
+        count, block = connected_components(self.coupling != 0.0, directed=False)
+        order = np.argsort(block, kind="stable")
+        self.blocks = np.bincount(block, minlength=count).astype(np.int32)
+        self.coupling = np.ascontiguousarray(self.coupling[np.ix_(order, order)])
+        self.omega, self.damping, self.well = self.omega[order], self.damping[order], self.well[order]
+        self.rest, self.force, self.rows = self.rest[order], self.force[order], self.rows[:, order]
+        self.starts = [start[order] for start in self.starts]
 
     def ends(self, velocity: _Array, counts: _Array, order: int) -> _Array:
         """Displacements at the end, with each number of steps, over the length that normalises.
 
         Shape (counts, places).
         """
-        composition, damping = COMPOSITIONS[order], self.damping
         steps = _PERIODS * self.period / counts
-        time = np.multiply.outer(steps, composition.flow)[:, :, None]
-        # the flow of q' = p, p' = -omega^2 q - 2 zeta omega p, whichever way the mode is damped
-        root = np.sqrt((self.omega**2 - damping**2).astype(np.complex128))
-        sine = np.where(root == 0.0, time, np.sin(root * time) / np.where(root == 0.0, 1.0, root)).real
-        cosine, decay = np.cos(root * time).real, np.exp(-damping * time)
-        flows = np.stack(
-            [
-                decay * (cosine + damping * sine),
-                decay * sine,
-                -decay * self.omega**2 * sine,
-                decay * (cosine - damping * sine),
-            ],
-            axis=2,
-        )
-        kicks = np.multiply.outer(steps, composition.kick)
-        out, work = np.empty((counts.size, self.omega.size)), np.empty((3, self.omega.size))
-        whole, gamma = counts.astype(np.int64), self.structure.nonlinear_stiffness
-        kernel(_march, ())(
-            whole,
-            flows,
-            kicks,
-            self.columns,
-            self.well,
-            gamma,
-            np.stack((self.rest, velocity, self.force)),
-            work,
-            out,
-        )
-        return out @ self.rows.T
+        batch = _free_runs(self.rest, velocity, steps, counts)
+        problem = self._problem | {"composition": 0 if order == 4 else 1}
+        _core.integrate(problem, batch, "runs", "", usable_cores(), None)
+        found: _Array = batch["states"][:, 0, : self.omega.size]
+        return found @ self.rows.T
+
+    @cached_property
+    def _problem(self) -> dict[str, Any]:
+        """The structure in free flight, as the core gets it."""
+        n = self.omega.size
+        zero, nothing = np.zeros(n), np.zeros((0, 0))
+        return {
+            "omega": self.omega.copy(), "sigma": self.damping.copy(), "G": self.coupling, "g": -self.well,
+            "gamma": float(self.structure.nonlinear_stiffness), "shift": None, "far_force": self.force.copy(), "second": None, "high": None,
+            "beam": np.ones(n), "lift": 0.0, "block_sizes": self.blocks, "laws": np.zeros(0, np.int32),
+            "signals": 0, "uses": nothing, "law_numbers": 0, "center": zero, "center_rest": 0.0, "dividing_height": 0.0, "levels": 2,
+            "fewest_parts": 1, "parts_per_decay": 1.0,
+        }  # fmt: skip
 
     def fewest(self, limit: float) -> float:
         """Fewest flight steps per period that serve, and still do with a few more of them."""
@@ -222,41 +277,21 @@ class _Bench:
         return worst
 
 
-def _march(counts, flows, kicks, columns, well, gamma, start, work, out):
-    # r = G q column by column: every sum keeps its order, and nothing waits for the sum before
-    modes = well.size
-    last = kicks.shape[1] - 1
-    q, p, r = work[0], work[1], work[2]
-    for run in range(counts.size):
-        for i in range(modes):
-            q[i], p[i] = start[0, i], start[1, i]
-        for step in range(counts[run]):
-            for stage in range(last + 1):
-                weight = kicks[run, stage]
-                if stage == last and step < counts[run] - 1:
-                    weight += kicks[run, 0]
-                if stage > 0 or step == 0:
-                    along_well, along = 0.0, 0.0
-                    for i in range(modes):
-                        r[i] = 0.0
-                    for j in range(modes):
-                        along_mode = q[j]
-                        for i in range(modes):
-                            r[i] += columns[j, i] * along_mode
-                    for i in range(modes):
-                        along += r[i] * q[i]
-                        along_well += well[i] * q[i]
-                    toward, back = -gamma * along * weight, -gamma * (2.0 * along_well + along) * weight
-                    for i in range(modes):
-                        p[i] += toward * well[i] + back * r[i]
-                        p[i] += weight * start[2, i]
-                if stage < last:
-                    for i in range(modes):
-                        turned = flows[run, stage, 0, i] * q[i] + flows[run, stage, 1, i] * p[i]
-                        p[i] = flows[run, stage, 2, i] * q[i] + flows[run, stage, 3, i] * p[i]
-                        q[i] = turned
-        for i in range(modes):
-            out[run, i] = q[i]
+def _free_runs(rest: _Array, velocity: _Array, steps: _Array, counts: _Array) -> dict[str, Any]:
+    """Runs of so many steps of so many seconds from one state, as the core gets them: about the well of sign -1."""
+    runs, n = counts.size, rest.size
+    run = np.zeros((runs, 13))
+    run[:, 0], run[:, 1], run[:, 5], run[:, 11] = steps, 1.0, -1.0, 1e15
+    run[:, 2] = run[:, 3] = np.floor(counts)
+    run[:, 6] = 1.0
+    run[:, 8], run[:, 10] = -math.inf, -1.0
+    return {
+        "run": run, "signals": np.zeros((runs, 0, 5)), "numbers": np.zeros((runs, 0, 0)), "offset": np.zeros((runs, 0)),
+        "since": np.zeros((runs, 0)), "rows": np.zeros((1, n)), "row_of": np.zeros((runs, 1), np.int32), "rest": np.zeros((runs, 1)),
+        "q": np.tile(rest, (runs, 1)), "p": np.tile(velocity, (runs, 1)), "order": np.argsort(-counts, kind="stable").astype(np.int32),
+        "outputs": 1, "states": np.full((runs, 1, 2 * n + 1), np.nan), "statistics": np.zeros((runs, 27)), "of_channels": np.zeros((runs, 0, 10)),
+        "account": 0,
+    }  # fmt: skip
 
 
 class Plan(NamedTuple):
@@ -269,6 +304,12 @@ class Plan(NamedTuple):
     """Halvings of the flight step that make the longest contact step."""
     max_halvings: int
     """Halvings of the flight step that make the shortest contact step."""
+    contact: float = math.inf
+    """Longest contact step of the native core, s."""
+
+    def scaled(self, factor: float) -> Plan:
+        """Steps that are all so many times as long."""
+        return self._replace(step=factor * self.step, contact=factor * self.contact)
 
 
 def choose_base_step(
@@ -277,6 +318,7 @@ def choose_base_step(
     *,
     step: float | None = None,
     accuracy: str = "standard",
+    native: bool = False,
 ) -> Plan:
     """The steps of a run: short enough in flight, as measured on the model itself, and for an impact.
 
@@ -290,6 +332,8 @@ def choose_base_step(
     accuracy : {"standard", "reference"}
         ``"standard"``: order 4, and errors of about a thousandth of the buckling level where a run is well conditioned.
         ``"reference"``: order 6, and errors a hundred thousand times smaller.
+    native : bool
+        Steps of the native core: at the standard level ten times the error in flight, where no tension makes them resonate.
     """
     choice("accuracy", accuracy, ACCURACIES)
     order = _ORDER[accuracy]
@@ -300,7 +344,9 @@ def choose_base_step(
         mass = model.lightest_contact_mass
         speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * model.reference_frequency
         duration = contact.time_scale(mass, speed)
-    flight = flight_step(model, order, limits[accuracy], duration if duration > 0.0 else math.inf)
+    longer = native and order == 4 and not (contact is not None and contact.impulsive)
+    limit = limits[accuracy] * (_LONGER if longer else 1.0)
+    flight = flight_step(model, order, limit, duration if duration > 0.0 else math.inf, resonances=longer)
     if accuracy == "reference" and fastest * flight > _FREE_TURN:
         flight = _FREE_TURN / fastest
     decay = float((model.damping_ratio * model.omega).max())
@@ -314,8 +360,11 @@ def choose_base_step(
             impact = min(impact, _CONTACT_TURN / fastest)
     min_contact_halvings = max(0, math.ceil(math.log2(flight / impact)))
     if step is not None:
-        flight = positive("step", step, "s")
-    return Plan(order, flight, min_contact_halvings, min_contact_halvings + _HALVINGS[order])
+        impact *= positive("step", step, "s") / flight
+        flight = step
+    # steps of the native core in contact are chosen apart from those in flight
+    halvings = _NATIVE_HALVINGS if longer else _HALVINGS[order]
+    return Plan(order, flight, min_contact_halvings, min_contact_halvings + halvings, impact)
 
 
 # The clock of a run: time in ticks, so that halved steps and located events are whole numbers.
@@ -356,6 +405,12 @@ def clocked(
     alone = len(system.moving) < 2
     repeats = drive is None or (drive.is_periodic and alone)
     table["step"] = SUBDIVISION
+    table["contact_step"] = [
+        min(
+            plan.contact, plan.step * 0.5**plan.min_contact_halvings if plan.contact == math.inf else math.inf
+        )
+        for plan in plans
+    ]
     table["min_contact_halvings"] = [plan.min_contact_halvings for plan in plans]
     table["max_halvings"] = [plan.max_halvings for plan in plans]
     if isinstance(drive, RecordedMotion):

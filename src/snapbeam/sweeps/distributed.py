@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from snapbeam._version import __version__
-from snapbeam.solver.cpu.driver import usable_cores
 from snapbeam.sweeps.checkpoint.records import CheckpointError
 from snapbeam.sweeps.points import Columns
 from snapbeam.sweeps.tasks import PointWork, Provenance, ResultTable, Stage, provenance_of
+from snapbeam.util.cores import usable_cores
 from snapbeam.util.input_files import read_toml
 from snapbeam.util.packages import needs
 from snapbeam.util.provenance import code_hash

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from threading import Lock
@@ -26,6 +25,7 @@ from snapbeam.solver.registered_statistics import extras_of_table
 from snapbeam.solver.simd import WIDTH
 from snapbeam.solver.statistics import Last, OutputStates, Recorded, empty_accumulators
 from snapbeam.solver.step_control import SUBINTERVALS
+from snapbeam.util.cores import usable_cores
 from snapbeam.util.status_codes import RunStatus
 
 _Array = NDArray[np.float64]
@@ -49,14 +49,6 @@ _SLICE_STEPS = 200_000
 """Steps of a recorded run between two checks for a stop or full buffers: about 0.1 s."""
 _SLICE_BYTES = 32 * 2**20
 """Size of a slice's buffers, at most."""
-
-
-def usable_cores() -> int:
-    """Cores that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:
-        return os.cpu_count() or 1
 
 
 def _packed(ensemble: Ensemble) -> Packed:
