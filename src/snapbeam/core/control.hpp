@@ -67,6 +67,18 @@ template <class L> struct Group {
         }
     }
 
+    // Does the first contact act where the displacement is observed, in every run?
+    bool shares_row() const {
+        if (!z.channels || !z.channel[0].contact) return false;
+        for (int i = 0; i < batch->runs; ++i) {
+            const int *row_of = batch->row_of + long(i) * (z.channels + 1);
+            const double *one = batch->rows + long(row_of[0]) * problem->modes, *other = batch->rows + long(row_of[z.channels]) * problem->modes;
+            for (int m = 0; one != other && m < problem->modes; ++m)
+                if (one[m] != other[m]) return false;
+        }
+        return true;
+    }
+
     void begin() {
         const int n = s->cells;
         Cell *rows[] = {z.q, z.p, z.k, z.q1, z.p1, z.k1, z.r};
@@ -102,7 +114,7 @@ template <class L> struct Group {
             Event<L> &e = events[j];
             e.flip = e.force = FromBits<Marks>::of(0), e.at_force = e.low = e.low_f = e.high = e.high_f = Real(0.0);
         }
-        totals.clear();
+        totals.clear(shares_row());
         unsigned fresh = 0;
         for (int l = 0; l < L::runs; ++l) fresh |= unsigned(load(l)) << l;
         start(fresh);
@@ -177,7 +189,8 @@ template <class L> struct Group {
             for (Number *x : zeros) set_lane(*x, l, 0.0);
             set_lane(c.safe, l, 0.0), set_lane(c.onset, l, 0.0), set_lane(c.closed, l, false), set_lane(c.pressing, l, false);
         }
-        totals.load(*batch, i, l, batch->rows + long(row_of[z.channels]) * modes, rest[z.channels]);
+        const double *observed = batch->rows + long(row_of[z.channels]) * modes;
+        totals.load(*batch, i, l, observed, rest[z.channels]);
         // flows of the steps of every length
         const int n = s->cells, distinct = s->composition.distinct;
         for (int level = 0; level < problem->levels; ++level) {
@@ -304,6 +317,24 @@ template <class L> struct Group {
         for (int i = 0; i < z.signals; ++i) z.signal[i].set_length(s->composition, z.h);
     }
     SNAPBEAM_FN void form_flows(Plain *to, Marks which) {
+        if constexpr (L::runs > 1 && L::fixed != 1) {  // few runs at a time: their modes side by side
+            const unsigned some = bits(which);
+            const int n = s->size(), distinct = s->composition.distinct;
+            for (int l = 0; l < L::runs; ++l) {
+                if (!(some >> l & 1u)) continue;
+                for (int m = 0; m < n; m += L::runs) {
+                    const int count = n - m < L::runs ? n - m : L::runs;
+                    Pack<L::runs> omega(1.0), sigma(0.0), a[4];
+                    for (int k = 0; k < count; ++k) set_lane(omega, k, s->omega[m + k]), set_lane(sigma, k, s->sigma[m + k]);
+                    for (int f = 0; f < distinct; ++f) {
+                        set_flow(Pack<L::runs>(lane(value(z.h), l) * s->composition.flow[f]), sigma, omega, a);
+                        for (int k = 0; k < count; ++k)
+                            for (int x = 0; x < 4; ++x) set_lane(to[(long(f) * n + m + k) * 4 + x], l, lane(a[x], k));
+                    }
+                }
+            }
+            return;
+        }
         for (int f = 0; f < s->composition.distinct; ++f)
             for (int i = 0; i < s->size(); ++i, to += 4) {
                 Plain a[4];
@@ -320,6 +351,7 @@ template <class L> struct Group {
         inside.begin(z, scratch);
         Real found = Real(2.0), d0 = min(value(c.d0), Real(0.0)), r0 = value(c.r0);
         const int n = s->size();
+        keep_signals();
         begin_signals();
         advance_signals(inside.part);
         for (;;) {
@@ -340,19 +372,20 @@ template <class L> struct Group {
         restore_signals();
         return found;
     }
-    // Signals at the end of the step are those of its end again after the motion inside it was followed.
+    // While the inside of a step is followed, the signals at its end are kept.
+    SNAPBEAM_FN void keep_signals() {
+        for (int i = 0; i < z.signals; ++i) z.signal[i].kept_sine = z.signal[i].sine, z.signal[i].kept_cosine = z.signal[i].cosine;
+    }
+    SNAPBEAM_FN void restore_signals() {
+        for (int i = 0; i < z.signals; ++i) {
+            z.signal[i].sine = z.signal[i].kept_sine, z.signal[i].cosine = z.signal[i].kept_cosine;
+            z.signal[i].set_length(s->composition, z.h);
+        }
+    }
     SNAPBEAM_FN void advance_signals(Real part) {
         for (int i = 0; i < z.signals; ++i) {
             const Turn<Number> ahead = turn(Number(z.signal[i].rate * Number(part)));
             z.signal[i].ahead_sine[0] = ahead.sine, z.signal[i].ahead_cosine[0] = ahead.cosine;
-        }
-    }
-    SNAPBEAM_FN void restore_signals() {
-        for (int i = 0; i < z.signals; ++i) {
-            const Turn<Number> ahead = turn(Number(z.signal[i].rate * z.h));
-            Signal<L> &one = z.signal[i];
-            one.sine = fma(one.sine0, ahead.cosine, one.cosine0 * ahead.sine), one.cosine = fma(one.cosine0, ahead.cosine, -(one.sine0 * ahead.sine));
-            one.set_length(s->composition, z.h);
         }
     }
 

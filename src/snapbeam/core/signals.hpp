@@ -16,6 +16,7 @@ template <class L> struct Signal {
     Real period;                                          // ticks, 0: none
     Number sine0, cosine0;                                // at the beginning of the step
     Number sine, cosine;                                  // at the kick
+    Number kept_sine, kept_cosine;                        // at the end of the step, while its inside is followed
     Number ahead_sine[MOST_DISTINCT], ahead_cosine[MOST_DISTINCT];  // over each flow of the step
 
     SNAPBEAM_FN Number value_at() const { return fma(amplitude, sine, mean); }
