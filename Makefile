@@ -44,15 +44,18 @@ help:
 $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
+# What the native core is built from: an editable installation is made again when one of them changes.
+CORE := CMakeLists.txt $(wildcard build_backend/*.py src/snapbeam/core/*)
+
 # One stamp per set of packages: a second make installs nothing again.
-$(VENV)/.installed-run: pyproject.toml constraints.txt | $(BIN)/python
+$(VENV)/.installed-run: pyproject.toml constraints.txt $(CORE) | $(BIN)/python
 	$(PIP) install --constraint constraints.txt pip
 	$(PIP) install --constraint constraints.txt --editable .
 	@touch $@
 
 # Every package is compared with its hash.  The list is complete: with dependencies, pip 23 ignores the pin of a package
 # that another one asks for with an extra.
-$(VENV)/.installed-dev: pyproject.toml requirements-dev.txt | $(BIN)/python
+$(VENV)/.installed-dev: pyproject.toml requirements-dev.txt $(CORE) | $(BIN)/python
 	$(PIP) install --require-hashes --no-deps --requirement requirements-dev.txt
 	$(PIP) install --no-deps --no-build-isolation --editable .
 	@touch $@

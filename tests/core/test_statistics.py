@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from conftest import beam, crowded, stop, struck
@@ -75,7 +77,7 @@ def test_order_of_convergence(accuracy, order, lossy):
         )
     errors = [np.abs(each - ends[-1]).max() for each in ends[:3]]
     floor = 1e-13 * np.abs(ends[-1]).max()
-    for coarse, fine in zip(errors, errors[1:], strict=False):
+    for coarse, fine in itertools.pairwise(errors):
         if fine > 30.0 * floor:
             assert np.log2(coarse / fine) > order - 0.7
     assert errors[0] > errors[-1]

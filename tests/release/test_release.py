@@ -50,7 +50,7 @@ def test_metadata_agree():
 @pytest.fixture
 def copied(tmp_path):
     """The files that a release changes, in a folder of their own."""
-    for name in (*VERSIONS, "pyproject.toml", "README.md", "hatch_build.py", "LICENSE"):
+    for name in (*VERSIONS, "pyproject.toml", "README.md", "build_backend/snapbeam_build.py", "LICENSE"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(ROOT / name, tmp_path / name)
     text = "# Changelog\n\n## Unreleased\n\n### Added\n\n- A file.\n\n## 0.1.0\n"
@@ -82,12 +82,22 @@ def test_a_release_is_prepared(copied):
 
 def test_description_has_links_that_work_elsewhere(copied):
     """In the archives of a release, links of the README are absolute."""
-    pytest.importorskip("hatchling", reason="make dist builds with it")
-    from hatchling.metadata.core import ProjectMetadata
-    from hatchling.plugin.manager import PluginManager
-
+    pytest.importorskip("scikit_build_core", reason="make dist builds with it")
     prepare("0.2.0", "https://example.org/snapbeam", root=copied)
-    text = ProjectMetadata(str(copied), PluginManager()).core.readme
+    made = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "import os, sys; sys.path.insert(0, 'build_backend'); import snapbeam_build; os.makedirs('out'); "
+            "print(snapbeam_build.prepare_metadata_for_build_wheel('out'))",
+        ],
+        cwd=copied,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    name = made.stdout.split()[-1]
+    text = (copied / "out" / name / "METADATA").read_text(encoding="utf-8").partition("\n\n")[2]
     targets = re.findall(r"\]\(([^)]+)\)", text)
     assert len(targets) > 20 and all(target.startswith("https://") for target in targets)
     assert (
@@ -123,24 +133,26 @@ def test_no_machine_is_named():
                 assert not re.search(r"(?<![\w/.])/(work|root|home|opt)/|/simple/", text), path
 
 
+def built(kind: str, folder: Path) -> None:
+    """Build an archive by the backend, with the packages at hand."""
+    words = f"import sys; sys.path.insert(0, 'build_backend'); import snapbeam_build; snapbeam_build.build_{kind}({str(folder)!r})"
+    subprocess.run([sys.executable, "-c", words], cwd=ROOT, check=True, capture_output=True)
+
+
 @pytest.fixture(scope="module")
 def archives(tmp_path_factory):
-    if importlib.util.find_spec("hatchling") is None:
-        pytest.skip("hatchling is not installed: make dist builds with it")
+    if importlib.util.find_spec("scikit_build_core") is None:
+        pytest.skip("scikit-build-core is not installed: make dist builds with it")
     folder = tmp_path_factory.mktemp("dist")
     for kind in ("wheel", "sdist"):
-        subprocess.run(
-            [sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", str(folder)], cwd=ROOT, check=True,
-            capture_output=True,
-        )  # fmt: skip
+        built(kind, folder)
     return next(folder.glob("*.tar.gz")), next(folder.glob("*.whl"))
 
 
 @pytest.mark.slow
 def test_wheel_is_reproducible(archives, tmp_path):
     """A second build has the same bytes."""
-    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
-    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    built("wheel", tmp_path)
     first, second = (path.read_bytes() for path in (archives[1], next(tmp_path.glob("*.whl"))))
     assert hashlib.sha256(first).hexdigest() == hashlib.sha256(second).hexdigest()
 
@@ -151,11 +163,16 @@ def test_archives_hold_what_they_must(archives):
     names = zipfile.ZipFile(wheel).namelist()
     for needed in ("snapbeam/py.typed", "snapbeam/paper/claims/topics/beam.toml"):
         assert needed in names
+    assert len([name for name in names if name.startswith("snapbeam/_core.")]) == 1
+    assert not [name for name in names if name.endswith((".hpp", ".cpp"))] and wheel.stat().st_size < 8e6
     assert all(name.startswith(("snapbeam/", "snapbeam-")) for name in names)
     with tarfile.open(source) as archive:
         held = {name.partition("/")[2] for name in archive.getnames()}
     for needed in (
         "pyproject.toml",
+        "CMakeLists.txt",
+        "build_backend/snapbeam_build.py",
+        "src/snapbeam/core/step.hpp",
         "README.md",
         "LICENSE",
         "CITATION.cff",

@@ -27,7 +27,8 @@ def test_other_bounds_are_refused(tmp_path, text):
 
 
 def test_the_source_distribution_holds_what_builds_and_tests_it():
-    held = tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))["tool"]["hatch"]["build"]["targets"]["sdist"][
-        "include"
-    ]
-    assert {"/Makefile", "/src", "/tests", "/constraints.txt", "/requirements-dev.txt"} <= set(held)
+    build = tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))["tool"]["scikit-build"]["sdist"]
+    assert {"src", "tests", "build_backend"} <= set(build["include"])
+    assert not {"Makefile", "constraints.txt", "requirements-dev.txt", "CMakeLists.txt"} & set(
+        build["exclude"]
+    )
