@@ -498,7 +498,8 @@ class Config:
         if not self.section("beam"):
             return ()
         found, swept = self._defaults(), self.axes() if self.section("sweep") else {}
-        sections = ("beam", "model", "contact") if self.extends_paper else ("drive",)
+        driven = not (self._is_unstruck or self._stands_still)
+        sections = ("beam", "model", "contact") if self.extends_paper else ("drive",) if driven else ()
         return tuple(
             f"{section}.{name}"
             for section in sections
