@@ -23,9 +23,9 @@ STRUCTURE = {"beam": BEAM, "model": {"modes": 2, "damping_ratio": 0.01}}
 PARTS = {
     "contact": {"type": "hertz", "stiffness": 1e8, "location": 0.45, "gap": 1e-5},
     "drive": {"type": "sine", "frequency_ratio": 0.83, "velocity_amplitude": 0.11},
-    "base_excitation": {"type": "acceleration_sine", "frequency_hz": 310.0, "acceleration_amplitude": "30 g"},
-    "axial_load": {"type": "sine", "frequency_ratio": 1.4, "load_amplitude": 0.7},
-    "force": {"type": "local_spring", "stiffness": 40.0, "location": 0.35},
+    "base_excitation": {"type": "acceleration_sine", "frequency_hz": 310.0, "amplitude_g": 30.0},
+    "axial_load": {"type": "sine", "frequency_ratio": 1.4, "amplitude": 0.7},
+    "force": {"type": "harmonic_force", "frequency_ratio": 0.6, "amplitude": 0.02, "location": 0.35},
     "harvester": {"type": "piezo", "moment_per_volt": 1e-6, "capacitance": 2e-8, "resistance": 1e5},
     "initial_state": {"velocity[1]": 0.05},
     "sweep": {"beam.thickness": "3e-4:3.4e-4:2"},
@@ -33,8 +33,8 @@ PARTS = {
     "imperfection": {"point_load": 0.01},
     "integration": {"cycles": 2, "early_termination": False},
 }  # fmt: skip
-MOVING = ("contact", "drive", "base_excitation", "axial_load", "force", "harvester", "initial_state", "sweep")
-STATIC = ("boundary", "imperfection", "integration")
+MOVING = ("contact", "drive", "base_excitation", "axial_load", "force", "harvester", "initial_state")
+STATIC = ("sweep", "boundary", "imperfection", "integration")
 
 
 def subsets(names):
@@ -43,7 +43,11 @@ def subsets(names):
 
 def sections_of(chosen, start):
     """Sections of a file; *start*: a beam of its own, the paper's beam, or the paper's with another beam."""
-    first = {"own": STRUCTURE, "paper": {"extends": "paper", "model": {"modes": 2}}, "changed": {"extends": "paper"} | STRUCTURE}[start]
+    first = {
+        "own": STRUCTURE,
+        "paper": {"extends": "paper", "model": {"modes": 2}},
+        "changed": {"extends": "paper"} | STRUCTURE,
+    }[start]
     return first | {name: PARTS[name] for name in chosen}  # fmt: skip
 
 
@@ -53,30 +57,41 @@ def names_a_section(message, sections):
     return any(re.search(rf"(?<![\w]){re.escape(name)}(?![\w])", message) for name in known)
 
 
+@pytest.mark.parametrize("name", PARTS)
+def test_every_section_is_valid_where_it_belongs(name):
+    beside = {"drive": "contact", "contact": "drive"}.get(name, "base_excitation")
+    config = config_from_mapping(sections_of((name, beside), "own"))
+    assert name in config.given
+    assert config.system.moving
+
+
 @pytest.mark.parametrize("start", ["own", "paper", "changed"])
-@pytest.mark.parametrize("several", [False, True], ids=["one contact", "two contacts"])
-def test_every_combination_makes_a_system_or_names_the_section(tmp_path, capsys, start, several):
-    for chosen in subsets(MOVING):
-        sections = sections_of((*chosen, *STATIC[len(chosen) % 4 :]), start)
-        if several and "contact" in sections:
+def test_every_combination_makes_a_system_or_names_the_section(tmp_path, capsys, start):
+    for number, chosen in enumerate(
+        subsets(MOVING)[0 if start == "own" else 1 :: 1 if start == "own" else 3]
+    ):
+        sections = sections_of((*chosen, *STATIC[number % 5 :]), start)
+        if number % 2 and "contact" in sections:
             sections["contact"] = [sections["contact"], {"side": "above", "gap": 2e-5}]
         # every command reads its parameters by this function; its options differ in whether a drive and axes are known
         file = tmp_path / "system.toml"
         file.write_text(tomli_w.dumps(sections))
-        for given in ({}, {"drive.frequency_ratio": None}, {"drive.frequency_ratio": None, "sweep": None}):
-            try:
-                config = parameter_options.configured({"config": file} | given)
-                system = config.system
-            except InputError as error:
-                assert names_a_section(str(error), sections), (chosen, str(error))
-                continue
-            noted = capsys.readouterr().err
-            for name in re.findall(r"(drive\.\w+) = ", noted):
-                assert name in system.parameters, (chosen, noted)
-            assert bool(system.contacts) == ("contact" in chosen or "drive" in chosen or config.extends_paper
-                                             and not {"base_excitation", "axial_load"} & {*chosen}), chosen  # fmt: skip
-            whole = config_from_mapping(config.whole().to_mapping())
-            assert "sweep" in chosen or whole.system == system, chosen
+        given = ({"drive.frequency_ratio": None}, {}, {"drive.frequency_ratio": None, "sweep": None})[
+            number % 3
+        ]
+        try:
+            config = parameter_options.configured({"config": file} | given)
+            system = config.system
+        except InputError as error:
+            assert names_a_section(str(error), sections), (chosen, str(error))
+            continue
+        noted = capsys.readouterr().err
+        for name in re.findall(r"(drive\.\w+) = ", noted):
+            assert name in system.parameters, (chosen, noted)
+        assert bool(system.contacts) == ("contact" in chosen or "drive" in chosen or config.extends_paper
+                                         and not {"base_excitation", "axial_load", "force"} & {*chosen}), chosen  # fmt: skip
+        whole = config_from_mapping(config.whole().to_mapping())
+        assert "sweep" in sections or whole.system == system, chosen
 
 
 class ReachedError(Exception):
@@ -107,10 +122,12 @@ COMMANDS = {
     "design": ("design",),
 }
 SAMPLED = [chosen for chosen in subsets(MOVING[:5]) if len(chosen) in (0, 1, 2, 5)]
+REAL = [("contact",), ("base_excitation",), ("contact", "base_excitation"), ("axial_load", "initial_state"),
+        ("contact", "drive", "base_excitation", "axial_load", "force", "harvester")]  # fmt: skip
 UNCERTAIN = {
-    "uncertainty": {"beam.thickness": "3.2e-4 +- 1e-6"},
-    "probability": {"samples": 8},
-    "design": {"objectives": "peak_midspan_displacement", "variables": {"beam.thickness": [3e-4, 3.4e-4]}},
+    "uncertainty": {"beam.thickness": {"normal": 1e-6}},
+    "probability": {"runs": 8},
+    "design": {"objectives": "peak_force", "variables": {"contact.location": [0.3, 0.5]}},
 }
 
 
@@ -121,18 +138,25 @@ def cli(tmp_path, monkeypatch):
     def run(sections, args):
         (tmp_path / "system.toml").write_text(tomli_w.dumps(sections))
         file = ("system.toml",) if args[0] in ("probability", "design") else ("--config", "system.toml")
-        args = (*args[:2], *file, *args[2:]) if args[0] == "dynamics" else (args[0], *file, *args[1:])
+        head = 2 if args[0] == "dynamics" else 1
+        args = (*args[:head], *file, *args[head:], "--force")
         monkeypatch.setattr(sys, "argv", ["snapbeam", *args])
         return CliRunner().invoke(app, args)
 
     return run
 
 
-def works_or_names_the_section(result, sections):
+def works(result, sections):
+    """Return whether a command did what it is for; if it refused, its message must name a section."""
     if result.exception is not None and not isinstance(result.exception, (ReachedError, SystemExit)):
         raise result.exception
     if result.exit_code == 2:
         assert names_a_section(result.stderr, sections), result.stderr
+    return isinstance(result.exception, ReachedError) or result.exit_code == 0
+
+
+def file_of(chosen, command):
+    return sections_of(chosen, "own") | (UNCERTAIN if command in ("probability", "design") else {})
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -142,8 +166,36 @@ def test_commands_before_the_first_kernel(cli, monkeypatch, command):
 
     for place in ("step_size.kernel", "cpu.driver.kernel"):
         monkeypatch.setattr(f"snapbeam.solver.{place}", reached)
-    for chosen in SAMPLED:
-        sections = sections_of(chosen, "own")
-        if command in ("probability", "design"):
-            sections = sections | UNCERTAIN
-        works_or_names_the_section(cli(sections, COMMANDS[command]), sections)
+    chosen = SAMPLED[:9] if command in ("schematic", "force-displacement") else SAMPLED  # those two compute
+    files = [file_of(each, command) for each in chosen]
+    accepted = [
+        each for each, file in zip(chosen, files, strict=True) if works(cli(file, COMMANDS[command]), file)
+    ]
+    assert accepted
+
+
+SHORT = {
+    "simulate": ("simulate",),
+    "hysteresis": ("dynamics", "hysteresis", "--parameter"),
+    "map": ("map", "--sweep"),
+    "threshold": ("threshold", "--parameter"),
+    "poincare-section": ("dynamics", "poincare-section", "--periods", "3", "--transient", "2"),
+}  # fmt: skip
+VARIED = {
+    "drive": "velocity_amplitude",
+    "base_excitation": "acceleration_amplitude",
+    "axial_load": "amplitude",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", SHORT)
+@pytest.mark.parametrize("chosen", REAL, ids="+".join)
+def test_commands_run(cli, command, chosen):
+    file, args = sections_of(chosen, "own") | {"integration": {"cycles": 3}}, SHORT[command]
+    section = next((each for each in VARIED if each in chosen), "drive")
+    if args[-1] == "--parameter":
+        args = (*args, f"{section}.{VARIED[section]}", "--values", "0.1:0.2:2")
+    elif args[-1] == "--sweep":
+        args = (*args, f"{section}.{VARIED[section]}=0.1:0.2:2")
+    assert works(cli(file, args), file)
