@@ -32,6 +32,7 @@ from snapbeam.model.parameters import (
     parameters,
     physical_names,
     ratio_of,
+    refuse_well_axis,
     row_of,
 )
 from snapbeam.model.parameters import SECTIONS as SYSTEM_SECTIONS
@@ -200,7 +201,7 @@ def _checked(
         try:
             row: Parameter | None = lookup(f"initial_state.{name}")
         except InputError:
-            return f"{name}: unknown key; must be amplitude[i], velocity[i] or striker_position"
+            return f"{name}: unknown key; must be initial_well, amplitude[i], velocity[i] or striker_position"
     else:
         known = _known(section, flat[section])
         row = row_of(ratio_of(f"{section}.{name}"))
@@ -350,6 +351,7 @@ def _checked_axis(name: str, value: Any, own: dict[str, Any], flat: Mapping[str,
 def parsed_axis(name: str, value: Any) -> Any:
     """The values of an axis: numbers, or words."""
     row, short = lookup(name), split_name(name)[1] or name
+    refuse_well_axis(row)
     if row.quantity.kind in (str, bool):
         words = value.split(",") if isinstance(value, str) else value
         return np.array([row.quantity.check(short, word) for word in words])

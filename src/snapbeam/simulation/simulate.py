@@ -77,10 +77,8 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
     if model.imperfection is not None:
         attrs |= _short(model.imperfection)
     if model.transverse_force is not None:
-        attrs |= {
-            "reference_well": model.reference_well,
-            "initial_well": model.side_of(system.start_state.amplitude),
-        }
+        attrs["reference_well"] = model.reference_well
+    attrs |= {"initial_well": system.start_well, "initial_well_reason": system.initial_well_reason}
     if not model.is_bistable:
         attrs["wells"] = 1
     if system.contacts[1:]:
