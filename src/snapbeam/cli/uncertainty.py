@@ -61,13 +61,12 @@ def read(
     InputError
         If the file cannot be read, has no section [uncertainty], or has an unknown section or name.
     """
-    from snapbeam.model.parameter_file import config_from_mapping
+    from snapbeam.model.parameter_file import config_from_mapping, read_parameter_file
     from snapbeam.uncertainty.distributions import uncertainty_from_mapping
-    from snapbeam.util.input_files import read_toml
     from snapbeam.util.validation import InputError
 
     opt.import_laws(law)
-    sections = read_toml("file", file)
+    sections = read_parameter_file("file", file)
     if "uncertainty" not in sections:
         raise InputError(
             f"{file.name}: has no section [uncertainty]; add one, or use snapbeam map for a system without uncertainty"

@@ -8,6 +8,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -146,7 +147,8 @@ def checked_sections(
         if section == "extends":
             if values != "paper":
                 lines.append(
-                    f'extends = {shown(values)}: must be "paper"; leave it out for a beam of your own'
+                    f'extends = {shown(values)}: must be "paper" or a parameter file, such as "beam.toml"; leave it out for '
+                    "a beam of your own"
                 )
         elif section in _OF_OTHER_COMMANDS and isinstance(values, Mapping):
             continue
@@ -868,7 +870,12 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]], source: 
     instance("config", config, Config, "a Config")
     for name, own in mapping("sections", sections).items():
         mapping(str(name), own)
-    merged: dict[str, dict[str, Any]] = {name: dict(values) for name, values in config.given.items()}
+    return config_from_mapping(_merged(config.given, sections) | config.extension, source)
+
+
+def _merged(given: Sections, sections: Sections) -> dict[str, dict[str, Any]]:
+    """Sections with others laid over them; what they contradict is taken away, None is left alone."""
+    merged: dict[str, dict[str, Any]] = {name: dict(values) for name, values in given.items()}
     for section, values in sections.items():
         own = {name: value for name, value in values.items() if value is not None}
         target = merged.setdefault(section, {})
@@ -887,7 +894,7 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]], source: 
             for name in own:
                 for same in same_axis(f"{section}.{name}"):
                     merged.get("sweep", {}).pop(same, None)
-    return config_from_mapping(merged | config.extension, source)
+    return merged
 
 
 def same_axis(name: str) -> set[str]:
@@ -906,7 +913,52 @@ def same_axis(name: str) -> set[str]:
 def load_config(path: str | os.PathLike[str], *, complete: bool = True) -> Config:
     """Read a parameter file; unless it must be *complete*, options may add what a system needs."""
     file = file_path("config", path)
-    return config_from_mapping(read_toml("config", file), file.name, complete=complete, folder=file.parent)
+    return config_from_mapping(
+        read_parameter_file("config", file), file.name, complete=complete, folder=file.parent
+    )
+
+
+def read_parameter_file(name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read the sections of a parameter file, over those of the file that its line ``extends = "beam.toml"`` names.
+
+    The path is relative to the folder of the file that contains it.  A section of another type replaces that of the extended
+    file.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read or is no TOML, and for files that extend each other.
+    """
+    return _extended(name, file_path(name, path), ())
+
+
+def _extended(name: str, file: Path, above: tuple[Path, ...]) -> dict[str, Any]:
+    sections = read_toml(name, file)
+    base = sections.get("extends")
+    if not isinstance(base, str) or not base.endswith(".toml"):
+        return sections
+    above = (*above, file.resolve())
+    target = file.parent / base
+    if target.resolve() in above:
+        chain = ", ".join(each.name for each in above)
+        raise InputError(f"extends = {shown(base)} of {file.name}: the files extend each other: {chain}")
+    below = flattened(_extended(f"extends of {file.name}", target, above))
+    own = flattened({section: values for section, values in sections.items() if section != "extends"})
+    for values in below.values():
+        if isinstance(values, dict) and isinstance(values.get("file"), str):
+            values["file"] = str((target.parent / values["file"]).absolute())
+    for section, values in own.items():
+        other = below.get(section)
+        if (
+            isinstance(values, dict)
+            and isinstance(other, dict)
+            and values.get("type", other.get("type")) != other.get("type")
+        ):
+            striker = {*quantities(Striker), "label"} if numbered(section)[0] == "contact" else set()
+            below[section] = {key: value for key, value in other.items() if key in striker}
+    tables = {section: values for section, values in below.items() if isinstance(values, dict)}
+    laid = {section: values for section, values in own.items() if isinstance(values, dict)}
+    return below | own | _merged(tables, laid)
 
 
 def system_of_file(path: str | os.PathLike[str]) -> System:
@@ -917,7 +969,7 @@ def system_of_file(path: str | os.PathLike[str]) -> System:
     InputError
         If it cannot be read or is no TOML, and for anything :func:`config_from_mapping` refuses.
     """
-    sections = read_toml("path", path)
+    sections = read_parameter_file("path", path)
     if _is_saved_system(sections):
         return System.from_mapping(sections)
     file = file_path("path", path)

@@ -128,7 +128,8 @@ class System:
             if law.max_modes is not None and model.modes > law.max_modes:
                 raise InputError(
                     f"{section} = {shown(law)} with modes = {model.modes}: Newton's law needs one mode, since the "
-                    "mass met by an impulse at a point falls to zero as modes are added; use a HertzContact"
+                    "mass met by an impulse at a point falls to zero as modes are added; use one mode, or type = "
+                    "'hunt_crossley' with restitution and speed (HuntCrossley.from_restitution(stiffness, restitution, speed))"
                 )
             if striker.mass is not None and law.impulsive:
                 raise InputError(
