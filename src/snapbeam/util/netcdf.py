@@ -19,47 +19,13 @@ from typing import TYPE_CHECKING, Any
 
 from snapbeam._version import __version__
 from snapbeam.util.files import REQUEST, VERSION, NoRoomError, atomic_path, check_writable, request_hash
-from snapbeam.util.input_files import refuse_inflated
+from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.interrupts import held_back, raise_held
 from snapbeam.util.validation import InputError, file_path, instance, mapping
 
 if TYPE_CHECKING:
     import h5netcdf
     import xarray as xr
-
-_MOST_TEXTS = 100_000
-
-
-def refuse_large(path: str | os.PathLike[str], name: str = "path") -> None:
-    """Refuse an HDF5 file whose contents fill the memory although the file is small.
-
-    Parameters
-    ----------
-    path : path
-    name : str
-        The parameter to name in a refusal.
-
-    Raises
-    ------
-    InputError
-        For content that :func:`~snapbeam.util.input_files.refuse_inflated` refuses, and for more than 100,000 texts.
-    """
-    import h5py
-
-    size = texts = 0
-
-    def add(_: str, item: Any) -> None:
-        nonlocal size, texts
-        if not isinstance(item, h5py.Dataset) or not item.size:
-            return
-        size += item.size * max(item.dtype.itemsize, 8)
-        texts += item.size if item.dtype.hasobject else 0
-
-    with h5py.File(path, "r") as file:
-        file.visititems(add)
-    refuse_inflated(name, path, size)
-    if texts > _MOST_TEXTS:
-        raise InputError(f"{name} = {str(path)!r}: has {texts} texts: must be at most {_MOST_TEXTS}")
 
 
 def read_netcdf(
@@ -81,7 +47,7 @@ def read_netcdf(
         with open(path, "rb") as file:
             if file.read(3) == b"CDF" and group is None:  # version 3, whose layout is not that of HDF5
                 return read(path, engine="scipy")
-        refuse_large(path, name)
+        open_hdf5(path, name).close()
         return read(path, engine="h5netcdf", group=group)
     except (InputError, MemoryError):
         raise
@@ -116,7 +82,7 @@ def read_result(path: str | os.PathLike[str], name: str = "path", *, lazily: boo
         dataset = read_netcdf(file, name, lazily=lazily)
         if dataset.variables:
             return dataset
-    with h5py.File(file, "r") if file.is_file() else nullcontext({}) as stored:
+    with open_hdf5(file, name) if file.is_file() else nullcontext({}) as stored:
         groups = [each for each in stored if isinstance(stored[each], h5py.Group)]
     if group is None and groups:
         raise InputError(
