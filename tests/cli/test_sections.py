@@ -88,8 +88,8 @@ def test_every_combination_makes_a_system_or_names_the_section(tmp_path, capsys,
         noted = capsys.readouterr().err
         for name in re.findall(r"(drive\.\w+) = ", noted):
             assert name in system.parameters, (chosen, noted)
-        assert bool(system.contacts) == ("contact" in chosen or "drive" in chosen or config.extends_paper
-                                         and not {"base_excitation", "axial_load", "force"} & {*chosen}), chosen  # fmt: skip
+        assert bool(system.contacts) == ("contact" in chosen or "drive" in chosen or (config.extends_paper
+                                         and not {"base_excitation", "axial_load", "force"} & {*chosen})), chosen  # fmt: skip
         whole = config_from_mapping(config.whole().to_mapping())
         assert "sweep" in sections or whole.system == system, chosen
 
