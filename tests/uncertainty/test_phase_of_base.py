@@ -7,11 +7,13 @@ import math
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.uncertainty.probability import probability_map
 
 BASE = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.8, acceleration_amplitude=0.25))
-SYSTEM = sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.02), base_excitation=BASE)
+SYSTEM = sb.System(
+    sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.02), base_excitation=BASE
+)
 
 
 def probability(**spread):

@@ -11,15 +11,15 @@ import pytest
 import xarray as xr
 
 import snapbeam as sb
-from snapbeam.paper.store import load_results
 from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.netcdf import read_netcdf, read_result
 from snapbeam.util.validation import InputError
 
 
 def read_channels(path):
-    lab = pytest.importorskip("snapbeam.lab")
-    return lab.read_channels(path)
+    from snapbeam.lab import read_channels
+
+    return read_channels(path)
 
 
 def open_recording(path):
@@ -37,7 +37,6 @@ READERS = {
     "group": lambda path: read_netcdf(path, group="deep"),
     "read_result": lambda path: read_result(f"{path}:deep") if path.suffix == ".nc" else read_result(path),
     "load": sb.load,
-    "paper": load_results,
     "read_channels": read_channels,
     "open_recording": open_recording,
 }
