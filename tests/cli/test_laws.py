@@ -29,10 +29,6 @@ class SpringOfATest(sb.LocalForce):
         return -law.constant * displacement
 
     @staticmethod
-    def stiffness(law, displacement):
-        return law.constant
-
-    @staticmethod
     def energy(law, displacement):
         return 0.5 * law.constant * displacement * displacement
 """

@@ -43,6 +43,8 @@ SEPARATE = frozenset(name for name, law in LAWS.items() if law.impulsive or law.
 """Laws with solutions of their own: Newton's (``test_surrounded_bounces``) and those with a memory."""
 """Laws without a force, which the reference does not contain."""
 KNOWN_FORCES = ("local_spring", "rotation", "magnetic_force", "electrostatic_force", "quadratic_damping")
+ATTRACTIVE = ("electrostatic_force", "attracting_magnet", "softening_spring")
+"""Local forces with a negative potential energy."""
 GRAVITY = 9.80665
 PERMITTIVITY = 8.8541878188e-12
 
@@ -121,6 +123,10 @@ def features_of(seed: int) -> Features:
         uneven=bool(rng.random() < 0.35),
         started=not contacts or bool(rng.random() < 0.2),
     )
+    if seed // SAME % 2 == 1:
+        # a circuit and a negative energy together, in every second system
+        attractive, tapped = str(rng.choice(ATTRACTIVE)), features.circuits or (str(rng.choice(CIRCUITS)),)
+        features = dataclasses.replace(features, local=(*features.local, attractive), circuits=tapped)
     moves = any(drive != "fixed" for _, drive, _ in contacts)
     if not (moves or features.started):
         return dataclasses.replace(features, started=True)
@@ -457,8 +463,13 @@ def acting(name: str, number: Numbers, beam: ReferenceBeam) -> tuple[sb.LocalFor
         stiff, cubic = 5.0 + 60.0 * share, number(-1e7, 1e8)
         spring = sb.LocalSpring(stiffness=stiff, cubic_stiffness=cubic, location=place)
         return spring, PointForce(row, lambda u: -stiff * u - cubic * u**3)
-    if name == "magnetic_force":
-        strength = (2.0 * share - 1.0) * 0.02 * number.unit**2
+    if name == "softening_spring":
+        stiff, cubic = 5.0 * share, number(-3e8, -5e7)
+        soft = sb.LocalSpring(stiffness=stiff, cubic_stiffness=cubic, location=place)
+        return soft, PointForce(row, lambda u: -stiff * u - cubic * u**3)
+    if name in ("magnetic_force", "attracting_magnet"):
+        share = 2.0 * share - 1.0 if name == "magnetic_force" else 1.0 + 1.5 * share
+        strength = 0.02 * share * number.unit**2
         magnet = sb.MagneticForce(strength=strength, gap=number.flip * gap, location=place)
         return magnet, PointForce(row, lambda u: side * strength / (gap - u) ** 2)
     if name == "electrostatic_force":
@@ -627,7 +638,8 @@ def composed(seed: int, features: Features | None = None, mirror: bool = False) 
     )  # fmt: skip
     parts = Parts(tips, rows, local, shaking, features.carried, load, circuits, start, tuple(sorted(breaks)))
     # without a striker the damping is that of the lower well, also of the mirror image
-    known = set(features.local) <= set(KNOWN_FORCES) and bool(features.contacts or not features.uneven)
+    known = set(features.local) <= {*KNOWN_FORCES, *ATTRACTIVE}
+    known = known and bool(features.contacts or not features.uneven)
     places = [tip.location for tip in tips] + [i / 8.0 for i in range(1, 8)]
     return Composition(features, system, beam, parts, volts, known, places)
 

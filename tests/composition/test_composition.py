@@ -40,6 +40,12 @@ QUICK = (
     ),
     Features(2, (("power", "displacement_sine", True),), load="sine", circuits=("piezo", "coil")),
     Features(4, external=("harmonic_force",), local=("quadratic_damping", "magnetic_force"), started=True),
+    Features(
+        2,
+        (("hertz", "sine", False), ("hertz", "sine", False)),
+        local=("attracting_magnet", "softening_spring"),
+        circuits=("piezo",),
+    ),
 )
 """Parts whose numbers are drawn in the quick tests."""
 LIMIT = {"standard": 1e-3, "reference": 5e-7}

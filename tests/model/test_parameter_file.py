@@ -155,7 +155,7 @@ REFUSALS = [
     ({"initial_state": {"amplitude[1]": "much"}}, "[initial_state] amplitude[1] = 'much': must be a number"),
     (
         {"initial_state": {"amplitude[0]": 1.0}},
-        "[initial_state] amplitude[0]: unknown key; must be amplitude[i], velocity[i]",
+        "[initial_state] amplitude[0]: unknown key; must be initial_well, amplitude[i], velocity[i]",
     ),
     (
         {"initial_state": {"amplitude[40]": 1.0}},

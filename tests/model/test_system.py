@@ -200,6 +200,7 @@ def test_every_parameter_of_scope_run_can_be_changed() -> None:
     }
     # of a body alone, or of a rise or a force that is there; a profile is no number
     others = {"contact.suspension_stiffness", "contact.suspension_damping"}
+    others |= {"initial_state.initial_well"}  # see test_initial_well.py
     others |= {f"imperfection.{name}" for name in ("shape", "point_location", "profile")}
     assert names - set(CHANGES) == others
 

@@ -130,7 +130,7 @@ def test_refusals(tmp_path) -> None:
     with pytest.raises(InputError, match=r"none\.nc.*no such file"):
         sb.load(tmp_path / "none.nc")
     (tmp_path / "text.nc").write_text("no netcdf", encoding="utf-8")
-    with pytest.raises(InputError, match="is no NetCDF file of results"):
+    with pytest.raises(InputError, match="is no NetCDF or HDF5 file"):
         sb.load(tmp_path / "text.nc")
     run.dataset.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")
     with pytest.raises(InputError, match=r"is not a run that Run\.save wrote"):

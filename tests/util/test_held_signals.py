@@ -108,14 +108,14 @@ def system():
 def test_a_signal_in_each_callback_of_hdf5(tmp_path, monkeypatch, write, method):
     """From Python too, where Ctrl-C raises an exception wherever it is."""
     target, calls = tmp_path / "st.nc", []
-    own = getattr(netcdf._Stream, method)
+    own = getattr(netcdf.DiskStream, method)
 
     def interrupted(self, *arguments):
         calls.append(method)
         os.kill(os.getpid(), signal.SIGINT)
         return own(self, *arguments)
 
-    monkeypatch.setattr(netcdf._Stream, method, interrupted)
+    monkeypatch.setattr(netcdf.DiskStream, method, interrupted)
     with pytest.raises(KeyboardInterrupt):
         write(target)
     assert calls

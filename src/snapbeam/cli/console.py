@@ -124,6 +124,7 @@ def write_json(path: Path, found: Mapping[str, Any]) -> None:
         json.dumps({VERSION: __version__} | _plain(found), indent=2, ensure_ascii=False, allow_nan=False)
         + "\n"
     )
+    text = text.encode("utf-8", "backslashreplace").decode()  # a name that is not UTF-8: an escape of JSON
     if path == Path("-"):
         sys.stdout.write(text)
         sys.stdout.flush()

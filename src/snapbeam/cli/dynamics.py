@@ -133,10 +133,12 @@ def _plain(found: object) -> str:
 def _finish(dataset: xr.Dataset, output: Path, plot: Path | None, lines: list[str]) -> None:
     """Write, draw and print the results."""
     from snapbeam.cli.console import draw, write_map
+    from snapbeam.cli.summary import initial_well_lines
 
     reason = dataset.attrs.get("termination_reason")
     if reason and not any(str(reason) in line for line in lines):
         lines = [*lines, f"stopped: {reason}"]
+    lines = [*initial_well_lines(dataset), *lines]
     files = [write_map(dataset, output)]
     if plot is not None:
         files.append(draw(dataset, plot))
@@ -279,6 +281,7 @@ def hysteresis(
     --values 0.2:1.4:25 --statistic harvested_power_last_quarter --plot power.png
     """
     from snapbeam.cli.console import check_pictures, draw, write_map
+    from snapbeam.cli.summary import initial_well_lines
     from snapbeam.dynamics.swept_statistics import hysteresis as swept
     from snapbeam.model.parameter_file import parsed_axis
     from snapbeam.solver.statistics import STATISTICS
@@ -297,6 +300,7 @@ def hysteresis(
     failed = int((dataset["status"] != RunStatus.OK).sum())
     lines = [
         f"{points.size} values up and down in {duration(time.monotonic() - begun)}, {failed} runs failed or not run",
+        *initial_well_lines(dataset),
         *_extremes(dataset, statistic),
     ]
     files = [write_map(dataset, output)]

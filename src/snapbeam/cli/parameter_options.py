@@ -52,6 +52,7 @@ RUN = (
     "integration.engine",
     "integration.early_termination",
     "integration.max_steps",
+    "initial_state.initial_well",
 )
 
 _PANELS = {
@@ -62,6 +63,7 @@ _PANELS = {
     "contact": "Reduced model and contact",
     "drive": "Striker and drive",
     "integration": "Integration",
+    "initial_state": "Initial state",
 }
 # Options that differ from the name of the parameter, and help texts that the table does not contain.
 _OPTIONS = {
@@ -84,6 +86,8 @@ _OPTIONS = {
     "contact.suspension_damping": "--striker-suspension-damping",
 }
 _WORDS = {
+    "initial_state.initial_well": "well that runs begin in, by name or by its index; by default the one that the first striker or stop "
+    "pushes away from",
     "contact.radius": "radius of the sphere, m; with the next two options, instead of --contact-stiffness",
     "contact.young_modulus": "Young's moduli of sphere and beam, Pa: E1,E2",
     "contact.poisson_ratio": "Poisson ratios of sphere and beam: nu1,nu2",
@@ -276,6 +280,8 @@ def _option(name: str, is_axis: bool) -> Any:
         return Annotated[str | None, typer.Option(flag, metavar="NUMBER|A,B,...", **options)]
     if row is not None and row.quantity.kind is str:
         return Annotated[str | None, typer.Option(flag, metavar="|".join(row.quantity.choices), **options)]
+    if name == "initial_state.initial_well":
+        return Annotated[str | None, typer.Option(flag, metavar="lower|upper|INDEX", **options)]
     if name == "model.modes":
         return Annotated[str | None, typer.Option(flag, metavar="COUNT|auto", **options)]
     if row is not None and row.quantity.kind is int:
@@ -822,8 +828,7 @@ def config_of_file(path: Path, point: str | None) -> Config:
         ).items()
         if value is not None and name != "engine"
     }
-    start = sections.pop("initial_state", None)
-    if start is not None:
+    if sections.get("initial_state", {}).keys() - {"initial_well"}:
         raise InputError(f"from = {str(path)!r}: has its own initial state; use it from Python")
     sections["integration"] = run
     for name, value in _at_point(dataset, point, path).items():

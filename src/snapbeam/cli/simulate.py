@@ -140,6 +140,7 @@ def simulate(
     files = [path for path in (output, plot, animate) if path is not None]
     wells = 2 if system.model.is_bistable else 1
     shown = dict(summary) | {"response_class": summary.response_class.label_of(wells)}
+    shown |= {"initial_well": system.start_well, "initial_well_reason": system.initial_well_reason}
     add_json(summary=shown, seconds=time.monotonic() - start, system=system.hash, files=files)
     if summary.status not in (sb.RunStatus.OK, sb.RunStatus.EARLY_STOP):
         raise typer.Exit(FAILED)
@@ -291,6 +292,7 @@ def _summary_text(summary: Any, elapsed: float, system: Any) -> str:
     work, lost = (prefixed(each, "J", 4) for each in (summary.striker_work, summary.energy_dissipated))
     lines = [
         f"[bold]{kind.label_of(wells)}[/] (in {duration(elapsed)}; {status.advice})",
+        f"  at the start          in the {system.initial_well_text}",
         f"  zero crossings        {crossings}",
         f"  at the end            {end}",
         f"  centre displacement   {center}; {other}",
@@ -310,5 +312,5 @@ def _summary_text(summary: Any, elapsed: float, system: Any) -> str:
     if system.harvester is not None:
         lines += _harvest_lines(summary)
     if summary.zero_crossings:
-        lines.insert(2, f"  last crossing         at {prefixed(summary.last_zero_crossing, 's', 5)}")
+        lines.insert(3, f"  last crossing         at {prefixed(summary.last_zero_crossing, 's', 5)}")
     return "\n".join(lines)

@@ -45,7 +45,7 @@ def map_summary(
     head = f"{_count(runs, noun)} of {_modes(dataset)} over {_count(attrs.get('cycles', 0), 'cycle')}"
     if elapsed is not None:
         head += f" in {duration(elapsed)} ({runs / max(elapsed, 1e-9):.3g} runs/s)"
-    lines = [head]
+    lines = [head, *initial_well_lines(dataset)]
     low, response = lowest_interwell(dataset), dataset["response_class"]
     interwell = response.values >= _SNAPPED
     failed = _failed_below(dataset, low)
@@ -83,6 +83,14 @@ def map_summary(
     lines_after += [f"Written: {file_line(path)}" for path in files]
     lines_after += ["Next:", *(f"  {line}" for line in _suggestions(dataset, files, point))]
     return Group(*lines, class_table(dataset), *lines_after)
+
+
+def initial_well_lines(dataset: xr.Dataset) -> list[str]:
+    """Return the line with the well that the runs begin in; none if it differs between the points."""
+    well, reason = (dataset.attrs.get(name) for name in ("initial_well", "initial_well_reason"))
+    if well is None:
+        return []
+    return [f"Runs begin in the {well if well[-1].isdigit() else f'{well} well'} ({reason})."]
 
 
 def _highest(dataset: xr.Dataset, variable: str | None) -> tuple[dict[str, Any], str] | None:

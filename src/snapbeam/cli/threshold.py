@@ -21,7 +21,7 @@ from snapbeam.cli.parameter_options import (
     configured,
     with_parameters,
 )
-from snapbeam.cli.summary import coordinate_text, status_lines, value_text
+from snapbeam.cli.summary import coordinate_text, initial_well_lines, status_lines, value_text
 from snapbeam.util.status_codes import wells_of
 
 if TYPE_CHECKING:
@@ -94,6 +94,7 @@ def threshold(
     )  # fmt: skip
     add_json(
         parameter=dataset.attrs["parameter"],
+        initial_well=dataset.attrs.get("initial_well"),
         axes={str(each): dataset[each].values for each in dataset["lower_threshold"].dims},
         **{each: dataset[each].values for each in names},
         outcome=np.array(_kinds(dataset))[dataset["outcome"].values],
@@ -128,7 +129,7 @@ def _axes_of(settings: Config, parameter: str, text: str | None) -> dict[str, An
 
 
 def _summary(dataset: xr.Dataset, elapsed: float) -> list[str]:
-    lines = [f"{dataset.attrs['runs']} runs in {duration(elapsed)}"]
+    lines = [f"{dataset.attrs['runs']} runs in {duration(elapsed)}", *initial_well_lines(dataset)]
     parameter = dataset.attrs["parameter"]
     first = dataset["lower_threshold"]
     if not first.ndim:  # one threshold

@@ -61,13 +61,12 @@ def read(
     InputError
         If the file cannot be read, has no section [uncertainty], or has an unknown section or name.
     """
-    from snapbeam.model.parameter_file import config_from_mapping
+    from snapbeam.model.parameter_file import config_from_mapping, read_parameter_file
     from snapbeam.uncertainty.distributions import uncertainty_from_mapping
-    from snapbeam.util.input_files import read_toml
     from snapbeam.util.validation import InputError
 
     opt.import_laws(law)
-    sections = read_toml("file", file)
+    sections = read_parameter_file("file", file)
     if "uncertainty" not in sections:
         raise InputError(
             f"{file.name}: has no section [uncertainty]; add one, or use snapbeam map for a system without uncertainty"
@@ -311,12 +310,17 @@ def _default_axes(system: System) -> dict[str, Any]:
     """Axes of a map if none is named: the paper's plane of a struck beam; the one point of another system."""
     from snapbeam.model.parameter_file import DEFAULT_AXES, parsed_axis
     from snapbeam.model.parameters import lookup
+    from snapbeam.util.validation import InputError
 
     if DEFAULT_AXES.keys() <= system.parameters.keys():
         return {name: parsed_axis(name, text) for name, text in DEFAULT_AXES.items()}
     numbers = [
         name for name, each in system.parameters.items() if isinstance(each, float) and lookup(name).is_run
     ]
+    if not numbers:
+        raise InputError(
+            "[contact]: missing, as is any other excitation; add one, and name the axes in [sweep]"
+        )
     return {numbers[0]: np.array([system.get(numbers[0])])}
 
 

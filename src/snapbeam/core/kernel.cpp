@@ -20,9 +20,6 @@ void modes_side_by_side(const Problem &problem, const Batch &batch) {
     else integrate<ModeLanes<SNAPBEAM_WIDTH>>(problem, batch);
 }
 #else
-void run_by_run(const Problem &problem, const Batch &batch) {
-    if (problem.modes == 1) integrate<Thread<1>>(problem, batch);
-    else integrate<Thread<>>(problem, batch);
-}
+void run_by_run(const Problem &problem, const Batch &batch) { integrate<Thread<>>(problem, batch); }
 #endif
 }  // namespace SNAPBEAM_SET

@@ -13,6 +13,7 @@ from snapbeam.model.equilibria import tangent_stiffness
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
 from snapbeam.util.diagnostics import counting
+from snapbeam.util.singular_values import lstsq, svd
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -386,7 +387,7 @@ def _corrected(
         matrix[n] = direction
         residual = np.append(v, direction @ (point - anchor))
         if np.abs(residual).max() < _CONVERGED and iteration:
-            along = np.linalg.svd(matrix[:n])[2][-1]
+            along = svd(matrix[:n])[2][-1]
             return point, along * np.sign(along @ direction or 1.0), y, iteration
         try:
             step = np.linalg.solve(matrix, residual)
@@ -447,7 +448,7 @@ def _follow(
             near = _NEAR_ZERO * np.linalg.norm(apart - last_apart)
             if np.linalg.norm(met) < near:
                 return points, _AT_REST
-            to_rest = np.linalg.lstsq(structure.slope(met), structure.acceleration(met), rcond=None)[0]
+            to_rest = lstsq(structure.slope(met), structure.acceleration(met))
             return points, _OTHER_REST if np.linalg.norm(to_rest) < near else _RETRACED
         points.append(point)
         if iterations <= 3:

@@ -42,6 +42,7 @@ from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.parameters import ratio_of
 from snapbeam.model.quantity import numbered, split_name
 from snapbeam.util.diagnostics import counting
+from snapbeam.util.singular_values import pinv, svd
 from snapbeam.util.validation import InputError, checked, instance, integer, interval, shown, within
 
 if TYPE_CHECKING:
@@ -119,7 +120,7 @@ class _Curve:
     def border(self, came: Return) -> None:
         """Take the singular vectors at a point of the curve as borders: the bordered matrix is regular nearby."""
         if self.kind in ("fold", "flip"):
-            left, _, right = np.linalg.svd(self._singular(came))
+            left, _, right = svd(self._singular(came))
             self.borders = left[:, -1], right[-1]
 
     def _singular(self, came: Return) -> _Array:
@@ -291,7 +292,7 @@ class _Curve:
         # a gap follows from the run itself, a multiplier from the derivative of the map
         uncertain = self.room if self.kind == "grazing" else relative * steep
         off = np.append(np.full(size, point.residual), uncertain + point.residual)
-        inverse = np.linalg.pinv(point.table)[size:]
+        inverse = pinv(point.table)[size:]
         return np.asarray(np.abs(inverse) @ off * self.spans)
 
 
@@ -336,7 +337,7 @@ def _pair(came: Return) -> tuple[float, float]:
 
 def _tangent(table: _Array, before: _Array) -> _Array:
     """Unit tangent of the curve, in the direction of *before*."""
-    found: _Array = np.linalg.svd(table)[2][-1]
+    found: _Array = svd(table)[2][-1]
     return found if found @ before >= 0.0 else -found
 
 

@@ -20,6 +20,7 @@ from snapbeam.simulation.simulate import simulate
 from snapbeam.util.cores import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, tell, to_json
 from snapbeam.util.display import plotter
+from snapbeam.util.singular_values import svd
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -853,7 +854,7 @@ class Corrector:
         guess = np.append(here.carried(spot.y[:-1], self.family.flow.striker_phase), spot.y[-1])
         row = np.append(np.zeros(guess.size - 1), 1.0)
         found = self.correct(guess, row, row)
-        along = np.linalg.svd(self.bordered(found.came, found.slope, row)[:-1])[2][-1]
+        along = svd(self.bordered(found.came, found.slope, row)[:-1])[2][-1]
         return found._replace(tangent=along if along[-1] * spot.tangent[-1] >= 0.0 else -along)
 
     def orbit(self, spot: Spot) -> PeriodicOrbit:

@@ -338,7 +338,9 @@ def run_test(test: Test, settings: SeriesSettings, folder: Path, fingerprint: st
     }
     plain = asdict(result) | missing
     with atomic_path(folder / f"{test.name}.json") as temporary:
-        temporary.write_text(json.dumps(plain, indent=1, ensure_ascii=False), encoding="utf-8")
+        temporary.write_text(
+            json.dumps(plain, indent=1, ensure_ascii=False), encoding="utf-8", errors="backslashreplace"
+        )
     return result
 
 
@@ -475,7 +477,10 @@ def run_test_series(
 def write_table(path: Path, results: list[TestResult]) -> None:
     """Write the table of tests, as ``snapbeam compare`` reads it."""
     check_table(path)
-    with atomic_path(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
+    with (
+        atomic_path(path) as temporary,
+        open(temporary, "w", encoding="utf-8", errors="backslashreplace", newline="") as file,
+    ):
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
         writer.writerows(_row_of(result) for result in results)
@@ -511,7 +516,7 @@ def write_page(
         table=table.to_html(index=False, border=0),
     )
     with atomic_path(path) as temporary:
-        temporary.write_text(PAGE_START + page, encoding="utf-8")
+        temporary.write_text(PAGE_START + page, encoding="utf-8", errors="backslashreplace")
     return path
 
 

@@ -27,6 +27,7 @@ from snapbeam.model.parameter_file import config_from_mapping, dump_config
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.uncertainty.measurements import HERTZ_TIME, Measurements
 from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.singular_values import svd
 from snapbeam.util.validation import InputError, InputTypeError, choice, integer, positive, shown
 
 if TYPE_CHECKING:
@@ -144,7 +145,7 @@ def open_upwards(residual: Callable[[_Array], _Array], logs: _Array, names: list
 
 def directions(jacobian: _Array) -> _Array:
     """Orthonormal combinations of parameters that the data respond to, one a column."""
-    _, singular, rows = np.linalg.svd(jacobian, full_matrices=False)
+    _, singular, rows = svd(jacobian, full_matrices=False)
     told = singular > UNDETERMINED * singular[0]
     return np.asarray(rows[told].T)
 

@@ -484,6 +484,7 @@ def write_photron(
     'noise.cihx'
     """
     path = check_writable(path, "path", (".cih", ".cihx"))
+    check_writable(path.with_suffix(".mraw"), "path")
     kind = path.suffix.lower()
     rate = positive("frame_rate", frame_rate, "Hz")
     size = positive("pixel_size", pixel_size, "m")

@@ -11,6 +11,7 @@ from scipy.ndimage import spline_filter1d
 
 from snapbeam.lab.camera import Recording
 from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.util.singular_values import pinv
 from snapbeam.util.validation import InputError, checked, choice, instance, integer, within
 
 if TYPE_CHECKING:
@@ -323,7 +324,7 @@ def modal_amplitudes(
         if known.sum() < number:
             continue
         design = shapes[known] / e[known, None]
-        inverse = np.linalg.pinv(design / scale) / scale[:, None]
+        inverse = pinv(design / scale) / scale[:, None]
         amplitude[k] = inverse @ (w[known] / e[known])
         spread[k] = np.sqrt((inverse * inverse).sum(1))
         residual[k] = np.sqrt(np.mean((w[known] - shapes[known] @ amplitude[k]) ** 2))

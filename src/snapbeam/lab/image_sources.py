@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from snapbeam.lab.diagnostics import KINDS_RECORDING, LOSSY_ERROR
 from snapbeam.lab.photron import CameraHeader, check_pixels, read_header, read_mraw
 from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.input_files import refuse_inflated
 from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError
@@ -269,17 +270,12 @@ class ArraySource(FrameSource):
             return np.load(self.path, mmap_mode="r", allow_pickle=False)
         import h5py
 
-        self._file = h5py.File(self.path, "r")
+        self._file = open_hdf5(self.path, in_parts=True)
         found: dict[str, Any] = {}
 
         def visit(name: str, item: Any) -> None:
-            if not isinstance(item, h5py.Dataset) or not _is_stack(item.shape, item.dtype):
-                return
-            if item.external or item.is_virtual:
-                raise InputError(
-                    f"{self.path}: {name!r} has its pictures in another file: copy them into this one"
-                )
-            found[name] = item
+            if isinstance(item, h5py.Dataset) and _is_stack(item.shape, item.dtype):
+                found[name] = item
 
         self._file.visititems(visit)
         if dataset:

@@ -9,6 +9,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from snapbeam.util.singular_values import lstsq, pinv
+
 _Array = NDArray[np.float64]
 _Fit = TypeVar("_Fit", bound=Any)
 
@@ -30,14 +32,14 @@ def solve(design: _Array, values: _Array, rcond: float = 1e-14) -> _Array:
     """Solution by scaled normal equations: the columns of waves are nearly orthogonal."""
     scale = _scale(design)
     gram = (design.T @ design) / np.outer(scale, scale)
-    solution: _Array = np.linalg.lstsq(gram, (design.T @ values) / scale, rcond=rcond)[0] / scale
+    solution: _Array = lstsq(gram, (design.T @ values) / scale, rcond=rcond) / scale
     return solution
 
 
 def covariance(design: _Array, rcond: float = 1e-15) -> _Array:
     """Covariance of the solution for noise of variance 1."""
     scale = _scale(design)
-    inverse = np.asarray(np.linalg.pinv((design / scale).T @ (design / scale), rcond=rcond), dtype=np.float64)
+    inverse = np.asarray(pinv((design / scale).T @ (design / scale), rcond=rcond), dtype=np.float64)
     return inverse / np.outer(scale, scale)
 
 

@@ -18,6 +18,7 @@ from snapbeam.lab.least_squares import sines, solve
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import SineFit
 from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.singular_values import lstsq
 
 _Array = NDArray[np.float64]
 _SURE = 6.0  # standard errors
@@ -489,7 +490,7 @@ def _in_step(record: Record) -> list[Hypothesis]:
         # (n + parts j/size) samples have gone by; their share that the fit took as a frequency is left out
         saw = np.mod(np.arange(size) * parts / size, 1.0) - 0.5
         waves = np.column_stack([-np.roll(saw, k) * fast for k in range(math.ceil(size / parts))])
-        waves -= own @ np.linalg.lstsq(own, waves, rcond=None)[0]
+        waves -= own @ lstsq(own, waves)
         strength = (waves * waves).sum(0)
         height = waves.T @ mean / strength
         gain = height**2 * strength / variance
@@ -538,7 +539,7 @@ def _courses(record: Record) -> list[Hypothesis]:
     # of few cycles the scatter may be small by chance
     white = record.fit.noise_rms / record.fit.amplitude * math.sqrt(2.0 * t.size / record.fit.samples)
     noise = [max(one, white) for one in noise]
-    found = [np.linalg.lstsq(basis, one, rcond=None)[0] for one in course]
+    found = [lstsq(basis, one) for one in course]
     size = np.linalg.norm(basis, axis=0)
     gain = [(coefficients * size / sd) ** 2 for coefficients, sd in zip(found, noise, strict=True)]
     found[0][0] = found[1][0] = found[1][1] = 0.0

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from snapbeam.lab.diagnostics import KINDS_SIGNAL
 from snapbeam.lab.signals import check_signal, even_sampling, si_unit
 from snapbeam.util.diagnostics import Diagnostic, tell
+from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.input_files import decoded, refuse_inflated
-from snapbeam.util.netcdf import hdf5_stream, refuse_large
+from snapbeam.util.netcdf import hdf5_stream
 from snapbeam.util.tables import universal_record, write_universal
 from snapbeam.util.validation import InputError, positive
 
@@ -391,11 +392,10 @@ def read_hdf5(path: Path, _told: Told) -> list[Channel]:
         start = opened.read(4)
     if start[:3] == b"CDF":
         return _netcdf3(path, start[3])
-    refuse_large(path)
     _refuse_length_of_hdf5(path)
     stored: dict[str, _Stored] = {}
     groups: dict[str, dict[str, Any]] = {}
-    with h5py.File(path, "r") as file:
+    with open_hdf5(path) as file:
         groups[""] = _stating(file.attrs)
 
         def visit(name: str, item: Any) -> None:
@@ -404,10 +404,6 @@ def read_hdf5(path: Path, _told: Told) -> list[Channel]:
                 return
             if not isinstance(item, h5py.Dataset) or item.ndim > 2 or item.dtype.kind not in "iufSO":
                 return
-            if item.external or item.is_virtual:
-                raise InputError(
-                    f"path = {str(path)!r}: {name!r} has its numbers in another file: copy them into this one"
-                )
             kept = item.dtype.kind in "iuf" or item.size == 1
             if not kept or (item.is_scale and not _is_axis(name, item.attrs)):
                 return
@@ -851,10 +847,9 @@ def _stated_matlab_size(path: Path) -> int:
 def _version_73(path: Path) -> dict[str, Any]:
     import h5py
 
-    refuse_large(path)
     _refuse_length_of_hdf5(path)
     values: dict[str, Any] = {}
-    with h5py.File(path, "r") as file:
+    with open_hdf5(path) as file:
 
         def visit(name: str, item: Any) -> None:
             numbers = isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf"

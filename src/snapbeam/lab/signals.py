@@ -51,6 +51,7 @@ _LONG_NAMES = {
     "m": "displacement", "m/s": "velocity", "m/s^2": "acceleration", "N": "force", "V": "voltage", "Pa": "pressure",
 }  # fmt: skip
 MINIMUM_SAMPLES = 16
+_LARGEST = 1e30  # of a value in SI units and of a sampling rate: powers and derivatives stay finite
 
 
 def si_unit(name: str, unit: str) -> tuple[float, str]:
@@ -204,8 +205,10 @@ def make_signal(
         rate = positive("sampling_frequency", sampling_frequency, "Hz")
         start = finite("start", start)
     long_name = _LONG_NAMES.get(unit, name)
+    with np.errstate(over="ignore", under="ignore"):
+        scaled = _computable(name, array * factor, rate, unit)
     return xr.DataArray(
-        array * factor,
+        scaled,
         dims="time",
         coords={"time": ("time", start + np.arange(array.size) / rate, {"units": "s", "long_name": "time"})},
         name=name,
@@ -238,7 +241,22 @@ def check_signal(
         raise InputError(f"{label}: {signal.size} sample(s): must have at least {MINIMUM_SAMPLES}")
     values = finite_array(label, signal.values, 1)
     start, rate = even_sampling(label, signal["time"].values)
+    _computable(label, values, rate, str(unit))
     return SignalSamples(values, start + np.arange(values.size) / rate, rate)
+
+
+def _computable(label: str, values: NDArray[np.float64], rate: float, unit: str) -> NDArray[np.float64]:
+    """Return values of a signal whose powers and derivatives are numbers; refuse others."""
+    largest = float(np.abs(values).max(initial=0.0))
+    for what, size, its_unit in (
+        (f"{label}: largest value", largest, unit),
+        (f"{label}: sampling rate", rate, "Hz"),
+    ):
+        if size and not 1.0 / _LARGEST <= size <= _LARGEST:
+            raise InputError(
+                f"{what} = {size:.3g} {its_unit}: must be from {1.0 / _LARGEST:g} to {_LARGEST:g}; check the unit"
+            )
+    return values
 
 
 def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

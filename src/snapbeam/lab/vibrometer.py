@@ -40,6 +40,7 @@ from snapbeam.lab.sine_fit import (
     stuck_runs,
 )
 from snapbeam.util.diagnostics import Diagnostic, diagnostics_of, doubtful
+from snapbeam.util.singular_values import lstsq, polyfit
 from snapbeam.util.validation import InputError, finite, positive, within
 
 if TYPE_CHECKING:
@@ -161,10 +162,10 @@ def _pulling(times: _Array, cycles: NDArray[np.complex128]) -> float:
     mean = np.array([phase[part].mean() for part in parts])
     own = []
     for part in parts:
-        left = phase[part] - np.polyval(np.polyfit(times[part] - times[part].mean(), phase[part], 1),
+        left = phase[part] - np.polyval(polyfit(times[part] - times[part].mean(), phase[part], 1),
                                         times[part] - times[part].mean())  # fmt: skip
         own.append(float(np.std(left, ddof=2)) / math.sqrt(part.size) if part.size > 2 else math.inf)
-    off = mean - np.polyval(np.polyfit(at, mean, 1), at)
+    off = mean - np.polyval(polyfit(at, mean, 1), at)
     if float(np.sqrt(np.mean(off**2))) < _PULLED * float(np.sqrt(np.mean(np.square(own)))):
         return 0.0
     rates = np.diff(mean) / np.diff(at)
@@ -833,9 +834,7 @@ def _cycle_phasors(samples: SignalSamples, fit: SineFit, start: float, stop: flo
     found = np.empty(count, dtype=np.complex128)
     for n in range(count):
         part = slice(borders[n], borders[n + 1])
-        found[n : n + 1] = phasors(
-            np.asarray(np.linalg.lstsq(design[part], samples.values[part], rcond=None)[0], dtype=np.float64)
-        )
+        found[n : n + 1] = phasors(np.asarray(lstsq(design[part], samples.values[part]), dtype=np.float64))
     middle: _Array = start + (np.arange(count, dtype=np.float64) + 0.5) * period
     return middle, found
 
@@ -937,7 +936,7 @@ def _about(
 
     if np.count_nonzero(used) < 12:
         return samples.values[first:last]
-    solution = np.linalg.lstsq(design(since[used]), samples.values[used] - drive.steady.offset, rcond=None)[0]
+    solution = lstsq(design(since[used]), samples.values[used] - drive.steady.offset)
     return drive.steady.offset + design(since[first:last]) @ solution
 
 

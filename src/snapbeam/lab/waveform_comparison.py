@@ -15,6 +15,7 @@ from snapbeam.lab.signals import check_signal, make_signal
 from snapbeam.lab.vibrometer import measure_drive
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.singular_values import lstsq
 from snapbeam.util.status_codes import ResponseClass, classify
 from snapbeam.util.validation import (
     InputError,
@@ -355,7 +356,7 @@ def _shaker_sine(run: xr.Dataset, clock: _Array) -> tuple[float, float]:
     good &= clock >= clock[good][0] + (span / 3.0 if span > 6.0 else 0.0)
     turn = 2.0 * math.pi * clock[good]
     columns = np.column_stack([np.cos(turn), np.sin(turn), np.ones_like(turn), turn])
-    cosine, sine = np.linalg.lstsq(columns, values[good], rcond=None)[0][:2]
+    cosine, sine = lstsq(columns, values[good])[:2]
     return math.hypot(cosine, sine), math.atan2(-sine, cosine)
 
 

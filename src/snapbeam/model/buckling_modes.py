@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.model.equilibria import landscape_of
 from snapbeam.model.matrix_pairs import eigenpairs, fixed_coordinates, is_positive_definite, symmetric
 from snapbeam.util.diagnostics import Diagnostic, tell
+from snapbeam.util.singular_values import svd
 from snapbeam.util.validation import InputError, finite_array, integer, nonnegative, positive, within
 
 MAX_MODES = 256
@@ -306,7 +307,7 @@ class SpringModes:
 
 def _null(matrix: _Array) -> _Array:
     scaled = matrix / np.abs(matrix).max(axis=1, keepdims=True)
-    vector: _Array = np.linalg.svd(scaled)[2][-1]
+    vector: _Array = svd(scaled)[2][-1]
     return vector
 
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.potential import Potential
 from snapbeam.util.diagnostics import Diagnostic, tell
+from snapbeam.util.singular_values import lstsq, svd
 from snapbeam.util.validation import InputError
 
 _Array = NDArray[np.float64]
@@ -240,7 +241,7 @@ class _Tracer:
 
     def point(self, y: _Array, along: _Array) -> _Point:
         """The point with the tangent on the side of *along*."""
-        tangent = np.linalg.svd(self._jacobian(y))[2][-1]
+        tangent = svd(self._jacobian(y))[2][-1]
         potential = self.potential(y)
         stiffness = potential.in_modes(potential.tangent(self.amplitude(y)))
         tangent = math.copysign(1.0, float(tangent @ along)) * tangent
@@ -258,7 +259,7 @@ class _Tracer:
                     return None
                 residual = self.family.residual(self.amplitude(y), self.value(y)) * self.balance
                 if normal is None:
-                    step = np.linalg.lstsq(self._jacobian(y), residual, rcond=1e-9)[0]
+                    step = lstsq(self._jacobian(y), residual, rcond=1e-9)
                 else:
                     system = np.vstack((self._jacobian(y), normal))
                     step = np.linalg.solve(system, np.append(residual, normal @ (y - guess)))
@@ -406,7 +407,7 @@ class _Tracer:
         kinds |= {shift + at: kind for at, kind in special.items()}
         for at, kind in kinds.items():
             if kind == "origin":
-                self._add_beside(points[at], np.linalg.svd(self._jacobian(points[at].y))[2][-2:], False)
+                self._add_beside(points[at], svd(self._jacobian(points[at].y))[2][-2:], False)
                 return
         unstable = np.array([point.unstable for point in points])
         for at in kinds:

@@ -23,9 +23,15 @@ FORCES: dict[str, type[Drive]] = {}
 
 
 class ForceHistory(Drive):
-    """A force as a function of time, N: a drive whose *motion* is the force and its rate."""
+    """A force as a function of time, N: a drive whose *motion* is the force and its rate, and whose *acceleration* is the force.
+
+    ``constant_part`` is the part of it that lasts, under which a run begins at rest; ``peak_acceleration`` returns the
+    maximum of the force, N.
+    """
 
     registry: ClassVar[dict[str, type[Drive]]] = FORCES
+    hooks = (*Drive.hooks, "shape_numbers", "constant_part")
+    required: ClassVar[tuple[str, ...]] = ("cycle", "peak_acceleration")
 
     @property
     def constant_part(self) -> float:

@@ -19,6 +19,7 @@ from snapbeam.model.equilibrium_paths import (
 from snapbeam.model.potential import Potential
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
+from snapbeam.util.singular_values import svd
 from snapbeam.util.validation import InputError, InputTypeError, checked, choice, interval, shown, within
 
 if TYPE_CHECKING:
@@ -247,7 +248,7 @@ def _unstable_at_fixed_displacement(potential: Potential, row: _Array, alpha: _A
     """Negative eigenvalues of the tangent stiffness, at fixed displacement on the row, at (points, N) amplitudes."""
     if alpha.shape[1] == 1:
         return np.zeros(alpha.shape[0], dtype=np.int_)
-    free = np.linalg.svd(row[None, :])[2][1:]
+    free = svd(row[None, :])[2][1:]
     value = np.linalg.eigvalsh(free @ np.stack([potential.tangent(each) for each in alpha]) @ free.T)
     return np.asarray((value < -1e-12 * np.abs(value).max(axis=1)[:, None]).sum(axis=1))
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import modes_between
+from snapbeam.model.extension import check_defined, check_names
 from snapbeam.model.quantity import RUN, check_fields, quantity
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.diagnostics import Diagnostic
@@ -34,9 +35,20 @@ class Harvester:
         m alpha'' + ... = theta z,     M z' = -theta . alpha' - rho z,
 
     so that what the beam gives, -z theta . alpha', is the change of M z^2/2 and the loss rho z^2, of which a share ends
-    in the load.
+    in the load.  A subclass defines :meth:`row`, :attr:`inertia`, :meth:`loss`, :meth:`share` and :meth:`volts`.
     """
 
+    hooks: ClassVar[tuple[str, ...]] = (
+        "name",
+        "row",
+        "inertia",
+        "unit",
+        "loss",
+        "share",
+        "volts",
+        "diagnostics",
+    )
+    """Names that are read of a harvester of one's own; it has no others, but for those that begin with an underscore."""
     name: ClassVar[str] = ""
     noun: ClassVar[str] = "a harvester"
     """In messages."""
@@ -47,7 +59,9 @@ class Harvester:
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
+        check_names(cls)
         if cls.name:
+            check_defined(cls, Harvester, ["row", "inertia", "loss", "share", "volts"])
             HARVESTERS[cls.name] = cls
 
     def row(self, model: ReducedModel) -> _Array:

@@ -11,6 +11,7 @@ from snapbeam.model.beam import Beam
 from snapbeam.model.buckling_modes import MAX_MODES
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.util.singular_values import lstsq
 from snapbeam.util.validation import InputError, choice, instance, integer, positive
 
 FITTED = ("midspan_amplitude", "point_load", "uniform_load")
@@ -97,7 +98,7 @@ def identify_imperfection(
         slope = (np.stack(columns, axis=1) - found[:, None]) / step
         if not np.isfinite(slope).all():
             break
-        change = np.linalg.lstsq(slope, -found, rcond=None)[0]
+        change = lstsq(slope, -found)
         change *= min(1.0, 0.3 / max(float(np.abs(change[0])), 10.0 * float(np.abs(change[1])), 1e-300))
         for _ in range(_TRIES):
             new = residual(at + change) if at[0] + change[0] > 0.0 else None

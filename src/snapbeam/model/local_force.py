@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.model.extension import check_defined, check_names, check_pair, overrides
 from snapbeam.model.quantity import STRUCTURE, check_fields, check_label, numbers_type, quantity
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.validation import InputError, finite_array
@@ -37,7 +38,7 @@ class LocalForce:
     - ``force(law, displacement)``: conservative force on the beam, N, or moment, N m; positive in the direction of u;
     - ``energy(law, displacement)``: its potential energy, J; the force is minus its derivative.
 
-    A law with *dissipative* = True has two more:
+    A law with ``dissipative`` = True has two more, and need not have the first two:
 
     - ``damping_force(law, displacement, velocity)``: the part that depends on v;
     - ``damping_coefficient(law, displacement, velocity)``: minus its derivative by v, N s/m or N m s/rad.
@@ -92,6 +93,10 @@ class LocalForce:
     )  # fmt: skip
     label: str = dataclasses.field(default="", repr=False)
 
+    hooks: ClassVar[tuple[str, ...]] = (
+        "name", "force", "energy", "dissipative", "damping_force", "damping_coefficient", "displacement_range",
+    )  # fmt: skip
+    """Names that are read of a law of one's own; a law has no others, but for those that begin with an underscore."""
     name: ClassVar[str] = ""
     """In parameter files and attributes."""
     noun: ClassVar[str] = "a local force"
@@ -108,7 +113,13 @@ class LocalForce:
                 f"{cls.__name__}.energy: must be given for a law with a force, which is minus its derivative; define "
                 "energy(law, displacement)"
             )
+        check_names(cls)
+        if overrides(cls, LocalForce, "energy"):
+            check_defined(cls, LocalForce, ["force"])
         if cls.name:
+            check_pair(cls, "dissipative", LocalForce, ["damping_force", "damping_coefficient"])
+            if not cls.dissipative:
+                check_defined(cls, LocalForce, ["force"])
             LOCAL_FORCES[cls.name] = cls
 
     def __post_init__(self) -> None:

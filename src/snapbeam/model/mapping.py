@@ -92,6 +92,8 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
             for name, value in values.items()
             if not np.isnan(value).all()
         }
+    if system.initial_well is not None:
+        sections["initial_state"] = {"initial_well": system.initial_well}
     return sections
 
 
@@ -141,9 +143,12 @@ def parts_from_mapping(sections: Mapping[str, Any]) -> dict[str, Any]:
     )
     if "initial_state" in sections:
         values = dict(sections["initial_state"])
-        _only(values, "initial_state", list(_START))
-        _needed(values, "initial_state", State)
-        parts["initial_state"] = State(**values)
+        _only(values, "initial_state", ["initial_well", *_START])
+        if "initial_well" in values:
+            parts["initial_well"] = values.pop("initial_well")
+        if values or "initial_well" not in parts:
+            _needed(values, "initial_state", State)
+            parts["initial_state"] = State(**values)
     return parts
 
 
@@ -317,7 +322,7 @@ _MOVED = {"base_excitation": BaseExcitation, "axial_load": AxialLoadModulation}
 """Parts with a motion, by the section of a system."""
 _TUPLES = {"contact": "contacts", "force": "forces", "harvester": "harvesters"}
 """Parts of a system that are tuples, by the section of one of them."""
-_PARTS = ("model", "base_excitation", "axial_load", "initial_state", *_TUPLES.values())
+_PARTS = ("model", "base_excitation", "axial_load", "initial_state", "initial_well", *_TUPLES.values())
 
 
 def resolved(name: str, labels: Mapping[str, Sequence[str]]) -> str:
@@ -366,6 +371,9 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         else:
             whole[section] = value
     found = dict(parts) | {name: whole[name] for name in _PARTS if name in whole}
+    for name, other in (("initial_state", "initial_well"), ("initial_well", "initial_state")):
+        if whole.get(name) is not None and other not in whole:  # a new start replaces the other one
+            found[other] = None
     for kind, name in _TUPLES.items():
         count = len(sequence_of(name, found[name]))
         for section in (*whole, *inside):

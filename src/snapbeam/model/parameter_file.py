@@ -8,6 +8,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from snapbeam.model.parameters import (
     parameters,
     physical_names,
     ratio_of,
+    refuse_well_axis,
     row_of,
 )
 from snapbeam.model.parameters import SECTIONS as SYSTEM_SECTIONS
@@ -145,7 +147,8 @@ def checked_sections(
         if section == "extends":
             if values != "paper":
                 lines.append(
-                    f'extends = {shown(values)}: must be "paper"; leave it out for a beam of your own'
+                    f'extends = {shown(values)}: must be "paper" or a parameter file, such as "beam.toml"; leave it out for '
+                    "a beam of your own"
                 )
         elif section in _OF_OTHER_COMMANDS and isinstance(values, Mapping):
             continue
@@ -200,7 +203,7 @@ def _checked(
         try:
             row: Parameter | None = lookup(f"initial_state.{name}")
         except InputError:
-            return f"{name}: unknown key; must be amplitude[i], velocity[i] or striker_position"
+            return f"{name}: unknown key; must be initial_well, amplitude[i], velocity[i] or striker_position"
     else:
         known = _known(section, flat[section])
         row = row_of(ratio_of(f"{section}.{name}"))
@@ -350,6 +353,7 @@ def _checked_axis(name: str, value: Any, own: dict[str, Any], flat: Mapping[str,
 def parsed_axis(name: str, value: Any) -> Any:
     """The values of an axis: numbers, or words."""
     row, short = lookup(name), split_name(name)[1] or name
+    refuse_well_axis(row)
     if row.quantity.kind in (str, bool):
         words = value.split(",") if isinstance(value, str) else value
         return np.array([row.quantity.check(short, word) for word in words])
@@ -498,7 +502,8 @@ class Config:
         if not self.section("beam"):
             return ()
         found, swept = self._defaults(), self.axes() if self.section("sweep") else {}
-        sections = ("beam", "model", "contact") if self.extends_paper else ("drive",)
+        driven = not (self._is_unstruck or self._stands_still)
+        sections = ("beam", "model", "contact") if self.extends_paper else ("drive",) if driven else ()
         return tuple(
             f"{section}.{name}"
             for section in sections
@@ -865,7 +870,12 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]], source: 
     instance("config", config, Config, "a Config")
     for name, own in mapping("sections", sections).items():
         mapping(str(name), own)
-    merged: dict[str, dict[str, Any]] = {name: dict(values) for name, values in config.given.items()}
+    return config_from_mapping(_merged(config.given, sections) | config.extension, source)
+
+
+def _merged(given: Sections, sections: Sections) -> dict[str, dict[str, Any]]:
+    """Sections with others laid over them; what they contradict is taken away, None is left alone."""
+    merged: dict[str, dict[str, Any]] = {name: dict(values) for name, values in given.items()}
     for section, values in sections.items():
         own = {name: value for name, value in values.items() if value is not None}
         target = merged.setdefault(section, {})
@@ -884,7 +894,7 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]], source: 
             for name in own:
                 for same in same_axis(f"{section}.{name}"):
                     merged.get("sweep", {}).pop(same, None)
-    return config_from_mapping(merged | config.extension, source)
+    return merged
 
 
 def same_axis(name: str) -> set[str]:
@@ -903,7 +913,52 @@ def same_axis(name: str) -> set[str]:
 def load_config(path: str | os.PathLike[str], *, complete: bool = True) -> Config:
     """Read a parameter file; unless it must be *complete*, options may add what a system needs."""
     file = file_path("config", path)
-    return config_from_mapping(read_toml("config", file), file.name, complete=complete, folder=file.parent)
+    return config_from_mapping(
+        read_parameter_file("config", file), file.name, complete=complete, folder=file.parent
+    )
+
+
+def read_parameter_file(name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read the sections of a parameter file, over those of the file that its line ``extends = "beam.toml"`` names.
+
+    The path is relative to the folder of the file that contains it.  A section of another type replaces that of the extended
+    file.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read or is no TOML, and for files that extend each other.
+    """
+    return _extended(name, file_path(name, path), ())
+
+
+def _extended(name: str, file: Path, above: tuple[Path, ...]) -> dict[str, Any]:
+    sections = read_toml(name, file)
+    base = sections.get("extends")
+    if not isinstance(base, str) or not base.endswith(".toml"):
+        return sections
+    above = (*above, file.resolve())
+    target = file.parent / base
+    if target.resolve() in above:
+        chain = ", ".join(each.name for each in above)
+        raise InputError(f"extends = {shown(base)} of {file.name}: the files extend each other: {chain}")
+    below = flattened(_extended(f"extends of {file.name}", target, above))
+    own = flattened({section: values for section, values in sections.items() if section != "extends"})
+    for values in below.values():
+        if isinstance(values, dict) and isinstance(values.get("file"), str):
+            values["file"] = str((target.parent / values["file"]).absolute())
+    for section, values in own.items():
+        other = below.get(section)
+        if (
+            isinstance(values, dict)
+            and isinstance(other, dict)
+            and values.get("type", other.get("type")) != other.get("type")
+        ):
+            striker = {*quantities(Striker), "label"} if numbered(section)[0] == "contact" else set()
+            below[section] = {key: value for key, value in other.items() if key in striker}
+    tables = {section: values for section, values in below.items() if isinstance(values, dict)}
+    laid = {section: values for section, values in own.items() if isinstance(values, dict)}
+    return below | own | _merged(tables, laid)
 
 
 def system_of_file(path: str | os.PathLike[str]) -> System:
@@ -914,7 +969,7 @@ def system_of_file(path: str | os.PathLike[str]) -> System:
     InputError
         If it cannot be read or is no TOML, and for anything :func:`config_from_mapping` refuses.
     """
-    sections = read_toml("path", path)
+    sections = read_parameter_file("path", path)
     if _is_saved_system(sections):
         return System.from_mapping(sections)
     file = file_path("path", path)

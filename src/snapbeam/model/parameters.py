@@ -37,7 +37,7 @@ from snapbeam.model.quantity import (
     split_name,
 )
 from snapbeam.model.reduced_model import MODEL_QUANTITIES
-from snapbeam.model.state import START_NAME
+from snapbeam.model.state import START_NAME, checked_well
 from snapbeam.model.striker import Striker
 from snapbeam.util.validation import InputError, shown
 
@@ -130,11 +130,15 @@ def _rows() -> Iterable[Parameter]:
         yield dataclasses.replace(row, short=f"force_{row.short}", kinds=tuple(FORCES))
     for name, (item, default) in MODEL_QUANTITIES.items():
         yield Parameter(f"model.{name}", item.short or name, item, default)
+    yield Parameter("initial_state.initial_well", "initial_well", _INITIAL_WELL, None)
     for section in ("contact", "drive", *_AROUND):
         for kind_name, kind in kinds_of(section).items():
             for row in _of_class(section, kind):
                 row = _around(row) if section in _AROUND else row
                 yield dataclasses.replace(row, kinds=(kind_name,))
+
+
+_INITIAL_WELL = ParameterField("1", "well that runs begin in", kind=object, optional=True, parse=checked_well)
 
 
 def kinds_of(section: str) -> Mapping[str, Any]:
@@ -292,6 +296,12 @@ def lookup(name: str) -> Parameter:
         else f"; see {', '.join(list(table)[:6])}, ..."
     )
     raise InputError(f"{name}: is not a parameter{hint}")
+
+
+def refuse_well_axis(row: Parameter) -> None:
+    """Refuse the initial well as an axis (InputError)."""
+    if row.short == "initial_well":
+        raise InputError("initial_well: cannot be an axis; compute one map from each well")
 
 
 # ----------------------------------------------------------------------------------------------------

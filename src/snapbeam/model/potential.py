@@ -336,6 +336,23 @@ class Potential:
         stable = [each for each in self.equilibria if each.is_stable]
         return tuple(sorted(stable, key=self.center))
 
+    def well(self, name: str | int) -> Equilibrium:
+        """A well by its index in :attr:`wells`, or "lower" or "upper" of two.
+
+        Raises
+        ------
+        InputError
+            If there is no such well.
+        """
+        wells, two = self.wells, ("lower", "upper")
+        at = two.index(name) if name in two and len(wells) == 2 else name
+        if not isinstance(at, int) or not 0 <= at < len(wells):
+            many = ", 'lower' or 'upper'" if len(wells) == 2 else ""
+            allowed = f"must be {', '.join(map(str, range(len(wells))))}{many}" if wells else "leave it out"
+            count = f"{len(wells) or 'no'} well{'' if len(wells) == 1 else 's'}"
+            raise InputError(f"well = {shown(name)}: the system has {count}; {allowed}")
+        return wells[at]
+
     def center(self, equilibrium: Equilibrium) -> float:
         """Displacement of the centre, m."""
         return float(self.model.midspan_shape @ equilibrium.amplitude)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import secrets
 from collections import namedtuple
 from collections.abc import Callable, Iterable
@@ -152,8 +153,10 @@ def split_name(name: str) -> tuple[str, str]:
 def check_label(label: Any) -> None:
     """Raise an error for a label that cannot replace a number in a dotted name."""
     if not isinstance(label, str) or (label and not label.isidentifier()):
+        word = re.sub(r"\W+", "_", label).strip("_") if isinstance(label, str) else ""
+        such = f", such as {word!r}" if word.isidentifier() else ""
         raise InputError(
-            f"label = {shown(label)}: must be a name of letters, digits and underscores that begins with a letter"
+            f"label = {shown(label)}: must be a name of letters, digits and underscores that begins with a letter{such}"
         )
 
 

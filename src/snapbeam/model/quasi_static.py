@@ -20,7 +20,7 @@ def quasi_static_objection(attributes: Mapping[Hashable, Any]) -> str | None:
     for section in _OTHER:
         if (kind := attributes.get(f"{section}_type")) is not None:
             return f"{section} of type {kind!r}: {form}"
-    return f"unequal wells: {form}" if "initial_well" in attributes else None
+    return f"unequal wells: {form}" if "reference_well" in attributes else None
 
 
 @checked

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from snapbeam.model.equilibria import Equilibrium
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
 from snapbeam.util.status_codes import RunStatus
@@ -43,8 +44,8 @@ class State:
 
     Parameters
     ----------
-    amplitude : array_like of shape (..., N)
-        Amplitudes alpha of the buckling modes, m^0.5.
+    amplitude : array_like of shape (..., N), or Equilibrium
+        Amplitudes alpha of the buckling modes, m^0.5; of an equilibrium, such as one of ``potential.wells``, its own.
     velocity : array_like of shape (..., N), optional
         Their velocities, m^0.5/s; zeros by default.
     phase : array_like of shape (...), optional
@@ -95,7 +96,9 @@ class State:
     modal: ModalState | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        amplitude = _finite_where_known("state amplitude", self.amplitude, self.statistics)
+        given: Any = self.amplitude
+        given = given.amplitude if isinstance(given, Equilibrium) else given
+        amplitude = _finite_where_known("state amplitude", given, self.statistics)
         if amplitude.ndim == 0:
             raise InputError(
                 f"state amplitude = {float(amplitude):g}: must be an array of shape (..., modes)"
@@ -278,6 +281,18 @@ def _numbers(name: str, value: ArrayLike) -> _Array:
 
 START_NAME = re.compile(r"(amplitude|velocity)\[([1-9][0-9]{0,3})\]")
 """Names of the parameters of a start, after ``initial_state.``: ``amplitude[1]``, ``velocity[3]``."""
+
+
+def checked_well(name: str, value: Any) -> str | int:
+    """The name of a well, "lower" or "upper", or its index in ``potential.wells``, also as text."""
+    if isinstance(value, str) and value.isdecimal():
+        value = int(value)
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool) and value >= 0
+    if not whole and (not isinstance(value, str) or value not in ("lower", "upper")):
+        raise InputError(
+            f"{name} = {shown(value)}: must be 'lower', 'upper' or the index of a well in potential.wells"
+        )
+    return int(value) if whole else value
 
 
 def amplitude_scale(model: ReducedModel) -> float:

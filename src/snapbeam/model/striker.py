@@ -28,8 +28,8 @@ class Striker:
         Side of the beam the tip pushes from.  ``"below"``: it pushes upward on the beam at rest in
         its lower well.  ``"above"`` is the mirror image, downward on the upper well.
     gap : float, optional
-        Distance, m, between the mid-position and the beam at rest in the well that a run begins in; negative
-        presses.  By default the tip touches the beam at the start, wherever the beam then is.
+        Distance, m, between the mid-position and the beam at rest in the well that the first striker pushes away
+        from; negative presses.  By default the tip touches the beam at the start, wherever the beam then is.
     mass : float, optional
         Mass of the striker, kg; infinite by default: the tip follows its drive exactly.  With a mass the drive
         is the motion that the tip has as long as nothing touches it, and the contact force moves the body from

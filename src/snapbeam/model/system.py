@@ -36,7 +36,7 @@ from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, named_in, rat
 from snapbeam.model.potential import Potential
 from snapbeam.model.quantity import section_of
 from snapbeam.model.reduced_model import ReducedModel
-from snapbeam.model.state import State, rest_state, started
+from snapbeam.model.state import State, checked_well, rest_state, started
 from snapbeam.model.striker import Contact, Striker
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.files import atomic_path, check_writable
@@ -64,8 +64,7 @@ class System:
     ----------
     model : ReducedModel
     contacts : sequence of Contact, optional
-        Strikers, each with the law of its contact.  Without any the structure vibrates freely from *initial_state*.  Runs begin
-        in the well that the first one pushes away from.
+        Strikers, each with the law of its contact.  Without any the structure vibrates freely from *initial_state*.
     forces : sequence of LocalForce or ExternalForce, optional
         A :class:`~snapbeam.LocalForce` depends on the displacement and velocity of one point, an
         :class:`~snapbeam.ExternalForce` on time.
@@ -76,7 +75,10 @@ class System:
     harvesters : sequence of PiezoelectricHarvester or ElectromagneticHarvester, optional
         Circuits that turn motion into power in a resistor.
     initial_state : State, optional
-        Where runs begin, one state; by default at rest in the well that the striker pushes away from, touched by it.
+        Where runs begin, one state; by default at rest in *initial_well*.
+    initial_well : {"lower", "upper"} or int, optional
+        Well in which runs begin at rest, by name or by its index in ``unloaded_potential.wells``.  By default the one that the
+        first striker or stop pushes away from, touched by it; :attr:`initial_well_text` names it.
 
     Notes
     -----
@@ -101,6 +103,7 @@ class System:
     axial_load: AxialLoadModulation | None = None
     harvesters: Sequence[Harvester] = ()
     initial_state: State | None = None
+    initial_well: str | int | None = None
 
     def __post_init__(self) -> None:
         model, start = self.model, self.initial_state
@@ -125,7 +128,8 @@ class System:
             if law.max_modes is not None and model.modes > law.max_modes:
                 raise InputError(
                     f"{section} = {shown(law)} with modes = {model.modes}: Newton's law needs one mode, since the "
-                    "mass met by an impulse at a point falls to zero as modes are added; use a HertzContact"
+                    "mass met by an impulse at a point falls to zero as modes are added; use one mode, or type = "
+                    "'hunt_crossley' with restitution and speed (HuntCrossley.from_restitution(stiffness, restitution, speed))"
                 )
             if striker.mass is not None and law.impulsive:
                 raise InputError(
@@ -136,6 +140,10 @@ class System:
             rigid_mass(model)
         for each in (*self.forces, *self.harvesters):
             each.row(model)
+        if self.initial_well is not None:
+            if start is not None:
+                raise InputError("initial_well, initial_state: give one of the two")
+            object.__setattr__(self, "initial_well", checked_well("initial_well", self.initial_well))
         if self.axial_load is not None and model.beam is None:
             raise InputError(
                 "axial_load: changes the axial load of a beam; a structure given by matrices has its load in its stiffness"
@@ -165,7 +173,7 @@ class System:
         ``beam.thickness``, ``model.modes``, ``contact.stiffness``, ``contact.location`` and ``drive.frequency_ratio``.
         Those of the second contact, its drive or the second force have its number, ``contact.2.gap``,
         ``drive.2.frequency_ratio``, or its label, ``contact.stop.gap``.  Whole parts are ``beam``, ``model``, ``contacts``,
-        ``forces``, ``base_excitation``, ``axial_load``, ``harvesters`` and ``initial_state``; one of several is ``contact``,
+        ``forces``, ``base_excitation``, ``axial_load``, ``harvesters``, ``initial_state`` and ``initial_well``; one of several is ``contact``,
         ``contact.law``, ``contact.striker``, ``drive``, ``force`` or ``harvester``, with its number after the first word.
         """
         from snapbeam.model.parameter_axes import ratios_of
@@ -180,9 +188,12 @@ class System:
         other = {name: value for name, value in changes.items() if not name.startswith(prefix)}
         found = System(**replaced(parts, other))
         start = {name.removeprefix(prefix): changes[name] for name in changes if name not in other}
+        if "initial_well" in start:
+            found = dataclasses.replace(found, initial_state=None, initial_well=start.pop("initial_well"))
         if not start:
             return found
-        return dataclasses.replace(found, initial_state=started(found.model, found.start_state, start))
+        state = started(found.model, found.start_state, start)
+        return dataclasses.replace(found, initial_state=state, initial_well=None)
 
     def get(self, name: str) -> Any:
         """The value of a parameter by its dotted name."""
@@ -318,7 +329,7 @@ class System:
             )
         return State(amplitude=local.wells[well].amplitude)
 
-    def poles(self, equilibrium: Equilibrium | None = None) -> NDArray[np.complex128]:
+    def poles(self, equilibrium: Equilibrium | str | int | None = None) -> NDArray[np.complex128]:
         """Poles of small oscillations about an equilibrium, with damping, local forces and circuits.
 
         Of m a'' + C a' + K a = sum_j theta_j z_j and M_j z_j' = -theta_j . a' - rho_j z_j, with the tangent stiffness K of the
@@ -326,8 +337,9 @@ class System:
 
         Parameters
         ----------
-        equilibrium : Equilibrium, optional
-            One of ``potential.equilibria``; by default that of the rest state.
+        equilibrium : Equilibrium, {"lower", "upper"} or int, optional
+            One of ``potential.equilibria``, or a well by name or by its index in ``potential.wells``; by default the one of
+            *initial_well*, or of :attr:`rest_state`.
 
         Returns
         -------
@@ -347,9 +359,9 @@ class System:
         1.118034
         """
         model, potential = self.model, self.potential
-        if equilibrium is not None:
-            instance("equilibrium", equilibrium, Equilibrium, "an Equilibrium or None")
-        alpha = self.rest_state.amplitude if equilibrium is None else equilibrium.amplitude
+        if equilibrium is not None and not isinstance(equilibrium, Equilibrium):
+            equilibrium = potential.well(checked_well("equilibrium", equilibrium))
+        alpha = self._start_at_rest.amplitude if equilibrium is None else equilibrium.amplitude
         n, modes = model.modes, model.linear_modes
         damping = modes.T @ model.damping_matrix @ modes
         for force in self.local_forces:
@@ -374,9 +386,50 @@ class System:
         return np.asarray(found[np.lexsort((found.imag, np.abs(found)))])
 
     @property
+    def _start_at_rest(self) -> State:
+        """At rest in the initial well."""
+        if self.initial_well is None:
+            return self.rest_state
+        try:
+            return State(amplitude=self.unloaded_potential.well(self.initial_well))  # type: ignore[arg-type]
+        except InputError as error:
+            raise InputError(f"initial_{error}") from None
+
+    @property
     def start_state(self) -> State:
-        """The state that runs begin in: the initial state, or at rest."""
-        return self.rest_state if self.initial_state is None else self.initial_state
+        """The state that runs begin in: the initial state, or at rest in the initial well."""
+        return self._start_at_rest if self.initial_state is None else self.initial_state
+
+    @cached_property
+    def start_well(self) -> str:
+        """Well that runs begin in: "lower", "upper", "only", or "well 2" of more than two wells.
+
+        Of an initial state it is the well on whose side of the dividing height the centre is.
+        """
+        if self.initial_state is not None:
+            return self.model.side_of(self.initial_state.amplitude)
+        potential, alpha = self.unloaded_potential, self.start_state.amplitude
+        distances = [float(np.abs(each.amplitude - alpha).max()) for each in potential.wells]
+        if len(distances) < 2:
+            return "only"
+        return potential.well_names[int(np.argmin(distances))].removesuffix(" well")
+
+    @property
+    def initial_well_reason(self) -> str:
+        """Reason for the well that runs begin in, in a few words."""
+        if self.initial_state is not None:
+            return "side of the initial state"
+        if self.initial_well is not None:
+            return f"initial_well = {self.initial_well!r}"
+        if self.striker is not None:
+            return f"contact on side {self.striker.side!r}"
+        return "default" if self.model.as_fabricated_well is None else "as fabricated"
+
+    @property
+    def initial_well_text(self) -> str:
+        """Sentence part with the well that runs begin in and the reason."""
+        well = self.start_well
+        return f"{well if well[-1].isdigit() else f'{well} well'} ({self.initial_well_reason})"
 
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Diagnostics: values that look like another unit, and assumptions of the model that do not hold."""

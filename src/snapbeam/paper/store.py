@@ -10,6 +10,7 @@ import numpy as np
 
 from snapbeam.solver.fingerprint import solver_fingerprint
 from snapbeam.util.files import check_writable
+from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.netcdf import write_netcdf
 from snapbeam.util.validation import InputError
 
@@ -48,8 +49,11 @@ def load_results(path: Path, size: str | None = None) -> dict[str, xr.Dataset]:
     from snapbeam.util.datasets import xr
 
     try:
+        open_hdf5(path, "data").close()
         with xr.open_datatree(path, engine="h5netcdf") as tree:
             tree.load()
+    except InputError:
+        raise
     except Exception as error:  # of damaged bytes the libraries make errors of every kind
         raise InputError(f"data = {str(path)!r}: cannot be read, {error}") from error
     there = tree.attrs.get("paper_size")

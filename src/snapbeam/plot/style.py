@@ -306,7 +306,11 @@ def caption(dataset: xr.Dataset, lines: int = 1, axes: Sequence[str] = ()) -> st
         ):
             unit = row.quantity.unit
             how.append(f"{value:.4g} µm" if unit == "um" else prefixed(value, unit, 4))
-    parts.append(", ".join(how + base_and_load(dataset)))
+    how += base_and_load(dataset)
+    if "initial_well" in attrs and attrs["initial_well"] != "only":
+        well = str(attrs["initial_well"])
+        how.append(f"from {well}" if well[-1].isdigit() else f"from the {well} well")
+    parts.append(", ".join(how))
     text = ("\n" if lines > 1 else ", ").join(part for part in parts if part)
     kind = attrs.get("response_class")
     return f"{text}: {kind}" if isinstance(kind, str) and text else text

@@ -139,7 +139,8 @@ def advance(
 
 def tangent_obstacle(system: System) -> str | None:
     """The part that the tangent flow of the steps does not contain; None if it contains the whole system."""
-    if any(not (each.law.properties.smooth and each.law.properties.tangent) for each in system.contacts):
+    laws = [each.law for each in system.contacts]
+    if any(law.is_dissipative or not (law.properties.smooth and law.properties.tangent) for law in laws):
         return "a contact force that jumps, depends on the velocity or has a memory"
     if any(each.striker.mass is not None for each in system.contacts):
         return "a striker with a mass"

@@ -48,7 +48,7 @@ MEMORY_LIMIT = 4 * 2**30
 """Maximum memory of the samples of a run, bytes."""
 _ENERGY_ERROR = 1e-3
 """Energy-balance error, over the gross work, above which a run gets a diagnostic."""
-_ENDED = (RunStatus.OK, RunStatus.EARLY_STOP)
+_ENDED = (RunStatus.OK, RunStatus.EARLY_STOP, RunStatus.INTERRUPTED)
 
 
 # Attributes of datasets: all parameters by name.
@@ -77,10 +77,8 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
     if model.imperfection is not None:
         attrs |= _short(model.imperfection)
     if model.transverse_force is not None:
-        attrs |= {
-            "reference_well": model.reference_well,
-            "initial_well": model.side_of(system.start_state.amplitude),
-        }
+        attrs["reference_well"] = model.reference_well
+    attrs |= {"initial_well": system.start_well, "initial_well_reason": system.initial_well_reason}
     if not model.is_bistable:
         attrs["wells"] = 1
     if system.contacts[1:]:
@@ -208,9 +206,10 @@ def run_attributes(run: Prepared, summary: RunSummary, accumulators_of_runs: Any
     attrs = attributes_of("run of a struck bistable beam", run.system, run.integration, run.plan, more)
     attrs["gross_work"] = float(accumulators_of_runs["gross_work"][0])
     missed, scale = _energy_balance(accumulators_of_runs)
-    attrs["energy_error"] = missed / scale
+    ended = summary.status is not RunStatus.INTERRUPTED  # the balance is closed at the end of a run alone
+    attrs["energy_error"] = missed / scale if ended else math.nan
     rounding = float(rounding_energy(run.ensemble, accumulators_of_runs)[0])
-    if summary.status is not RunStatus.DIVERGED and abs(missed) > _ENERGY_ERROR * scale + rounding:
+    if ended and summary.status is not RunStatus.DIVERGED and abs(missed) > _ENERGY_ERROR * scale + rounding:
         tell(
             [
                 Diagnostic(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,9 +19,9 @@ from snapbeam.simulation.summary import RunSummary
 from snapbeam.solver.registry import engine_of
 from snapbeam.solver.statistics import Recorded, statistics_of
 from snapbeam.util.diagnostics import sharing
-from snapbeam.util.files import check_writable
+from snapbeam.util.files import NoRoomError, check_writable
 from snapbeam.util.interrupts import raise_held
-from snapbeam.util.netcdf import netcdf_file
+from snapbeam.util.netcdf import netcdf_stream, read_netcdf
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputTypeError, instance, shown
 
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 _KEPT_BACK = 4096
 """Samples of a piece that are not written yet, because the next piece may contain earlier ones."""
+_END = 2**20
+"""Bytes for the summary, the attributes and the structure of the file."""
 _CHUNK = 2**16
 """Numbers in a chunk of a variable."""
 
@@ -70,7 +73,8 @@ def simulate_to_file(
     InputError
         If the sample times are not increasing times within the run.
     NoRoomError
-        If the disk is full.
+        If the disk is full.  The run ends before the part for which there is no room; the file has the samples up to
+        there, the status ``INTERRUPTED`` and the state to continue from.
 
     Examples
     --------
@@ -95,14 +99,33 @@ def simulate_to_file(
         if report is not None:
             report(share)
 
-    with netcdf_file(target) as file:
+    full = False
+    with netcdf_stream(target) as (file, stream):
         writer = _Writer(file, run)
         for piece in engine_of(run.ensemble).record(run.ensemble, run.instants, run.times is None, reported):
+            full = not stream.reserve(writer.room(piece))
+            if full and writer.waiting is not None:
+                break
             writer.take(piece)
+            if (
+                full or stream.trouble is not None
+            ):  # not even the first piece: an error below says where it is
+                break
         summary = writer.finish()
+    if full and summary.status is RunStatus.INTERRUPTED:
+        raise _stopped(target)
     if report is not None:
         report(1.0)
     return summary
+
+
+def _stopped(target: Path) -> NoRoomError:
+    with read_netcdf(target, lazily=True) as kept:
+        end = float(kept["time"][-1])
+    return NoRoomError(
+        f"{str(target)!r}: the disk is full; the run was stopped at {end:.6g} s, and the file is whole up to there.  Make "
+        "room and continue in another file, with initial_state = snapbeam.load(...).final_state of this one"
+    )
 
 
 class _Writer:
@@ -112,6 +135,13 @@ class _Writer:
         self.file, self.run, self.written = file, run, 0
         self.waiting: Recorded | None = None
         self.impacts: list[Any] = []
+
+    def room(self, piece: Recorded) -> int:
+        """Bytes on the disk that suffice to write a piece, and the end of the file after it."""
+        parts = [piece] if self.waiting is None else [self.waiting, piece]
+        samples = sum(array.nbytes for part in parts for array in (part.times, part.q, part.p, part.values))
+        impacts = sum(rows.nbytes for rows in (*self.impacts, piece.impacts))
+        return 4 * (samples + impacts) + _END  # derived variables, and chunks that are written twice
 
     def take(self, piece: Recorded) -> None:
         """Write a piece without its last samples, which wait for the next piece."""

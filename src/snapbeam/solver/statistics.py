@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.early_termination import crossing_energy, decidable_energy, passed_heights
+from snapbeam.model.extension import takes
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.terms import WORKS
 from snapbeam.util.status_codes import ResponseClass, RunStatus, class_of
@@ -414,6 +415,13 @@ def register_statistic(statistic: Statistic) -> None:
         raise InputError(f"statistic {statistic.name!r}: must be a name, such as 'rms_force'")
     if statistic.name in STATISTICS:
         raise InputError(f"statistic {statistic.name!r}: there is one of that name")
+    results = ("reading",) if statistic.update is None else ("reading", "held")
+    for hook, names in (("value", results), ("update", ("held", "step"))):
+        function = getattr(statistic, hook)
+        if function is not None and not takes(function, len(names)):
+            raise InputError(
+                f"statistic {statistic.name!r}: {hook} must be a function of ({', '.join(names)})"
+            )
     STATISTICS[statistic.name] = statistic
 
 

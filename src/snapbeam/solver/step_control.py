@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from snapbeam.solver.compilation import compiled, inlined
@@ -134,10 +135,11 @@ def accumulate_open_contact(accumulators, law, end, tick):
 
 @compiled
 def safe_interval(distance, bound, tip_speed, acceleration, step):
-    """For how long a signal at *distance* from zero cannot reach it, at most a few steps."""
+    """For how long a signal at *distance* from zero cannot reach it, at most a few steps; 0 if a bound is not finite."""
     horizon = TRUST * step
     speed = _MARGIN * bound + tip_speed + abs(acceleration) * horizon
-    return select_less(distance, speed * horizon, distance / speed, horizon)
+    safe = select_less(distance, speed * horizon, distance / speed, horizon)
+    return select_less(speed, math.inf, safe, 0.0 * horizon)
 
 
 @compiled

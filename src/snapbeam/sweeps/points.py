@@ -19,7 +19,15 @@ from snapbeam.model.parameter_axes import (
     ratios_of,
     unit_of,
 )
-from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, parameters, ratio_of, short_names
+from snapbeam.model.parameters import (
+    PHYSICAL,
+    Parameter,
+    lookup,
+    parameters,
+    ratio_of,
+    refuse_well_axis,
+    short_names,
+)
 from snapbeam.model.quantity import split_name
 from snapbeam.util.provenance import array_hash
 from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, shown
@@ -262,6 +270,7 @@ def _array(name: str, values: Any) -> NDArray[Any]:
 
 def _axis(row: Parameter, name: str, values: Any) -> NDArray[Any]:
     """Return the checked values of one axis: increasing numbers, or different words."""
+    refuse_well_axis(row)
     item = row.quantity
     if item.kind in (str, bool):
         words = [item.check(name, value) for value in np.atleast_1d(_array(name, values)).tolist()]

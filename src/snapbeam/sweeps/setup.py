@@ -298,10 +298,11 @@ class SweepSetup:
                 "length_scale",
                 "reference_well",
                 "initial_well",
+                "initial_well_reason",
                 "wells",
             }
         if any(name == "contact.side" or name.startswith("initial_state.") for name in self.points.names):
-            varied.add("initial_well")
+            varied |= {"initial_well", "initial_well_reason"}
         beam = self.system.model.beam
         if beam is not None and any(name.startswith(("beam.", "boundary.")) for name in self.points.names):
             # the one that follows from the other differs at every point

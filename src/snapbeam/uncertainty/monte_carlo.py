@@ -172,7 +172,13 @@ class Trials:
     def _nominal(self, name: str) -> float:
         value = self.system.get(name) if ratio_of(name) in self.system.parameters else None
         if value is None or np.ndim(value) != 0:
-            raise InputError(f"{name}: has no single value in this system to be drawn about")
+            same = [
+                each for each in self.system.parameters if split_name(each)[1] == split_name(name)[1] != ""
+            ]
+            way = f"; this system has {', '.join(same)}" if value is None and same else ""
+            if way and name == "drive.phase":
+                way += ": leave phase = True out, and give it as a UniformRange(0, 2 pi)"
+            raise InputError(f"{name}: has no single value in this system to be drawn about{way}")
         return float(value)
 
     def _hold(self, points: Columns, found: Columns, size: int, known: set[str]) -> None:

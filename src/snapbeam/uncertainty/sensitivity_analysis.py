@@ -23,6 +23,7 @@ from snapbeam.uncertainty.distributions import ParameterUncertainty
 from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, require_held, trials_of
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.provenance import canonical_json
+from snapbeam.util.singular_values import polyfit
 from snapbeam.util.validation import (
     InputError,
     axis,
@@ -465,7 +466,7 @@ class NotchQoI:
 
 def _vertex(x: _Array, y: _Array) -> tuple[float, float]:
     """Place and height of the lowest point of the parabola through three points of which the middle is lowest."""
-    a, b, c = np.polyfit(x - x[1], y, 2)
+    a, b, c = polyfit(x - x[1], y, 2)
     if not a > 0.0:
         return float(x[1]), float(y[1])
     place = float(np.clip(-0.5 * b / a, x[0] - x[1], x[2] - x[1]))

@@ -223,7 +223,7 @@ def check_writable(
     Raises
     ------
     InputError
-        If the folder is missing or cannot be written to, *path* is a folder, its suffix is not allowed, or a
+        If the folder is missing or cannot be written to, *path* is a folder, a device or a pipe, its suffix is not allowed, or a
         command would replace what is not snapbeam's.
     """
     target = file_path(name, path)
@@ -231,6 +231,10 @@ def check_writable(
         raise InputError(f"{name} = {str(path)!r}: must end in {' or '.join(suffixes)}")
     if target.is_dir():
         raise InputError(f"{name} = {str(path)!r}: must be a file, not a folder")
+    if (
+        target.exists() and not target.is_file()
+    ):  # to open a pipe waits for its reader; a device would be replaced
+        raise InputError(f"{name} = {str(path)!r}: must be a regular file, not a device, a pipe or a socket")
     folder = target.parent
     if not folder.is_dir():
         raise InputError(

@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -21,6 +22,8 @@ WORDS = "interrupted; no file was left half written"
 _SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 _GRACE = 0.5
 """Seconds that the main thread has to react, before the program ends if it compiles or holds signals back."""
+_LONGEST = 5.0
+"""Seconds after which the program ends if the main thread has not reacted, as in a call of a library that does not end."""
 
 
 @dataclass
@@ -118,13 +121,21 @@ def _stop(number: int, frame: FrameType | None) -> None:
 
 
 def _watch(reader: int) -> None:
-    """End a program whose main thread compiles or writes a large file: it reacts to a signal only after seconds."""
+    """End a program whose main thread compiles, writes a large file or is in a call that does not end.
+
+    It reacts to a signal only after seconds, or never.  A call of a library that keeps the interpreter's lock keeps this
+    thread waiting too.
+    """
     while data := os.read(reader, 1):
-        while data[0] in _SIGNALS and not _State.heard.wait(_GRACE):
-            if _State.held is not None or _compiles(
-                sys._current_frames().get(threading.main_thread().ident or 0)
-            ):
+        if data[0] not in _SIGNALS:
+            continue
+        since = time.monotonic()
+        while not _State.heard.wait(_GRACE):
+            late = time.monotonic() - since >= _LONGEST
+            frame = sys._current_frames().get(threading.main_thread().ident or 0)
+            if late or _State.held is not None or _compiles(frame):
                 _leave(data[0])
+        _State.heard.clear()  # the next signal must be heard too, while the program closes its files
 
 
 def _compiles(frame: FrameType | None) -> bool:

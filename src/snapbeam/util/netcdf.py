@@ -2,7 +2,8 @@
 
 The HDF5 library cannot be stopped while it writes: a disk that fills ends in a file that it cannot close, and may take
 the process with it.  So it writes to a stream that does not fail.  What the disk has no room for is held in memory;
-once the library is done, the file is put where there is room, and the error says where, and how much was needed.
+once the library is done, the file is put where there is room, and the error says where, and how much was needed.  A file
+that grows without end reserves room on the disk before each part, and ends before the part for which there is none.
 """
 
 from __future__ import annotations
@@ -19,47 +20,13 @@ from typing import TYPE_CHECKING, Any
 
 from snapbeam._version import __version__
 from snapbeam.util.files import REQUEST, VERSION, NoRoomError, atomic_path, check_writable, request_hash
-from snapbeam.util.input_files import refuse_inflated
+from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.interrupts import held_back, raise_held
 from snapbeam.util.validation import InputError, file_path, instance, mapping
 
 if TYPE_CHECKING:
     import h5netcdf
     import xarray as xr
-
-_MOST_TEXTS = 100_000
-
-
-def refuse_large(path: str | os.PathLike[str], name: str = "path") -> None:
-    """Refuse an HDF5 file whose contents fill the memory although the file is small.
-
-    Parameters
-    ----------
-    path : path
-    name : str
-        The parameter to name in a refusal.
-
-    Raises
-    ------
-    InputError
-        For content that :func:`~snapbeam.util.input_files.refuse_inflated` refuses, and for more than 100,000 texts.
-    """
-    import h5py
-
-    size = texts = 0
-
-    def add(_: str, item: Any) -> None:
-        nonlocal size, texts
-        if not isinstance(item, h5py.Dataset) or not item.size:
-            return
-        size += item.size * max(item.dtype.itemsize, 8)
-        texts += item.size if item.dtype.hasobject else 0
-
-    with h5py.File(path, "r") as file:
-        file.visititems(add)
-    refuse_inflated(name, path, size)
-    if texts > _MOST_TEXTS:
-        raise InputError(f"{name} = {str(path)!r}: has {texts} texts: must be at most {_MOST_TEXTS}")
 
 
 def read_netcdf(
@@ -81,7 +48,7 @@ def read_netcdf(
         with open(path, "rb") as file:
             if file.read(3) == b"CDF" and group is None:  # version 3, whose layout is not that of HDF5
                 return read(path, engine="scipy")
-        refuse_large(path, name)
+        open_hdf5(path, name).close()
         return read(path, engine="h5netcdf", group=group)
     except (InputError, MemoryError):
         raise
@@ -116,7 +83,7 @@ def read_result(path: str | os.PathLike[str], name: str = "path", *, lazily: boo
         dataset = read_netcdf(file, name, lazily=lazily)
         if dataset.variables:
             return dataset
-    with h5py.File(file, "r") if file.is_file() else nullcontext({}) as stored:
+    with open_hdf5(file, name) if file.is_file() else nullcontext({}) as stored:
         groups = [each for each in stored if isinstance(stored[each], h5py.Group)]
     if group is None and groups:
         raise InputError(
@@ -183,11 +150,18 @@ def netcdf_file(path: str | os.PathLike[str]) -> Iterator[h5netcdf.File]:
 
     Signals are held back in the block, apart from calls of :func:`~snapbeam.util.interrupts.raise_held`.
     """
+    with netcdf_stream(path) as (file, _):
+        yield file
+
+
+@contextmanager
+def netcdf_stream(path: str | os.PathLike[str]) -> Iterator[tuple[h5netcdf.File, DiskStream]]:
+    """Give what :func:`netcdf_file` gives, and the stream, which reserves room on the disk for a file that grows."""
     import h5netcdf
 
     with held_back(), atomic_path(path) as temporary, hdf5_stream(temporary, Path(path)) as stream:
         with h5netcdf.File(stream, "w", invalid_netcdf=False) as file:
-            yield file
+            yield file, stream
             if VERSION not in file.attrs:
                 file.attrs[VERSION] = __version__
             if (request := request_hash()) is not None:
@@ -195,33 +169,32 @@ def netcdf_file(path: str | os.PathLike[str]) -> Iterator[h5netcdf.File]:
 
 
 @contextmanager
-def hdf5_stream(path: Path, target: Path | None = None) -> Iterator[io.RawIOBase]:
+def hdf5_stream(path: Path, target: Path | None = None) -> Iterator[DiskStream]:
     """Give a stream that h5py can write to, and have what it wrote in the file *path*.
 
     *target* is the name to tell in errors, those of :func:`write_netcdf`.
     """
-    with held_back() as incomplete, _Stream(path) as stream:
+    with held_back() as incomplete, DiskStream(path) as stream:
         incomplete.add(path)
         yield stream
         stream.settle()
-    if stream.trouble is not None:
-        raise _kept_elsewhere(target or path, stream)
+        if stream.trouble is not None:
+            raise _kept_elsewhere(target or path, stream)
 
 
-def _kept_elsewhere(target: Path, stream: _Stream) -> NoRoomError:
+def _kept_elsewhere(target: Path, stream: DiskStream) -> NoRoomError:
     """Save what did not fit where there is room, if there is; the error to raise."""
-    size = len(stream.held.getbuffer())
-    free = _free(target.parent)
+    free = _free(target.parent, stream)
     there = f", {free / 1e6:.3g} MB are free" if free is not None else ""
     words = (
         f"{str(target)!r}: cannot be written, {stream.trouble.strerror or stream.trouble}; "  # type: ignore[union-attr]
-        f"it needs {max(size, 1000) / 1e6:.3g} MB{there}"
+        f"it needs {max(stream.size, 1000) / 1e6:.3g} MB{there}"
     )
     try:
         handle, name = tempfile.mkstemp(prefix=f"{target.stem}.", suffix=target.suffix)
         try:
             with os.fdopen(handle, "wb") as file:
-                file.write(stream.held.getbuffer())
+                stream.copy(file)
                 file.flush()
                 os.fsync(file.fileno())
         except BaseException:
@@ -232,90 +205,164 @@ def _kept_elsewhere(target: Path, stream: _Stream) -> NoRoomError:
     return NoRoomError(f"{words}; it was written to {name!r} instead")
 
 
-def _free(folder: Path) -> int | None:
+def _free(folder: Path, stream: DiskStream) -> int | None:
+    """Bytes that are free on the disk once the incomplete file is removed."""
     try:
-        return shutil.disk_usage(folder).free
+        return shutil.disk_usage(folder).free + stream.on_disk()
     except OSError:
         return None
 
 
-class _Stream(io.RawIOBase):
-    """A file on disk that goes on in memory once the disk fails."""
+_PAGE = 2**16
+
+
+class DiskStream(io.RawIOBase):
+    """A file on disk whose further changes are held in memory once the disk fails.
+
+    The file may be longer than its content: :meth:`reserve` takes room on the disk before it is needed.
+    """
 
     def __init__(self, path: Path) -> None:
         self._file: Any = path.open("w+b", buffering=0)
-        self.held = io.BytesIO()
-        """The file, once the disk has failed."""
+        self.size = self._at = self._reserved = 0
+        self._pages: dict[int, bytearray] = {}
+        """Parts of the content that differ from those on the disk, once the disk has failed."""
         self.trouble: OSError | None = None
 
-    @property
-    def _at(self) -> Any:
-        return self._file if self.trouble is None else self.held
+    def on_disk(self) -> int:
+        """Return the bytes that the file takes on the disk."""
+        found = os.fstat(self._file.fileno())
+        return getattr(found, "st_blocks", 0) * 512 or found.st_size
+
+    def reserve(self, more: int) -> bool:
+        """Take room on the disk for so many bytes after the content; return False if there is none."""
+        if self.trouble is not None:
+            return False
+        zeros = bytes(2**20)
+        try:
+            self._file.seek(begin := max(self._reserved, self.size))
+            while begin < self.size + more:
+                begin += self._file.write(zeros[: self.size + more - begin])
+                self._reserved = begin
+        except OSError:
+            return False
+        return True
 
     def write(self, data: Any) -> int:
+        """Write at the present place, to the disk or to memory."""
         view = memoryview(data).cast("B")
-        start, done = self.tell(), 0
-        while self.trouble is None and done < len(view):
-            try:
+        done = 0
+        try:
+            while self.trouble is None and done < len(view):
+                self._file.seek(self._at + done)
                 done += self._file.write(view[done:])
-            except OSError as error:
-                self._give_up(error, start + done)
-        if done < len(view):
-            self.held.write(view[done:])
+                self.size = max(self.size, self._at + done)
+        except OSError as error:
+            self.trouble = error
+        while done < len(view):
+            number, begin = divmod(self._at + done, _PAGE)
+            part = view[done : done + _PAGE - begin]
+            self._page(number)[begin : begin + len(part)] = part
+            done += len(part)
+        self._at += len(view)
+        self.size = max(self.size, self._at)
         return len(view)
 
-    def _give_up(self, error: OSError, at: int) -> None:
-        """Take what is on the disk into memory, and leave the disk alone."""
-        self._file.seek(0)
-        self.held.write(self._file.read())
-        self.held.seek(at)
-        self.trouble = error
-        self._file.truncate(0)
+    def _page(self, number: int) -> bytearray:
+        """A part of the content, to be changed in memory."""
+        if number not in self._pages:
+            self._pages[number] = bytearray(self._stored(number * _PAGE, _PAGE).ljust(_PAGE, b"\0"))
+        return self._pages[number]
+
+    def _stored(self, at: int, count: int) -> bytes:
+        """Content on the disk, as far as it is there."""
+        self._file.seek(at)
+        data = b""
+        while part := self._file.read(max(0, min(count, self.size - at) - len(data))):
+            data += part
+        return data
+
+    def _content(self, at: int, count: int) -> bytes:
+        """Content from one place, up to the end of a page."""
+        number, begin = divmod(at, _PAGE)
+        count = min(count, _PAGE - begin, self.size - at)
+        page = self._pages.get(number)
+        return (
+            (self._stored(at, count).ljust(count, b"\0"))
+            if page is None
+            else bytes(page[begin : begin + count])
+        )
+
+    def copy(self, file: Any) -> None:
+        """Write the content to another file."""
+        at = 0
+        while at < self.size:
+            at += file.write(self._content(at, _PAGE))
 
     def settle(self) -> None:
-        """Have all of it on the disk, as far as it went there."""
+        """Have all of it on the disk, as far as it went there, and give the reserved room back."""
         if self.trouble is None:
             try:
+                self._file.truncate(self.size)
                 os.fsync(self._file.fileno())
             except OSError as error:
                 if error.errno not in (errno.EINVAL, errno.ENOTSUP):
-                    self._give_up(error, 0)
+                    self.trouble = error
 
     def readinto(self, buffer: Any) -> int:
-        return int(self._at.readinto(buffer))
+        """Read from the present place."""
+        view, done = memoryview(buffer).cast("B"), 0
+        while done < len(view) and self._at < self.size:
+            part = self._content(self._at, len(view) - done)
+            view[done : done + len(part)] = part
+            self._at += len(part)
+            done += len(part)
+        return done
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        return int(self._at.seek(offset, whence))
+        """Set the present place."""
+        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self.size}[whence]
+        return self._at
 
     def tell(self) -> int:
-        return int(self._at.tell())
+        """Return the present place."""
+        return self._at
 
     def truncate(self, size: int | None = None) -> int:
-        if self.trouble is None:
+        """Set the size of the content."""
+        asked = self._at if size is None else size
+        if self.trouble is None and asked > self._reserved:
             try:
-                return int(self._file.truncate(size))
+                self._file.truncate(asked)
             except OSError as error:
-                self._give_up(error, self._file.tell())
-        asked = self.held.tell() if size is None else size
-        end = len(self.held.getbuffer())
-        if asked > end:
-            at = self.held.tell()
-            self.held.seek(end)
-            self.held.write(bytes(asked - end))
-            self.held.seek(at)
-            return asked
-        return self.held.truncate(asked)
+                self.trouble = error
+        if asked < self.size:
+            self._clear(asked)
+        self.size = asked
+        return asked
+
+    def _clear(self, begin: int) -> None:
+        """Make zeros of the content from a place on: it is not there any more."""
+        at, end = self._at, self.size
+        self._at = begin
+        while self._at < end:
+            self.write(bytes(min(_PAGE, end - self._at)))
+        self._at = at
 
     def readable(self) -> bool:
+        """Return True."""
         return True
 
     def writable(self) -> bool:
+        """Return True."""
         return True
 
     def seekable(self) -> bool:
+        """Return True."""
         return True
 
     def close(self) -> None:
+        """Close the file on the disk."""
         if not self.closed:
             self._file.close()
         super().close()

@@ -32,6 +32,7 @@ __all__ = [
     "code_hash",
     "command_line",
     "created_now",
+    "encodable",
     "made_by",
     "parameter_hash",
     "platform_name",
@@ -89,14 +90,21 @@ def created_now() -> str:
 
 
 def command_line(argv: Sequence[str] | None = None) -> str:
-    """Return the command that runs, each absolute path in it shortened to its last part.
+    r"""Return the command that runs, each absolute path in it shortened to its last part.
+
+    Bytes of names that are not UTF-8, which no file format takes as text, are written as ``\xff``.
 
     Parameters
     ----------
     argv : sequence of str, optional
         The program and its arguments; ``sys.argv`` by default.
     """
-    return " ".join(_without_directory(word) for word in (sys.argv if argv is None else argv))
+    return " ".join(encodable(_without_directory(word)) for word in (sys.argv if argv is None else argv))
+
+
+def encodable(text: str) -> str:
+    r"""Return text with bytes of a file name that are not UTF-8 as ``\xff``, so that every file format takes it."""
+    return text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
 def _without_directory(word: str) -> str:

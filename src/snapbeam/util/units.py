@@ -13,6 +13,9 @@ from snapbeam.util.validation import InputError
 
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _TEXT = re.compile(rf"\s*([-+]?{_NUMBER})(?:\s*/\s*({_NUMBER}))?\s*(\D.*?)?\s*", re.DOTALL)
+_OPERATOR = re.compile(r"(?<!\*)\s*([*/])\s*(?=[-+]?(?:\d|\.\d))")
+"""Operator before a number, between two factors of a product; a power, ``m**2``, has none."""
+_FACTOR = re.compile(rf"\s*([-+]?{_NUMBER})\s*(\D.*?)?\s*", re.DOTALL)
 _ANGLE = "radian"
 
 
@@ -71,16 +74,49 @@ def number_in_unit(text: str, unit: str) -> float | None:
         If the unit of the text does not fit.
     """
     found = _TEXT.fullmatch(text)
-    if found is None or (found[2] is not None and float(found[2]) == 0.0):
+    if found is None or (found[3] and _OPERATOR.search(found[3])):
+        return _product(text, unit)
+    if found[2] is not None and float(found[2]) == 0.0:
         return None
-    value = float(found[1]) / float(found[2] or 1.0)
-    if not found[3]:
-        return value
-    factor = conversion_factor(found[3], unit)
-    if factor is None:
-        must = "a number without a unit" if unit == "1" else f"in {unit}"
-        raise InputError(f"the unit {found[3]!r} does not fit; must be {must}")
-    if not math.isfinite(value * factor) or value == 0.0:  # exponents that a fraction would write out
+    return _converted([(found[1], False), (found[2] or "1", True)], found[3] or "", unit)
+
+
+def _converted(numbers: list[tuple[str, bool]], given: str, unit: str) -> float:
+    """The product of numbers, each of which may be a divisor, from the unit *given* to *unit*."""
+    value = math.prod(1.0 / float(text) if divides else float(text) for text, divides in numbers)
+    if given:
+        factor = conversion_factor(given, unit)
+        if factor is None:
+            must = "a number without a unit" if unit == "1" else f"in {unit}"
+            raise InputError(f"the unit {given!r} does not fit; must be {must}")
+    else:
+        factor = 1.0
+    if (
+        not math.isfinite(value * factor) or value * factor == 0.0
+    ):  # exponents that a fraction would write out
         return value * factor
-    exact = Fraction(found[1]) / Fraction(found[2] or 1) * Fraction(repr(factor))
+    exact = Fraction(repr(factor))
+    for text, divides in numbers:
+        exact = exact / Fraction(text) if divides else exact * Fraction(text)
     return float(exact)  # rounded once: 10 um is 1e-5 m to the last digit
+
+
+def _product(text: str, unit: str) -> float | None:
+    """The number of a product or a quotient of numbers with units, such as ``"200 um * 30 um"``; None if it is none."""
+    numbers, given = [], ""
+    parts = _OPERATOR.split(text)
+    for operator, part in zip(["*", *parts[1::2]], parts[::2], strict=True):
+        found = _FACTOR.fullmatch(part)
+        divides = operator == "/"
+        if found is None or len(parts) == 1 or (divides and float(found[1]) == 0.0):
+            return None
+        numbers.append((found[1], divides))
+        if found[2]:
+            given += (
+                f" {operator} ({found[2]})"
+                if given
+                else f"({found[2]})"
+                if not divides
+                else f"1 / ({found[2]})"
+            )
+    return _converted(numbers, given, unit)

@@ -33,6 +33,7 @@ from snapbeam.lab.least_squares import widened
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import fit_sine
 from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.singular_values import polyfit
 from snapbeam.util.validation import InputError
 
 _MISFIT = 1.7  # times the noise that a fit may leave near the first mode
@@ -219,7 +220,7 @@ def mode_by_cycles(
     start = float(rest.time[0])
     cycles = maker(rest, center, sigma)
     estimate = regress(cycles, start, units, method, soften)
-    mean = float(np.polyfit(cycles.time, cycles.phase, 1, w=cycles.amplitude)[0] / (2.0 * math.pi))
+    mean = float(polyfit(cycles.time, cycles.phase, 1, w=cycles.amplitude)[0] / (2.0 * math.pi))
     if 0.8 * center < mean < 1.2 * center:
         cycles = maker(rest, mean, sigma)
         estimate = regress(cycles, start, units, method, soften)

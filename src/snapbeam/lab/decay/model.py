@@ -26,6 +26,7 @@ from snapbeam.lab.decay.poles import Line, Stabilisation, damped_waves
 from snapbeam.lab.least_squares import phasors, weighted_line
 from snapbeam.lab.signals import SignalSamples, check_signal
 from snapbeam.util.diagnostics import Diagnostic, doubtful
+from snapbeam.util.singular_values import lstsq, pinv
 from snapbeam.util.validation import InputError, nonnegative, positive
 
 if TYPE_CHECKING:
@@ -293,7 +294,7 @@ def _weighted(basis: _Array, target: _Array, weight: _Array) -> tuple[_Array, _A
     """Weighted linear least squares: the solution, and its covariance for unit noise."""
     scale = np.linalg.norm(basis, axis=0)
     heavy = basis / scale * weight[:, None]
-    gram = np.linalg.pinv(heavy.T @ (basis / scale)) / np.outer(scale, scale)
+    gram = pinv(heavy.T @ (basis / scale)) / np.outer(scale, scale)
     return gram @ (scale * (heavy.T @ target)), gram
 
 
@@ -363,7 +364,7 @@ def find_law(cycles: Cycles, start: float, decay_rate: float) -> tuple[DampingLa
         bounds = [-np.inf, -np.inf, 0.0][:n], [np.inf] * n
         found = least_squares(miss, guess, bounds=bounds, x_scale=[0.1, 0.3, 0.3][:n])
         gram = found.jac.T @ found.jac
-        spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(gram)), 0.0))
+        spread = np.sqrt(np.maximum(np.diag(pinv(gram)), 0.0))
         return found.x, 2.0 * float(found.cost), spread
 
     rate = max(decay_rate, 1e-6)
@@ -429,7 +430,7 @@ def _complex_amplitudes(samples: SignalSamples, fit: DecayFit) -> list[complex]:
     inside = (samples.time >= fit.start - 1e-12) & (samples.time <= fit.stop + 1e-12)
     t, y = samples.time[inside] - fit.start, samples.values[inside]
     design = damped_waves(t, [(mode.natural_frequency, mode.damping_ratio) for mode in fit.modes])
-    return phasors(np.asarray(np.linalg.lstsq(design, y, rcond=None)[0], dtype=np.float64)).tolist()
+    return phasors(np.asarray(lstsq(design, y), dtype=np.float64)).tolist()
 
 
 # The paper tests both and finds 81.3 and 80.5 Hz (section 2).

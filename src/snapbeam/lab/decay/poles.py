@@ -21,6 +21,7 @@ from scipy.signal import fftconvolve
 from snapbeam.lab.least_squares import solve
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import fit_sine
+from snapbeam.util.singular_values import lstsq
 from snapbeam.util.validation import InputError
 
 _Array = NDArray[np.float64]
@@ -232,13 +233,13 @@ def find_drift(samples: SignalSamples, frequency: float, decay_rate: float) -> t
     mean = fftconvolve(samples.values, bell / bell.sum(), mode="valid")[::width]
     at = np.arange(mean.size) * width + width
     fall = np.column_stack([np.ones(mean.size), np.exp(-2.0 * decay_rate * at / samples.sampling_frequency)])
-    rest = mean - fall @ np.linalg.lstsq(fall, mean, rcond=None)[0]
+    rest = mean - fall @ lstsq(fall, mean)
     x = 2.0 * (at + 0.5) / n - 1.0
     largest = float(np.percentile(np.abs(samples.values - np.median(samples.values)), 99))
     best, chosen, solution = math.inf, 0, np.zeros(1)
     for degree in range(0, min(_HIGHEST_DEGREE, mean.size // 5) + 1):
         basis = np.polynomial.legendre.legvander(x, degree)
-        found = np.linalg.lstsq(basis, rest, rcond=None)[0]
+        found = lstsq(basis, rest)
         left = float(np.mean((rest - basis @ found) ** 2)) + (1e-4 * largest) ** 2
         score = mean.size * math.log(left) + 2.0 * (degree + 1) * math.log(mean.size)
         if score < best - 6.0:

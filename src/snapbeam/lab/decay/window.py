@@ -28,6 +28,7 @@ from snapbeam.lab.sensor_errors import Hypothesis, best_of
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import falling_window, highest_peak, stuck_runs
 from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.singular_values import lstsq, polyfit
 from snapbeam.util.validation import InputError, finite
 
 _Array = NDArray[np.float64]
@@ -140,14 +141,14 @@ def find_jump(cycles: Cycles) -> tuple[float, float] | None:
         return None
     log_a = np.log(cycles.amplitude)
     # cycles begin at whole samples, so they are not quite evenly spaced: their phase is told against time
-    phase = cycles.phase - np.polyval(np.polyfit(cycles.time, cycles.phase, 1), cycles.time)
+    phase = cycles.phase - np.polyval(polyfit(cycles.time, cycles.phase, 1), cycles.time)
     x = np.arange(span, dtype=np.float64)
     steps = np.zeros((2, n))
     errors = np.full(n, math.inf)
     for k in range(span, n - span - 1):
         for row, series in enumerate((log_a, phase)):
-            left = np.polyfit(x - span, series[k - span : k], 1)
-            right = np.polyfit(x + 2.0, series[k + 2 : k + 2 + span], 1)
+            left = polyfit(x - span, series[k - span : k], 1)
+            right = polyfit(x + 2.0, series[k + 2 : k + 2 + span], 1)
             steps[row, k] = np.polyval(right, 0.5) - np.polyval(left, 0.5)
         relative = cycles.noise / float(np.min(cycles.amplitude[k - span : k + span]))
         errors[k] = relative * math.sqrt(2.0 * (1.0 / span + 12.0 * (0.5 * span + 1.0) ** 2 / span**3))
@@ -213,7 +214,7 @@ def courses(cycles: Cycles, frequency: float) -> list[Hypothesis]:
             if columns[:2] == soft:
                 held[0, 3] = 1.0 / max(_SECOND * (found[2] / turns) ** 2 * turns, 1e-6)
             rows, aims = np.vstack([basis, held]) / scale, np.append(aim * weight, 0.0)
-            found = np.linalg.lstsq(rows, aims, rcond=1e-12)[0]
+            found = lstsq(rows, aims, rcond=1e-12)
             misfit, found = float(((aims - rows @ found) ** 2).sum()), found / scale
         return misfit, found
 
@@ -543,7 +544,7 @@ def noise_fall(rest: SignalSamples, frequency: float, decay_rate: float) -> Nois
     # a quantile q of the exponential distribution that a periodogram has, with lines that share a window of Hann
     spread = -math.sqrt(_QUANTILE / (1.0 - _QUANTILE)) / math.log(1.0 - _QUANTILE)
     error = 0.5 * spread * math.sqrt(1.5 / count)
-    slope, base = np.polyfit(t, y, 1)
+    slope, base = polyfit(t, y, 1)
     off = float(np.sqrt(np.mean((y - base - slope * t) ** 2)))
     fall = -float(slope) * rest.values.size / rest.sampling_frequency
     lever = math.sqrt(float(((t - t.mean()) ** 2).sum()))
@@ -558,7 +559,7 @@ def noise_fall(rest: SignalSamples, frequency: float, decay_rate: float) -> Nois
     if fall < max(_FALL, _CERTAIN_NOISE_FALL * 1.5 * error) or off > 2.0 * error or not late:
         return None
     seen = np.exp(-decay_rate * t)
-    rate = float(np.polyfit(t, y, 1, w=seen)[0])
+    rate = float(polyfit(t, y, 1, w=seen)[0])
     return NoiseFall(max(-rate, 0.0), math.exp(fall), False)
 
 

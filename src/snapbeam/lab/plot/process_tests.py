@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from snapbeam.plot.style import BEAM_COLOR, CLASS_COLORS, SHAKER_COLOR, figure_style, fix_ticks, new_figure
+from snapbeam.util.netcdf import read_netcdf
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError
 
@@ -65,9 +66,7 @@ def _thumbnail(ax: Axes, result: TestResult, path: Path) -> None:
     color = CLASS_COLORS[_LABELS.get(result.response_class, ResponseClass.UNKNOWN)]
     told = result.status != "measured"
     if path.exists() and not told:
-        from snapbeam.util.datasets import xr
-
-        with xr.open_dataset(path, engine="h5netcdf") as run:
+        with read_netcdf(path, lazily=True) as run:
             time = run["time"].values
             step = max(1, time.size // 2000)
             for name, line, width in (

@@ -17,6 +17,7 @@ from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import SineFit, fit_sine, spectral_peak
 from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.vibrometer import moving_part
+from snapbeam.util.singular_values import lstsq
 from snapbeam.util.validation import InputError
 
 _RATE = 1e-4  # of false alarms of a pattern over a recording with normal noise
@@ -104,7 +105,7 @@ def _steps(
     wave = np.column_stack([np.cos(turn), np.sin(turn)])
     since = part.time - part.time.mean()
     slope = part.values - part.values.mean()
-    slope = wave @ np.linalg.lstsq(wave, slope, rcond=None)[0]
+    slope = wave @ lstsq(wave, slope)
     slope = np.gradient(slope)
     begun = part.time - part.time[0]
     fading = [np.exp(-begun / (share * begun[-1]))[:, None] * wave for share in _FADING]

@@ -33,6 +33,7 @@ from snapbeam.lab.tracking.settings import (
     TipOutline,
     gather,
 )
+from snapbeam.util.singular_values import polyfit
 
 _WIDER = 1.6  # times the width that is explained
 _FAR = 5.0  # standard deviations of the thickness that are no chance
@@ -402,7 +403,7 @@ def measure_beam(view: BeamView, frames: NDArray[np.floating]) -> BeamRows:
 
 def _hollow(x: Floats, edges: Floats, slope: Floats, kept: NDArray[np.bool_]) -> Floats:
     """Rows at x = 0 of a parabola through *edges*, which are counted from the line through them."""
-    line = np.polyfit(x, x * x, 1)
+    line = polyfit(x, x * x, 1)
     bend = x * x - np.polyval(line, x)
     left = np.where(kept, edges - slope[:, None] * x, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -883,7 +884,7 @@ def exposure_blur(row: Floats, width: Floats, exposure: float | None) -> tuple[f
     if np.count_nonzero(used & (np.abs(np.nan_to_num(speed)) > 3.0 * _MOVES)) < _LEAST:
         return 0.0, 0.0
     x, y = speed[used] ** 2, width[used] ** 2
-    (slope, _), cover = np.polyfit(x, y, 1, cov=True)
+    (slope, _), cover = polyfit(x, y, 1, cov=True)
     opened = 1.0 if exposure is None else min(exposure, 1.0)
     more = float(slope) - opened**2 / 12.0
     certain = max(_LAG, _SURE_LAG * math.sqrt(float(cover[0, 0])))

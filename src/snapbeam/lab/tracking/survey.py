@@ -45,6 +45,7 @@ from snapbeam.lab.tracking.settings import (
     spread_columns,
 )
 from snapbeam.util.packages import needs
+from snapbeam.util.singular_values import lstsq, polyfit
 from snapbeam.util.validation import InputError
 
 # ----------------------------------------------------------------------------------------------------
@@ -436,7 +437,7 @@ def beam_view(
         # the surface is uneven on the scale of three pixels: neighbouring columns count as one
         independent = max(min(by_column.size, float(np.ptp(columns)) / 3.0), 1.0)
         error = float(np.std(by_column)) / math.sqrt(independent)
-        (lean, level), cover = np.polyfit(across, by_column, 1, cov="unscaled")
+        (lean, level), cover = polyfit(across, by_column, 1, cov="unscaled")
         left = float(np.std(by_column - lean * across))
         if abs(lean) * math.sqrt(independent / by_column.size) > _LEANS * left * math.sqrt(cover[0, 0]):
             thickness = float(level)
@@ -818,7 +819,7 @@ def find_apex(outline: TipOutline, rod: tuple[int, int], contact_column: float) 
 
     def fitted(centre: float) -> tuple[Floats, float]:
         design = np.stack([(u - centre) ** power for power in powers], axis=1)
-        solution = np.linalg.lstsq(design, v, rcond=None)[0]
+        solution = lstsq(design, v)
         return solution, float(np.mean((v - design @ solution) ** 2))
 
     spread = max(fitted(middle)[1], 1e-4)
@@ -968,7 +969,7 @@ def rod_sides(frames: NDArray[np.floating], rod: tuple[int, int], blur: float) -
     known &= np.abs(found - np.median(found[known])) < 1.0 if known.any() else known
     if np.count_nonzero(known) < _ROWS:
         return unknown
-    lean = float(np.polyfit(rows[known], middle[known], 1)[0])
+    lean = float(polyfit(rows[known], middle[known], 1)[0])
     across = 1.0 / math.sqrt(1.0 + lean * lean)
     scatter = float(np.std(found[known])) / math.sqrt(np.count_nonzero(known) / 3.0)
     return Rod(across * float(np.mean(found[known])), math.hypot(scatter, _SIDE), lean)

@@ -44,6 +44,7 @@ from snapbeam.lab.tracking.settings import (
 from snapbeam.lab.tracking.survey import CLIPPED, pixel_noise, saturation_level, survey
 from snapbeam.simulation.dataset import trajectory_dataset
 from snapbeam.util.diagnostics import Diagnostic, diagnostics_of, to_json
+from snapbeam.util.singular_values import polyfit
 from snapbeam.util.validation import InputError, InputTypeError, instance, integer, positive
 
 if TYPE_CHECKING:
@@ -702,7 +703,7 @@ def _crossing(
         return float(time[edge]), float("nan"), 0.5 * usual
     frame = abs(float(time[outside[0]] - time[edge]))
     for count in range(2, len(outside) + 1):
-        slope, level = np.polyfit(time[outside[:count]] - time[edge], gap[outside[:count]], 1)
+        slope, level = polyfit(time[outside[:count]] - time[edge], gap[outside[:count]], 1)
         # The line's error where it is continued to, about 2 noise/sqrt(count), in frames of the approach.
         if slope * step < 0.0 and 2.0 * noise / math.sqrt(count) < 0.2 * abs(slope) * frame:
             break

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from snapbeam.model.extension import check_names, check_pair
 from snapbeam.model.quantity import check_fields, numbers_type
 from snapbeam.util.validation import InputError
 
@@ -50,8 +51,8 @@ class ContactLaw:
     - ``energy(law, penetration)``: energy stored in the contact, J, whose derivative is the force;
     - ``slope(law, penetration)``: derivative of the force, N/m, for tangents and for the length of contact steps.
 
-    A law that loses energy (``rate_dependent``) has ``damping(law, penetration)`` besides, N s/m: its force is
-    max(0, force + damping times the rate of penetration).
+    A law that loses energy (``rate_dependent`` = True) has ``damping_coefficient(law, penetration)`` besides, N s/m: its force
+    is max(0, force + damping coefficient times the rate of penetration).
 
     A law with a state of its own (``memory``, the name of a residual indentation D, m, which is the last of the law's
     numbers) has the penetration measured from the indented surface, and besides
@@ -59,7 +60,8 @@ class ContactLaw:
     - ``yield_penetration(law)``: penetration beyond which D increases, m;
     - ``memory_after(law, deepest)``: D of a contact that unloads from a maximum penetration beyond it.
 
-    They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone, and never allocate.
+    They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone, and never allocate.  A name that none of these
+    hooks has is refused when the class is defined; names of your own begin with an underscore.
 
     Examples
     --------
@@ -71,6 +73,11 @@ class ContactLaw:
     '8.08e-05 s'
     """
 
+    hooks: ClassVar[tuple[str, ...]] = (
+        "name", "force", "energy", "slope", "rate_dependent", "damping_coefficient", "memory", "yield_penetration",
+        "memory_after", "properties", "impact_duration", "time_scale",
+    )  # fmt: skip
+    """Names that are read of a law of one's own."""
     name: ClassVar[str] = ""
     """In parameter files and attributes."""
     properties: ClassVar[LawProperties] = LawProperties()
@@ -100,7 +107,10 @@ class ContactLaw:
                     f"contact law {cls.name!r}: has no {' and no '.join(missing)}; write them as static methods of "
                     "(law, penetration): the force (N), its integral (J) and its derivative (N/m)"
                 )
+        check_names(cls)
         if cls.name:
+            check_pair(cls, "rate_dependent", ContactLaw, ["damping_coefficient"])
+            check_pair(cls, "memory", ContactLaw, ["yield_penetration", "memory_after"])
             LAWS[cls.name] = cls
 
     def __post_init__(self) -> None:

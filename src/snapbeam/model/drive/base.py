@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.model.extension import check_defined, check_names, overrides
 from snapbeam.model.quantity import check_fields, numbers_type
 from snapbeam.util.diagnostics import Diagnostic
-from snapbeam.util.validation import NamedTable
+from snapbeam.util.validation import InputError, NamedTable
 
 if TYPE_CHECKING:
     from snapbeam.model.reduced_model import ReducedModel
@@ -71,7 +72,12 @@ class Drive:
     Kernels see its motion as a function of one argument that grows by ``omega`` radians a second.  A drive that
     is not a sine brings ``motion(drive, memory, argument)``, a scalar function of numbers that every engine
     compiles for itself and that returns displacement (m) and velocity (m/s), and ``acceleration`` in the same
-    way (m/s^2); ``drive`` contains its numbers and ``memory[drive.table:]`` its samples.
+    way (m/s^2); ``drive`` contains its numbers and ``memory[drive.table:]`` its samples.  :class:`Timed` is the base of
+    drives that do not repeat.
+
+    The numbers have the names ``number_names``, of which ``omega`` is the first.  ``amplitudes`` names those that the motion is
+    proportional to, and ``discontinuities`` those that are times at which a derivative of the motion jumps.  A name that none
+    of the hooks has is refused when the class is defined; names of your own begin with an underscore.
 
     Examples
     --------
@@ -80,6 +86,14 @@ class Drive:
     True
     """
 
+    hooks: ClassVar[tuple[str, ...]] = (
+        "name", "number_names", "amplitudes", "discontinuities", "numbers", "cycle", "frequencies", "bounds",
+        "mirrored_bounds", "peak_acceleration", "motion", "acceleration", "samples", "diagnostics",
+        "file_keys", "file_gives",
+    )  # fmt: skip
+    """Names that are read of a drive of one's own."""
+    required: ClassVar[tuple[str, ...]] = ("numbers", "cycle", "bounds")
+    """Hooks without which a drive cannot move."""
     name: ClassVar[str] = ""
     """In parameter files and attributes."""
     harmonic: ClassVar[bool] = False
@@ -104,7 +118,21 @@ class Drive:
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
+        check_names(cls)
         if cls.name:
+            moving = ["motion", "acceleration"]
+            check_defined(cls, Drive, [*cls.required, *([] if cls.harmonic else moving)])
+            unread = [each for each in moving if cls.harmonic and overrides(cls, Drive, each)]
+            if unread:
+                raise InputError(f"{cls.__name__}.{unread[0]}: is not read of a sine; set harmonic = False")
+            for hook in ("discontinuities", "amplitudes"):
+                strange = set(getattr(cls, hook)) - set(cls.number_names)
+                # a drive that does not name its amplitudes has the default
+                if strange and (hook == "discontinuities" or cls.amplitudes is not Drive.amplitudes):
+                    raise InputError(
+                        f"{cls.__name__}.{hook} = {getattr(cls, hook)}: {', '.join(sorted(strange))} is not among the numbers "
+                        f"{', '.join(cls.number_names)}; name it in number_names, or leave it out of {hook}"
+                    )
             cls.registry[cls.name] = cls
 
     def __post_init__(self) -> None:
@@ -182,6 +210,8 @@ class Timed(Drive):
     """
 
     is_periodic = False
+    hooks = (*Drive.hooks, "shape_numbers")
+    required: ClassVar[tuple[str, ...]] = ("shape_numbers", "cycle", "bounds")
 
     def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """Numbers in addition to ``omega``."""

@@ -26,6 +26,7 @@ class Joined(Drive):
     motion the tip makes in the frame of the ends.
     """
 
+    hooks = (*Drive.hooks, "alone")
     alone: ClassVar[bool] = False
     """True if only one part moves, with its own argument."""
 

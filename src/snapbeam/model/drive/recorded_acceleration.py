@@ -264,8 +264,8 @@ class RecordedAcceleration(FileKeys, SampledAcceleration):
             refuse_drift(made.drift, f"an offset of {float(np.median(values)):.3g} m/s^2")
         return made
 
-    @staticmethod
-    def from_psd(psd: Any, duration_s: float, **options: Any) -> RandomVibration:
+    @classmethod
+    def from_psd(cls, psd: Any, duration_s: float, **options: Any) -> RandomVibration:
         """Return a random vibration by its power spectral density, a :class:`RandomVibration` with its *options*.
 
         Examples

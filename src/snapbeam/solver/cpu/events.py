@@ -355,12 +355,17 @@ def detect_contact_event(memory, layout, run, now, tip, step, kinematics1, scrat
             event, event_ticks = False, int(fraction * step.ticks) + 1
         return ContactEvent(event, event_ticks, onset_time, safe_gap, safe_center, subintervals, subinterval)
     size, known = layout.size, validity_horizon(layout, run.step_time)
+    may_hide = may_hide_onset(layout.terms) or layout.others is not None
     if after > safe_gap:
-        bound = speed_bound_with_terms(memory, layout, tip.drive, layout.contact, step.q, step.p, known)
+        bound = speed_bound_with_terms(
+            memory, layout, tip.drive, layout.contact, step.q, step.p, step.k, known
+        )
         push = dot(memory, size, layout.contact, step.k)
         safe_gap = now.t + int(safe_interval(-kinematics.d, bound, run.tip_speed, push, known) / tick)
     if after > safe_center:
-        bound = speed_bound_with_terms(memory, layout, tip.drive, layout.center, step.q, step.p, known)
+        bound = speed_bound_with_terms(
+            memory, layout, tip.drive, layout.center, step.q, step.p, step.k, known
+        )
         push = dot(memory, size, layout.center, step.k)
         safe_center = now.t + int(
             safe_interval(abs(center_from_barrier(layout.terms, kinematics.c)), bound, 0.0, push, known)
@@ -368,6 +373,9 @@ def detect_contact_event(memory, layout, run, now, tip, step, kinematics1, scrat
         )
     safe_gap = limit_safe_interval(memory, layout.others, now.t, safe_gap)
     safe_center = limit_safe_interval(memory, layout.others, now.t, safe_center)
+    if may_hide and max(kinematics.d, kinematics1.d) > 0.0:
+        # the accelerations changed more than was foreseen
+        safe_gap = now.t
     if after > min(safe_gap, safe_center):
         sampling, subintervals = sampling_slot(run), run.step_subintervals
         if step.ticks != clock.step:
@@ -381,14 +389,13 @@ def detect_contact_event(memory, layout, run, now, tip, step, kinematics1, scrat
         )
         if after > safe_gap:
             onset_time = first_contact_onset(scratch.inner_samples, subintervals, subinterval)
-            if onset_time >= 0.0:
-                event, event_ticks = True, min(step.ticks, int(onset_time / tick))
-    if may_hide_onset(layout.terms) and not event and kinematics1.d > 0.0 and kinematics.d <= 0.0:
-        # a free step ended in the contact unseen: the accelerations changed more than was foreseen
+    if may_hide and onset_time < 0.0 and kinematics1.d > 0.0 and kinematics.d <= 0.0:
+        # the step ended in the contact, unseen by the samples
         onset_time = (
             first_upcrossing(kinematics.d, kinematics.dv, kinematics1.d, kinematics1.dv, step.length)
             * step.length
         )
+    if onset_time >= 0.0:
         event, event_ticks = True, min(step.ticks, int(onset_time / tick))
     return ContactEvent(event, event_ticks, onset_time, safe_gap, safe_center, subintervals, subinterval)
 

@@ -21,16 +21,17 @@ from snapbeam.solver.physics import (
     tension_acceleration,
     turned,
 )
-from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat, store, vabs
+from snapbeam.solver.simd import WIDTH, broadcast_load, dot, fma, lanes_sum, load, splat, store
 from snapbeam.solver.step import flow_mode, kick_mode
 from snapbeam.solver.step_control import TRUST
 from snapbeam.solver.terms.interface import (
     acceleration_about_nearest_well,
     add_acceleration,
-    add_potential_energy,
+    add_circuit_energy,
     add_to_speed_bound,
     bounds_by_energy,
     enter_flow,
+    speed_bound,
 )
 
 WORK_ROWS = 11
@@ -265,32 +266,24 @@ def modal_energies(memory, layout, q, near, p, k, force):
 
 
 @inlined
-def speed_bound(memory, layout, c, q, p):
-    """A speed that c.q cannot exceed by the linear flow alone: sum |c_j| (|p_j| + |omega_j q_j|)."""
-    total = splat(0.0)
-    for row in range(0, layout.size, WIDTH):
-        oq = load(memory, layout.omega + row) * load(memory, q + row)
-        total = fma(vabs(load(memory, c + row)), vabs(load(memory, p + row)) + vabs(oq), total)
-    return lanes_sum(total)
-
-
-@inlined
 def validity_horizon(layout, step_time):
     """Time for which the bound of a free flight is trusted, in flight steps of *step_time*: a circuit changes soon."""
     return 0.25 * step_time if bounds_by_energy(layout.terms) else step_time
 
 
 @inlined
-def speed_bound_with_terms(memory, layout, drive, along, q, p, horizon):
-    """The same with what the terms can change while the bound is trusted; *horizon* is :func:`validity_horizon`."""
-    bound, energy = speed_bound(memory, layout, along, q, p), 0.0
+def speed_bound_with_terms(memory, layout, drive, along, q, p, k, horizon):
+    """A speed along a row that is not exceeded while the bound is trusted; *horizon* is :func:`validity_horizon`.
+
+    It is that of the linear flow, and what the terms add.  For circuits: the linear modes and they keep or lose their
+    energy E >= 0, to which other forces, of acceleration k, add: sqrt(2 E) grows by |k| per second at most.
+    """
+    size, omega, trusted, speed = layout.size, layout.omega, TRUST * horizon, 0.0
     if bounds_by_energy(layout.terms):
-        energy = add_potential_energy(
-            memory, layout.size, layout.terms, q, modal_energy(memory, layout, q, p)
-        )
-    return add_to_speed_bound(
-        memory, layout.size, layout.terms, drive, along, q, p, energy, TRUST * horizon, bound
-    )
+        energy = add_circuit_energy(memory, size, layout.terms, q, modal_energy(memory, layout, q, p))
+        speed = math.sqrt(2.0 * energy) + math.sqrt(dot(memory, size, k, k)) * trusted
+    bound = speed_bound(memory, size, omega, along, q, p)
+    return add_to_speed_bound(memory, size, layout.terms, drive, omega, along, q, p, speed, trusted, bound)
 
 
 @inlined

@@ -57,6 +57,7 @@ class AxialLoad(NamedTuple):
     accumulator = "load_work"  # type: ignore[misc]
     work_description = "work done by the change of the axial load"  # type: ignore[misc]
     needs_tension_product = True  # type: ignore[misc]
+    may_hide_onset = True  # type: ignore[misc]
 
     @staticmethod
     @inlined

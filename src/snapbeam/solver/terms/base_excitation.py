@@ -49,7 +49,7 @@ class BaseExcitationTerm(ForceOfTime):
 
     @staticmethod
     @inlined
-    def add_to_speed_bound(memory, size, term, drive, along, q, p, energy, horizon, bound):
+    def add_to_speed_bound(memory, size, term, drive, omega, along, q, p, speed, horizon, bound):
         """Within a time tau the base changes c.p by no more than tau max|a| sum |b_j c_j|."""
         return bound + absolute_product(memory, size, term.row, along) * drive.base_hardest * horizon
 

@@ -24,7 +24,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from snapbeam.solver.compilation import inlined
-from snapbeam.solver.simd import WIDTH, broadcast_load, dot, fma, lanes_sum, load, splat, vabs
+from snapbeam.solver.simd import WIDTH, broadcast_load, dot, fma, load
+from snapbeam.solver.terms.force_of_time import absolute_product
 from snapbeam.solver.terms.interface import TermMemory
 
 _RATE, _Y, _CARRIED, _LOSS, _STORED = range(5)
@@ -92,6 +93,8 @@ class Circuit(NamedTuple):
         y = memory[q + term.own] - dot(memory, size, term.row, q)
         return energy + 0.5 * y * y
 
+    add_circuit_energy = add_potential_energy  # type: ignore[misc]
+
     @staticmethod
     @inlined
     def begin_kick(memory, term, weight, begins):
@@ -140,15 +143,9 @@ class Circuit(NamedTuple):
 
     @staticmethod
     @inlined
-    def add_to_speed_bound(memory, size, term, drive, along, q, p, energy, horizon, bound):
-        """Within a time tau the circuit changes c.p by no more than tau max|y| sum |c_j t_j|, y^2 at most all energy.
-
-        The energy of linear modes and circuits together only falls.
-        """
-        gain = splat(0.0)
-        for row in range(0, size, WIDTH):
-            gain = fma(vabs(load(memory, along + row)), vabs(load(memory, term.row + row)), gain)
-        return bound + lanes_sum(gain) * math.sqrt(2.0 * energy) * horizon
+    def add_to_speed_bound(memory, size, term, drive, omega, along, q, p, speed, horizon, bound):
+        """Within a time tau the circuit changes c.p by no more than tau max|y| sum |c_j t_j|, and |y| <= *speed*."""
+        return bound + absolute_product(memory, size, term.row, along) * speed * horizon
 
     @staticmethod
     @inlined
@@ -223,14 +220,10 @@ class ResistiveCircuit(NamedTuple):
 
     @staticmethod
     @inlined
-    def add_to_speed_bound(memory, size, term, drive, along, q, p, energy, horizon, bound):
-        """Add to the speed bound as for a circuit with inertia, with |y| <= rate |t| sqrt(2 E)."""
-        gain, square = splat(0.0), splat(0.0)
-        for row in range(0, size, WIDTH):
-            t = load(memory, term.row + row)
-            gain, square = fma(vabs(load(memory, along + row)), vabs(t), gain), fma(t, t, square)
-        y = memory[term.state + _RATE] * math.sqrt(2.0 * energy * lanes_sum(square))
-        return bound + lanes_sum(gain) * y * horizon
+    def add_to_speed_bound(memory, size, term, drive, omega, along, q, p, speed, horizon, bound):
+        """Add to the speed bound as for a circuit with inertia, with |y| <= rate |t| *speed*."""
+        y = memory[term.state + _RATE] * math.sqrt(dot(memory, size, term.row, term.row)) * speed
+        return bound + absolute_product(memory, size, term.row, along) * y * horizon
 
     @staticmethod
     @inlined

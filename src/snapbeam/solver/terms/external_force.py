@@ -57,7 +57,7 @@ class ExternalForceTerm(ForceOfTime):
 
     @staticmethod
     @inlined
-    def add_to_speed_bound(memory, size, term, drive, along, q, p, energy, horizon, bound):
+    def add_to_speed_bound(memory, size, term, drive, omega, along, q, p, speed, horizon, bound):
         """Add to the speed bound as for a base, with max|F|."""
         greatest = _greatest_force(drive, memory, term.number)
         return bound + absolute_product(memory, size, term.row, along) * greatest * horizon

@@ -34,6 +34,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from snapbeam.solver.compilation import INLINE_HERE, inlined
+from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, splat, vabs
 from snapbeam.solver.step_control import ContactKinematics
 
 
@@ -131,23 +132,40 @@ def add_to_tension(memory: Any, terms: Any, along_g: Any, along_r: Any) -> Any:
     raise _of_kernels()
 
 
+@inlined
+def speed_bound(memory, size, omega, c, q, p):
+    """A speed that c.q cannot exceed by the linear flow alone: sum |c_j| (|p_j| + |omega_j q_j|)."""
+    total = splat(0.0)
+    for row in range(0, size, WIDTH):
+        oq = load(memory, omega + row) * load(memory, q + row)
+        total = fma(vabs(load(memory, c + row)), vabs(load(memory, p + row)) + vabs(oq), total)
+    return lanes_sum(total)
+
+
 @operation()
 def add_to_speed_bound(
     memory: Any,
     size: int,
     terms: Any,
     drive: Any,
+    omega: int,
     along: int,
     q: int,
     p: int,
-    energy: float,
+    speed: float,
     horizon: float,
     bound: Any,
 ) -> Any:
     """Add to a *bound* of the speed along a row what the term can change within a time, for the interval without contact.
 
-    *energy* is that of linear modes and circuits at q and p, if a term :func:`bounds_by_energy`.
+    *speed* is what neither the norm of p nor y of a circuit exceeds in that time, if a term :func:`bounds_by_energy`.
     """
+    raise _of_kernels()
+
+
+@operation()
+def add_circuit_energy(memory: Any, size: int, terms: Any, q: int, energy: Any) -> Any:
+    """Add the energy in circuits: with that of the linear modes it has a minimum of 0, whatever other forces store."""
     raise _of_kernels()
 
 

@@ -15,7 +15,8 @@ from numba.extending import overload
 from snapbeam.solver.compilation import INLINE, inlined
 from snapbeam.solver.contact_force import scalar_function
 from snapbeam.solver.simd import WIDTH, broadcast_load, dot, fma, load
-from snapbeam.solver.terms.interface import TermMemory
+from snapbeam.solver.terms.force_of_time import absolute_product
+from snapbeam.solver.terms.interface import TermMemory, speed_bound
 
 _ORIGIN, _PLACE, _FORCE, _DAMPING, _WORK = range(5)
 """Numbers of a run: u at the origin of q; u, F and D at the last kick; work of D in a kick."""
@@ -78,6 +79,20 @@ _damping_force, _damping_coefficient = (
 )
 
 
+@inlined
+def greatest_change(law, u, reach):
+    """The change of the force within *reach* of u, N, of a law that is monotonic there; NaN beyond the law's range."""
+    here = _force(law, u)
+    return abs(_force(law, u + reach) - here) + abs(_force(law, u - reach) - here)
+
+
+@inlined
+def _change_by_force(memory, size, term, omega, along, q, p, horizon):
+    reach = horizon * speed_bound(memory, size, omega, term.row, q, p)
+    u = memory[term.state + _ORIGIN] + dot(memory, size, term.row, q)
+    return absolute_product(memory, size, term.row, along) * greatest_change(term.law, u, reach) * horizon
+
+
 class LocalForceTerm(NamedTuple):
     """Places in memory, and the law."""
 
@@ -123,6 +138,12 @@ class LocalForceTerm(NamedTuple):
 
     may_hide_onset = True  # type: ignore[misc]
 
+    @staticmethod
+    @inlined
+    def add_to_speed_bound(memory, size, term, drive, omega, along, q, p, speed, horizon, bound):
+        """Within a time tau, F changes c.p by no more than tau max|F(u') - F(u)| sum |r_j c_j| beyond its present push."""
+        return bound + _change_by_force(memory, size, term, omega, along, q, p, horizon)
+
 
 class DampedLocalForceTerm(LocalForceTerm):
     """The same of a law with damping."""
@@ -136,12 +157,10 @@ class DampedLocalForceTerm(LocalForceTerm):
 
     @staticmethod
     @inlined
-    def add_to_speed_bound(memory, size, term, drive, along, q, p, energy, horizon, bound):
-        """Within a time tau, D changes c.p by about tau |D| sum |r_j c_j|."""
-        total = 0.0
-        for row in range(size):
-            total += abs(memory[term.row + row] * memory[along + row])
-        return bound + total * abs(memory[term.state + _DAMPING]) * horizon
+    def add_to_speed_bound(memory, size, term, drive, omega, along, q, p, speed, horizon, bound):
+        """Add the change by F, and by D: about tau |D| sum |r_j c_j|."""
+        damping = absolute_product(memory, size, term.row, along) * abs(memory[term.state + _DAMPING])
+        return bound + _change_by_force(memory, size, term, omega, along, q, p, horizon) + damping * horizon
 
     def channel(self, unknown: int) -> LocalDamping:
         """Channel of the velocity block for the damping part."""

@@ -12,6 +12,7 @@ from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, bel
 from snapbeam.paper.claims.uncertainty import part, resampled
 from snapbeam.paper.studies.sensitivity import tip_contact
 from snapbeam.paper.system import paper_model, paper_run
+from snapbeam.util.singular_values import polyfit
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,8 +41,8 @@ def restitution(results: Results) -> ClaimResult:
     speed = _DRIVE[1] * BEAM.buckling_level * 2.0 * math.pi * paper_model(32).reference_frequency
     mass = np.array([paper_model(modes).contact_mass(LOCATION) for modes in counts])
     impulse = (1.0 + _RESTITUTION) * mass * speed
-    (slope, _), covariance = np.polyfit(np.log(counts), np.log(impulse), 1, cov="unscaled")
-    left = np.log(impulse) - np.polyval(np.polyfit(np.log(counts), np.log(impulse), 1), np.log(counts))
+    (slope, _), covariance = polyfit(np.log(counts), np.log(impulse), 1, cov="unscaled")
+    left = np.log(impulse) - np.polyval(polyfit(np.log(counts), np.log(impulse), 1), np.log(counts))
     error = 1.96 * math.sqrt(float(covariance[0, 0]) * float(np.sum(left**2)) / max(len(counts) - 2, 1))
     value = Quantity(float(slope), error)
     return found(

@@ -245,11 +245,12 @@ def _edge(memory, layout, others, slot, run, t, drive, step, scratch):
                     # the force is not smooth there, though the contact goes on
                     event_ticks, earliest = -1, min(earliest, int(share * step.ticks) + 1)
         else:
-            if busy:
+            inside = max(depth, depth1) > 0.0
+            if busy or inside:
                 memory[at + SAFE] = t
             elif after > memory[at + SAFE]:
                 known = validity_horizon(layout, run.step_time)
-                bound = speed_bound_with_terms(memory, layout, drive, row, step.q, step.p, known)
+                bound = speed_bound_with_terms(memory, layout, drive, row, step.q, step.p, step.k, known)
                 push = dot(memory, size, row, step.k)
                 safe = safe_interval(-depth, bound, memory[at + SPEED], push, known)
                 memory[at + SAFE] = t + int(safe / tick)
@@ -260,10 +261,11 @@ def _edge(memory, layout, others, slot, run, t, drive, step, scratch):
                     onset_time = first_upcrossing(depth, rate, depth1, rate1, step.length) * step.length
                 else:
                     onset_time = _sampled_onset(memory, layout, others, slot, run, drive, step, j, scratch)
+            if onset_time < 0.0 and depth1 > 0.0:
+                # a free step ended in the contact unseen: the accelerations changed more than was foreseen
+                onset_time = first_upcrossing(depth, rate, depth1, rate1, step.length) * step.length
             if onset_time >= 0.0:
                 event_ticks = min(step.ticks, int(onset_time / tick))
-            elif depth1 > 0.0:
-                event_ticks = step.ticks
         memory[at + EVENT_TICKS] = event_ticks
         if event_ticks >= 0:
             earliest = min(earliest, event_ticks)
