@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import arrays, crowded
+from core_systems import arrays, crowded
 
 from snapbeam import _core
 from snapbeam.solver import native

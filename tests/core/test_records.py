@@ -7,7 +7,7 @@ import threading
 
 import numpy as np
 import pytest
-from conftest import arrays, beam, crowded, stop, struck
+from core_systems import arrays, beam, crowded, stop, struck
 
 import snapbeam as sb
 from snapbeam import _core

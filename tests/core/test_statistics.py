@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from conftest import beam, crowded, stop, struck
+from core_systems import beam, crowded, stop, struck
 
 import snapbeam as sb
 

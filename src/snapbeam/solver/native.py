@@ -191,8 +191,8 @@ class _Arrays:
             found["peak_force"], found["touching"] = contacts["peak_force"][:, 0], contacts["touching"][:, 0]
             found["onset"] = np.rint(contacts["onset"][:, 0] / self.finer)
         if further:
-            for column, name in ((OTHER_IMPACTS, "impacts"), (OTHER_PEAK, "peak_force"), (OTHER_IMPULSE, "impulse"), (OTHER_WORK, "work")):  # fmt: skip
-                found["others"][:, :, column] = contacts[name][:, 1:]
+            for at, name in ((OTHER_IMPACTS, "impacts"), (OTHER_PEAK, "peak_force"), (OTHER_IMPULSE, "impulse"), (OTHER_WORK, "work")):  # fmt: skip
+                found["others"][:, :, at] = contacts[name][:, 1:]
         works = OF_CHANNEL.index("work"), OF_CHANNEL.index("gross_work"), OF_CHANNEL.index("lost")
         found["gross_work"] = of_channels[:, :, works[1]].sum(axis=1)
         for j, law in enumerate(channels.laws.tolist()):
@@ -278,7 +278,7 @@ def record(
     most = int((np.searchsorted(times, times + span, side="right") - np.arange(times.size)).max(initial=0))
     samples = max(_SAMPLES, most + 8)
     saved = np.zeros((3 * (n + 64) + count * (9 + len(OF_CHANNEL)) + len(STATISTICS) + 32) * 8)
-    recorder = {
+    recorder: dict[str, Any] = {
         "times": np.ascontiguousarray(times, dtype=float),
         "in_contact": int(in_contact),
         "rows": np.empty((samples, 2 * n)),

@@ -218,12 +218,12 @@ class _Bench:
             self.starts.append(velocity * math.sqrt(2.0 * energy * barrier / (velocity @ velocity)))
         # modes that the tension couples follow each other
         count, block = connected_components(self.coupling != 0.0, directed=False)
-        order = np.argsort(block, kind="stable")
+        placed = np.argsort(block, kind="stable")
         self.blocks = np.bincount(block, minlength=count).astype(np.int32)
-        self.coupling = np.ascontiguousarray(self.coupling[np.ix_(order, order)])
-        self.omega, self.damping, self.well = self.omega[order], self.damping[order], self.well[order]
-        self.rest, self.force, self.rows = self.rest[order], self.force[order], self.rows[:, order]
-        self.starts = [start[order] for start in self.starts]
+        self.coupling = np.ascontiguousarray(self.coupling[np.ix_(placed, placed)])
+        self.omega, self.damping, self.well = self.omega[placed], self.damping[placed], self.well[placed]
+        self.rest, self.force, self.rows = self.rest[placed], self.force[placed], self.rows[:, placed]
+        self.starts = [start[placed] for start in self.starts]
 
     def ends(self, velocity: _Array, counts: _Array, order: int) -> _Array:
         """Displacements at the end, with each number of steps, over the length that normalises.

@@ -1,0 +1,25 @@
+"""The native core: integration of damped modes and scalar channels (``core/module.cpp``)."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+def integrate(
+    problem: Mapping[str, Any],
+    batch: Mapping[str, Any],
+    layout: str,
+    set: str,
+    threads: int,
+    progress: Callable[[int, int], object] | None,
+) -> None:
+    """Integrate runs; writes into the arrays of *batch*."""
+
+def record(
+    problem: Mapping[str, Any], batch: Mapping[str, Any], recorder: Mapping[str, Any], layout: str, set: str
+) -> None:
+    """Integrate one run with its records, until the room or the steps of *recorder* are used up."""
+
+def law_values(law: int, arrays: Mapping[str, Any]) -> None:
+    """Evaluate a law; writes into *arrays*."""
+
+def instruction_sets() -> list[str]:
+    """Return the instruction sets that this build and this processor have, best first."""
