@@ -31,8 +31,10 @@ class Integration:
     tolerance : float, optional
         Requested maximum error of the displacement of the contact point and of mid-span, over b, from 1e-10 to
         0.1, up to the predictability horizon. Excludes *step* and *accuracy*.
-    engine : {"auto", "cpu", "cuda"}
-        Solver; ``"auto"`` selects the fastest available one.
+    engine : {"auto", "cpu", "cuda", "native"}
+        Solver; ``"auto"`` selects the fastest available one of the first two.  ``"native"`` is the native core, which compiles
+        nothing when it is used; it has contacts without memory, local and external forces, base and axial load, with sines
+        and constants, and refuses the rest.
     early_termination : bool
         End a run once its response class is certain: the class is the same, statistics other than it stop there.
     threads : int, optional
