@@ -110,7 +110,7 @@ class InitialConditions:
         locations the result is a batch, also where they do not matter.
         """
         found = state if state is not None else system.start_state
-        if np.ndim(location):
+        if location is not None and np.ndim(location):
             shape = (*np.broadcast_shapes(np.shape(location), found.batch), system.model.modes)
             found = dataclasses.replace(
                 found,
