@@ -112,6 +112,46 @@ def test_a_parameter_that_changes_the_modes() -> None:
         assert frequency == pytest.approx(model.reference_frequency, rel=1e-7)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_what_becomes_of_the_wells_under_a_magnet(side: float) -> None:
+    """The far well snaps over to the near one before that one is pulled in; over a shorter range neither ends."""
+    model = sb.ReducedModel.from_beam(BEAM, modes=1)
+    gap = 3.4 * side * BEAM.buckling_level
+    system = sb.System(model, forces=[sb.MagneticForce(strength=1e-9, gap=gap, location=0.5)])
+    calls: list[tuple[int, int]] = []
+    found = sb.model.equilibrium_branches(
+        system, "force.strength", (0.0, 8e-7), progress=lambda *each: calls.append(each)
+    )
+    ends = sorted(zip(found.critical_value.values, found.critical_outcome.values.tolist(), strict=True))
+    assert [each for _, each in ends] == ["another well", "pull-in"]
+    assert [side * value < 0.0 for value in found.critical_displacement.values] == [True, False] or side < 0.0
+    assert calls[-1][0] == calls[-1][1] > 0
+    short = sb.model.equilibrium_branches(system, "force.strength", (0.0, 0.6 * float(ends[0][0])))
+    assert short.sizes["critical_point"] == 0 and short.sizes["stable_part"] == 2
+    assert (short.stable_end_kind == "none").all()
+    between = sb.model.equilibrium_branches(
+        system, "force.strength", (0.0, float(0.5 * (ends[0][0] + ends[1][0])))
+    )
+    kinds = sorted(map(tuple, between.stable_end_kind.values.tolist()))
+    assert sorted(sum(each != "none" for each in own) for own in kinds) == [0, 1]
+
+
+def test_a_bifurcation_of_unstable_branches() -> None:
+    """Of two buckled coordinates the second one branches off where the first is unstable already."""
+    two = sb.ReducedModel.from_matrices(
+        np.eye(2),
+        np.diag([-3.0, -1.0]),
+        contact_shape=[1.0, 0.0],
+        nonlinear_stiffness=1.0,
+        well_amplitude=[-(3**0.5), 0.0],
+        length_scale=1.0,
+    )
+    row = sb.LocalSpring(stiffness=0.2, shape=[0.0, 1.0])
+    found = sb.model.equilibrium_branches(sb.System(two, forces=[row]), "force.stiffness", (0.2, 2.0))
+    (point,) = np.flatnonzero(np.abs(found.critical_value.values - 1.0) < 1e-6)
+    assert found.critical_outcome.values[point] == "unstable"
+
+
 def test_refusals() -> None:
     system = sb.System(sb.ReducedModel.from_beam(BEAM, modes=1))
     for parameter, values, message in (
@@ -155,10 +195,13 @@ label = "magnet"
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
     assert "limit point at force.strength = " in done.output
+    assert (
+        ": branch 0, a stable branch ends" in done.output or "does not end, force.strength = " in done.output
+    )
     assert (tmp_path / "b.png").stat().st_size > 5_000
     refused = CliRunner().invoke(app, [*command, "--force-displacement"])
     assert refused.exit_code == 2
     refused = CliRunner().invoke(
         app, ["equilibria", "--config", "own.toml", "--over", "force.strength=1:2:3"]
     )
-    assert refused.exit_code == 2 and "must be name=start:stop" in refused.output
+    assert refused.exit_code == 2 and "must be first:last" in refused.output

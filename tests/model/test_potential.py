@@ -310,5 +310,10 @@ def test_magnets_on_both_sides_at_nearly_the_same_place():
         sb.MagneticForce(strength=1.86e-10, gap=-1.11e-3, location=0.363),
         sb.MagneticForce(strength=5.0e-10, gap=9.04e-4, location=0.340),
     ]
-    found = sb.System(model, forces=magnets).potential.equilibria
-    assert sorted(each.unstable_directions for each in found) == [0, 0, 1, 1, 1]
+    potential = sb.System(model, forces=magnets).potential
+    far = [
+        np.abs(each.amplitude).max() > 20.0 * np.abs(potential.size).max() for each in potential.equilibria
+    ]
+    directions = [each.unstable_directions for each in potential.equilibria]
+    assert sorted(n for n, beyond in zip(directions, far, strict=True) if not beyond) == [0, 0, 1, 1, 1]
+    assert [n for n, beyond in zip(directions, far, strict=True) if beyond] in ([], [2])

@@ -16,6 +16,7 @@ from snapbeam.cli.console import (
     draw,
     file_line,
     out,
+    progress,
     write_map,
 )
 from snapbeam.cli.parameter_options import BEAM, BOUNDARY, IMPERFECTION, MODEL, configured, with_parameters
@@ -23,6 +24,14 @@ from snapbeam.cli.parameter_options import BEAM, BOUNDARY, IMPERFECTION, MODEL, 
 if TYPE_CHECKING:
     from snapbeam.model.potential import Potential
     from snapbeam.model.system import System
+
+
+_OUTCOMES = {
+    "unstable": "on an unstable branch",
+    "pull-in": "a stable branch ends, pull-in",
+    "another well": "a stable branch ends, the beam goes to another well",
+}
+"""Words for the outcome of a critical point."""
 
 
 @cli_command
@@ -206,20 +215,42 @@ def _branches(settings: Any, over: str, output: Path | None, plot: Path | None) 
     unit = lookup(name).quantity.unit
     if not equals:
         raise InputError(f"over = {over!r}: must be name=start:stop, such as force.voltage=0:40")
-    found = equilibrium_branches(settings.static_system, name, opt.parse_range(name, text, unit))
+    ends = opt.parse_range(name, text, unit)
+    with progress(None, "equilibrium branches", "equilibria") as report:
+        found = equilibrium_branches(settings.static_system, name, ends, progress=report)
     console = out()
-    for kind, value, place in zip(
-        *(found[f"critical_{each}"].values for each in ("kind", "value", "displacement")), strict=True
+
+    def shown(value: float) -> str:
+        return f"{value:.6g}{'' if unit == '1' else ' ' + unit}"
+
+    columns = ("kind", "value", "displacement", "branch", "outcome")
+    for kind, value, place, branch, outcome in zip(
+        *(found[f"critical_{each}"].values for each in columns), strict=True
     ):
-        shown = f"{value:.6g}{'' if unit == '1' else ' ' + unit}"
-        console.print(f"{kind} point at {name} = {shown}, centre at {prefixed(float(place), 'm', 4)}")
+        console.print(
+            f"{kind} point at {name} = {shown(value)}, centre at {prefixed(float(place), 'm', 4)}: branch {branch}, "
+            f"{_OUTCOMES[str(outcome)]}"
+        )
     if not found.sizes["critical_point"]:
         console.print(f"no critical points over {name}")
+    for part in range(found.sizes["stable_part"]):
+        own = found.isel(stable_part=part)
+        if (own["stable_end_kind"] == "none").all():
+            first, last = (prefixed(float(each), "m", 4) for each in own["stable_displacement"].values)
+            between = " to ".join(shown(float(each)) for each in own["stable_value"].values)
+            console.print(
+                f"the stable branch with the centre at {first} to {last} does not end, {name} = {between}"
+            )
     add_json(
         parameter=name,
         critical_values=found["critical_value"].values,
         critical_displacements=found["critical_displacement"].values,
         critical_kinds=[str(each) for each in found["critical_kind"].values],
+        critical_branches=found["critical_branch"].values,
+        critical_outcomes=[str(each) for each in found["critical_outcome"].values],
+        stable_values=found["stable_value"].values,
+        stable_displacements=found["stable_displacement"].values,
+        stable_end_kinds=found["stable_end_kind"].values.tolist(),
     )
     _write(found, output, plot)
 

@@ -106,9 +106,20 @@ class InitialConditions:
     ) -> State:
         """Start *number* of a system, or that start added to *state* or a batch of states.
 
-        *location* is where the tip strikes, x_s/L, or that of each of several runs; the system's by default.
+        *location* is where the tip strikes, x_s/L, or that of each of several runs; the system's by default.  With several
+        locations the result is a batch, also where they do not matter.
         """
         found = state if state is not None else system.start_state
+        if location is not None and np.ndim(location):
+            shape = (*np.broadcast_shapes(np.shape(location), found.batch), system.model.modes)
+            found = dataclasses.replace(
+                found,
+                amplitude=np.broadcast_to(found.amplitude, shape),
+                velocity=np.broadcast_to(found.velocity, shape),
+                tangent=None,
+                statistics=None,
+                modal=None,
+            )
         if self.displacement > 0.0:
             rung = perturbed_start(system, Replicates(1, self.displacement, seed=self.seed), number, found)
             found = leaving(system, found, rung, location)
@@ -134,7 +145,7 @@ class InitialConditions:
 def leaving(system: System, rest: State, begun: State, location: ArrayLike | None = None) -> State:
     """A state beside *rest*, turned about it where it would move the beam towards the first tip.
 
-    *location* is x_s/L, or that of each of several runs; then the state is a batch.
+    *location* is x_s/L, or that of each run of a batch.
     """
     striker = system.striker
     if striker is None:

@@ -248,12 +248,23 @@ class Landscape:
 def tangent_stiffness(
     stiffness: _Array, gamma: float, alpha: _Array, elongation: _Array | None = None
 ) -> _Array:
-    """K0 + gamma (s S + 2 S alpha alpha^T S), shape (N, N), with s = alpha . S alpha; S is the identity by default."""
+    """K0 + gamma (s S + 2 S alpha alpha^T S), shape (..., N, N), with s = alpha . S alpha; S is the identity by default."""
     k0 = np.diag(stiffness) if stiffness.ndim == 1 else stiffness
-    matrix = np.eye(alpha.size) if elongation is None else elongation
-    pulled = alpha if elongation is None else elongation @ alpha
-    tangent: _Array = k0 + gamma * (float(alpha @ pulled) * matrix + 2.0 * np.outer(pulled, pulled))
+    matrix = np.eye(alpha.shape[-1]) if elongation is None else elongation
+    pulled = product(elongation, alpha)
+    outer = pulled[..., :, None] * pulled[..., None, :]
+    tangent: _Array = k0 + gamma * (dot(alpha, pulled)[..., None, None] * matrix + 2.0 * outer)
     return tangent
+
+
+def dot(one: _Array, other: _Array) -> _Array:
+    """Inner products of the last axes, one by one, so that none depends on the others of a batch."""
+    return np.asarray((one[..., None, :] @ other[..., :, None])[..., 0, 0])
+
+
+def product(matrix: _Array | None, alpha: _Array) -> _Array:
+    """Products of a matrix, the identity by default, with vectors of shape (..., N), one by one."""
+    return alpha if matrix is None else np.asarray((matrix @ alpha[..., None])[..., 0])
 
 
 class Condensed(NamedTuple):

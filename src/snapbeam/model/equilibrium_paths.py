@@ -213,6 +213,8 @@ class _Tracer:
     paths: list[EquilibriumPath] = field(default_factory=list)
     lost: bool = False
     """True if the current path ended because the maximum number of steps was reached."""
+    progress: Callable[[int, int], object] | None = None
+    """Called with the equilibria from which paths were followed, and their number."""
 
     def __post_init__(self) -> None:
         value, first = self.family.first
@@ -452,13 +454,20 @@ class _Tracer:
         """All paths: through the equilibria at the family's values, those that branch off, and closed ones between."""
         values = self.family.values([])
         while len(values):
-            for value in values:
-                for each in self.family.loaded(value).equilibria:
-                    y = np.append(each.amplitude / self.length, (value - self.origin) / self.unit)
-                    if self.low <= self.family.place(
-                        each.amplitude, value
-                    ) <= self.high and not self.is_known(y):
-                        self.add(self.point(y, self.family.along(len(y))), False)
+            starts = [
+                (value, each.amplitude)
+                for value in values
+                for each in self.family.loaded(value).equilibria
+                if self.low <= self.family.place(each.amplitude, value) <= self.high
+            ]
+            for done, (value, alpha) in enumerate(starts):
+                if self.progress is not None:
+                    self.progress(done, len(starts))
+                y = np.append(alpha / self.length, (value - self.origin) / self.unit)
+                if not self.is_known(y):
+                    self.add(self.point(y, self.family.along(len(y))), False)
+            if self.progress is not None:
+                self.progress(len(starts), len(starts))
             values = self.family.values(
                 [float(path.value[at]) for path in self.paths for at, _ in path.singular]
             )
@@ -473,10 +482,14 @@ def equilibrium_paths(
 
 
 def paths_over_parameter(
-    name: str, unit: str, of: Callable[[float], Potential], between: tuple[float, float]
+    name: str,
+    unit: str,
+    of: Callable[[float], Potential],
+    between: tuple[float, float],
+    progress: Callable[[int, int], object] | None = None,
 ) -> list[EquilibriumPath]:
     """Paths of the equilibria of the potentials *of* the values of a parameter, between two values."""
-    return _Tracer(_OverParameter(name, unit, of, *between), *between).run()
+    return _Tracer(_OverParameter(name, unit, of, *between), *between, progress=progress).run()
 
 
 def attributes(unit: str, words: str) -> dict[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -155,18 +156,18 @@ class LocalForce:
         """Displacements at which the law is valid, such as up to the contact of two electrodes; all by default."""
         return -math.inf, math.inf
 
-    def force_at(self, displacement: float) -> float:
-        """Conservative force, N."""
-        return float(type(self).force(self.numbers, displacement))
+    def force_at(self, displacement: Any) -> Any:
+        """Conservative force, N, at a displacement or an array of them."""
+        return _elementwise(type(self).force, self.numbers, displacement)
 
-    def energy_at(self, displacement: float) -> float:
-        """Potential energy, J."""
-        return float(type(self).energy(self.numbers, displacement))
+    def energy_at(self, displacement: Any) -> Any:
+        """Potential energy, J, at a displacement or an array of them."""
+        return _elementwise(type(self).energy, self.numbers, displacement)
 
-    def stiffness_at(self, displacement: float, length: float) -> float:
+    def stiffness_at(self, displacement: Any, length: float) -> Any:
         """Minus the derivative of the conservative force, N/m, by differences of order six over a part of *length*."""
         low, high = self.displacement_range(self.numbers)
-        h = min(1e-3 * length, 0.1 * (displacement - low), 0.1 * (high - displacement))
+        h = np.minimum(np.minimum(1e-3 * length, 0.1 * (displacement - low)), 0.1 * (high - displacement))
         total = 0.0
         for k, weight in enumerate((45.0, -9.0, 1.0), 1):
             total += weight * (self.force_at(displacement + k * h) - self.force_at(displacement - k * h))
@@ -241,6 +242,12 @@ class LocalForce:
         return max(abs(damping(numbers, u, s * v)) for u in places for v in speeds for s in (1.0, -1.0))
 
 
+def _elementwise(function: Callable[[Any, float], float], numbers: Any, displacement: Any) -> Any:
+    """A scalar function of a law at each displacement; a float for a float."""
+    values = np.frompyfunc(lambda u: float(function(numbers, float(u))), 1, 1)(displacement)
+    return values.astype(np.float64) if isinstance(values, np.ndarray) else values
+
+
 @dataclass(frozen=True, kw_only=True)
 class LocalSpring(LocalForce):
     """A linear and cubic spring to the ground, F = -k u - k_3 u^3, such as a torsional spring at mid-span.
@@ -250,7 +257,8 @@ class LocalSpring(LocalForce):
     stiffness : float
         k, N/m, or N m/rad for a rotation.
     cubic_stiffness : float
-        k_3, N/m^3, or N m/rad^3.
+        k_3, N/m^3, or N m/rad^3.  A softening spring, k_3 < 0, is valid up to u^2 = k/|k_3|, where its force falls to zero
+        and its potential energy has a maximum; with k = 0 it has no such limit.
 
     Examples
     --------
@@ -274,6 +282,14 @@ class LocalSpring(LocalForce):
         """k u^2/2 + k_3 u^4/4."""
         square = displacement * displacement
         return square * (0.5 * law.stiffness + 0.25 * law.cubic_stiffness * square)
+
+    @staticmethod
+    def displacement_range(law: Any) -> tuple[float, float]:
+        """Up to where the force of a softening spring falls to zero."""
+        if law.cubic_stiffness < 0.0 < law.stiffness:
+            end = math.sqrt(-law.stiffness / law.cubic_stiffness)
+            return -end, end
+        return -math.inf, math.inf
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,27 +13,32 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.model.equilibria import Equilibrium, landscape_of, tangent_stiffness
+from snapbeam.model.equilibria import Equilibrium, dot, landscape_of, product, tangent_stiffness
 from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.local_force import LocalForce
 from snapbeam.model.reduced_model import LinearModes, ReducedModel, linear_modes_about
 from snapbeam.util.validation import InputError, shown
 
 _Array = NDArray[np.float64]
-_STARTS = 512
-"""Starting points of Newton's method, in a first search; a second one has eight times as many."""
+_STARTS = 512, 4096, 32768
+"""Starting points of Newton's method, in one search after another until the equilibria are complete."""
 _ITERATIONS = 200
 _HALVINGS = 40
 _RESIDUAL = 1e-11
 """Tolerance of the gradient, over the sum of the magnitudes of its terms."""
+_ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
 _SAME = 1e-6
 """Distance of two solutions that are one, over the largest amplitude."""
 _NEAR = 1e-3
 """Distance from a well, over the largest amplitude, at which a descent has come to it."""
 _DESCENT_STEP, _DESCENT_STEPS = 0.02, 2000
 """Largest step of a descent, over the largest amplitude, and the maximum number of steps."""
-_TOWARDS = 40
-"""Starting points on the way to the end of the range of a law."""
+_TOWARDS, _BESIDE = 40, 1e-9
+"""Starting points on the way to the end of the range of a law, up to 1e-6 of it and then to that distance of one end."""
+_WEAK = 100.0
+"""Attraction at that distance, over the forces of the structure, up to which it may have no equilibrium there."""
+_SINGULAR = 1e3
+"""Growth of a force over the last thousandth of the range of its law, above which it has no bound there."""
 _FAR = 20.0
 """Amplitudes, over the size, beyond which equilibria may be missing."""
 _REACH = 3.0
@@ -111,31 +116,33 @@ class Potential:
         a = np.asarray(alpha, dtype=np.float64)
         found = found - a @ self.constant
         for row, law in zip(self.rows, self.local_forces, strict=True):
-            found = found + np.vectorize(law.energy_at, otypes=[float])(a @ row)
+            found = found + law.energy_at(a @ row)
         return np.asarray(found)
 
     def gradient(self, alpha: _Array) -> _Array:
-        """dU/dalpha, shape (N,): minus the generalised force."""
+        """dU/dalpha, shape (..., N): minus the generalised force."""
         return self.terms(alpha).sum(axis=0)
 
     def terms(self, alpha: _Array) -> _Array:
-        """Terms of the gradient, whose magnitudes are the measure of its rounding."""
+        """Terms of the gradient, shape (terms, ..., N), whose magnitudes are the measure of its rounding."""
         model = self.model
-        pulled = model.pulled(alpha)
-        bent = model.stiffness * alpha if model.stiffness.ndim == 1 else model.stiffness @ alpha
+        pulled = product(model.elongation_matrix, alpha)
+        bent = model.stiffness * alpha if model.stiffness.ndim == 1 else product(model.stiffness, alpha)
         load = self.constant if model.transverse_force is None else self.constant + model.transverse_force
         forces = [
-            -law.force_at(float(row @ alpha)) * row
+            -np.asarray(law.force_at(dot(alpha, row)))[..., None] * row
             for row, law in zip(self.rows, self.local_forces, strict=True)
         ]
-        return np.array([bent, model.nonlinear_stiffness * float(alpha @ pulled) * pulled, -load, *forces])
+        tension = (model.nonlinear_stiffness * dot(alpha, pulled))[..., None] * pulled
+        return np.array([bent, tension, np.broadcast_to(-load, alpha.shape), *forces])
 
     def tangent(self, alpha: _Array) -> _Array:
-        """Second derivative of U, shape (N, N)."""
+        """Second derivative of U, shape (..., N, N)."""
         model = self.model
         found = tangent_stiffness(model.stiffness, model.nonlinear_stiffness, alpha, model.elongation_matrix)
         for row, law in zip(self.rows, self.local_forces, strict=True):
-            found = found + law.stiffness_at(float(row @ alpha), self._length) * np.outer(row, row)
+            stiffness = law.stiffness_at(dot(alpha, row), self._length)
+            found = found + np.asarray(stiffness)[..., None, None] * np.outer(row, row)
         return found
 
     @cached_property
@@ -160,48 +167,71 @@ class Potential:
         """Equilibria, by energy.
 
         Without local forces they are in closed form, and all of them.  With local forces Newton's method starts from
-        more than 500 points of the space that is spanned by the lowest linear modes and the static responses to the
-        forces.  The sum of the indices shows a single missing equilibrium, but not a well and a saddle that are both
-        missing.
+        more than 500 points, within the ranges of the laws, of the space that is spanned by the lowest linear modes and
+        the static responses to the forces.  The sum of the indices shows a single missing equilibrium, but not a well
+        and a saddle that are both missing.  Where a law ends at a finite force, or U falls without bound, the sum is not
+        known; then a search from eight times as many points must find no more.
 
         Raises
         ------
         InputError
-            If the indices of the equilibria do not add up.
+            If an equilibrium is missing.
         """
         if not self.local_forces:
             return self.structure.equilibria
         found: list[_Array] = []
-        for count in (_STARTS, 8 * _STARTS):
-            for start in self._starts(count):
-                solution = self._newton(start)
-                if solution is not None and not any(self._is_same(solution, each) for each in found):
-                    found.append(solution)
+        for count in _STARTS:
+            before = len(found)
+            self._add_solutions(found, self._starts(count))
             listed = [self._equilibrium(each) for each in found]
-            if self._adds_up(listed):
+            if (len(found) == before and count > _STARTS[0]) if self._is_open else self._adds_up(listed):
                 return tuple(sorted(listed, key=lambda each: each.energy))
         raise InputError(
-            f"forces: {len(found)} equilibria were found, whose numbers of unstable directions "
-            f"{[each.unstable_directions for each in listed]} do not add up; check displacement_range of the law"
+            f"forces: {len(found)} equilibria were found, with {[each.unstable_directions for each in listed]} unstable "
+            "directions, and at least one is missing; use fewer modes, or make the forces weaker or smoother"
         )
+
+    @cached_property
+    def _is_open(self) -> bool:
+        """True if a law ends at a finite force, or U falls without bound where the laws are valid."""
+        for law in self.local_forces:
+            for end, sign in zip(law.displacement_range(law.numbers), (-1.0, 1.0), strict=True):
+                if math.isfinite(end):
+                    size = max(abs(end), self._length)
+                    far, near = (abs(law.force_at(end - sign * d * size)) for d in (1e-3, _BESIDE))
+                    if 0.0 < far and near <= _SINGULAR * far:
+                        return True
+        away = self._starts(_STARTS[0])
+        sizes = np.linalg.norm(away, axis=-1)
+        away = away[sizes > 0.0] * (float(np.linalg.norm(self.size)) / sizes[sizes > 0.0, None])
+        away = away[self.holds(1e3 * _FAR * away)]
+        near, far = (self.energy(reach * away) for reach in (_FAR, 1e3 * _FAR))
+        return bool(((far < near) & (far < 0.0)).any())
 
     def _adds_up(self, found: list[Equilibrium]) -> bool:
         """Check the equilibria by their indices: sum of (-1)^(unstable directions) = 1 - chi (Morse).
 
         chi is the Euler characteristic of the part of the boundary beyond which laws pull, a union of faces of the convex
         set in which all laws are valid: over every group of faces that have a point in common, the sum of
-        (-1)^(1 + faces).  Points beyond ``_FAR`` times the size may be left out.
+        (-1)^(1 + faces).  Points beyond ``_FAR`` times the size may be left out, and so may those next to a body that
+        attracts too weakly to balance the structure farther from it than rounding.
         """
         from scipy.optimize import linprog
 
+        structure = Potential(self.model, self.constant, ())
         ranges = np.array([law.displacement_range(law.numbers) for law in self.local_forces])
-        faces = []
+        faces, weak = [], []
         for j, law in enumerate(self.local_forces):
             for end, sign in zip(ranges[j], (-1.0, 1.0), strict=True):
                 if math.isfinite(end):
-                    beside = end - sign * 1e-9 * max(abs(end), self._length)
-                    if sign * law.force_at(beside) > 0.0:
+                    beside = end - sign * _BESIDE * max(abs(end), self._length)
+                    pull = sign * law.force_at(beside)
+                    if pull > 0.0:
                         faces.append((j, end / self._length))
+                        row = self.rows[j]
+                        terms = structure.terms(end * row / float(row @ row))
+                        if pull * float(np.abs(row).max()) < _WEAK * float(np.abs(terms).max()):
+                            weak.append(faces[-1])
         above = np.concatenate((self.rows, -self.rows))
         bounds = np.concatenate((ranges[:, 1], -ranges[:, 0]))
         limited = np.isfinite(bounds)
@@ -220,16 +250,17 @@ class Potential:
             )
             return solution.status == 0
 
-        def characteristic(reach: float | None) -> int:
+        def characteristic(among: list[tuple[int, float]], reach: float | None) -> int:
             return sum(
                 (-1) ** (1 + count) * meet(group, reach)
-                for count in range(1, 1 + len(faces))
-                for group in combinations(faces, count)
+                for count in range(1, 1 + len(among))
+                for group in combinations(among, count)
             )
 
         # faces that meet far away have an equilibrium there, far beyond every motion
         total = sum((-1) ** each.unstable_directions for each in found)
-        return total in (1 - characteristic(None), 1 - characteristic(_FAR))
+        groups = [faces, [each for each in faces if each not in weak]] if weak else [faces]
+        return total in [1 - characteristic(among, reach) for among in groups for reach in (None, _FAR)]
 
     def _is_same(self, one: _Array, other: _Array) -> bool:
         return bool(np.abs(one - other).max() <= _SAME * np.abs(self.size).max())
@@ -271,7 +302,7 @@ class Potential:
             if math.isfinite(end)
         ]
         found = []
-        shares = 1.0 - np.geomspace(1.0, 1e-6, _TOWARDS)
+        near, nearer = np.geomspace(1.0, 1e-6, _TOWARDS), np.geomspace(1e-6, _BESIDE, _TOWARDS // 2)
         # towards one end, and towards two at once, where an equilibrium with two unstable directions can be
         for group in [*combinations(ends, 1), *combinations(ends, 2)]:
             rows = self.rows[[j for j, _ in group]]
@@ -280,52 +311,71 @@ class Potential:
                 continue
             for alpha in known:
                 away = np.linalg.solve(product, np.array([end for _, end in group]) - rows @ alpha)
-                found += [alpha + share * (away @ (compliance * rows)) for share in shares]
+                distances = np.append(near, nearer) if len(group) == 1 else near
+                found += [alpha + share * (away @ (compliance * rows)) for share in 1.0 - distances]
         return found
 
-    def holds(self, alpha: _Array) -> bool:
-        """Return whether the displacement of every local force is within the range of its law."""
+    def holds(self, alpha: _Array) -> NDArray[np.bool_]:
+        """Return whether the displacement of every local force is within the range of its law, for shape (..., N)."""
+        inside = np.ones(alpha.shape[:-1], dtype=bool)
         for row, law in zip(self.rows, self.local_forces, strict=True):
-            low, high = law.displacement_range(law.numbers)
-            if not low < float(row @ alpha) < high:
-                return False
-        return True
+            (low, high), u = law.displacement_range(law.numbers), dot(alpha, row)
+            inside = inside & (low < u) & (u < high)
+        return inside
 
-    def _newton(self, alpha: _Array) -> _Array | None:
-        """An equilibrium by damped Newton steps; None if they come to none within the ranges of the laws."""
-        if not self.holds(alpha):
-            return None
-        terms = self.terms(alpha)
+    def _add_solutions(self, found: list[_Array], starts: _Array) -> None:
+        """Add the equilibria that Newton's method comes to from some starting points, each once, in their order."""
+        solutions = self._newton(starts)
+        while len(solutions):
+            first = solutions[0]
+            if not any(self._is_same(first, each) for each in found):
+                found.append(first.copy())
+            solutions = solutions[np.abs(solutions - first).max(axis=-1) > _SAME * np.abs(self.size).max()]
+
+    def _newton(self, alpha: _Array) -> _Array:
+        """Equilibria by damped Newton steps from starting points, shape (starts, N); without those that come to none."""
+        alpha = np.array(alpha)
+        solved = np.zeros(len(alpha), dtype=bool)
+        runs = np.flatnonzero(self.holds(alpha))
+        terms = self.terms(alpha[runs])
         for _ in range(_ITERATIONS):
-            gradient = terms.sum(axis=0)
-            if np.abs(gradient).max() <= _RESIDUAL * np.abs(terms).sum(axis=0).max():
-                return self._polished(alpha)
-            try:
-                step = np.linalg.solve(self.tangent(alpha), gradient)
-            except np.linalg.LinAlgError:
-                return None
-            share, size = 1.0, float(gradient @ gradient)
+            gradient, tangent = terms.sum(axis=0), self.tangent(alpha[runs])
+            # next to a body that attracts, rounding of the amplitudes changes the force by more than its own rounding
+            rounding = _ROUNDING * product(np.abs(tangent), np.abs(alpha[runs]))
+            bound = (_RESIDUAL * np.abs(terms).sum(axis=0) + rounding).max(axis=-1)
+            ends = np.abs(gradient).max(axis=-1) <= bound
+            solved[runs[ends]] = True
+            runs, gradient, tangent, terms = runs[~ends], gradient[~ends], tangent[~ends], terms[:, ~ends]
+            if not runs.size:
+                break
+            step = _solved(tangent, gradient)
+            size, share = dot(gradient, gradient), 1.0
+            searching = np.array(np.isfinite(step).all(axis=-1))
+            moved = np.zeros(runs.size, dtype=bool)
             for _ in range(_HALVINGS):
-                tried = alpha - share * step
-                if self.holds(tried):
-                    terms = self.terms(tried)
-                    new = terms.sum(axis=0)
-                    if float(new @ new) < (1.0 - 0.1 * share) * size:
-                        break
+                at = np.flatnonzero(searching)
+                tried = alpha[runs[at]] - share * step[at]
+                inside = self.holds(tried)
+                at, tried = at[inside], tried[inside]
+                terms_there = self.terms(tried)
+                new = terms_there.sum(axis=0)
+                less = dot(new, new) < (1.0 - 0.1 * share) * size[at]
+                taken = at[less]
+                alpha[runs[taken]], terms[:, taken] = tried[less], terms_there[:, less]
+                moved[taken], searching[taken] = True, False
+                if not searching.any():
+                    break
                 share *= 0.5
-            else:
-                return None
-            alpha = tried
-        return None
+            runs, terms = runs[moved], terms[:, moved]
+        return self._polished(alpha[solved])
 
     def _polished(self, alpha: _Array) -> _Array:
         for _ in range(2):
-            tried = alpha - np.linalg.solve(self.tangent(alpha), self.gradient(alpha))
-            if not self.holds(tried):
-                break
-            if np.abs(self.gradient(tried)).max() >= np.abs(self.gradient(alpha)).max():
-                break
-            alpha = tried
+            tried = alpha - _solved(self.tangent(alpha), self.gradient(alpha))
+            better = np.flatnonzero(self.holds(tried))
+            new, old = (np.abs(self.gradient(each[better])).max(axis=-1) for each in (tried, alpha))
+            better = better[new < old]
+            alpha[better] = tried[better]
         return alpha
 
     # ------------------------------------------------------------------ wells
@@ -450,3 +500,14 @@ class Potential:
                 return None
             alpha = tried
         return None
+
+
+def _solved(matrix: _Array, vector: _Array) -> _Array:
+    """Solutions of systems, shape (..., N); NaN where the matrix is singular."""
+    try:
+        return np.asarray(np.linalg.solve(matrix, vector[..., None])[..., 0])
+    except np.linalg.LinAlgError:
+        if len(matrix) == 1:
+            return np.full(vector.shape, np.nan)
+        half = len(matrix) // 2
+        return np.concatenate((_solved(matrix[:half], vector[:half]), _solved(matrix[half:], vector[half:])))

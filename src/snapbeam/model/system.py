@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -321,11 +322,19 @@ class System:
         state, local = rest_state(self.model, self.striker), self.unloaded_potential
         if local.is_of_the_structure_alone:
             return state
-        well = local.descent(state.amplitude)
+        well = local.descent(state.amplitude) if local.holds(state.amplitude) else None
         if well is None:
+            limits = [law.displacement_range(law.numbers) for law in self.local_forces]
+            valid = [
+                f"valid from {a:.4g} to {b:.4g} m or rad"
+                for a, b in limits
+                if math.isfinite(a) or math.isfinite(b)
+            ]
+            others = "an initial_well, " if local.wells else ""
             raise InputError(
-                f"forces = {shown(self.local_forces)}: leave no well where a run begins, such as beyond pull-in; give "
-                "an initial_state, or a weaker force"
+                f"forces = {shown(self.local_forces)}: leave no well where a run begins, such as beyond pull-in or outside "
+                f"the displacements of a law ({', '.join(valid) or 'all are valid'}); give {others}an initial_state, or "
+                "a weaker force"
             )
         return State(amplitude=local.wells[well].amplitude)
 

@@ -8,6 +8,7 @@ that kernels call after every step.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -141,6 +142,12 @@ class Statistic:
     update: Callable[[float, Any], float] | None = None
     start: float = 0.0
     comment: str = ""
+
+    @property
+    def normalised_by(self) -> str:
+        """Unit that the value is over: "b", "b omega_1", or none."""
+        found = re.search(r", over (b omega_1|b)$", self.long_name)
+        return found[1] if found else ""
 
 
 def _column(column: str) -> Callable[[Reading], Values]:

@@ -217,7 +217,7 @@ def compute_sweep(
     setup, words = snapped(setup, options.path)
     if words and options.note is not None:
         options.note(words)
-    work = PointWork(setup, replicates)
+    work = PointWork(setup, replicates, metres=setup.length_varies)
     with _runner(work, options, asked) as runner:
         points, rows = _computed(runner, levels, progress)
         more = {} if not isinstance(runner, CheckpointRunner) else runner.store.made_with()

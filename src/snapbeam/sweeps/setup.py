@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -264,6 +265,39 @@ class SweepSetup:
             )
         ]
 
+    @cached_property
+    def length_varies(self) -> bool:
+        """True if the length that displacements are normalised by differs between the points."""
+        names = [name for name in self.structural if not name.startswith("integration.")]
+        if not names:
+            return False
+        if isinstance(self.points, Grid):
+            axes = {name: self.points.axes[name] for name in names}
+            first = {name: values[0].item() for name, values in axes.items()}
+            asked = [
+                first | {name: values[at].item()}
+                for name, values in axes.items()
+                for at in (0, values.size // 2, -1)
+            ]
+        else:
+            table = {name: np.asarray(self.points.columns[name]).ravel() for name in names}
+            places = {int(find(values)) for values in table.values() for find in (np.argmin, np.argmax)}
+            asked = [{name: values[at].item() for name, values in table.items()} for at in places]
+        lengths = []
+        for changes in asked:
+            with suppress(InputError):  # refused when the points are computed
+                lengths.append(self.neighbour(changes)[0].scale.length)
+        return bool(lengths) and max(lengths) - min(lengths) > 1e-9 * max(lengths)
+
+    def scales_of(self, columns: Columns) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Length, m, and velocity, m/s, that the displacements and velocities of every point are normalised by."""
+        size = next(iter(columns.values())).size
+        length, speed = np.empty(size), np.empty(size)
+        for system, _, which, _ in self.groups(columns):
+            length[which] = system.scale.length
+            speed[which] = system.scale.length * 2.0 * np.pi * system.model.reference_frequency
+        return length, speed
+
     def identity(self) -> dict[str, Any]:
         """Return plain values of everything that the results depend on; sweeps with equal values have equal results."""
         integration = {
@@ -427,10 +461,13 @@ def _alike(system: System, state: State | None, runs: int) -> list[NDArray[np.in
     return [part for part in (every[~upper], every[upper]) if part.size]
 
 
-def variable_attributes(name: str) -> dict[str, Any]:
-    """Return the attributes of a variable: unit, long name, and the meanings of codes."""
+def variable_attributes(name: str, metres: bool = False) -> dict[str, Any]:
+    """Return the attributes of a variable: unit, long name, and the meanings of codes; in m and m/s, or over b."""
     row = STATISTICS[name]
     labels: dict[str, Any] = {"units": row.unit, "long_name": row.long_name}
+    if metres and row.normalised_by:
+        words = row.long_name.removesuffix(f", over {row.normalised_by}")
+        labels = {"units": "m" if row.normalised_by == "b" else "m/s", "long_name": words}
     if row.comment:
         labels["comment"] = row.comment
     if name == "response_class":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import platform
 from collections.abc import Iterable
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass, field, fields
 from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple, Protocol
@@ -60,6 +60,8 @@ class PointWork:
 
     setup: SweepSetup
     replicates: Replicates | None = None
+    metres: bool = field(default=False, kw_only=True)
+    """True if displacements are in m and velocities in m/s, because b differs between the points; else over b."""
 
     @cached_property
     def statistics(self) -> dict[str, Statistic]:
@@ -88,6 +90,8 @@ class PointWork:
     def parameters(self) -> dict[str, Any]:
         """Plain values of everything that the results depend on; sweeps with equal values have equal results."""
         found = self.setup.identity() | {"statistics": list(self.statistics)}
+        if self.metres:
+            found["displacements"] = "m"
         if self.replicates is not None:
             found["replicates"] = {
                 "count": self.replicates.count,
@@ -128,6 +132,11 @@ class PointWork:
                 progress((before + done) // self.runs_per_point, size)
 
         results = setup.integrate(points, threads, report)
+        if self.metres:
+            length, speed = setup.scales_of(points)
+            for name, row in self.statistics.items():
+                if row.normalised_by:
+                    results[name] = results[name] * (length if row.normalised_by == "b" else speed)
         if self.replicates is not None:
             repeats, replicates = [results["response_class"]], self.replicates
             for repeat in range(replicates.count):
@@ -162,7 +171,8 @@ class PointWork:
     def variables(self) -> dict[str, tuple[str, bool, dict[str, Any]]]:
         """Return for each variable its data type, whether it has one value for each class, and its attributes."""
         variables = {
-            name: (row.dtype, False, variable_attributes(name)) for name, row in self.statistics.items()
+            name: (row.dtype, False, variable_attributes(name, self.metres))
+            for name, row in self.statistics.items()
         }
         if self.replicates is not None:
             labels = {"units": "1", "long_name": "fraction of the runs of a point, by response class"}

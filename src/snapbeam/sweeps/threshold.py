@@ -14,7 +14,7 @@ from snapbeam.model.parameters import lookup, ratio_of
 from snapbeam.model.system import System
 from snapbeam.sweeps.compute import CheckpointOptions, compute_sweep
 from snapbeam.sweeps.points import Grid
-from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup, variable_attributes
+from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError, shown
@@ -173,7 +173,7 @@ def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
     dataset["outcome"] = (dims, rows["outcome"].astype(np.int8), flags)
     extremes = () if dims else ("min_midspan_displacement", "max_midspan_displacement")
     for name in ("response_class", "status", *extremes):
-        dataset[name] = (whole, computed[name].transpose(*whole).values, variable_attributes(name))
+        dataset[name] = (whole, computed[name].transpose(*whole).values, computed[name].attrs)
     return dataset
 
 

@@ -101,8 +101,8 @@ _ADVICE = {
     RunStatus.EARLY_STOP: "ended early because its response class was certain; statistics stop at early_stop_time",
     RunStatus.INTERRUPTED: "not finished: the run was interrupted before its last cycle",
     RunStatus.DIVERGED: "the state left the finite numbers, or a local force the displacements that its law is valid for, "
-    "as at pull-in; use a smaller step, and check that the contact stiffness, the damping and the drive are meant in SI "
-    "units",
+    "as at pull-in or where the force of a softening spring falls to zero; use a smaller step, and check that the contact "
+    "stiffness, the damping and the drive are meant in SI units",
     RunStatus.STEP_LIMIT: "used more steps than allowed, as happens when the contact is far stiffer than the "
     "default step expects; increase max_steps, or use a larger step or a softer contact",
     RunStatus.NOT_RUN: "never started: the task that held this point failed or was skipped",

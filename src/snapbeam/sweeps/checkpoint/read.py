@@ -123,7 +123,8 @@ def _work(described: dict[str, Any], name: str, done: dict[int, TaskRecord]) -> 
     repeats = Replicates(**held["replicates"]) if "replicates" in held else None
     points = points_of({axis: axes[axis] for axis in described["axes"]})
     require_memory(points.size, "read the file that its command writes with --output")
-    work = PointWork(SweepSetup(system, integration, points), repeats)
+    setup = SweepSetup(system, integration, points)
+    work = PointWork(setup, repeats, metres=setup.length_varies)
     number, record = next(iter(done.items()), (0, None))
     if record is not None and work.task_hash(Stage(BASE, points, chunk).columns(number)) != record.parameters:
         raise InputError(
