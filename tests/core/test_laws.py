@@ -9,33 +9,38 @@ import snapbeam as sb
 from snapbeam import _core
 from snapbeam.solver.channels import LAW_NUMBERS, LAWS
 
-MADE = {
-    sb.HertzContact: sb.HertzContact(3.3e8),
-    sb.PowerLaw: sb.PowerLaw(0.7, 2.3),
-    sb.LayeredHertz: sb.LayeredHertz(4e8, 2e12),
-    sb.HuntCrossley: sb.HuntCrossley(2e8, 3.1),
-    sb.KelvinVoigt: sb.KelvinVoigt(3e5, 1.7),
-    sb.LocalSpring: sb.LocalSpring(stiffness=30.0, cubic_stiffness=4e7),
-    sb.ElectrostaticForce: sb.ElectrostaticForce(voltage=30.0, area=2e-4, gap=-1.1e-3),
-    sb.MagneticForce: sb.MagneticForce(strength=-4e-9, gap=9e-4),
-    sb.QuadraticDamping: sb.QuadraticDamping(coefficient=0.3),
-    sb.CoulombFriction: sb.CoulombFriction(friction_force=2e-3, smoothing_velocity=0.03),
-}
+MADE = (
+    sb.HertzContact(3.3e8),
+    sb.PowerLaw(0.7, 2.3),
+    sb.LayeredHertz(4e8, 2e12),
+    sb.HuntCrossley(2e8, 3.1),
+    sb.KelvinVoigt(3e5, 1.7),
+    sb.LocalSpring(stiffness=30.0, cubic_stiffness=4e7),
+    sb.LocalSpring(stiffness=30.0, cubic_stiffness=-3e7),
+    sb.ElectrostaticForce(voltage=30.0, area=2e-4, gap=-1.1e-3),
+    sb.MagneticForce(strength=-4e-9, gap=9e-4),
+    sb.QuadraticDamping(coefficient=0.3),
+    sb.CoulombFriction(friction_force=2e-3, smoothing_velocity=0.03),
+)
 SPEEDS = (-0.4, -0.01, 0.0, 0.2)
 
 
 def values(law, numbers, x, y):
-    found = {name: np.empty(x.size) for name in ("force", "potential", "stiffness", "damping")}
+    found = {name: np.empty(x.size) for name in ("force", "potential", "stiffness", "damping", "low", "high")}
     padded = np.zeros(LAW_NUMBERS)
     padded[: len(numbers)] = numbers
     _core.law_values(law, {"x": x, "y": y, "numbers": padded, **found})
     return found
 
 
-@pytest.mark.parametrize("kind", LAWS, ids=lambda kind: kind.__name__)
-def test_law(kind):
-    assert set(MADE) == set(LAWS)
-    law, (number, names) = MADE[kind], LAWS[kind]
+def test_every_law_is_here():
+    assert set(map(type, MADE)) == set(LAWS)
+
+
+@pytest.mark.parametrize("law", MADE, ids=repr)
+def test_law(law):
+    kind = type(law)
+    number, names = LAWS[kind]
     contact = isinstance(law, sb.ContactLaw)
     held = law.numbers() if contact else law.numbers
     x = np.geomspace(1e-9, 1e-5, 9) if contact else np.linspace(-5e-4, 5e-4, 9)
@@ -50,6 +55,7 @@ def test_law(kind):
             loss = [kind.damping_force(held, u, speed) for u in x]
             force = [kind.force(held, u) + f for u, f in zip(x, loss, strict=True)]
             steep = np.abs([kind.damping_coefficient(held, u, speed) for u in x])
+            assert (found["low"][0], found["high"][0]) == pytest.approx(kind.displacement_range(held))
             assert (found["damping"] >= steep * (1.0 - 1e-12)).all()
         np.testing.assert_allclose(found["force"], force, rtol=1e-12, atol=1e-300)
         np.testing.assert_allclose(
@@ -57,11 +63,9 @@ def test_law(kind):
         )
 
 
-@pytest.mark.parametrize(
-    "kind", [kind for kind in LAWS if issubclass(kind, sb.LocalForce)], ids=lambda kind: kind.__name__
-)
-def test_the_stiffness_bounds_the_slope_of_the_force(kind):
-    law, (number, names) = MADE[kind], LAWS[kind]
+@pytest.mark.parametrize("law", [law for law in MADE if isinstance(law, sb.LocalForce)], ids=repr)
+def test_the_stiffness_bounds_the_slope_of_the_force(law):
+    number, names = LAWS[type(law)]
     numbers = [getattr(law.numbers, name) for name in names]
     x = np.linspace(-6e-4, 6e-4, 101)
     found, moved = (values(number, numbers, x + dx, np.zeros(x.size)) for dx in (0.0, 1e-9))

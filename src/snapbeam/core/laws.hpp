@@ -93,10 +93,14 @@ struct KelvinVoigt : ContactLaw<2> {  // f = k d + c d'
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *P) { return P[1]; }
 };
 
-struct LocalSpring : ForceLaw<2> {  // f = -(k + k_3 u^2) u
+struct LocalSpring : ForceLaw<2> {  // f = -(k + k_3 u^2) u; one that softens is valid up to where its force is zero
     template <class T> static SNAPBEAM_FN T force(T u, T, const T *P) { return -(u * fma(P[1], u * u, P[0])); }
     template <class T> static SNAPBEAM_FN T potential(T u, const T *P) { return u * u * fma(T(0.25) * P[1], u * u, T(0.5) * P[0]); }
     template <class T> static SNAPBEAM_FN T stiffness(T u, const T *P) { return abs(P[0]) + T(3.0) * abs(P[1]) * u * u; }
+    template <class T> static SNAPBEAM_FN T high(const T *P) {
+        return select((P[0] > T(0.0)) & (P[1] < T(0.0)), sqrt(P[0] / max(-P[1], T(1e-300))), T(INFINITY));
+    }
+    template <class T> static SNAPBEAM_FN T low(const T *P) { return -high(P); }
 };
 // f = sign(g) a / (g - u)^2 towards a plate or magnet at g; P: a, g.
 struct Magnetic : ForceLaw<2> {

@@ -332,11 +332,13 @@ static void law_values(int law, nb::dict arrays) {
     const size_t count = a.length("x"), numbers = a.length("numbers");
     const double *x = a.array<double>("x", {count}), *y = a.array<double>("y", {count}), *P = a.array<double>("numbers", {numbers});
     double *force = a.array<double, true>("force", {count}, false), *potential = a.array<double, true>("potential", {count}, false);
+    double *low = a.array<double, true>("low", {count}, false), *high = a.array<double, true>("high", {count}, false);
     double *stiffness = a.array<double, true>("stiffness", {count}, false), *damping = a.array<double, true>("damping", {count}, false);
     plain::with_law(law, [&](auto each) {
         if (int(numbers) < each.numbers) a.refuse("numbers", "has fewer numbers than the law");
         for (size_t i = 0; i < count; ++i) {
             force[i] = each.force(x[i], y[i], P), potential[i] = each.potential(x[i], P);
+            low[i] = each.low(P), high[i] = each.high(P);
             stiffness[i] = each.stiffness(x[i], P), damping[i] = each.damping(x[i], y[i], P);
         }
     });
