@@ -119,7 +119,7 @@ def test_json_goes_to_standard_output_alone(tmp_path):
     result = RUNNER.invoke(app, [*words, "--json", "-"])
     found = json.loads(result.stdout)
     assert found["summary"]["response_class"] in {kind.label for kind in sb.ResponseClass}
-    assert set(found["summary"]) == set(sb.STATISTICS)
+    assert set(found["summary"]) == {*sb.STATISTICS, "initial_well", "initial_well_reason"}
     assert RUNNER.invoke(app, [*words, "--quiet"]).output == ""
     said = RUNNER.invoke(app, [*words, "--json", str(tmp_path / "a.json")])
     again = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))

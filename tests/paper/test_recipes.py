@@ -53,7 +53,7 @@ def test_written_and_drawn_again(tmp_path, results):
 
 def test_stored_whole_or_not_at_all(tmp_path, results):
     (tmp_path / "fig6.nc").write_bytes(b"no netcdf")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="is no NetCDF or HDF5 file"):
         paper.fig6(data=tmp_path)
     with pytest.raises(InputError, match="must be an existing folder"):
         paper.fig6.write(tmp_path / "none", results=results)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -48,6 +49,7 @@ def test_a_call_that_does_not_end(tmp_path, body, number):
     )  # fmt: skip
     try:
         assert process.stdout is not None and process.stdout.readline() == "blocked\n"
+        time.sleep(2.0)  # a signal before the call is a plain interrupt
         process.send_signal(number)
         _, told = process.communicate(timeout=60)
     finally:
