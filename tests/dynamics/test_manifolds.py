@@ -121,7 +121,9 @@ def test_bracket_of_a_tangency() -> None:
     assert 1.0 <= apart < crossing <= 1.4 and crossing - apart <= 0.08 + 1e-12
     assert found.attrs["termination_reason"] == "tolerance"
     crosses = found["crosses"].values
-    assert not crosses[found["value"].values <= apart].any() and crosses[found["value"].values >= crossing].all()
+    assert (
+        not crosses[found["value"].values <= apart].any() and crosses[found["value"].values >= crossing].all()
+    )
     assert told == sorted(told) and told[-1] == 1.0 and len(told) > 10
 
 
@@ -134,7 +136,9 @@ def test_a_search_that_is_stopped_keeps_what_it_found(known: int, monkeypatch: p
     monkeypatch.setattr(manifolds, "homoclinic_points", lambda *both: made.append(1) or tell(*both))
     monkeypatch.setattr(manifolds._Clock, "is_over", property(lambda clock: len(made) >= known))
     saddle = sb.dynamics.periodic_orbit(henon(1.4, 0.3), [0.6, 0.19])
-    found = sb.dynamics.homoclinic_tangency(saddle, "a", (1.0, 1.4), max_arclength=3.0, max_distance=0.05, max_seconds=9.0)
+    found = sb.dynamics.homoclinic_tangency(
+        saddle, "a", (1.0, 1.4), max_arclength=3.0, max_distance=0.05, max_seconds=9.0
+    )
     assert found.attrs["termination_reason"] == "max_seconds"
     assert found.sizes["value"] == known
     apart, crossing = found["bracket"].values

@@ -204,7 +204,10 @@ def edge_tracking(
         low, high = both[0], both[1]
         size = float(np.abs(high - low).max())
         if not np.isfinite(size):
-            raise InputError("a run failed on the border; look at its status with sb.advance")
+            if not states:
+                raise InputError("a run failed on the border; look at its status with sb.advance")
+            stopped = f"a run failed on the border after {period} periods; look at its status with sb.advance"
+            break
         states.append(0.5 * (low + high))
         distances.append(size)
         if size == 0.0:

@@ -18,7 +18,17 @@ from numpy.typing import NDArray
 from snapbeam.dynamics.flow import Flow, Stroboscope, dimensionless, fixed_parameters
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, periodic_orbit
 from snapbeam.util.diagnostics import sharing
-from snapbeam.util.validation import InputError, checked, choice, instance, integer, interval, positive, shown, within
+from snapbeam.util.validation import (
+    InputError,
+    checked,
+    choice,
+    instance,
+    integer,
+    interval,
+    positive,
+    shown,
+    within,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -122,7 +132,12 @@ class _Segment(NamedTuple):
 
 
 def _grow(
-    segment: _Segment, max_arclength: float, max_distance: float, max_turn: float, max_points: int, clock: _Clock
+    segment: _Segment,
+    max_arclength: float,
+    max_distance: float,
+    max_turn: float,
+    max_points: int,
+    clock: _Clock,
 ) -> tuple[_Array, _Array, str]:
     """Age and state of the points of a branch, and the reason for its end."""
     ages = np.linspace(0.0, 1.0, _BEGUN)
@@ -526,7 +541,9 @@ def homoclinic_tangency(
             low, high = (middle, high) if found == ends[0] else (low, middle)
     if clock.report is not None:
         clock.report(1.0)
-    kept = [next((each for each in (low, high) if tried.get(each) is state), np.nan) for state in (False, True)]
+    kept = [
+        next((each for each in (low, high) if tried.get(each) is state), np.nan) for state in (False, True)
+    ]
     values = sorted(tried)
     return xr.Dataset(
         {
