@@ -160,10 +160,9 @@ def test_pages_of_the_change_log_exist() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", ["harvesters", "systems", "base_and_load", "getting-started"])
+@pytest.mark.parametrize("page", ["harvesters", "systems", "base_and_load"])
 def test_page_as_a_reader(page, tmp_path, monkeypatch, capsys) -> None:
     """Files, commands and scripts in their order, in an empty folder; the tutorials run in ``test_tutorials.py``."""
     monkeypatch.chdir(tmp_path)
-    smaller = {"--cycles 1000": "--cycles 5 --modes 1 --frequency-ratio 1:2:3 --velocity-amplitude 0.1:0.4:2"}
-    follow(page, capsys, smaller)
+    follow(page, capsys)
     plt.close("all")

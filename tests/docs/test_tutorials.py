@@ -34,8 +34,8 @@ def assert_shown(shown: str, printed: str, name: str) -> None:
         rest = rest[found[0] + 1 :]
 
 
-def follow(name: str, capsys: pytest.CaptureFixture[str], instead: dict[str, str] | None = None) -> None:
-    """Do what a page says, in the present folder; *instead*: other words of its commands, so that they take less time."""
+def follow(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Do what a page says, in the present folder."""
     printed, scope = "", {}
     for kind, text in blocks(name):
         file = re.match(r"# (\S+\.toml)\b", text)
@@ -47,8 +47,6 @@ def follow(name: str, capsys: pytest.CaptureFixture[str], instead: dict[str, str
             printed = capsys.readouterr().out
         elif text.startswith("snapbeam "):
             printed = ""
-            for words, other in (instead or {}).items():
-                text = text.replace(words, other)
             for line in text.replace("\\\n", " ").splitlines():
                 if not line.startswith("snapbeam "):
                     continue

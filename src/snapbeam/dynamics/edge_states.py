@@ -185,7 +185,8 @@ def edge_tracking(
             f"diverge_threshold = {far:g}: must be at most {_FARTHEST:g} times the distance of u1 and u2, "
             f"{float(np.abs(high - low).max()):.3g}"
         )
-    states, distances, closest = [], [], 0.0
+    states: list[_Array] = []
+    distances, closest = [], 0.0
     stopped = f"{total} periods"
     begin = True
     report = counting(progress, "edge tracking", "periods")
