@@ -479,10 +479,13 @@ def _parts() -> dict[str, Any]:
         "the paper's": struck(),
         "a gap": struck(gap=5e-5),
         "contact `power`": struck(contact=sb.PowerLaw.from_stiffness(1e13, 2.0)),
+        "contact `layer`": struck(contact=sb.LayeredHertz(stiffness=1e9, layer_stiffness=1e6)),
         "contact `hunt_crossley`": struck(contact=sb.HuntCrossley(4e8, 1.0)),
         "contact `kelvin_voigt`": struck(contact=sb.KelvinVoigt(1e5, 1.0)),
         "contact `elastic_plastic`": struck(contact=sb.ElasticPlasticContact(1e5, 2e5)),
         "contact `restitution`": struck(contact=sb.Restitution(0.9), of=sb.ReducedModel.from_beam(beam, modes=1)),
+        "drive `displacement_sine`": struck(sb.DisplacementSine(frequency_ratio=1.2, displacement_amplitude=0.1)),
+        "drive `acceleration_sine`": struck(sb.AccelerationSine(frequency_ratio=1.2, acceleration_amplitude=0.1)),
         "drive `two_tone`, in a ratio of small whole numbers": struck(
             sb.TwoTone(frequency_ratio=1.2, velocity_amplitude=0.1, **second)
         ),
@@ -510,6 +513,10 @@ def _parts() -> dict[str, Any]:
         "a base with a chirp": based(chirp),
         "a base with noise": based(noise),
         "a base with a shock": based(sb.Shock(acceleration_g=20.0, duration_ms=11.0)),
+        "a base with a recorded acceleration": based(sb.RecordedAcceleration.from_g(np.sin(50.0 * time), 2e4)),
+        "a base with random vibration": based(
+            sb.RecordedAcceleration.from_psd([(20.0, 0.01), (200.0, 0.01)], duration_s=0.5, seed=1)
+        ),
         "a load with a sine": struck(
             axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.4, amplitude=3.0))
         ),
@@ -526,7 +533,20 @@ def _parts() -> dict[str, Any]:
                 motion=sb.AccelerationSine(frequency_ratio=0.6, acceleration_amplitude=0.25)
             ),
         ),
+        "a constant external force": struck(
+            forces=[sb.ExternalForce(history=sb.ConstantForce(force=0.01), location=0.4)]
+        ),
+        "a recorded external force": struck(
+            forces=[
+                sb.ExternalForce(
+                    history=sb.RecordedForce(record=np.sin(50.0 * time), sampling_frequency=2e4), location=0.4
+                )
+            ]
+        ),
         "a local force": struck(forces=[spring]),
+        "an electrode": struck(forces=[sb.ElectrostaticForce(location=0.5, area=1e-6, gap=2e-3, voltage=10.0)]),
+        "a magnet": struck(forces=[sb.MagneticForce(location=0.5, gap=2e-3, strength=1e-9)]),
+        "Coulomb friction of a point": struck(forces=[sb.CoulombFriction(friction_force=1e-3, smoothing_velocity=1e-3, location=0.4)]),
         "a local force with damping": struck(forces=[drag]),
         "several local forces, one with damping, and an external force": struck(
             forces=[spring, drag, sb.ExternalForce(history=sb.ConstantForce(force=0.01), location=0.4)]
@@ -535,6 +555,19 @@ def _parts() -> dict[str, Any]:
             sine, sb.HuntCrossley(4e8, 1.0), harvesters=[piezo, piezo], forces=[drag]
         ),
         "a harvester": struck(harvesters=[piezo]),
+        "a coil": struck(harvesters=[sb.ElectromagneticHarvester(force_factor=1.0, resistance=10.0)]),
+        "a coil with an inductance": struck(
+            harvesters=[sb.ElectromagneticHarvester(force_factor=1.0, resistance=10.0, inductance=0.01)]
+        ),
+        "a structure given by matrices": struck(
+            of=sb.ReducedModel.from_matrices([[1.0]], [[1e5]], contact_shape=[1.0], length_scale=1e-3)
+        ),
+        "a base and no contact": sb.System(
+            model,
+            base_excitation=sb.BaseExcitation(
+                motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25)
+            ),
+        ),
     }  # fmt: skip
 
 

@@ -78,3 +78,19 @@ def test_refusals() -> None:
     system = sb.System(model(1), axial_load=load)
     assert sb.System.from_mapping(system.to_mapping()) == system
     assert system.replace(**{"axial_load.amplitude": 2.0}).get("axial_load.amplitude") == 2.0
+
+
+def test_time_at_the_changed_load() -> None:
+    """A ramp of 2.5 periods, 4 periods at the changed value, 2.5 periods back."""
+    ramp = sb.LoadRamp(change=-0.7, duration=2.5, hold_periods=4.0)
+    system = sb.System(model(1), axial_load=sb.AxialLoadModulation(motion=ramp))
+    period = 1.0 / model(1).natural_frequencies[0]
+    times = np.arange(0.0, 12.0, 0.25) * period
+    run = sb.simulate(system, sb.Integration(cycles=12), sample_times=times)
+    load, cycle = run.dataset.load_change.values, run.dataset.time.values / period
+    held = np.isclose(load, -0.7, rtol=0.0, atol=1e-12)
+    assert cycle[held][0] == pytest.approx(2.5) and cycle[held][-1] == pytest.approx(6.5)
+    assert held[(cycle > 2.6) & (cycle < 6.4)].all()
+    assert load[cycle > 9.05] == pytest.approx(0.0, abs=1e-12)
+    there, back = load[(cycle > 0.1) & (cycle < 2.4)], load[(cycle > 6.6) & (cycle < 8.9)]
+    np.testing.assert_allclose(there, back[::-1], rtol=0.0, atol=1e-9)

@@ -82,7 +82,13 @@ def test_numbers_of_the_comparison():
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines() if "e-0" in line]
     ratio = {row[0]: float(row[4]) for row in rows}
     seconds = float(rows[0][3].split()[0])
-    assert f"takes {1e3 * seconds:.0f} ms on one core, averaged over twelve test points" in PLAIN
+    text = (ROOT / "docs" / "images" / "fixed_steps.inc").read_text(encoding="utf-8")
+    again = [float(line.split("|")[6]) for line in text.splitlines() if line.startswith("| 32 |")]
+    assert len(again) == 2  # of the same points
+    assert (
+        f"takes {1e3 * seconds:.0f} to {max(again):.0f} ms on one core, averaged over twelve test points"
+        in PLAIN
+    )
     page = (ROOT / "docs" / "accuracy_and_speed.md").read_text(encoding="utf-8")
     first, second = re.search(r"dop853 took ([\d.]+) and ([\d.]+) times", page).groups()
     assert float(second) == min(ratio["numbalsoda dop853"], ratio["numbalsoda lsoda"])
@@ -92,6 +98,17 @@ def test_numbers_of_the_comparison():
     scipy = [value for name, value in ratio.items() if name.startswith("scipy")]
     assert f"Boost.odeint {odeint:.0f}, heyoka {taylor:.0f}, diffrax {diffrax:.0f}" in PLAIN
     assert f"SciPy {min(scipy):.0f} to {max(scipy):.0f}" in PLAIN
+
+
+def test_numbers_of_short_runs():
+    """The ratios of single runs in the tables of Impact-20; ``replicas`` and ``threshold`` are many runs."""
+    table = (ROOT / "impact20" / "results" / "table.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\w+), \w+ \| ([\d.]+) \| [\w.]+ \|$", table, re.MULTILINE)
+    assert {"replicas", "threshold"} < {name for name, _ in rows}
+    single = [float(value) for name, value in rows if name not in ("replicas", "threshold")]
+    words = f"{min(single):.1f} to {max(single):.0f} times"
+    assert f"takes {words} less time" in PLAIN
+    assert f"takes {words} as long" in (ROOT / "impact20" / "README.md").read_text(encoding="utf-8")
 
 
 def test_numbers_of_the_claims():

@@ -38,7 +38,7 @@ def follow(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Do what a page says, in the present folder."""
     printed, scope = "", {}
     for kind, text in blocks(name):
-        file = re.match(r"# (\S+\.toml)\n", text)
+        file = re.match(r"# (\S+\.toml)\b", text)
         if kind == "toml" and file:
             Path(file[1]).write_text(text, encoding="utf-8")
         elif kind == "python":
@@ -48,7 +48,9 @@ def follow(name: str, capsys: pytest.CaptureFixture[str]) -> None:
         elif text.startswith("snapbeam "):
             printed = ""
             for line in text.replace("\\\n", " ").splitlines():
-                result = CliRunner().invoke(app, shlex.split(line)[1:])
+                if not line.startswith("snapbeam "):
+                    continue
+                result = CliRunner().invoke(app, shlex.split(line, comments=True)[1:])
                 stopped = result.exit_code == 130 and "--cluster" in line
                 assert result.exit_code == 0 or stopped, f"{line}\n{result.output}"
                 printed += result.output

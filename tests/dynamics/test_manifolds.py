@@ -104,13 +104,62 @@ def test_a_map_that_jumps_ends_the_branch() -> None:
 def test_a_manifold_that_ends_early_is_no_proof_that_none_cross(monkeypatch: pytest.MonkeyPatch) -> None:
     from snapbeam.dynamics import manifolds
 
-    whole = manifolds.invariant_manifold
-    monkeypatch.setattr(
-        manifolds, "invariant_manifold", lambda *each, **limits: whole(*each, **limits, max_points=40)
-    )
+    monkeypatch.setattr(manifolds, "_POINTS", 40)
     saddle = sb.dynamics.periodic_orbit(henon(1.0, 0.3), [0.7, 0.2])
-    with pytest.raises(sb.dynamics.OrbitNotFoundError, match="ends before max_arclength"):
-        sb.dynamics.homoclinic_tangency(saddle, "a", (0.95, 1.05))
+    found = sb.dynamics.homoclinic_tangency(saddle, "a", (0.95, 1.05))
+    assert "manifold ends before max_arclength" in found.attrs["termination_reason"]
+    assert found.sizes["value"] == 0 and np.isnan(found["bracket"]).all()
+
+
+def test_bracket_of_a_tangency() -> None:
+    """The manifolds of the Henon map begin to cross between a = 1 and 1.4."""
+    saddle = sb.dynamics.periodic_orbit(henon(1.4, 0.3), [0.6, 0.19])
+    told: list[float] = []
+    options = {"max_arclength": 3.0, "max_distance": 0.05, "tolerance": 0.2}
+    found = sb.dynamics.homoclinic_tangency(saddle, "a", (1.0, 1.4), **options, progress=told.append)
+    apart, crossing = found["bracket"].sel(manifolds=["apart", "crossing"]).values
+    assert 1.0 <= apart < crossing <= 1.4 and crossing - apart <= 0.08 + 1e-12
+    assert found.attrs["termination_reason"] == "tolerance"
+    crosses = found["crosses"].values
+    assert (
+        not crosses[found["value"].values <= apart].any() and crosses[found["value"].values >= crossing].all()
+    )
+    assert told == sorted(told) and told[-1] == 1.0 and len(told) > 10
+
+
+@pytest.mark.parametrize("known", [0, 1, 2, 3])
+def test_a_search_that_is_stopped_keeps_what_it_found(known: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The time is over after so many values: each is kept, with the bracket that they give."""
+    from snapbeam.dynamics import manifolds
+
+    made, tell = [], manifolds.homoclinic_points
+    monkeypatch.setattr(manifolds, "homoclinic_points", lambda *both: made.append(1) or tell(*both))
+    monkeypatch.setattr(manifolds._Clock, "is_over", property(lambda clock: len(made) >= known))
+    saddle = sb.dynamics.periodic_orbit(henon(1.4, 0.3), [0.6, 0.19])
+    found = sb.dynamics.homoclinic_tangency(
+        saddle, "a", (1.0, 1.4), max_arclength=3.0, max_distance=0.05, max_seconds=9.0
+    )
+    assert found.attrs["termination_reason"] == "max_seconds"
+    assert found.sizes["value"] == known
+    apart, crossing = found["bracket"].values
+    assert [np.isnan(apart), np.isnan(crossing)] == [known < 1, known < 2]
+    if known == 3:
+        assert crossing - apart == pytest.approx(0.2)
+
+
+def test_a_manifold_that_is_stopped_keeps_its_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    from snapbeam.dynamics import manifolds
+
+    asked: list[int] = []
+    monkeypatch.setattr(
+        manifolds._Clock, "is_over", property(lambda clock: asked.append(1) or len(asked) > 12)
+    )
+    saddle = sb.dynamics.periodic_orbit(henon(1.4, 0.3), [0.6, 0.19])
+    curve = sb.dynamics.invariant_manifold(saddle, "stable", max_seconds=1.0, max_arclength=100.0)
+    assert curve.attrs["termination_reason"] == "max_seconds; max_seconds"
+    assert curve.sizes["point"] > 10 and np.isfinite(curve["state"]).all()
+    with pytest.raises(InputError, match="max_seconds = 0"):
+        sb.dynamics.invariant_manifold(saddle, max_seconds=0.0)
 
 
 @pytest.mark.slow
@@ -137,7 +186,7 @@ def test_melnikovs_threshold() -> None:
     history = sb.HarmonicForce(amplitude=force, frequency_ratio=ratio)
     system = sb.System(model, forces=[sb.ExternalForce(location=0.5, history=history)])
     saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0], integration=sb.Integration())
-    without, crossing = sb.dynamics.homoclinic_tangency(
+    found = sb.dynamics.homoclinic_tangency(
         saddle,
         "force.amplitude",
         (0.95 * force, 1.05 * force),
@@ -145,5 +194,7 @@ def test_melnikovs_threshold() -> None:
         max_distance=0.05,
         tolerance=0.1,
     )
+    assert found.attrs["termination_reason"] == "tolerance"
+    without, crossing = found["bracket"].values
     assert without < crossing
     assert without == pytest.approx(force, rel=0.031) and crossing == pytest.approx(force, rel=0.031)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import warnings
 
 import numpy as np
@@ -12,6 +13,7 @@ import snapbeam as sb
 from snapbeam.model import default_values
 from snapbeam.solver.cpu import driver
 from snapbeam.solver.statistics import Statistic, accumulators_dtype, register_statistic, unregister_statistic
+from snapbeam.sweeps.setup import variable_attributes
 
 ROOTS = {
     "displacement": "displacement_at_striker",
@@ -166,3 +168,33 @@ def test_the_layouts_of_the_processor_agree_on_integrated_statistics(monkeypatch
     assert (found[0]["zero_crossings"] > 0).any() and (found[0]["high_energy_time"] > 0.0).all()
     for name in found[0].dtype.names:
         np.testing.assert_array_equal(found[0][name], found[1][name], err_msg=name)
+
+
+@pytest.mark.parametrize("modes", [1, 8, pytest.param(32, marks=pytest.mark.slow)])
+def test_peaks_are_low_by_at_most_what_they_state(modes: int) -> None:
+    """Maxima over the ends of steps, against fine output at level reference; the comment has the bound of each level."""
+    rng = np.random.default_rng(40 + modes)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, damping_ratio=0.005)
+    layers = sb.PiezoelectricHarvester(moment_per_volt=1e-4, capacitance=3e-7, resistance=1e4)
+    for _ in range(4):
+        ratio = rng.uniform(0.4, 3.0)
+        shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=rng.uniform(0.03, 0.6))
+        contact = sb.Contact(default_values.CONTACT, shaker)
+        for peaks, around in (
+            ({"peak_velocity": "velocity_at_striker", "peak_midspan_velocity": "midspan_velocity"}, []),
+            ({"peak_voltage": "voltage"}, [layers]),
+        ):
+            system = sb.System(model, contacts=[contact], harvesters=around)
+            end = 4 / (ratio * model.reference_frequency) * (1.0 - 1e-13)
+            fine = sb.simulate(
+                system,
+                sb.Integration(cycles=4, accuracy="reference"),
+                sample_times=np.linspace(0.0, end, 40_001),
+            )
+            for name, variable in peaks.items():
+                exact = float(np.abs(fine.dataset[variable].values).max())
+                comment = variable_attributes(name)["comment"]
+                for accuracy in ("standard", "reference"):
+                    bound = 0.01 * float(re.search(rf"([\d.]+) % (low )?\({accuracy}\)", comment)[1])
+                    found = sb.simulate(system, sb.Integration(cycles=4, accuracy=accuracy)).summary[name]
+                    assert (1.0 - bound) * exact <= found <= (1.0 + 1e-3) * exact, (name, accuracy, ratio)

@@ -7,6 +7,7 @@ import pytest
 from small import small_system
 
 import snapbeam as sb
+from snapbeam.plot.uncertainty import plot_designs
 from snapbeam.uncertainty.differential_evolution import front_of
 from snapbeam.util.validation import InputError
 
@@ -215,11 +216,35 @@ def test_limits_of_the_design_itself_cost_no_run() -> None:
         system, {"drive.velocity_amplitude": np.array([0.2])}
     )
     assert float(stroke[0]) == pytest.approx(0.2 * scale.length / 1.21)
-    with pytest.raises(InputError, match="none of 12 designs"):
-        sb.uncertainty.optimize_design(
-            system, {"velocity_amplitude": (0.05, 0.4)}, "speed", sb.uncertainty.Constraint(quantity="stroke", upper=1e-9), SPREAD,
-            sb.uncertainty.OptimizerSettings(generations=2, population=6),
+
+
+@pytest.mark.parametrize("objectives", ["speed", ["speed", "peak_force"]])
+@pytest.mark.parametrize(
+    ("quantity", "limits"), [("stroke", {"upper": 1e-9}), ("snap", {"lower": 0.99}), ("peak_force", {"upper": 1e-6})]
+)  # fmt: skip
+def test_no_feasible_design(objectives, quantity, limits, monkeypatch) -> None:
+    """Every design that was tried is returned with its distance from each constraint, and the best of them is reported."""
+    monkeypatch.setattr("snapbeam.util.diagnostics._told", set())
+    with pytest.warns(sb.DiagnosticWarning, match=r"none of the 12 designs .* loosen a constraint"):
+        ds = sb.uncertainty.optimize_design(
+            small_system(location=0.3), {"velocity_amplitude": (0.001, 0.01)}, objectives,
+            [
+                sb.uncertainty.Constraint(quantity=quantity, **limits),
+                sb.uncertainty.Constraint(quantity="acceleration", upper=1e9),
+            ],
+            SPREAD, sb.uncertainty.OptimizerSettings(generations=2, population=6, samples=8, validation_samples=20), integration=HOW,
         )  # fmt: skip
+    assert ds.sizes["tried"] == 12 and ds.sizes["design"] == 1
+    assert "none of the 12 designs" in ds.attrs["termination_reason"]
+    assert int(ds["constraints_satisfied"][0]) < 2
+    assert (ds["violation"] > 0.0).all() and (ds[f"tried_distance_{quantity}"] < 0.0).all()
+    assert (ds["tried_distance_acceleration"] > 0.0).all()
+    best = int(np.argmin(ds["violation"].values))
+    assert float(ds["velocity_amplitude"][0]) == float(ds["tried_velocity_amplitude"][best])
+    if quantity == "stroke":
+        wanted = 1e-9 - ds["tried_velocity_amplitude"] / 1.21 * small_system().scale.length
+        np.testing.assert_allclose(ds["tried_distance_stroke"], wanted, rtol=1e-9)
+    assert plot_designs(ds).get_legend_handles_labels()[1] != []
 
 
 def test_intervals_of_objectives_cover() -> None:

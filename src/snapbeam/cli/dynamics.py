@@ -504,6 +504,9 @@ def manifold(
     max_arclength: Annotated[
         float | None, opt.number_option("Length of each branch, in units of the well's amplitude (10).", _OWN)
     ] = None,
+    max_seconds: Annotated[
+        float | None, opt.number_option("Time after which the manifold ends as it is, s.", _OWN)
+    ] = None,
     output: Output = Path("manifold.nc"),
     plot: opt.Plot = None,
 ) -> None:
@@ -526,12 +529,15 @@ def manifold(
         )
     except OrbitNotFoundError as error:
         raise InputError(f"no saddle near the straight beam: {error}") from None
-    curve = invariant_manifold(
-        saddle, stability, max_arclength=10.0 if max_arclength is None else max_arclength
-    )
+    with progress(None, "manifold", "percent of the length") as report:
+        curve = invariant_manifold(
+            saddle, stability, max_arclength=10.0 if max_arclength is None else max_arclength, max_seconds=max_seconds,
+            progress=lambda share: report(round(100.0 * share), 100),
+        )  # fmt: skip
     lines = [
         _plain(saddle),
         f"{curve.sizes['point']} points in {duration(time.monotonic() - begun)}",
+        f"ends of the branches: {curve.attrs['termination_reason']}",
     ]
     _finish(curve, output, plot, lines)
 

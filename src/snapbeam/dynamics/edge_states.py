@@ -185,7 +185,8 @@ def edge_tracking(
             f"diverge_threshold = {far:g}: must be at most {_FARTHEST:g} times the distance of u1 and u2, "
             f"{float(np.abs(high - low).max()):.3g}"
         )
-    states, distances, closest = [], [], 0.0
+    states: list[_Array] = []
+    distances, closest = [], 0.0
     stopped = f"{total} periods"
     begin = True
     report = counting(progress, "edge tracking", "periods")
@@ -204,7 +205,10 @@ def edge_tracking(
         low, high = both[0], both[1]
         size = float(np.abs(high - low).max())
         if not np.isfinite(size):
-            raise InputError("a run failed on the border; look at its status with sb.advance")
+            if not states:
+                raise InputError("a run failed on the border; look at its status with sb.advance")
+            stopped = f"a run failed on the border after {period} periods; look at its status with sb.advance"
+            break
         states.append(0.5 * (low + high))
         distances.append(size)
         if size == 0.0:

@@ -8,6 +8,7 @@ Phys. 104 (1993) 14).  The stable manifold is that of the inverse map, whose poi
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,9 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.dynamics.flow import Flow, Stroboscope, dimensionless, fixed_parameters
-from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, periodic_orbit
-from snapbeam.util.diagnostics import counting
-from snapbeam.util.validation import InputError, checked, choice, instance, integer, interval, shown, within
+from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, periodic_orbit
+from snapbeam.util.diagnostics import sharing
+from snapbeam.util.validation import (
+    InputError,
+    checked,
+    choice,
+    instance,
+    integer,
+    interval,
+    positive,
+    shown,
+    within,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,10 +45,44 @@ _SAME = 1e-11
 """Distance, in units of the well's amplitude, at which the image of an inverse image counts as met."""
 _CLOSEST = 1e-3
 """Distance of neighbours, over the maximum one, below which the curve may turn by any angle."""
+_POINTS = 20_000
+"""Maximum number of points of a branch."""
 _FINEST = 1e-12
 """Difference of ages below which no point is inserted."""
 _SHARE = 2**22
 """Pairs of segments that are compared at once."""
+
+
+class _Clock(NamedTuple):
+    """Time limit and progress of one branch, a part of a longer computation."""
+
+    end: float
+    """As of ``time.monotonic``."""
+    report: Callable[[float], object] | None
+    begun: float
+    """Share of the computation that was done before the branch."""
+    part: float
+    """Share of the computation that the branch is."""
+
+    @property
+    def is_over(self) -> bool:
+        """Return whether the time is over."""
+        return time.monotonic() > self.end
+
+    def tell(self, share: float) -> None:
+        """Report a share of the branch."""
+        if self.report is not None:
+            self.report(self.begun + self.part * share)
+
+    def half(self, number: int) -> _Clock:
+        """The first (0) or second (1) half."""
+        return self._replace(begun=self.begun + 0.5 * self.part * number, part=0.5 * self.part)
+
+
+def _clock(max_seconds: float | None, progress: Callable[[float], object] | bool | None, what: str) -> _Clock:
+    """A clock that begins now."""
+    end = np.inf if max_seconds is None else time.monotonic() + positive("max_seconds", max_seconds)
+    return _Clock(end, sharing(progress, what), 0.0, 1.0)
 
 
 class _Segment(NamedTuple):
@@ -87,13 +132,18 @@ class _Segment(NamedTuple):
 
 
 def _grow(
-    segment: _Segment, max_arclength: float, max_distance: float, max_turn: float, max_points: int
+    segment: _Segment,
+    max_arclength: float,
+    max_distance: float,
+    max_turn: float,
+    max_points: int,
+    clock: _Clock,
 ) -> tuple[_Array, _Array, str]:
     """Age and state of the points of a branch, and the reason for its end."""
     ages = np.linspace(0.0, 1.0, _BEGUN)
     levels = [(ages, segment.begin(ages))]
     while True:
-        found = _next_level(segment, levels, max_distance, max_turn, max_points)
+        found = _next_level(segment, levels, max_distance, max_turn, max_points, clock)
         if not isinstance(found, str):
             levels.append(found)
         last = float(len(levels) - 1)
@@ -101,6 +151,7 @@ def _grow(
         states = np.concatenate([*(known[:-1] for _, known in levels), levels[-1][1][-1:]])
         length = np.linalg.norm(np.diff(states, axis=0), axis=1).cumsum()
         end = 1 + int(np.searchsorted(length, max_arclength))
+        clock.tell(min(float(length[-1]) / max_arclength, 1.0))
         if isinstance(found, str) or end < len(states):
             return age[: end + 1], states[: end + 1], "max_arclength" if end < len(states) else str(found)
 
@@ -110,7 +161,7 @@ _Levels = list[tuple[_Array, _Array]]
 
 
 def _next_level(
-    segment: _Segment, levels: _Levels, max_distance: float, max_turn: float, max_points: int
+    segment: _Segment, levels: _Levels, max_distance: float, max_turn: float, max_points: int, clock: _Clock
 ) -> tuple[_Array, _Array] | str:
     """Ages and states of the image of the last level, with points inserted, or the reason why there is none."""
     room = max_points - sum(len(own) for own, _ in levels)
@@ -118,6 +169,8 @@ def _next_level(
     # the segments join: the inverse image of the first point is next to the last one
     states = segment.image(before, np.repeat(before[-1:], len(before), axis=0))
     while ages.size <= room:
+        if clock.is_over:
+            return "max_seconds"
         lost = np.asarray(np.isnan(states).any(axis=1))
         if lost.any() and not segment.inverse:
             return "a run failed"
@@ -171,7 +224,9 @@ def invariant_manifold(
     max_arclength: float = 10.0,
     max_distance: float = 0.05,
     max_turn: float = 0.2,
-    max_points: int = 20_000,
+    max_points: int = _POINTS,
+    max_seconds: float | None = None,
+    progress: Callable[[float], object] | bool | None = None,
 ) -> xr.Dataset:
     """One-dimensional stable or unstable manifold of a saddle orbit, in the stroboscopic section.
 
@@ -191,6 +246,11 @@ def invariant_manifold(
         Angle between successive chords, rad; between 0.001 and 1.
     max_points : int
         Of each branch.
+    max_seconds : float, optional
+        Time after which both branches end as they are, s; no limit by default.  A stable manifold takes minutes, since each of its
+        points is sought by Newton's method.
+    progress : callable, optional
+        Called as ``progress(share)`` with the share of the length; True writes a line with the time left to standard error.
 
     Returns
     -------
@@ -198,7 +258,7 @@ def invariant_manifold(
         Over ``point``: ``state`` over ``coordinate``, ``side`` (-1 or 1: the branch), ``arclength`` along the branch and ``age``
         (applications of the return map of the orbit, or its inverse, since the fundamental segment; of the map of twice its period for
         a negative multiplier).  The attributes have the multiplier, the estimated distance from the chord, ``chord_error``, and for each
-        branch the reason for its end: ``max_arclength`` if it is complete.
+        branch the reason for its end: ``max_arclength`` if it is complete, ``max_seconds`` if the time was over.
 
     Raises
     ------
@@ -224,6 +284,15 @@ def invariant_manifold(
     distance = within("max_distance", max_distance, 1e-6, 1.0, closed="both")
     turn = within("max_turn", max_turn, 1e-3, 1.0, closed="both")
     most = integer("max_points", max_points, 10, 10**6)
+    clock = _clock(max_seconds, progress, f"{stability} manifold")
+    return _manifold(orbit, inverse, length, distance, turn, most, clock)
+
+
+def _manifold(
+    orbit: PeriodicOrbit, inverse: bool, length: float, distance: float, turn: float, most: int, clock: _Clock
+) -> xr.Dataset:
+    """Both branches of a manifold."""
+    stability = "stable" if inverse else "unstable"
     flow = orbit.flow
     if inverse and isinstance(flow, Stroboscope) and any(each.law.impulsive for each in flow.system.contacts):
         raise InputError(
@@ -243,10 +312,10 @@ def invariant_manifold(
     twice = 2 if value < 0.0 else 1
     factor = abs(value) ** (-twice if inverse else twice)
     branches = []
-    for side in (1, -1):
+    for number, side in enumerate((1, -1)):
         begun = side * _NEAR_SADDLE * vector / np.linalg.norm(vector)
         segment = _Segment(flow, twice * orbit.period, orbit.coordinates, begun, factor, inverse)
-        branches.append((side, *_grow(segment, length, distance, turn, most)))
+        branches.append((side, *_grow(segment, length, distance, turn, most, clock.half(number))))
     return _dataset(orbit, stability, value, branches, distance * turn / 8.0)
 
 
@@ -366,8 +435,9 @@ def homoclinic_tangency(
     max_distance: float = 0.02,
     max_turn: float = 0.1,
     tolerance: float = 1e-3,
-    progress: Callable[[int, int], object] | bool | None = None,
-) -> tuple[float, float]:
+    max_seconds: float | None = None,
+    progress: Callable[[float], object] | bool | None = None,
+) -> xr.Dataset:
     """Bracket of the value of a parameter at which the manifolds of a saddle begin to cross.
 
     Up to *max_arclength* the stable and the unstable manifold cross at one end of the bracket and do not at the other; it is halved
@@ -386,20 +456,25 @@ def homoclinic_tangency(
         As in :func:`invariant_manifold`.
     tolerance : float
         Between 1e-9 and 0.5.
+    max_seconds : float, optional
+        Time after which the search ends with the bracket that it has, s; no limit by default.  Each value takes the time of two
+        manifolds, minutes for a beam.
     progress : callable, optional
-        Called as ``progress(done, total)`` with values; True writes a line to standard error.
+        Called as ``progress(share)`` with the share of the values; True writes a line with the time left to standard error.
 
     Returns
     -------
-    (float, float)
-        The value without and the value with crossing.
+    xarray.Dataset
+        Along ``value``: each value that was tried, and ``crosses``.  ``bracket`` over ``manifolds`` ("apart", "crossing"): the nearest
+        values without and with crossing, NaN where none was found.  The attribute ``termination_reason`` is ``tolerance``;
+        otherwise the bracket is wider than asked for: ``max_seconds``, or a manifold that ended before *max_arclength* without a crossing.
 
     Raises
     ------
     InputError
         If the manifolds cross at both ends of *bounds*, or at none.
     OrbitNotFoundError
-        If the saddle is not found at a value, or a manifold ends before *max_arclength* without a crossing.
+        If the saddle is not found at a value.
 
     Examples
     --------
@@ -415,38 +490,69 @@ def homoclinic_tangency(
     ...     print(str(error)[:46])
     bounds = (0.02, 0.03): the manifolds cross at
     """
+    from snapbeam.util.datasets import xr
+
     instance("orbit", orbit, PeriodicOrbit, "an orbit, as periodic_orbit gives")
     low, high = interval("bounds", bounds)
     width = within("tolerance", tolerance, 1e-9, 0.5, closed="both") * (high - low)
+    length = within("max_arclength", max_arclength, 0.0, 1e4, closed="right")
+    distance = within("max_distance", max_distance, 1e-6, 1.0, closed="both")
+    turn = within("max_turn", max_turn, 1e-3, 1.0, closed="both")
+    total = 2 + int(np.ceil(np.log2((high - low) / width)))
+    clock = _clock(max_seconds, progress, "homoclinic tangency")
+    tried: dict[float, bool] = {}
 
-    def crosses(value: float) -> bool:
-        flow = orbit.flow.neighbour(name, value)
-        saddle = periodic_orbit(flow, orbit.coordinates, orbit.period)
-        limits = {"max_arclength": max_arclength, "max_distance": max_distance, "max_turn": max_turn}
-        both = [invariant_manifold(saddle, kind, **limits) for kind in ("unstable", "stable")]  # type: ignore[arg-type]
-        if homoclinic_points(*both).sizes["point"]:
-            return True
-        for found in both:
-            reason = str(found.attrs["termination_reason"])
+    def crosses(value: float) -> bool | str:
+        """Return whether the manifolds cross, which *tried* keeps, or the reason why that is not known."""
+        if clock.is_over:
+            return "max_seconds"
+        part = clock._replace(begun=len(tried) / total, part=1.0 / total)
+        saddle = periodic_orbit(orbit.flow.neighbour(name, value), orbit.coordinates, orbit.period)
+        both = [
+            _manifold(saddle, inverse, length, distance, turn, _POINTS, part.half(int(inverse)))
+            for inverse in (False, True)
+        ]
+        found = bool(homoclinic_points(*both).sizes["point"])
+        for each in () if found else both:
+            reason = str(each.attrs["termination_reason"])
+            if "max_seconds" in reason:
+                return "max_seconds"
             if reason != "max_arclength; max_arclength":
-                raise OrbitNotFoundError(
-                    f"{name} = {value:g}: the {found.attrs['stability']} manifold ends before max_arclength = {max_arclength:g} ({reason}), so "
+                return (
+                    f"{name} = {value:g}: the {each.attrs['stability']} manifold ends before max_arclength = {max_arclength:g} ({reason}), so "
                     "that crossings may be missed; choose a smaller max_arclength"
                 )
-        return False
+        tried[value] = found
+        return found
 
-    report = counting(progress, "homoclinic tangency", "values")
-    total, done = 2 + int(np.ceil(np.log2((high - low) / width))), 2
-    at_low, at_high = crosses(low), crosses(high)
-    if at_low == at_high:
-        where = "both values" if at_low else "neither value"
+    ends = [crosses(low), crosses(high)]
+    reason = next((each for each in ends if isinstance(each, str)), "tolerance")
+    if reason == "tolerance" and ends[0] == ends[1]:
+        where = "both values" if ends[0] else "neither value"
         raise InputError(
             f"bounds = {shown(bounds)}: the manifolds cross at {where}; give one with and one without crossing"
         )
-    while high - low > width:
+    while reason == "tolerance" and high - low > width:
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if crosses(middle) == at_low else (low, middle)
-        done += 1
-        if report is not None:
-            report(done, total)
-    return (high, low) if at_low else (low, high)
+        found = crosses(middle)
+        if isinstance(found, str):
+            reason = found
+        else:
+            low, high = (middle, high) if found == ends[0] else (low, middle)
+    if clock.report is not None:
+        clock.report(1.0)
+    kept = [
+        next((each for each in (low, high) if tried.get(each) is state), np.nan) for state in (False, True)
+    ]
+    values = sorted(tried)
+    return xr.Dataset(
+        {
+            "crosses": ("value", np.array([tried[value] for value in values], bool), dimensionless("the manifolds cross")),
+            "bracket": ("manifolds", np.array(kept), {"long_name": f"nearest values of {name}"}),
+        },
+        {"value": ("value", np.array(values), {"long_name": name}), "manifolds": ["apart", "crossing"]},
+        {
+            "title": "homoclinic tangency", "parameter": name, "termination_reason": reason,
+            "max_arclength": length, "max_distance": distance, "max_turn": turn,
+        },
+    )  # fmt: skip

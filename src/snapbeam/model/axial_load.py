@@ -95,7 +95,8 @@ class LoadRamp(LoadMotion, Timed):
     duration : float
         Periods of the first mode that the change takes.
     hold_periods : float
-        Periods that it stays; then it goes back as it came.  Infinite, as by default: it never goes back.
+        Periods of the first mode for which the load stays at P + change, from the end of the change on; then it goes back
+        as it came, in *duration*.  By default 1e9: no run sees it go back.
 
     Examples
     --------
@@ -112,7 +113,7 @@ class LoadRamp(LoadMotion, Timed):
         short="load_duration",
     )
     hold_periods: float = quantity(
-        "1", "periods of the first mode after which the axial load goes back", default=1e9, low=0.0, closed="left",
+        "1", "periods of the first mode for which the axial load stays changed", default=1e9, low=0.0, closed="left",
         scope=RUN, short="load_hold",
     )  # fmt: skip
     name = "ramp"

@@ -68,7 +68,9 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
         raise InputError(f"no designs among {list(map(str, dataset.variables))}")
     names = [str(name) for name in dataset.data_vars]
     objectives = [name[len(_OBJECTIVE) :] for name in names if name.startswith(_OBJECTIVE)]
-    variables = [name[6:] for name in names if name.startswith("tried_") and not name.startswith(_OBJECTIVE)]
+    variables = [
+        name[6:] for name in names if name.startswith("tried_") and "parameter" in dataset[name].attrs
+    ]
     if over is None:
         across = f"objective_{objectives[1]}" if len(objectives) > 1 else variables[0]
     elif over in variables:

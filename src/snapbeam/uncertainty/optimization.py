@@ -28,7 +28,7 @@ from snapbeam.uncertainty.monte_carlo import (
     trials_of,
     wilson,
 )
-from snapbeam.util.diagnostics import counting
+from snapbeam.util.diagnostics import Diagnostic, counting, tell
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.validation import (
     InputError,
@@ -393,6 +393,22 @@ class DesignProblem:
         designs : array_like of shape (designs, variables)
             In the order of :attr:`names`.
         """
+        return self.judge(designs)[0]
+
+    def judge(self, designs: ArrayLike) -> tuple[Worth, _Array]:
+        """Evaluate designs, with their distances from the constraints.
+
+        Parameters
+        ----------
+        designs : array_like of shape (designs, variables)
+
+        Returns
+        -------
+        Worth
+        distances : array of shape (designs, constraints)
+            Of the fraction of the runs that satisfy a constraint from the required one, or of a quantity of the design from its
+            limit; negative if violated, NaN of a design that was not run.
+        """
         x = finite_array("designs", designs, 2)
         if x.shape[1] != len(self.bounds):
             raise InputError(f"designs of shape {x.shape}: must have {len(self.bounds)} variables")
@@ -402,10 +418,14 @@ class DesignProblem:
         objectives = np.full((len(x), len(self.objectives)), np.inf)
         violation = self._own_excess(x)
         runs = np.zeros(len(x), dtype=np.int64)
+        distances = np.full((len(x), len(self.constraints)), np.nan)
+        for k, constraint in enumerate(self.constraints):
+            if constraint._quantity.kind == "design":
+                distances[:, k] = self.room(constraint, x)
         alive = np.flatnonzero(violation == 0.0)
         if not self._needs_runs:
             objectives[alive] = self._own_objectives(x[alive])
-            return Worth(objectives, violation, runs)
+            return Worth(objectives, violation, runs), distances
         first = max(4, self.samples // 4)
         parts: dict[int, list[dict[str, NDArray[Any]]]] = {int(i): [] for i in alive}
         for begin, end in ((0, first), (first, self.samples)):
@@ -417,13 +437,16 @@ class DesignProblem:
             joined = {i: _joined(parts[i]) for i in alive.tolist()}
             last = end == self.samples
             for i in alive.tolist():
+                for k, constraint in enumerate(self.constraints):
+                    if constraint._quantity.kind != "design":
+                        distances[i, k] = self._kept(constraint, joined[i]).mean() - constraint.required
                 if last or self._missing(joined[i], hopeful=True) > 0.0:
                     violation[i] = self._missing(joined[i])
             if last:
                 for i in alive[violation[alive] == 0.0].tolist():
                     objectives[i] = self._objectives_of(x[i : i + 1], joined[i])
             alive = alive[violation[alive] == 0.0]
-        return Worth(objectives, violation, runs)
+        return Worth(objectives, violation, runs), distances
 
     def estimate(self, design: ArrayLike, numbers: NDArray[np.int64], confidence: float = 0.95) -> Estimate:
         """Estimate the objectives and constraints of one design from the given samples, with intervals."""
@@ -443,7 +466,7 @@ class DesignProblem:
             if constraint._quantity.kind == "design":
                 row[:] = float(constraint.excess(self._own(constraint, x))[0] == 0.0)
                 continue
-            kept = constraint.kept(constraint._quantity.of(self.trials.system, found)) & good
+            kept = self._kept(constraint, found)
             row[0] = kept.sum() / max(int(good.sum()), 1)
             row[1] = float(wilson(int(kept.sum()), good.size, confidence)[1])
             row[2] = float(wilson(int(kept.sum()) + failed, good.size, confidence)[2])
@@ -526,17 +549,21 @@ class DesignProblem:
         )
         return np.where(np.isfinite(signed), signed, np.inf)
 
+    def _kept(self, constraint: Constraint, found: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
+        """Mask of the runs that satisfy a constraint; failed runs satisfy none."""
+        values = constraint._quantity.of(self.trials.system, found)
+        return np.asarray(constraint.kept(values) & reached(found))
+
     def _missing(self, found: dict[str, NDArray[Any]], *, hopeful: bool = False) -> float:
         """Deficit of the fractions of runs that satisfy the constraints; failed runs satisfy none.
 
         *hopeful*: by how much they are too small even if they are as great as the runs let hope, without a margin.
         """
-        good = reached(found)
         total = 0.0
         for constraint in self.constraints:
             if constraint._quantity.kind == "design":
                 continue
-            kept = constraint.kept(constraint._quantity.of(self.trials.system, found)) & good
+            kept = self._kept(constraint, found)
             share = float(kept.mean())
             wanted = _share_for(constraint.required, self.validation_samples)
             if hopeful:
@@ -762,7 +789,8 @@ def optimize_design(
         ``constraints_satisfied``: whether every lower limit is at least the required fraction, some upper limit
         is less, or neither is known; ``distance_...``: that of the fraction from the required one, or of a
         quantity of the design from its limit.  Along ``tried``: every design that was evaluated, its objectives
-        and ``violation``. The attribute ``termination_reason`` gives the reason why the search and the
+        ``tried_distance_...`` and ``violation``.  If no design satisfies the constraints, the one that violates them least is
+        reported, with a :class:`~snapbeam.DiagnosticWarning`.  The attribute ``termination_reason`` gives the reason why the search and the
         refinement stopped.
 
     Examples
@@ -805,12 +833,12 @@ def optimize_design(
     )
     report = counting(progress, "design", "generations")
     search = DifferentialEvolution(list(problem.bounds.values()), settings.population, settings.seed)
-    tried: list[tuple[_Array, _Array, _Array]] = []
+    tried: list[tuple[_Array, _Array, _Array, _Array]] = []
     stopped, stalled, before = f"{settings.generations} generations", 0, None
     for generation in range(settings.generations):
         asked = search.ask()
-        worth = problem.evaluate(asked)
-        tried.append((asked, worth.objectives, worth.violation))
+        worth, distances = problem.judge(asked)
+        tried.append((asked, worth.objectives, worth.violation, distances))
         search.tell(worth.objectives, worth.violation)
         stalled = stalled + 1 if before is not None and not _improved(search, before) else 0
         before = search.violation[0], search.objectives.copy()
@@ -819,21 +847,27 @@ def optimize_design(
         if stalled >= _STALLED:
             stopped = f"{generation + 1} generations, the last {_STALLED} without progress"
             break
-    x, objective_values, violation = (np.concatenate(parts) for parts in zip(*tried, strict=True))
-    if len(problem.objectives) > 1:
-        chosen, factor = _front(problem, x, objective_values, violation), 1
+    x, objective_values, violation, distances = (np.concatenate(parts) for parts in zip(*tried, strict=True))
+    if not (violation == 0.0).any():
+        words = f"none of the {len(x)} designs satisfies the constraints; the one that violates them least is reported"
+        chosen, factor, stopped = [int(np.argmin(violation))], 1, f"{stopped}; {words}"
+    elif len(problem.objectives) > 1:
+        chosen, factor = _front(objective_values, violation), 1
     else:
         kept = _refined(problem, settings, x, objective_values, violation)
-        x, objective_values, violation = (
+        x, objective_values, violation, distances = (
             np.concatenate([known, np.array(more)]) if more else known
             for known, more in (
-                (x, kept.x), (objective_values, kept.objectives), (violation, kept.violation)
+                (x, kept.x), (objective_values, kept.objectives), (violation, kept.violation), (distances, kept.distances),
             )
         )  # fmt: skip
         chosen, factor, stopped = [kept.chosen], _REPORT_FACTOR, f"{stopped}; {kept.reason}"
     numbers = np.arange(REPORT, REPORT + factor * settings.validation_samples)
     found = [problem.estimate(x[i], numbers, settings.confidence) for i in chosen]
-    dataset = _dataset(problem, settings, (x, objective_values, violation), chosen, found)
+    dataset = _dataset(problem, settings, (x, objective_values, violation, distances), chosen, found)
+    if not (dataset["constraints_satisfied"] == SATISFIED.index("satisfied")).any():
+        tell([Diagnostic("NO_FEASIBLE_DESIGN", f"constraints: no reported design is known to satisfy them ({stopped}); widen the bounds, "
+                         "loosen a constraint or use more generations")])  # fmt: skip
     return dataset.assign_attrs(termination_reason=stopped)
 
 
@@ -856,22 +890,9 @@ def _early(objectives: Any, constraints: Any) -> bool:
     return all(getattr(each, "quantity", None) is not None and each._quantity.kind != "run" for each in made)
 
 
-def _require_good(problem: DesignProblem, x: _Array, violation: _Array) -> NDArray[np.int64]:
-    """Designs that the search found to satisfy the constraints."""
-    good = np.flatnonzero(violation == 0.0)
-    if not good.size:
-        best = int(np.argmin(violation))
-        where = ", ".join(f"{name} = {value:.4g}" for name, value in zip(problem.names, x[best], strict=True))
-        raise InputError(
-            f"constraints: none of {len(x)} designs satisfies them; {where} violates them least.  Widen the bounds, "
-            "loosen a constraint or use more generations"
-        )
-    return good
-
-
-def _front(problem: DesignProblem, x: _Array, objectives: _Array, violation: _Array) -> list[int]:
+def _front(objectives: _Array, violation: _Array) -> list[int]:
     """The front, by its first objective."""
-    good = _require_good(problem, x, violation)
+    good = np.flatnonzero(violation == 0.0)
     front = good[front_of(objectives[good])]
     _, unique = np.unique(objectives[front], axis=0, return_index=True)
     kept = front[np.sort(unique)]
@@ -887,6 +908,7 @@ class _Refined:
     x: list[_Array]
     objectives: list[_Array]
     violation: list[float]
+    distances: list[_Array]
 
 
 def _refined(
@@ -896,13 +918,18 @@ def _refined(
     sign = -1.0 if problem.objectives[0].maximize else 1.0
     numbers = np.arange(CHECK, CHECK + effort.validation_samples)
 
-    def check(design: _Array) -> tuple[bool, float, float]:
-        """Return whether a design satisfies the constraints, its signed objective, and the constraint deficit."""
+    def check(design: _Array) -> tuple[bool, float, float, _Array]:
+        """Return whether a design satisfies the constraints, its signed objective, the deficit and the distances."""
         found = problem.estimate(design, numbers, effort.confidence)
         state, short = _holds(problem, found)
-        return state == 2, sign * float(found.objectives[0, 0]), short
+        return (
+            state == 2,
+            sign * float(found.objectives[0, 0]),
+            short,
+            _distances(problem, design[None], [found])[0],
+        )
 
-    good = _require_good(problem, x, violation)
+    good = np.flatnonzero(violation == 0.0)
     order = good[np.argsort(objectives[good, 0], kind="stable")]
     ranked: list[int] = []
     for i in order.tolist():  # a population that has converged holds the same design many times over
@@ -913,7 +940,7 @@ def _refined(
     lacking: list[tuple[float, int]] = []
     best, value, beyond = -1, np.inf, None
     for i in (ranked[k] for k in steps.tolist()):
-        holds, value, short = check(x[i])
+        holds, value, short, _ = check(x[i])
         if holds:
             best = i
             break
@@ -921,10 +948,10 @@ def _refined(
         beyond = x[i]
     if best < 0:
         words = f"none of {len(lacking)} checked designs satisfies the constraints; the one that lacks least is reported"
-        return _Refined(min(lacking)[1], words, [], [], [])
+        return _Refined(min(lacking)[1], words, [], [], [], [])
     low, high = np.array(list(problem.bounds.values())).T
     inside, chosen = x[best], best
-    made = _Refined(best, "", [], [], [])
+    made = _Refined(best, "", [], [], [], [])
     broken = np.flatnonzero(violation > 0.0)
     distance = np.abs((x[broken] - inside) / (high - low)).max(axis=1)
     targets = broken[np.argsort(distance, kind="stable")].tolist()
@@ -943,10 +970,11 @@ def _refined(
             made.reason = f"refined to a constraint, after {checked} checked designs"
             break
         checked += 1
-        holds, found, short = check(tried)
+        holds, found, short, distances = check(tried)
         made.x.append(tried)
         made.objectives.append(np.array([found]))
         made.violation.append(short)
+        made.distances.append(distances)
         if holds and found < value:
             inside, value, chosen = tried, found, len(x) + len(made.x) - 1
         elif not holds and found < value:
@@ -956,6 +984,17 @@ def _refined(
     made.reason = made.reason or f"refined with {checked} checked designs, the maximum (refinements)"
     made.chosen = chosen
     return made
+
+
+def _distances(problem: DesignProblem, x: _Array, found: list[Estimate]) -> _Array:
+    """Distances of designs from their constraints, shape (designs, constraints), as :meth:`DesignProblem.judge`."""
+    distances = np.empty((len(x), len(problem.constraints)))
+    for k, constraint in enumerate(problem.constraints):
+        if constraint._quantity.kind == "design":
+            distances[:, k] = problem.room(constraint, x)
+        else:
+            distances[:, k] = [each.constraints[k, 0] - constraint.required for each in found]
+    return distances
 
 
 def _holds(problem: DesignProblem, found: Estimate) -> tuple[int, float]:
@@ -972,7 +1011,7 @@ def _holds(problem: DesignProblem, found: Estimate) -> tuple[int, float]:
 def _dataset(
     problem: DesignProblem,
     effort: OptimizerSettings,
-    tried: tuple[_Array, _Array, _Array],
+    tried: tuple[_Array, _Array, _Array, _Array],
     chosen: list[int],
     found: list[Estimate],
 ) -> xr.Dataset:
@@ -989,7 +1028,8 @@ def _dataset(
     attrs |= {f"fixed_{lookup(name).short}": +value for name, value in trials.system.parameters.items()
               if isinstance(value, (int, float)) and name not in problem.bounds}  # fmt: skip
     dataset = xr.Dataset(attrs=attrs)
-    x, objectives, violation = tried
+    x, objectives, violation, distances = tried
+    reported = _distances(problem, x[chosen], found)
     for j, name in enumerate(problem.names):
         row = lookup(name)
         labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": name}
@@ -1024,16 +1064,14 @@ def _dataset(
             {"units": "1", "long_name": "required fraction"},
         )
         if constraint._quantity.kind == "design":
-            distance, unit = problem.room(constraint, x[chosen]), constraint._quantity.unit
+            unit = constraint._quantity.unit
             about = f"distance of {constraint.quantity} from its limit"
         else:
-            distance, unit = np.array([each.constraints[k, 0] - required for each in found]), "1"
+            unit = "1"
             about = f"distance of the fraction that satisfies the constraint of {constraint.quantity} from the required one"
-        dataset[f"distance_{constraint.label}"] = (
-            ("design",),
-            distance,
-            {"units": unit, "long_name": f"{about}; negative: violated"},
-        )
+        labels = {"units": unit, "long_name": f"{about}; negative: violated"}
+        dataset[f"distance_{constraint.label}"] = (("design",), reported[:, k], labels)
+        dataset[f"tried_distance_{constraint.label}"] = (("tried",), distances[:, k], labels)
     states = np.array([_holds(problem, each)[0] for each in found], dtype=np.int8)
     flags = {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": " ".join(SATISFIED)}
     words = {"units": "1", "long_name": "whether the constraints are satisfied"}
