@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -50,7 +50,7 @@ def test_metadata_agree():
 @pytest.fixture
 def copied(tmp_path):
     """The files that a release changes, in a folder of their own."""
-    for name in (*VERSIONS, "pyproject.toml", "README.md", "hatch_build.py", "LICENSE"):
+    for name in (*VERSIONS, "pyproject.toml", "README.md", "LICENSE", "build_backend/snapbeam_build.py"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(ROOT / name, tmp_path / name)
     text = "# Changelog\n\n## Unreleased\n\n### Added\n\n- A file.\n\n## 0.1.0\n"
@@ -82,12 +82,10 @@ def test_a_release_is_prepared(copied):
 
 def test_description_has_links_that_work_elsewhere(copied):
     """In the archives of a release, links of the README are absolute."""
-    pytest.importorskip("hatchling", reason="make dist builds with it")
-    from hatchling.metadata.core import ProjectMetadata
-    from hatchling.plugin.manager import PluginManager
-
     prepare("0.2.0", "https://example.org/snapbeam", root=copied)
-    text = ProjectMetadata(str(copied), PluginManager()).core.readme
+    text = (copied / _build("prepare_metadata_for_build_wheel", copied, root=copied) / "METADATA").read_text(
+        encoding="utf-8"
+    )
     targets = re.findall(r"\]\(([^)]+)\)", text)
     assert len(targets) > 20 and all(target.startswith("https://") for target in targets)
     assert (
@@ -123,25 +121,28 @@ def test_no_machine_is_named():
                 assert not re.search(r"(?<![\w/.])/(work|root|home|opt)/|/simple/", text), path
 
 
+def _build(entry, folder, settings=None, root=ROOT, **environment):
+    """Path of what an entry of the build backend makes in a folder."""
+    pytest.importorskip("scikit_build_core", reason="the build backend")
+    program = f"import snapbeam_build; print('made', snapbeam_build.{entry}({str(folder)!r}, {settings!r}))"
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=root, capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": str(root / "build_backend"), **environment},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder / done.stdout.split("\nmade ")[-1].removeprefix("made ").strip()
+
+
 @pytest.fixture(scope="module")
 def archives(tmp_path_factory):
-    if importlib.util.find_spec("hatchling") is None:
-        pytest.skip("hatchling is not installed: make dist builds with it")
     folder = tmp_path_factory.mktemp("dist")
-    for kind in ("wheel", "sdist"):
-        subprocess.run(
-            [sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", str(folder)], cwd=ROOT, check=True,
-            capture_output=True,
-        )  # fmt: skip
-    return next(folder.glob("*.tar.gz")), next(folder.glob("*.whl"))
+    return _build("build_sdist", folder), _build("build_wheel", folder)
 
 
 @pytest.mark.slow
 def test_wheel_is_reproducible(archives, tmp_path):
     """A second build has the same bytes."""
-    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
-    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
-    first, second = (path.read_bytes() for path in (archives[1], next(tmp_path.glob("*.whl"))))
+    first, second = (path.read_bytes() for path in (archives[1], _build("build_wheel", tmp_path)))
     assert hashlib.sha256(first).hexdigest() == hashlib.sha256(second).hexdigest()
 
 
@@ -152,6 +153,8 @@ def test_archives_hold_what_they_must(archives):
     for needed in ("snapbeam/py.typed", "snapbeam/paper/claims/topics/beam.toml"):
         assert needed in names
     assert all(name.startswith(("snapbeam/", "snapbeam-")) for name in names)
+    assert len([name for name in names if re.fullmatch(r"snapbeam/_core[.\w-]*[.](so|pyd)", name)]) == 1
+    assert not [name for name in names if name.endswith((".cpp", ".hpp", "CMakeLists.txt"))]
     with tarfile.open(source) as archive:
         held = {name.partition("/")[2] for name in archive.getnames()}
     for needed in (
@@ -161,9 +164,14 @@ def test_archives_hold_what_they_must(archives):
         "CITATION.cff",
         "docs/index.md",
         "tests/conftest.py",
+        "CMakeLists.txt",
+        "build_backend/snapbeam_build.py",
+        "src/snapbeam/core/module.cpp",
+        "src/snapbeam/core/step.hpp",
     ):
         assert needed in held
-    assert not [name for name in held if "/_build/" in name or name.endswith(".pyc")]
+    assert not [name for name in held if "/_build/" in name or name.endswith((".pyc", ".so", ".pyd"))]
+    assert not [name for name in held if name.startswith((".", "build/"))]
 
 
 @pytest.fixture(scope="module")
