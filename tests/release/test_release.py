@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tarfile
 import tomllib
+import venv
 import zipfile
 from pathlib import Path
 
@@ -187,6 +188,29 @@ def test_each_runs_alone(which, extra, archives, code):
     """In a fresh environment, from nothing but the archive and what it says it needs."""
     source, wheel = archives
     alone.try_alone(source if which == "source" else wheel, extra, code)
+
+
+@pytest.mark.slow
+def test_no_compiler_is_needed(archives, tmp_path):
+    """With nothing on the PATH, pip brings a compiler; its core has an AVX set where the processor has one."""
+    venv.create(tmp_path / "env", with_pip=True)
+    python = tmp_path / "env" / ("Scripts" if os.name == "nt" else "bin") / "python"
+    (tmp_path / "empty").mkdir()
+    environment = {name: value for name, value in os.environ.items() if name not in ("CXX", "PYTHONPATH")}
+    environment["PATH"] = str(tmp_path / "empty")
+    words = ["-m", "pip", "install", "--no-deps", "--no-compile", str(archives[0])]
+    done = subprocess.run([python, *words], cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    # the module alone: what the package needs is not installed
+    program = "import sys, sysconfig; sys.path.insert(0, sysconfig.get_path('platlib') + '/snapbeam'); import _core; "
+    program += "print(*_core.instruction_sets())"
+    sets = subprocess.run(
+        [python, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True
+    ).stdout.split()
+    flags = Path("/proc/cpuinfo").read_text(encoding="utf-8").split() if sys.platform == "linux" else []
+    assert sets
+    if {"avx2", "fma"} <= set(flags):
+        assert {"avx2", "avx512"} & set(sets)
 
 
 def test_every_extra_is_tried():
