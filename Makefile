@@ -148,7 +148,7 @@ release: $(VENV)/.installed-dev
 dist: $(VENV)/.installed-dev
 	$(PIP) install --constraint constraints.txt --group archives
 	rm -rf dist
-	$(BIN)/python -m build --outdir dist .
+	$(BIN)/python -m build --outdir dist -C cmake.define.SNAPBEAM_SETS=all .
 	$(BIN)/python -m twine check --strict dist/*
 	$(BIN)/python tests/release/alone.py dist
 
