@@ -26,7 +26,7 @@ def _compiler_works():
         return True
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "try.cpp").write_text(
-            "#include <concepts>\nint main() { return std::integral<int> ? 0 : 1; }\n"
+            "#include <concepts>\nint main() { return !std::integral<int>; }\n"
         )
         for compiler in ("c++", "g++", "clang++"):
             trial = f"{compiler} -std=c++20 try.cpp -o try && ./try"
