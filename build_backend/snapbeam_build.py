@@ -25,9 +25,7 @@ def _compiler_works():
     if "CXX" in os.environ or os.name == "nt":
         return True
     with tempfile.TemporaryDirectory() as folder:
-        Path(folder, "try.cpp").write_text(
-            "#include <concepts>\nint main() { return !std::integral<int>; }\n"
-        )
+        Path(folder, "try.cpp").write_text("#include <concepts>\nint main() { return !std::integral<int>; }")
         for compiler in ("c++", "g++", "clang++"):
             trial = f"{compiler} -std=c++20 try.cpp -o try && ./try"
             if subprocess.run(trial, shell=True, cwd=folder, capture_output=True).returncode == 0:
