@@ -21,11 +21,12 @@ WORKERS ?= 2
 # Where the benchmarks write; the docs show what is in docs/images
 BENCH ?= out/bench
 
-.PHONY: help map tables prose explorer-deps test quick-tests test-slow test-oldest coverage lint lock docs bench audit release dist clean
+.PHONY: help map core tables prose explorer-deps test quick-tests test-slow test-oldest coverage lint lock docs bench audit release dist clean
 
 help:
 	@echo "make map        compute the response map ($(MAP), $(PLOT)); variables: MODES CYCLES FREQUENCY_RATIO"
 	@echo "                VELOCITY_AMPLITUDE LOCATION MAP PLOT"
+	@echo "make core       the native core again after a change of its sources; the other targets do it themselves"
 	@echo "make test       lint, types, import contracts, metadata and the tests"
 	@echo "make test-slow  the tests that take longer"
 	@echo "make explorer-deps   what the explorer and its tests in a browser need"
@@ -44,7 +45,7 @@ help:
 $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
-# What the native core is built from: an editable installation is made again when one of them changes.
+# What the native core is made from: after a change the editable install builds it again, in seconds, and only what changed.
 CORE := CMakeLists.txt $(wildcard build_backend/*.py src/snapbeam/core/*)
 
 # One stamp per set of packages: a second make installs nothing again.
@@ -55,10 +56,15 @@ $(VENV)/.installed-run: pyproject.toml constraints.txt $(CORE) | $(BIN)/python
 
 # Every package is compared with its hash.  The list is complete: with dependencies, pip 23 ignores the pin of a package
 # that another one asks for with an extra.
-$(VENV)/.installed-dev: pyproject.toml requirements-dev.txt $(CORE) | $(BIN)/python
+$(VENV)/.locked-dev: requirements-dev.txt | $(BIN)/python
 	$(PIP) install --require-hashes --no-deps --requirement requirements-dev.txt
-	$(PIP) install --no-deps --no-build-isolation --editable .
 	@touch $@
+
+$(VENV)/.installed-dev: pyproject.toml $(CORE) $(VENV)/.locked-dev
+	PATH="$(abspath $(BIN)):$$PATH" $(PIP) install --no-deps --no-build-isolation --editable .
+	@touch $@
+
+core: $(VENV)/.installed-dev
 
 $(VENV)/.installed-bench: pyproject.toml constraints.txt $(VENV)/.installed-dev
 	$(PIP) install --constraint constraints.txt --group bench
@@ -103,7 +109,7 @@ test-slow: $(VENV)/.installed-dev
 OLDEST ?= .venv-oldest
 OLDEST_PYTHON ?= python3.11
 
-$(OLDEST)/.installed: pyproject.toml tests/reliability/oldest.py
+$(OLDEST)/.installed: pyproject.toml $(CORE) tests/reliability/oldest.py
 	$(OLDEST_PYTHON) -m venv $(OLDEST)
 	$(OLDEST)/bin/python tests/reliability/oldest.py lab cluster video test > $(OLDEST)/oldest.txt
 	$(OLDEST)/bin/python -m pip install --quiet --requirement $(OLDEST)/oldest.txt
@@ -142,11 +148,12 @@ release: $(VENV)/.installed-dev
 dist: $(VENV)/.installed-dev
 	$(PIP) install --constraint constraints.txt --group archives
 	rm -rf dist
-	$(BIN)/python -m build --outdir dist .
+	$(BIN)/python -m build --outdir dist -C cmake.define.SNAPBEAM_SETS=all .
 	$(BIN)/python -m twine check --strict dist/*
 	$(BIN)/python tests/release/alone.py dist
 
 clean:
 	rm -rf build dist docs/_build docs/gallery docs/_paper docs/_generated docs/sg_execution_times.rst .pytest_cache .mypy_cache \
 		.ruff_cache .import_linter_cache .hypothesis
+	rm -f src/snapbeam/_core*.so src/snapbeam/_core*.pyd $(VENV)/.installed-run $(VENV)/.installed-dev
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +

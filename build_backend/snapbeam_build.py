@@ -1,72 +1,60 @@
-"""Build backend: scikit-build-core, with ziglang as the C++ compiler where no other one works."""
+"""Build backend: scikit-build-core, with the compiler of the package ziglang where no C++20 compiler works."""
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-from scikit_build_core import build as _build
-from scikit_build_core.build import *  # noqa: F403
-
-_PROGRAM = "#include <concepts>\n#include <vector>\nint main() { std::vector<int> v(1); return v[0]; }\n"
+import scikit_build_core.build as backend
+from scikit_build_core.build import *  # noqa: F403  (the other entries of a backend)
 
 
-def _works(command):
-    """Return whether a command compiles and links C++20."""
+def dynamic_metadata(settings, project):
+    """README.md, with links that also work outside the repository if [project.urls] has its address."""
+    text = Path("README.md").read_text(encoding="utf-8")
+    if source := project.get("urls", {}).get("Source"):
+        for kind, link in (("raw", r"(!\[[^\]]*\]\()(?!https?:)"), ("blob", r"(\]\()(?!https?:)")):
+            text = re.sub(link, rf"\g<1>{source}/{kind}/v{project['version']}/", text)
+    return {"readme": {"content-type": "text/markdown", "text": text}}
+
+
+def _compiler_works():
+    """Tell if a compiler makes a C++20 program that runs; CMake judges one that CXX names, and looks itself on Windows."""
+    if "CXX" in os.environ or os.name == "nt":
+        return True
     with tempfile.TemporaryDirectory() as folder:
-        source = Path(folder, "program.cpp")
-        source.write_text(_PROGRAM, encoding="utf-8")
-        words = [*command.split(), "-std=c++20", str(source), "-o", str(Path(folder, "program"))]
-        return bool(shutil.which(words[0])) and subprocess.run(words, capture_output=True).returncode == 0
+        Path(folder, "try.cpp").write_text("#include <concepts>\nint main() { return !std::integral<int>; }")
+        for compiler in ("c++", "g++", "clang++"):
+            trial = f"{compiler} -std=c++20 try.cpp -o try && ./try"
+            if subprocess.run(trial, shell=True, cwd=folder, capture_output=True).returncode == 0:
+                os.environ["CXX"] = compiler
+                return True
+    return False
 
 
-_HAS_COMPILER = os.name == "nt" or any(map(_works, [os.environ.get("CXX", "c++"), "g++", "clang++"]))
+def get_requires_for_build_wheel(config_settings=None):
+    """Add the compiler; cmake and ninja are named by scikit-build-core where they are missing."""
+    return backend.get_requires_for_build_wheel(config_settings) + ([] if _compiler_works() else ["ziglang"])
 
 
-def _with_zig(call):
-    """The call with a compiler: CMake takes one program, hence scripts."""
-
-    def wrapped(*args, **options):
-        if call.__name__.startswith("get_requires"):
-            return call(*args, **options) + (
-                [] if _HAS_COMPILER else ["ziglang<0.16", "cmake>=3.20", "ninja"]
-            )
-        if not _HAS_COMPILER:
-            folder = Path(tempfile.mkdtemp(prefix="snapbeam-zig-"))
-            for name in ("c++", "cc", "ar", "ranlib"):
-                script = folder / name.replace("+", "x")
-                script.write_text(
-                    f'#!/bin/sh\nexec "{sys.executable}" -m ziglang {name} "$@"\n', encoding="utf-8"
-                )
-                script.chmod(0o755)
-            os.environ |= {"CXX": f"{folder}/cxx", "CC": f"{folder}/cc"}
-            os.environ["CMAKE_ARGS"] = (
-                f"-DCMAKE_AR={folder}/ar -DCMAKE_RANLIB={folder}/ranlib " + os.environ.get("CMAKE_ARGS", "")
-            )
-        return call(*args, **options)
-
-    return wrapped
+def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
+    """Build a wheel; CMake wants single programs, so scripts in the build folder call the compiler of ziglang."""
+    if not _compiler_works():
+        os.makedirs("build/ziglang", exist_ok=True)
+        for tool, words in {"c++": "c++ -mcpu=baseline", "ar": "ar", "ranlib": "ranlib"}.items():
+            script = Path("build/ziglang", tool).absolute()
+            script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m ziglang {words} "$@"\n')
+            script.chmod(0o755)
+        os.environ["CXX"] = os.path.abspath("build/ziglang/c++")
+    return backend.build_wheel(wheel_directory, config_settings, metadata_directory)
 
 
-for _name in (
-    "get_requires_for_build_wheel",
-    "get_requires_for_build_editable",
-    "build_wheel",
-    "build_editable",
-):
-    globals()[_name] = _with_zig(getattr(_build, _name))
+def build_editable(wheel_directory, config_settings=None, metadata_directory=None):
+    """Build a wheel that holds a path to src, where the module lies: an import hook would go before PYTHONPATH."""
+    own = {"wheel.packages": [], "build-dir": "build/{wheel_tag}", "cmake.define.SNAPBEAM_EDITABLE": "ON"}
+    return build_wheel(wheel_directory, (config_settings or {}) | own, metadata_directory)
 
 
-def dynamic_metadata(field, settings, project):
-    """Return the README, its links absolute if ``[project.urls]`` has the address ``Source``."""
-    text, source = Path("README.md").read_text(encoding="utf-8"), project.get("urls", {}).get("Source")
-    if source:
-        version = re.search(
-            r'__version__ = "(.+)"', Path("src/snapbeam/_version.py").read_text(encoding="utf-8")
-        )[1]
-        text = re.sub(r"(!\[[^\]]*\]\()(?!https?:)", rf"\g<1>{source}/raw/v{version}/", text)
-        text = re.sub(r"(\]\()(?!https?:)", rf"\g<1>{source}/blob/v{version}/", text)
-    return {"content-type": "text/markdown", "text": text}
+get_requires_for_build_editable = get_requires_for_build_wheel

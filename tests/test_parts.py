@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 import snapbeam
-from snapbeam import _core
 from snapbeam.parts import PARTS
 
 ROOT = Path(__file__).parents[1]
@@ -115,7 +114,6 @@ def without(part: str, folder: Path) -> Path:
             shutil.copy(file, copy)
     for name in ("docs", "examples", "benchmarks", "impact20"):
         (copy / name).symlink_to(ROOT / name, target_is_directory=True)
-    shutil.copy(_core.__file__, copy / "src" / "snapbeam")
     shutil.rmtree(copy / "src" / "snapbeam" / part)
     shutil.rmtree(copy / "tests" / part)
     return copy
@@ -123,18 +121,8 @@ def without(part: str, folder: Path) -> Path:
 
 def in_copy(copy: Path, *arguments: str) -> str:
     """Run Python in a copy, with the package of the copy; return what it prints."""
-    # an editable installation would find the package of the repository first
-    start = (
-        "import runpy, sys; sys.meta_path[:] = [each for each in sys.meta_path if 'Redirecting' not in type(each).__name__]; "
-        "sys.argv[0:1] = []; "
-    )
-    module = (
-        f"runpy.run_module({arguments[1]!r}, run_name='__main__', alter_sys=True)"
-        if arguments[0] == "-m"
-        else arguments[1]
-    )
     done = subprocess.run(
-        [sys.executable, "-c", start + module, *(arguments[1:] if arguments[0] == "-m" else ("-c", *arguments[2:]))], cwd=copy, capture_output=True, text=True, encoding="utf-8", timeout=1800,
+        [sys.executable, *arguments], cwd=copy, capture_output=True, text=True, encoding="utf-8", timeout=1800,
         env={**os.environ, "PYTHONPATH": str(copy / "src"), "COLUMNS": "120"},
     )  # fmt: skip
     assert done.returncode == 0, f"{arguments}\n{done.stdout[-4000:]}\n{done.stderr[-4000:]}"

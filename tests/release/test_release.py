@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import json
+import os
 import re
 import shutil
 import subprocess
 import sys
 import tarfile
 import tomllib
+import venv
 import zipfile
 from pathlib import Path
 
@@ -50,7 +51,7 @@ def test_metadata_agree():
 @pytest.fixture
 def copied(tmp_path):
     """The files that a release changes, in a folder of their own."""
-    for name in (*VERSIONS, "pyproject.toml", "README.md", "build_backend/snapbeam_build.py", "LICENSE"):
+    for name in (*VERSIONS, "pyproject.toml", "README.md", "LICENSE", "build_backend/snapbeam_build.py"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(ROOT / name, tmp_path / name)
     text = "# Changelog\n\n## Unreleased\n\n### Added\n\n- A file.\n\n## 0.1.0\n"
@@ -82,22 +83,10 @@ def test_a_release_is_prepared(copied):
 
 def test_description_has_links_that_work_elsewhere(copied):
     """In the archives of a release, links of the README are absolute."""
-    pytest.importorskip("scikit_build_core", reason="make dist builds with it")
     prepare("0.2.0", "https://example.org/snapbeam", root=copied)
-    made = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "import os, sys; sys.path.insert(0, 'build_backend'); import snapbeam_build; os.makedirs('out'); "
-            "print(snapbeam_build.prepare_metadata_for_build_wheel('out'))",
-        ],
-        cwd=copied,
-        check=True,
-        capture_output=True,
-        text=True,
+    text = (copied / _build("prepare_metadata_for_build_wheel", copied, root=copied) / "METADATA").read_text(
+        encoding="utf-8"
     )
-    name = made.stdout.split()[-1]
-    text = (copied / "out" / name / "METADATA").read_text(encoding="utf-8").partition("\n\n")[2]
     targets = re.findall(r"\]\(([^)]+)\)", text)
     assert len(targets) > 20 and all(target.startswith("https://") for target in targets)
     assert (
@@ -133,27 +122,28 @@ def test_no_machine_is_named():
                 assert not re.search(r"(?<![\w/.])/(work|root|home|opt)/|/simple/", text), path
 
 
-def built(kind: str, folder: Path) -> None:
-    """Build an archive by the backend, with the packages at hand."""
-    words = f"import sys; sys.path.insert(0, 'build_backend'); import snapbeam_build; snapbeam_build.build_{kind}({str(folder)!r})"
-    subprocess.run([sys.executable, "-c", words], cwd=ROOT, check=True, capture_output=True)
+def _build(entry, folder, settings=None, root=ROOT, **environment):
+    """Path of what an entry of the build backend makes in a folder."""
+    pytest.importorskip("scikit_build_core", reason="the build backend")
+    program = f"import snapbeam_build; print('made', snapbeam_build.{entry}({str(folder)!r}, {settings!r}))"
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=root, capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": str(root / "build_backend"), **environment},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder / done.stdout.split("\nmade ")[-1].removeprefix("made ").strip()
 
 
 @pytest.fixture(scope="module")
 def archives(tmp_path_factory):
-    if importlib.util.find_spec("scikit_build_core") is None:
-        pytest.skip("scikit-build-core is not installed: make dist builds with it")
     folder = tmp_path_factory.mktemp("dist")
-    for kind in ("wheel", "sdist"):
-        built(kind, folder)
-    return next(folder.glob("*.tar.gz")), next(folder.glob("*.whl"))
+    return _build("build_sdist", folder), _build("build_wheel", folder)
 
 
 @pytest.mark.slow
 def test_wheel_is_reproducible(archives, tmp_path):
     """A second build has the same bytes."""
-    built("wheel", tmp_path)
-    first, second = (path.read_bytes() for path in (archives[1], next(tmp_path.glob("*.whl"))))
+    first, second = (path.read_bytes() for path in (archives[1], _build("build_wheel", tmp_path)))
     assert hashlib.sha256(first).hexdigest() == hashlib.sha256(second).hexdigest()
 
 
@@ -163,24 +153,26 @@ def test_archives_hold_what_they_must(archives):
     names = zipfile.ZipFile(wheel).namelist()
     for needed in ("snapbeam/py.typed", "snapbeam/paper/claims/topics/beam.toml"):
         assert needed in names
-    assert len([name for name in names if name.startswith("snapbeam/_core.")]) == 1
-    assert not [name for name in names if name.endswith((".hpp", ".cpp"))] and wheel.stat().st_size < 8e6
     assert all(name.startswith(("snapbeam/", "snapbeam-")) for name in names)
+    assert len([name for name in names if re.fullmatch(r"snapbeam/_core[.\w-]*[.](so|pyd)", name)]) == 1
+    assert not [name for name in names if name.endswith((".cpp", ".hpp", "CMakeLists.txt"))]
     with tarfile.open(source) as archive:
         held = {name.partition("/")[2] for name in archive.getnames()}
     for needed in (
         "pyproject.toml",
-        "CMakeLists.txt",
-        "build_backend/snapbeam_build.py",
-        "src/snapbeam/core/step.hpp",
         "README.md",
         "LICENSE",
         "CITATION.cff",
         "docs/index.md",
         "tests/conftest.py",
+        "CMakeLists.txt",
+        "build_backend/snapbeam_build.py",
+        "src/snapbeam/core/module.cpp",
+        "src/snapbeam/core/step.hpp",
     ):
         assert needed in held
-    assert not [name for name in held if "/_build/" in name or name.endswith(".pyc")]
+    assert not [name for name in held if "/_build/" in name or name.endswith((".pyc", ".so", ".pyd"))]
+    assert not [name for name in held if name.startswith((".", "build/"))]
 
 
 @pytest.fixture(scope="module")
@@ -196,6 +188,29 @@ def test_each_runs_alone(which, extra, archives, code):
     """In a fresh environment, from nothing but the archive and what it says it needs."""
     source, wheel = archives
     alone.try_alone(source if which == "source" else wheel, extra, code)
+
+
+@pytest.mark.slow
+def test_no_compiler_is_needed(archives, tmp_path):
+    """With nothing on the PATH, pip brings a compiler; its core has an AVX set where the processor has one."""
+    venv.create(tmp_path / "env", with_pip=True)
+    python = tmp_path / "env" / ("Scripts" if os.name == "nt" else "bin") / "python"
+    (tmp_path / "empty").mkdir()
+    environment = {name: value for name, value in os.environ.items() if name not in ("CXX", "PYTHONPATH")}
+    environment["PATH"] = str(tmp_path / "empty")
+    words = ["-m", "pip", "install", "--no-deps", "--no-compile", str(archives[0])]
+    done = subprocess.run([python, *words], cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    # the module alone: what the package needs is not installed
+    program = "import sys, sysconfig; sys.path.insert(0, sysconfig.get_path('platlib') + '/snapbeam'); import _core; "
+    program += "print(*_core.instruction_sets())"
+    sets = subprocess.run(
+        [python, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True
+    ).stdout.split()
+    flags = Path("/proc/cpuinfo").read_text(encoding="utf-8").split() if sys.platform == "linux" else []
+    assert sets
+    if {"avx2", "fma"} <= set(flags):
+        assert {"avx2", "avx512"} & set(sets)
 
 
 def test_every_extra_is_tried():
