@@ -107,7 +107,7 @@ def test_designs() -> None:
     draw = np.random.default_rng(1)
     x, goal = draw.random(50), draw.random(50)
     dataset = xr.Dataset(
-        {"location": ("design", [0.3]), "tried_location": ("tried", x), "objective_speed": ("design", [0.5]),
+        {"location": ("design", [0.3]), "tried_location": ("tried", x, {"parameter": "contact.location"}), "objective_speed": ("design", [0.5]),
          "objective_speed_low": ("design", [0.4]), "objective_speed_high": ("design", [0.7]),
          "tried_objective_speed": ("tried", goal), "violation": ("tried", np.where(goal < 0.4, 0.1, 0.0)),
          "constraints_satisfied": ("design", [2])}

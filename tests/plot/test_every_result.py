@@ -151,6 +151,7 @@ RESULTS = {
     "perturbation_growth": "growth of a perturbation", "backbone_curve": "backbone curve",
     "basins_of_attraction": "basins of attraction", "bifurcation_curve": "bifurcation curve",
     "bifurcation_diagram": "bifurcation diagram", "homoclinic_points": "homoclinic points",
+    "homoclinic_tangency": "homoclinic tangency",
     "hysteresis": "statistics swept up and down", "invariant_manifold": "manifold",
     "largest_lyapunov": "Lyapunov exponents", "lyapunov_spectrum": "Lyapunov exponents", "lifetime_map": "lifetimes",
     "poincare_section": "section", "gradient": "gradient", "optimize_design": "designs",

@@ -169,6 +169,7 @@ _KINDS = (
     _Kind(
         "backbone curve", {"participation", "initial_amplitude"}, {"point"}, lambda _: {"frequency_ratio": dynamics.plot_backbone}
     ),
+    _Kind("homoclinic tangency", {"crosses", "bracket"}, {"value"}, lambda _: {"crosses": dynamics.plot_tangency}),
     _Kind("manifold", {"saddle", "age"}, {"point"}, lambda _: {"state": dynamics.plot_manifold}),
     _Kind("attractors", {"points", "share"}, {"attractor"}, lambda _: {"points": dynamics.plot_attractors}),
     _Kind("Lyapunov exponents", {"exponent"}, set(), lambda _: {"exponent": dynamics.plot_exponents}),

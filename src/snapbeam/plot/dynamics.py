@@ -827,6 +827,32 @@ def plot_manifold(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     return ax
 
 
+def plot_tangency(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the values that a search for a homoclinic tangency tried, and its bracket."""
+    contains(dataset, "homoclinic tangency", "crosses", "bracket")
+    crosses, value = dataset["crosses"].values, dataset["value"].values
+    with frame(ax, dataset, height=48.0) as ax:
+        for state, color, label in ((False, cm.batlow(0.15), "apart"), (True, _RED, "crossing")):
+            ax.plot(
+                value[crosses == state],
+                crosses[crosses == state],
+                "o",
+                color=color,
+                markersize=3.0,
+                label=label,
+            )
+        bracket = dataset["bracket"].values
+        if np.isfinite(bracket).all():
+            ax.axvspan(
+                bracket.min(), bracket.max(), color="0.8", linewidth=0.0, label="bracket of the tangency"
+            )
+        # the long name of the values is that of the parameter
+        ax.set_xlabel(str(dataset["value"].attrs["long_name"]))
+        ax.set(ylabel="Manifolds", yticks=[0, 1], yticklabels=["apart", "crossing"], ylim=(-0.5, 1.5))
+        ax.legend(loc="best")
+    return ax
+
+
 @checked
 def plot_homoclinic(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Draw homoclinic points, the result of :func:`snapbeam.dynamics.homoclinic_points`, over manifolds too."""
