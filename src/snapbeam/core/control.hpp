@@ -2,8 +2,8 @@
 //
 // In free flight a step is the flight step, halved where the beam is stretched far beyond its wells.  In contact, steps grow from the
 // onset and shrink towards the release.  A step inside which a contact closes or opens, or a lossy contact begins or ceases to
-// press, is cut to end there, and the cut is corrected on the true motion until it is right to a tick.  If several do, the first
-// one counts; the others are found again.  A force that begins acts from the first kick of the next step.  Each run of a pack has
+// press, is cut to end there.  The cut is corrected on the true motion, up to CORRECTIONS times: a zero of the gap to a tick, one of
+// the force to 1e-9 of a flight step.  If several do, the first one counts; the others are found again.  A force that begins acts from the first kick of the next step.  Each run of a pack has
 // its own time, length of step and contacts; a run that ends is replaced.
 #pragma once
 #include "statistics.hpp"
