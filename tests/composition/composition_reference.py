@@ -192,6 +192,14 @@ class Parts:
     """Times at which a motion is not smooth."""
 
 
+class Singular(Exception):  # noqa: N818
+    """The motion reaches an electrode or a magnet, where its force is infinite, at a time (s)."""
+
+    def __init__(self, time: float) -> None:
+        super().__init__(f"the force is infinite at t = {time:.6g} s")
+        self.time = time
+
+
 class Solution:
     """States of a run at the times asked for."""
 
@@ -322,7 +330,9 @@ class Solution:
                 max_step=longest, first_step=min(1e-3 * longest, until - t), args=(tuple(touching),), events=events or None,
             )  # fmt: skip
             pieces += 1
-            assert part.success and pieces < MOST_PIECES, part.message
+            if not part.success:
+                raise Singular(float(part.t[-1]))
+            assert pieces < MOST_PIECES
             end = float(part.t[-1])
             inside = times[(times >= t) & ((times < end) | (end >= last))]
             if inside.size:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from composition_reference import Solution
+from composition_reference import Singular, Solution
 from generator import Composition, Features, composed, features_of
 from numpy.typing import NDArray
 
@@ -56,7 +56,7 @@ BEYOND = 100.0
 """Multiple of the limit up to which an error that the conditioning enlarges is compared."""
 KICK = 1e-10
 """Relative change of the start by which the conditioning is measured."""
-BALANCE = {"standard": 1e-4, "reference": 1e-6}
+BALANCE = {"standard": 1e-3, "reference": 1e-6}
 """Greatest errors of the energy balance, over the gross work."""
 ROUNDING = 1e-11
 """Difference over b of runs whose numbers agree to rounding, before the conditioning enlarges it."""
@@ -141,10 +141,17 @@ def checked(
         report.refused = reason(error)
         return report
     kick = np.random.default_rng([seed, 2]).uniform(-KICK, KICK, 200)
-    truth, moved = (
-        Solution(composition.beam, composition.parts, times, longest=longest, kick=each)
-        for longest, each in ((150.0, None), (240.0, kick))
-    )
+    try:
+        truth, moved = (
+            Solution(composition.beam, composition.parts, times, longest=longest, kick=each)
+            for longest, each in ((150.0, None), (240.0, kick))
+        )
+    except Singular as reached:
+        for level, run in runs.items():
+            known = np.isfinite(recorded(composition, run)).all(axis=1)
+            if run.summary.status.name != "DIVERGED" or known[times > reached.time].any() or not known[times < 0.8 * reached.time].all():
+                report.failures.append(f"{level}: status {run.summary.status.name}, and {reached}")
+        return report
     expected = observed(composition, truth, times)
     growth = np.abs(observed(composition, moved, times) - expected).max(axis=1) / KICK
     amplified = np.maximum.accumulate(np.maximum(growth, 1.0))

@@ -33,10 +33,11 @@ struct Problem {
     double parts_per_decay;       // and parts over the time in which the damping stops the motion along a row
 };
 
-// Numbers of a run.  STEP is the flight step, CONTACT_STEP the longest step in contact, which is halved up to HALVINGS times.
+// Numbers of a run.  STEP is the flight step, CONTACT_STEP the longest step in contact, which is halved up to HALVINGS times; with more
+// than CALM_ENERGY (J above the first well) flight steps are shorter too.
 enum RunNumber : int {
     TICK, STEP, END, OUTPUT_INTERVAL, LAST_QUARTER, WELL_SIGN, CONTACT_STEP, HALVINGS, DECIDE_ENERGY, DECIDE_REACH, DECIDE_CROSSINGS,
-    MAX_STEPS, STRETCH, RUN_NUMBERS
+    MAX_STEPS, STRETCH, CALM_ENERGY, RUN_NUMBERS
 };
 // Numbers of a signal: mean + amplitude sin(rate t + phase); its period in ticks, 0 if it has none.
 enum SignalNumber : int { MEAN, AMPLITUDE, RATE, PHASE, PERIOD, SIGNAL_NUMBERS };

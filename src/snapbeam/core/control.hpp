@@ -41,7 +41,7 @@ template <class L> struct Group {
     Event<L> *events;             // of each channel
     Cell *spare;                  // rows and channels that a record puts aside
     Channel<L> *spare_channel;
-    Real step, contact_step, end, limit, output_interval, halvings, most_steps, stretch, stretch_at_rest;
+    Real step, contact_step, end, limit, output_interval, halvings, most_steps, stretch, stretch_at_rest, calm, energy;
     int run[L::runs], output[L::runs];
 
     void lay_out(Structure<L> &structure, const Batch &b, Arena &arena) {
@@ -88,7 +88,7 @@ template <class L> struct Group {
         for (long i = 0; i < long(s->composition.distinct) * n * 4 * problem->levels; ++i) tables[i] = Plain(0.0);
         alive = again = landing = FromBits<Marks>::of(0);
         Real *zeros[] = {&ticks, &wanted, &event, &tries, &cuts, &key, &step, &end, &limit, &output_interval, &contact_step, &halvings,
-                         &most_steps, &stretch, &stretch_at_rest, &z.t};
+                         &most_steps, &stretch, &stretch_at_rest, &calm, &energy, &z.t};
         for (Real *x : zeros) *x = Real(0.0);
         z.tick = z.sign = z.parts = Real(1.0), z.h = z.gq = z.qr = z.next_gq = z.along_g = z.along_r = Number(0.0);
         z.flows = own;
@@ -124,7 +124,7 @@ template <class L> struct Group {
     template <class F> void visit(F number) {
         const int n = s->cells;
         for (int i = 0; i < n; ++i) number(z.q[i]), number(z.p[i]), number(z.k[i]);
-        number(z.t), number(z.sign), number(z.gq), number(z.qr), number(stretch);
+        number(z.t), number(z.sign), number(z.gq), number(z.qr), number(stretch), number(energy);
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
             number(c.onset), number(c.safe), number(c.d0), number(c.r0), number(c.own_impulse), number(c.deepest), number(c.hardest);
@@ -157,7 +157,7 @@ template <class L> struct Group {
         set_lane(z.tick, l, of_run(i, TICK)), set_lane(step, l, of_run(i, STEP)), set_lane(end, l, of_run(i, END));
         set_lane(output_interval, l, of_run(i, OUTPUT_INTERVAL)), set_lane(z.sign, l, of_run(i, WELL_SIGN));
         set_lane(contact_step, l, of_run(i, CONTACT_STEP)), set_lane(halvings, l, of_run(i, HALVINGS)), set_lane(most_steps, l, of_run(i, MAX_STEPS));
-        set_lane(stretch_at_rest, l, of_run(i, STRETCH)), set_lane(z.t, l, 0.0), set_lane(stretch, l, 0.0);
+        set_lane(stretch_at_rest, l, of_run(i, STRETCH)), set_lane(calm, l, of_run(i, CALM_ENERGY)), set_lane(z.t, l, 0.0), set_lane(stretch, l, 0.0);
         set_lane(z.parts, l, s->parts(of_run(i, STEP) * of_run(i, TICK)));
         for (int k = 0; k < z.signals; ++k) {
             const double *numbers = batch->signals + (long(i) * z.signals + k) * SIGNAL_NUMBERS;
@@ -238,7 +238,8 @@ template <class L> struct Group {
                 if (closed) set_lane(c.deepest, l, depth > 0.0 ? depth : 0.0);
             }
         }
-        if (!continued) totals.start(z, which);
+        assign(which, energy, totals.energy(z, true));
+        if (!continued) totals.start(z, which, energy);
         if (!continued && batch->recorder && batch->recorder->marks[4]) {  // goes on from a state that was saved
             const double *from = batch->recorder->saved;
             visit([&](auto &x) { __builtin_memcpy(&x, from, sizeof(x)), from += sizeof(x) / sizeof(double); });
@@ -272,6 +273,7 @@ template <class L> struct Group {
             want = select(far, Real(0.5) * want, want), reach += reach;
             far = far & (abs(stretch) > reach);
         }
+        want = select(energy > calm, min(want, contact_step), want);
         for (int j = 0; j < z.channels; ++j) {
             const Channel<L> &c = z.channel[j];
             if (!c.contact || !any(c.closed)) continue;
@@ -558,8 +560,10 @@ template <class L> struct Group {
             assign(on | off, c.d0, Number(0.0));  // the gap at an event is zero
             changed = changed | on | off | force;
         }
-        if (any(changed))
+        if (any(changed)) {
+            assign(changed, energy, totals.energy(z, true));
             for (int j = 0; j < z.channels; ++j) assign(changed, z.channel[j].safe, z.t);
+        }
         if (problem->high) totals.add_energy(z, ok, value(z.h));
         if (batch->recorder) record_end(*this, was_touching);
         const Marks finite = abs(totals.center.u) < Real(1e9);

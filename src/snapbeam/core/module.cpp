@@ -194,6 +194,7 @@ static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
         if (std::fmod(run[CONTACT_STEP], std::ldexp(1.0, int(run[HALVINGS]))) != 0.0) a.refuse("run", "must have contact steps that halve to whole ticks");
         if (!(run[MAX_STEPS] >= 1.0)) a.refuse("run", "must be allowed a step");
         if (!(run[STRETCH] >= 0.0)) a.refuse("run", "must not have a negative stretch");
+        if (!(run[CALM_ENERGY] >= 0.0)) a.refuse("run", "must not have a negative energy of calm motion");
     }
     b.signals = a.array<double>("signals", {runs, size_t(p.signals), SIGNAL_NUMBERS});
     b.numbers = a.array<double>("numbers", {runs, channels, size_t(p.law_numbers)});

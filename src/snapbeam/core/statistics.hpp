@@ -69,7 +69,7 @@ template <class L> struct Totals {
     SNAPBEAM_FN Number center_height(const Runs<L> &z, const Cell *q) const {
         return fma(z.sign, Number(s->problem->center_rest), dot<L>(s->center, q, s->size()));
     }
-    void start(Runs<L> &z, Marks which) {
+    void start(Runs<L> &z, Marks which, Real energy_now) {
         using namespace snapbeam;
         const int n = s->size();
         assign(which, point.u, height(z, z.q)), assign(which, point.v, dot<L>(row, z.p, n));
@@ -79,7 +79,7 @@ template <class L> struct Totals {
         assign(which, sum[PEAK_VELOCITY], abs(value(point.v))), assign(which, sum[PEAK_CENTER_VELOCITY], abs(value(center.v)));
         const Real from = value(center.u) - Real(s->problem->dividing_height);
         assign(which, sum[SIDE], select(from > Real(0.0), Real(1.0), Real(-1.0)));
-        assign(which, sum[FIRST_ENERGY], energy(z, true));
+        assign(which, sum[FIRST_ENERGY], energy_now);
         enter_well(z, which);
     }
 

@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from snapbeam import _core
 from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LAW_NUMBERS, Channels
 from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.step_size import TRIED, barrier_of
 from snapbeam.solver.statistics import (
     OTHER_IMPACTS,
     OTHER_IMPULSE,
@@ -34,7 +35,7 @@ Progress = Callable[[int, int], object]
 
 RUN = (
     "tick", "step", "end", "output_interval", "last_quarter", "well_sign", "contact_step", "halvings", "decide_energy",
-    "decide_reach", "decide_crossings", "max_steps", "stretch",
+    "decide_reach", "decide_crossings", "max_steps", "stretch", "calm_energy",
 )  # fmt: skip
 """Numbers of a run, in the order of ``core/api.hpp: RunNumber``."""
 STATISTICS = (
@@ -146,6 +147,7 @@ class _Arrays:
         run[:, RUN.index("halvings")] = halvings
         run[:, RUN.index("max_steps")] = ensemble.max_steps
         run[:, RUN.index("stretch")] = structure.stretch
+        run[:, RUN.index("calm_energy")] = TRIED * barrier_of(structure) or math.inf
         signals = channels.signals.copy()
         signals[:, :, 4] *= finer
         signals[signals[:, :, 4] > _MOST_TICKS, 4] = 0.0

@@ -33,7 +33,8 @@ _MARGIN = 1
 the cycle, and modes that come in step with the kicks spoil single lengths."""
 _FINER = 2.0
 """Steps of sixth order that all others are compared with, over the shortest of them."""
-_STARTS = ((0.15, 1.0 / 60.0, 2.0, 0.3), (10.0, 1.0 / 160.0, 1.0, 1.0))
+TRIED = 10.0
+_STARTS = ((0.15, 1.0 / 60.0, 2.0, 0.3), (TRIED, 1.0 / 160.0, 1.0, 1.0))
 """Of each impulse its energy over the barrier's, how long it lasts at most in periods of the first mode, the length of the
 steps that are tried over the flight step, and the error allowed over the limit: a beam that rings in its well, and one
 after a strong impulse.  The first may ring for many cycles, so that steps of twice the length must serve."""
@@ -173,6 +174,17 @@ def growth(structure: Structure, order: int, step: float) -> float:
     return float(logarithm.max()) / 2.0**_SQUARINGS * 2.0 * math.pi / (omega[0] * step)
 
 
+def barrier_of(structure: Structure) -> float:
+    """Energy of the lowest barrier between the wells above the deepest one, J; 0 of a structure with one well."""
+    model = structure.model
+    if not structure.wells_are_mirror_images and model.landscape is not None:
+        return model.saddle_energy - model.landscape.deepest.energy
+    if not model.is_bistable:
+        return 0.0
+    straight, well = np.zeros(model.modes), structure.equilibrium
+    return float(model.potential_energy(straight) - model.potential_energy(well))
+
+
 class _Bench:
     """The structure, let go."""
 
@@ -203,13 +215,7 @@ class _Bench:
         impulse_shape = (tip @ model.linear_modes)[lowest]
         if not impulse_shape.any():
             impulse_shape = np.ones(self.omega.size)
-        if not structure.wells_are_mirror_images and model.landscape is not None:
-            barrier = model.saddle_energy - model.landscape.deepest.energy
-        elif model.is_bistable:
-            straight, well = np.zeros(model.modes), structure.equilibrium
-            barrier = float(model.potential_energy(straight) - model.potential_energy(well))
-        else:
-            barrier = 0.5 * (2.0 * math.pi * model.reference_frequency / np.abs(self.rows[:, 0]).max()) ** 2
+        barrier = barrier_of(structure) or 0.5 * (2.0 * math.pi * model.reference_frequency / np.abs(self.rows[:, 0]).max()) ** 2
         self.starts = []
         for energy, duration, *_ in _STARTS:
             # the spectrum of a pulse falls off beyond the inverse of what it lasts
@@ -280,11 +286,11 @@ class _Bench:
 def _free_runs(rest: _Array, velocity: _Array, steps: _Array, counts: _Array) -> dict[str, Any]:
     """Runs of so many steps of so many seconds from one state, as the core gets them: about the well of sign -1."""
     runs, n = counts.size, rest.size
-    run = np.zeros((runs, 13))
+    run = np.zeros((runs, 14))
     run[:, 0], run[:, 1], run[:, 5], run[:, 11] = steps, 1.0, -1.0, 1e15
     run[:, 2] = run[:, 3] = np.floor(counts)
     run[:, 6] = 1.0
-    run[:, 8], run[:, 10] = -math.inf, -1.0
+    run[:, 8], run[:, 10], run[:, 13] = -math.inf, -1.0, math.inf
     return {
         "run": run, "signals": np.zeros((runs, 0, 5)), "numbers": np.zeros((runs, 0, 0)), "offset": np.zeros((runs, 0)),
         "since": np.zeros((runs, 0)), "rows": np.zeros((1, n)), "row_of": np.zeros((runs, 1), np.int32), "rest": np.zeros((runs, 1)),
