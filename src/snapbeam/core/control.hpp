@@ -10,7 +10,7 @@
 
 namespace SNAPBEAM_SET {
 
-constexpr double GRADING = 0.5, RELEASE = 0.5, STRETCH_LIMIT = 4.0, NEVER = 1e300;
+constexpr double GRADING = 0.5, RELEASE = 0.5, STRETCH_LIMIT = 4.0;
 constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
 
 // What a channel does at the end of a step.
@@ -90,7 +90,7 @@ template <class L> struct Group {
         Real *zeros[] = {&ticks, &wanted, &event, &tries, &cuts, &key, &step, &end, &limit, &output_interval, &contact_step, &halvings,
                          &most_steps, &stretch, &stretch_at_rest, &calm, &energy, &z.t};
         for (Real *x : zeros) *x = Real(0.0);
-        z.tick = z.sign = z.parts = Real(1.0), z.h = z.gq = z.qr = z.next_gq = z.along_g = z.along_r = Number(0.0);
+        z.tick = z.sign = z.parts = Real(1.0), z.h = z.gq = z.qr = z.along_g = z.along_r = Number(0.0), z.next_gq = Cell(0.0);
         z.flows = own;
         for (int i = 0; i < z.signals; ++i) {
             Signal<L> &one = z.signal[i];
@@ -537,7 +537,12 @@ template <class L> struct Group {
             for (int j = 0; j < z.channels; ++j) was_touching |= z.channel[j].contact && lane(z.channel[j].closed, 0);
         }
         totals.add_step(z, ok, amplitude, scratch);
-        for (int i = 0; i < n; ++i) assign(ok, z.q[i], z.q1[i]), assign(ok, z.p[i], z.p1[i]), assign(ok, z.k[i], z.k1[i]);
+        if (bits(alive & (!ok)) || batch->recorder) {
+            for (int i = 0; i < n; ++i) assign(ok, z.q[i], z.q1[i]), assign(ok, z.p[i], z.p1[i]), assign(ok, z.k[i], z.k1[i]);
+        } else {  // runs that ended may hold anything
+            Cell *q = z.q, *p = z.p, *k = z.k;
+            z.q = z.q1, z.p = z.p1, z.k = z.k1, z.q1 = q, z.p1 = p, z.k1 = k;
+        }
         z.t = select(ok, z.t + ticks, z.t);
         assign(ok, stretch, Real(value(fma(Number(2.0), z.gq, z.qr))));
         Marks changed = FromBits<Marks>::of(0);
@@ -564,7 +569,7 @@ template <class L> struct Group {
             assign(changed, energy, totals.energy(z, true));
             for (int j = 0; j < z.channels; ++j) assign(changed, z.channel[j].safe, z.t);
         }
-        if (problem->high) totals.add_energy(z, ok, value(z.h));
+        totals.add_modes(z, ok, value(z.h));
         if (batch->recorder) record_end(*this, was_touching);
         const Marks finite = abs(totals.center.u) < Real(1e9);
         const Marks diverged = ok & (broken | (!finite));

@@ -17,7 +17,7 @@
 
 namespace SNAPBEAM_SET {
 
-constexpr double MARGIN = 1.25, TRUST = 8.0;
+constexpr double MARGIN = 1.25, TRUST = 8.0, NEVER = 1e300;
 // The motion inside a step, part after part.
 template <class L> struct Inside {
     typedef typename L::Real Real;
@@ -98,6 +98,7 @@ template <class L> SNAPBEAM_FN void amplitudes(const Runs<L> &z, typename L::Pla
 template <class L, class Row, class Product>
 SNAPBEAM_FN typename L::Real largest_push(const Runs<L> &z, const Row *row, typename L::Real horizon, const typename L::Plain *amplitude, Product product) {
     typedef typename L::Real Real;
+    typedef typename L::Number Number;
     const int n = z.s->size();
     Real push = max(abs(value(dot<L>(row, z.k, n))), abs(value(dot<L>(row, z.k1, n))));
     for (int j = 0; j < z.channels; ++j) {
@@ -116,8 +117,14 @@ SNAPBEAM_FN typename L::Real largest_push(const Runs<L> &z, const Row *row, type
             typename L::Plain sum = typename L::Plain(0.0);
             for (int i = 0; i < n; ++i) sum = fma(abs(value(c.row[i])), amplitude[i], sum);
             const Real speed = L::total(sum);
-            const Real stiffness = with_law(c.law, [&](auto law) { return law.stiffness(value(c.x), c.P); });
-            const Real damping = with_law(c.law, [&](auto law) { return law.damping(value(c.x), speed, c.P); });
+            const Number x = c.x, reach = Number(Real(MARGIN) * speed * horizon);
+            const Real damping = with_law(c.law, [&](auto law) { return value(law.damping(x, Number(speed), c.P)); });
+            // stiffnesses have no maximum inside a range; where the range may be left, nothing is known
+            const Real stiffness = with_law(c.law, [&](auto law) {
+                const Number left = x - reach, right = x + reach;
+                const Number known = max(law.stiffness(x, c.P), max(law.stiffness(left, c.P), law.stiffness(right, c.P)));
+                return value(select((left > law.low(c.P)) & (right < law.high(c.P)), known, Number(NEVER)));
+            });
             most += speed * (stiffness * horizon + damping);
         } else {
             most = Real(2.0) * most;

@@ -3,7 +3,7 @@
 #include "control.hpp"
 
 namespace SNAPBEAM_SET {
-#if SNAPBEAM_LAYOUT < 2
+#if SNAPBEAM_LAYOUT == 1
 static bool halves(const Problem &problem, int modes) {  // symmetric and antisymmetric modes, as many of each
     return problem.modes == modes && problem.blocks == 2 && problem.block_sizes[0] == problem.block_sizes[1];
 }
@@ -11,7 +11,6 @@ static bool halves(const Problem &problem, int modes) {  // symmetric and antisy
 #if SNAPBEAM_LAYOUT == 0
 void runs_side_by_side(const Problem &problem, const Batch &batch) {
     if (problem.modes == 1) integrate<RunLanes<SNAPBEAM_WIDTH, 1>>(problem, batch);
-    else if (halves(problem, 8)) integrate<RunLanes<SNAPBEAM_WIDTH, 8>>(problem, batch);
     else integrate<RunLanes<SNAPBEAM_WIDTH>>(problem, batch);
 }
 #elif SNAPBEAM_LAYOUT == 1

@@ -6,7 +6,8 @@
 //   numbers                how many it has
 //   force(x, y, P)         force along the row: of a contact on the beam, away from the striker
 //   potential(x, P)        energy stored, J; the elastic part of the force is its derivative (of a contact), or minus that
-//   stiffness(x, P)        magnitude of the derivative of the elastic force by x, at most a bound of it
+//   stiffness(x, P)        magnitude of the derivative of the elastic force by x, at most a bound of it; in any interval of its
+//                          range the largest at an end
 //   damping(x, y, P)       magnitude of the derivative of the force by y, at most a bound of it for speeds up to |y|
 //   pressing(x, y, P)      of a lossy contact: what has the sign of the force, smooth down to x = 0
 //   low(P), high(P)        displacements between which it is valid (of a force)

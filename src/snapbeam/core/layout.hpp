@@ -22,6 +22,7 @@ template <int W, int FIXED = 0> struct RunLanes {
     typedef Mask<W> Marks;
     static constexpr int runs = W, lanes = 1, fixed = FIXED, together = 1;
     static SNAPBEAM_FN Number total(Cell x) { return x; }
+    static SNAPBEAM_FN void totals(Cell a, Cell b, Number &of_a, Number &of_b) { of_a = a, of_b = b; }
     static SNAPBEAM_FN Cell mode(const Cell *row, int i) { return row[i]; }
 };
 
@@ -55,6 +56,19 @@ template <int W, int FIXED = 0> struct ModeLanes {
             for (int l = 0; l < half; ++l) s[l] += s[l + half];
         return s[0];
     }
+    static SNAPBEAM_FN void totals(Cell a, Cell b, double &of_a, double &of_b) {
+#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
+        if constexpr (W == 8) {
+            const __m512d x = (__m512d)a.v, y = (__m512d)b.v;
+            const __m512d pairs = _mm512_add_pd(_mm512_unpacklo_pd(x, y), _mm512_unpackhi_pd(x, y));
+            const __m256d half = _mm256_add_pd(_mm512_castpd512_pd256(pairs), _mm512_extractf64x4_pd(pairs, 1));
+            const __m128d both = _mm_add_pd(_mm256_castpd256_pd128(half), _mm256_extractf128_pd(half, 1));
+            of_a = both[0], of_b = both[1];
+            return;
+        }
+#endif
+        of_a = total(a), of_b = total(b);
+    }
     static SNAPBEAM_FN double mode(const Cell *row, int i) { return reinterpret_cast<const double *>(row)[i]; }
 };
 
@@ -67,6 +81,7 @@ template <int FIXED = 0> struct Thread {
     typedef bool Marks;
     static constexpr int runs = 1, lanes = 1, fixed = FIXED, together = 1;
     static SNAPBEAM_FN double total(double x) { return x; }
+    static SNAPBEAM_FN void totals(double a, double b, double &of_a, double &of_b) { of_a = a, of_b = b; }
     static SNAPBEAM_FN double mode(const double *row, int i) { return row[i]; }
 };
 
@@ -88,6 +103,10 @@ template <class L> SNAPBEAM_FN double element(const typename L::Cell *row, int i
     else return lane(row[i], l);
 }
 template <class L> SNAPBEAM_FN void set_element(typename L::Cell *row, int i, int l, double x) {
+    if constexpr (L::lanes > 1) set_lane(row[i / L::lanes], i % L::lanes, x);
+    else set_lane(row[i], l, x);
+}
+template <class L> SNAPBEAM_FN void set_plain(typename L::Plain *row, int i, int l, double x) {
     if constexpr (L::lanes > 1) set_lane(row[i / L::lanes], i % L::lanes, x);
     else set_lane(row[i], l, x);
 }

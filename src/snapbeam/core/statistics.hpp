@@ -36,29 +36,38 @@ template <class L> struct Totals {
     Observed<L> point, center;
     Real sum[snapbeam::STATISTICS];
     Real late, decide_energy, decide_reach, decide_crossings;
-    Real modal_energy, high_energy, modal_power, high_power;  // where they were evaluated last
+    Plain *swing_u, *swing_v;  // weights of squared amplitudes, whose sums bound the errors of the cubics in a flight step
+    Real modal_energy, high_energy, most_u, most_v;  // energies and those sums, where they were evaluated last
 
     void lay_out(const Structure<L> &structure, const Runs<L> &, Arena &arena) {
         s = &structure;
-        row = arena.take<Cell>(s->cells);
+        row = arena.take<Cell>(s->cells), swing_u = arena.take<Plain>(s->cells), swing_v = arena.take<Plain>(s->cells);
     }
     void clear(bool of_contact) {
         shared = of_contact;
-        for (int i = 0; i < s->cells; ++i) row[i] = Cell(0.0);
+        for (int i = 0; i < s->cells; ++i) row[i] = Cell(0.0), swing_u[i] = swing_v[i] = Plain(0.0);
         rest = point.u = point.v = center.u = center.v = Number(0.0);
         for (Real &x : sum) x = Real(0.0);
         late = decide_energy = decide_reach = decide_crossings = Real(0.0);
-        modal_energy = high_energy = modal_power = high_power = Real(0.0);
+        modal_energy = high_energy = most_u = most_v = Real(0.0);
     }
     template <class F> void visit(F number) {
         number(point.u), number(point.v), number(center.u), number(center.v);
-        number(modal_energy), number(high_energy), number(modal_power), number(high_power);
+        number(modal_energy), number(high_energy), number(most_u), number(most_v);
         for (Real &x : sum) number(x);
     }
     void load(const Batch &batch, int i, int l, const double *observed, double at_rest) {
         using namespace snapbeam;
         const double *run = batch.run + long(i) * RUN_NUMBERS;
-        for (int m = 0; m < s->problem->modes; ++m) set_element<L>(row, s->place[m], l, observed[m]);
+        const double h = run[STEP] * run[TICK];
+        for (int m = 0; m < s->problem->modes; ++m) {
+            set_element<L>(row, s->place[m], l, observed[m]);
+            double of_u, of_v;
+            doubts_of_mode(h, s->problem->omega[m], of_u, of_v);
+            const double at = observed[m] < 0.0 ? -observed[m] : observed[m], middle = s->problem->center[m] < 0.0 ? -s->problem->center[m] : s->problem->center[m];
+            const double weight = 1.01 * double(s->problem->modes) * (at > middle ? at * at : middle * middle);
+            set_plain<L>(swing_u, s->place[m], l, weight * of_u * of_u), set_plain<L>(swing_v, s->place[m], l, weight * of_v * of_v);
+        }
         set_lane(rest, l, at_rest), set_lane(late, l, run[LAST_QUARTER]);
         set_lane(decide_energy, l, run[DECIDE_ENERGY]), set_lane(decide_reach, l, run[DECIDE_REACH]);
         set_lane(decide_crossings, l, run[DECIDE_CROSSINGS]);
@@ -92,7 +101,7 @@ template <class L> struct Totals {
             sum_of = fma(z.p[i], z.p[i], fma(oq, oq, sum_of));
         }
         const Number gq = z.gq, qr = z.qr, along_g = z.along_g, along_r = z.along_r;
-        tension(z, z.q, dot<L>(s->g, z.q, n));
+        tension(z, z.q, dot_cells<L>(s->g, z.q, n));
         Number all = fma(Number(0.5), L::total(sum_of), Number(s->problem->gamma) * z.qr * fma(Number(0.25), z.qr, z.gq));
         z.gq = gq, z.qr = qr, z.along_g = along_g, z.along_r = along_r;
         const Number there = Number(Real(0.5) * (Real(1.0) - z.sign));
@@ -107,42 +116,39 @@ template <class L> struct Totals {
         return value(all);
     }
 
-    // Energies of the modes of the beam about the nearest well, of the high ones, and their rates.
+    // Energies of the modes of the beam about the nearest well and of the high ones, and the sums that bound the errors of the cubics:
+    // by the inequality of Cauchy and Schwarz (sum_i c_i A_i)^2 <= N sum_i c_i^2 A_i^2.
     void modal(const Runs<L> &z, Real *found) {
-        Plain whole = Plain(0.0), high = Plain(0.0), power = Plain(0.0), high_power_of = Plain(0.0);
+        Plain whole = Plain(0.0), high = Plain(0.0), u = Plain(0.0), v = Plain(0.0);
         const Plain there = Plain(Real(0.5) * (Real(1.0) - z.sign));
         for (int i = 0; i < s->size(); ++i) {
-            Plain q = value(z.q[i]), a = value(z.k[i]);
-            const Plain p = value(z.p[i]);
-            if (s->problem->second) q -= there * s->second[i];
-            for (int j = 0; j < z.channels; ++j) {
-                const Channel<L> &c = z.channel[j];
-                if (c.active && c.law != AXIAL_LOAD) a = fma(Plain(value(c.f)), value(c.row[i]), a);
+            const Plain p = value(z.p[i]), oq = s->omega[i] * value(z.q[i]), square = fma(p, p, oq * oq);
+            u = fma(swing_u[i], square, u), v = fma(swing_v[i], square, v);
+            if (!s->problem->high) continue;
+            Plain own = square;
+            if (s->problem->second) {
+                const Plain from = s->omega[i] * (value(z.q[i]) - there * s->second[i]);
+                own = fma(p, p, from * from);
             }
-            const Plain oq = s->omega[i] * q, beam = Plain(s->beam[i]), up = Plain(s->high[i]);
-            const Plain e = Plain(0.5) * fma(p, p, oq * oq) * beam, rate = p * (a - Plain(2.0) * s->sigma[i] * p) * beam;
-            whole += e, power += rate;
-            high = fma(up, e, high), high_power_of = fma(up, rate, high_power_of);
+            own = Plain(s->beam[i]) * own;
+            whole += own, high = fma(Plain(s->high[i]), own, high);
         }
-        found[0] = L::total(whole), found[1] = L::total(high), found[2] = L::total(power), found[3] = L::total(high_power_of);
+        L::totals(whole, high, found[0], found[1]), L::totals(u, v, found[2], found[3]);
+        found[0] = Real(0.5) * found[0], found[1] = Real(0.5) * found[1];
     }
     void enter_well(const Runs<L> &z, Marks which) {
-        if (!s->problem->high) return;
         Real now[4];
         modal(z, now);
-        assign(which, modal_energy, now[0]), assign(which, high_energy, now[1]);
-        assign(which, modal_power, now[2]), assign(which, high_power, now[3]);
+        assign(which, modal_energy, now[0]), assign(which, high_energy, now[1]), assign(which, most_u, now[2]), assign(which, most_v, now[3]);
     }
-    void add_energy(const Runs<L> &z, Marks ok, Real h) {
+    // By the rule of trapezoids: over equal steps its corrections cancel, and steps change where modes exchange little energy.
+    void add_modes(const Runs<L> &z, Marks ok, Real h) {
         using namespace snapbeam;
         Real now[4];
         modal(z, now);
-        const Real half = Real(0.5) * h, twelfth = h * h * Real(1.0 / 12.0);
-        const Real whole = fma(half, modal_energy + now[0], twelfth * (modal_power - now[2]));
-        const Real high = fma(half, high_energy + now[1], twelfth * (high_power - now[3]));
-        sum[ENERGY_TIME] += select(ok, whole, Real(0.0)), sum[HIGH_ENERGY_TIME] += select(ok, high, Real(0.0));
-        assign(ok, modal_energy, now[0]), assign(ok, high_energy, now[1]);
-        assign(ok, modal_power, now[2]), assign(ok, high_power, now[3]);
+        const Real half = select(ok, Real(0.5) * h, Real(0.0));
+        sum[ENERGY_TIME] = fma(half, modal_energy + now[0], sum[ENERGY_TIME]), sum[HIGH_ENERGY_TIME] = fma(half, high_energy + now[1], sum[HIGH_ENERGY_TIME]);
+        assign(ok, modal_energy, now[0]), assign(ok, high_energy, now[1]), assign(ok, most_u, now[2]), assign(ok, most_v, now[3]);
     }
 
     SNAPBEAM_FN void widen(Marks ok, snapbeam::Statistic low, snapbeam::Statistic high, Real u0, Real v0, Real u1, Real v1, Real h) {
@@ -229,19 +235,26 @@ template <class L> struct Totals {
         count_crossings(ok, z.t, h, z.tick, c0 - level, cv0, c1 - level, cv1);
         widen(ok, MIN_DISPLACEMENT, MAX_DISPLACEMENT, u0, v0, u1, v1, h), widen(ok, MIN_CENTER, MAX_CENTER, c0, cv0, c1, cv1, h);
         Real speed = fastest(u0, v0, u1, v1, h), center_speed = fastest(c0, cv0, c1, cv1, h);
-        Real doubt, speed_doubt, center_doubt, center_speed_doubt;
-        doubts(z, amplitude, doubt, speed_doubt, center_doubt, center_speed_doubt);
-        const Real slack = Real(1e-5), wider = Real(1.05);
-        const Marks higher = ok & ((fma(wider, speed, speed_doubt) > sum[PEAK_VELOCITY]) | (fma(wider, center_speed, center_speed_doubt) > sum[PEAK_CENTER_VELOCITY]));
-        if (any(higher)) {  // with the accelerations at both ends the error of a speed is of fourth order
-            speed = speed_on(v0, bend_at(z, row, false), v1, bend_at(z, row, true), h);
-            center_speed = speed_on(cv0, bend_at(z, s->center, false), cv1, bend_at(z, s->center, true), h);
+        const Real slack = Real(1e-5), wider = Real(1.05), bound_u = sqrt(most_u), bound_v = sqrt(most_v);
+        Marks near = ok & ((fma(wider, speed, bound_v) > sum[PEAK_VELOCITY]) | (fma(wider, center_speed, bound_v) > sum[PEAK_CENTER_VELOCITY]) |
+                           (max(u0, u1) + bound_u > sum[MAX_DISPLACEMENT]) | (min(u0, u1) - bound_u < sum[MIN_DISPLACEMENT]) |
+                           (max(c0, c1) + bound_u > sum[MAX_CENTER]) | (min(c0, c1) - bound_u < sum[MIN_CENTER]));
+        if (any(near)) {
+            const Marks asked = near;
+            Real doubt, speed_doubt, center_doubt, center_speed_doubt;
+            doubts(z, amplitude, doubt, speed_doubt, center_doubt, center_speed_doubt);
+            const Marks higher = asked & ((fma(wider, speed, speed_doubt) > sum[PEAK_VELOCITY]) | (fma(wider, center_speed, center_speed_doubt) > sum[PEAK_CENTER_VELOCITY]));
+            if (any(higher)) {  // with the accelerations at both ends the error of a speed is of fourth order
+                assign(higher, speed, speed_on(v0, bend_at(z, row, false), v1, bend_at(z, row, true), h));
+                assign(higher, center_speed, speed_on(cv0, bend_at(z, s->center, false), cv1, bend_at(z, s->center, true), h));
+            }
+            const Real span = sum[MAX_DISPLACEMENT] - sum[MIN_DISPLACEMENT], center_span = sum[MAX_CENTER] - sum[MIN_CENTER];
+            near = (speed + speed_doubt > sum[PEAK_VELOCITY]) & (speed_doubt > slack * sum[PEAK_VELOCITY]);
+            near = near | ((center_speed + center_speed_doubt > sum[PEAK_CENTER_VELOCITY]) & (center_speed_doubt > slack * sum[PEAK_CENTER_VELOCITY]));
+            near = near | ((doubt > slack * span) & ((max(u0, u1) + doubt > sum[MAX_DISPLACEMENT]) | (min(u0, u1) - doubt < sum[MIN_DISPLACEMENT])));
+            near = near | ((center_doubt > slack * center_span) & ((max(c0, c1) + center_doubt > sum[MAX_CENTER]) | (min(c0, c1) - center_doubt < sum[MIN_CENTER])));
+            near = near & asked;
         }
-        Marks near = ok & ((speed + speed_doubt > sum[PEAK_VELOCITY]) & (speed_doubt > slack * sum[PEAK_VELOCITY]));
-        near = near | (ok & (center_speed + center_speed_doubt > sum[PEAK_CENTER_VELOCITY]) & (center_speed_doubt > slack * sum[PEAK_CENTER_VELOCITY]));
-        const Real span = sum[MAX_DISPLACEMENT] - sum[MIN_DISPLACEMENT], center_span = sum[MAX_CENTER] - sum[MIN_CENTER];
-        near = near | (ok & (doubt > slack * span) & ((max(u0, u1) + doubt > sum[MAX_DISPLACEMENT]) | (min(u0, u1) - doubt < sum[MIN_DISPLACEMENT])));
-        near = near | (ok & (center_doubt > slack * center_span) & ((max(c0, c1) + center_doubt > sum[MAX_CENTER]) | (min(c0, c1) - center_doubt < sum[MIN_CENTER])));
         assign(ok & (!near), sum[PEAK_VELOCITY], max(sum[PEAK_VELOCITY], speed));
         assign(ok & (!near), sum[PEAK_CENTER_VELOCITY], max(sum[PEAK_CENTER_VELOCITY], center_speed));
         if (any(near)) {
@@ -263,7 +276,12 @@ template <class L> struct Totals {
         const Real mean = select(h > Real(0.0), (u1 - u0) / h, Real(0.0)), a = Real(0.5) * (v1 - v0), b = Real(0.5) * (v0 + v1) - mean;
         return h * fma(mean, mean, fma(Real(1.0 / 3.0) * a, a, Real(0.6) * b * b));
     }
-    // Errors of the cubics, by the amplitudes of the modes.
+    // Errors of the cubics over a step of h, by the amplitude of a mode.
+    template <class T> static SNAPBEAM_FN void doubts_of_mode(T h, T omega, T &of_u, T &of_v) {
+        const T w = h * omega, w3 = w * w * w;
+        of_u = h * min(w3 * T(1.0 / 384.0), T(2.5) / max(w, T(1.0))), of_v = min(w3 * w * T(1.0 / 384.0), T(2.5));
+    }
+    // The same of the points observed, by the amplitudes of all modes.
     SNAPBEAM_FN void doubts(const Runs<L> &z, Plain *amplitude, Real &u, Real &v, Real &c, Real &cv) {
         u = v = c = cv = Real(0.0);
         const auto long_step = Real(s->fastest) * value(z.h) > Real(0.3);  // in a shorter one the errors are below 2e-5
@@ -272,9 +290,9 @@ template <class L> struct Totals {
         Plain su = Plain(0.0), sv = Plain(0.0), sc = Plain(0.0), scv = Plain(0.0);
         const Plain h = Plain(value(z.h));
         for (int i = 0; i < s->size(); ++i) {
-            const Plain w = h * s->omega[i], w3 = w * w * w, once = Plain(1.0) / max(w, Plain(1.0));
-            const Plain of_u = h * min(w3 * Plain(1.0 / 384.0), Plain(2.5) * once) * amplitude[i];
-            const Plain of_v = min(w3 * w * Plain(1.0 / 384.0), Plain(2.5)) * amplitude[i];
+            Plain of_u, of_v;
+            doubts_of_mode(h, Plain(s->omega[i]), of_u, of_v);
+            of_u *= amplitude[i], of_v *= amplitude[i];
             const Plain at = abs(value(row[i])), middle = abs(Plain(s->center[i]));
             su = fma(at, of_u, su), sv = fma(at, of_v, sv), sc = fma(middle, of_u, sc), scv = fma(middle, of_v, scv);
         }

@@ -61,17 +61,20 @@ template <class L> struct Runs {
     Real t, tick, sign;                   // sign: +1 about the first well, -1 about its mirror image
     Real parts;                           // in which a step is followed inside
     Number h;                             // s
-    Number gq, qr, next_gq, along_g, along_r, dissipated;
+    Cell next_gq;                         // cells of g.q after a flow
+    Number gq, qr, along_g, along_r, dissipated;
     bool account;
+    bool direct;                          // nothing acts but the tension: the first flow begins from q, p, k
 };
 
 constexpr int BLOCK_ARRAYS = 11;
 
-template <class L, class X, class Y> SNAPBEAM_FN typename L::Number dot(const X *a, const Y *b, int n) {
+template <class L, class X, class Y> SNAPBEAM_FN typename L::Cell dot_cells(const X *a, const Y *b, int n) {
     typename L::Cell s = a[0] * b[0];
     for (int i = 1; i < n; ++i) s = fma(a[i], b[i], s);
-    return L::total(s);
+    return s;
 }
+template <class L, class X, class Y> SNAPBEAM_FN typename L::Number dot(const X *a, const Y *b, int n) { return L::total(dot_cells<L>(a, b, n)); }
 
 // Rows at, ..., at + ROWS - 1 of r = Gq for columns of one block; returns their part of q.Gq.
 template <int ROWS, class L>
@@ -112,8 +115,8 @@ template <class L> SNAPBEAM_FN typename L::Number signal_slope(const Runs<L> &z,
     return s;
 }
 
-// Tension at q, where g.q is known: r = Gq and the factors of the acceleration.
-template <class L> SNAPBEAM_FN void tension(Runs<L> &z, const typename L::Cell *q, typename L::Number gq) {
+// Tension at q, where the cells of g.q are known: r = Gq and the factors of the acceleration.
+template <class L> SNAPBEAM_FN void tension(Runs<L> &z, const typename L::Cell *q, typename L::Cell gq) {
     typedef typename L::Number Number;
     const Structure<L> &s = *z.s;
     typename L::Cell along = typename L::Cell(0.0);
@@ -133,8 +136,8 @@ template <class L> SNAPBEAM_FN void tension(Runs<L> &z, const typename L::Cell *
             if (i < end) along += product_rows<1, L>(s, q, z.r, i, from, count);
         }
     }
-    z.qr = L::total(along);
-    z.gq = z.sign * gq;
+    L::totals(along, gq, z.qr, z.gq);
+    z.gq = z.sign * z.gq;
     const Number gamma = Number(-s.problem->gamma);
     z.along_g = gamma * z.qr, z.along_r = gamma * fma(Number(2.0), z.gq, z.qr);
     for (int j = 0; j < z.channels; ++j)
@@ -156,7 +159,7 @@ template <class L> SNAPBEAM_FN void acceleration_row(const Runs<L> &z, typename 
 }
 // The same at any state, from nothing.
 template <class L> SNAPBEAM_FN void tension_at(Runs<L> &z, const typename L::Cell *q, typename L::Cell *k) {
-    tension(z, q, dot<L>(z.s->g, q, z.s->size()));
+    tension(z, q, dot_cells<L>(z.s->g, q, z.s->size()));
     acceleration_row(z, k);
 }
 
@@ -307,15 +310,16 @@ template <class L> SNAPBEAM_FN void timed_work(Runs<L> &z, Channel<L> &c, typena
 
 template <class L> SNAPBEAM_FN void begin_step(Runs<L> &z) {
     typedef typename L::Number Number;
-    for (int i = 0; i < z.s->size(); ++i) z.q1[i] = z.q[i], z.p1[i] = z.p[i], z.k1[i] = z.k[i];
-    z.dissipated = Number(0.0);
+    z.dissipated = Number(0.0), z.direct = true;
     for (int i = 0; i < z.signals; ++i) z.signal[i].sine = z.signal[i].sine0, z.signal[i].cosine = z.signal[i].cosine0;
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
         c.impulse = c.work = c.lost = Number(0.0);
-        c.active = !c.contact || any(c.closed);
+        c.active = !c.contact || any(c.closed), z.direct &= !c.active;
         if (!(c.law == AXIAL_LOAD)) c.f = c.first_f = Number(0.0);
     }
+    if (z.direct) return;
+    for (int i = 0; i < z.s->size(); ++i) z.q1[i] = z.q[i], z.p1[i] = z.p[i], z.k1[i] = z.k[i];
 }
 
 template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
@@ -342,7 +346,7 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
         if (!c.active) continue;
         if (c.timed) {
             if (c.law == AXIAL_LOAD) {
-                if (stage == 0) tension(z, z.q1, dot<L>(s.g, z.q1, n));  // forms r
+                if (stage == 0) tension(z, z.q1, dot_cells<L>(s.g, z.q1, n));  // forms r
                 c.v = fma(z.sign, dot<L>(s.g, z.p1, n), dot<L>(z.r, z.p1, n));
             } else {
                 c.f = signal_of(z, c), c.v = dot<L>(c.row, z.p1, n);
@@ -381,9 +385,11 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
         const Cell there = Cell(w * (Number(0.5) * (Number(1.0) - z.sign)));
         for (int i = 0; i < n; ++i) z.p1[i] = fma(there, s.far_force[i], z.p1[i]);
     }
+    const bool direct = stage == 0 && z.direct;
+    const Cell *from_q = direct ? z.q : z.q1, *from_p = direct ? z.p : z.p1, *from_k = direct ? z.k : z.k1;
     Cell before = Cell(0.0), after = Cell(0.0), gq = Cell(0.0);
     for (int i = 0; i < n; ++i, a += 4) {
-        const Cell q = z.q1[i], p = stage ? fma(by_g, s.g[i], fma(by_r, z.r[i], z.p1[i])) : fma(weight, z.k1[i], z.p1[i]);
+        const Cell q = from_q[i], p = stage ? fma(by_g, s.g[i], fma(by_r, z.r[i], from_p[i])) : fma(weight, from_k[i], from_p[i]);
         const Cell q1 = q + fma(a[0], q, a[1] * p), p1 = p + fma(a[3], p, a[2] * q);
         if (z.account) {
             const Cell oq = s.omega[i] * q, oq1 = s.omega[i] * q1;
@@ -392,14 +398,13 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
         gq = fma(s.g[i], q1, gq);
         z.q1[i] = q1, z.p1[i] = p1;
     }
-    z.next_gq = L::total(gq);
+    z.next_gq = gq;
     if (z.account) z.dissipated = fma(Number(0.5), L::total(before - after), z.dissipated);
     for (int i = 0; i < z.signals; ++i) z.signal[i].advance(z.signal[i].ahead_sine[which], z.signal[i].ahead_cosine[which]);
 }
 
 // The whole step from q, p, k to q1, p1, k1; rows of a length that the compiler knows stay in registers.
 template <class L> SNAPBEAM_FN void take_step(Runs<L> &outer) {
-    begin_step(outer);
     const int flows = outer.s->composition.flows;
     if constexpr (L::fixed > 0 && L::together == 1) {
         typedef typename L::Cell Cell;
@@ -407,11 +412,13 @@ template <class L> SNAPBEAM_FN void take_step(Runs<L> &outer) {
         Cell q[N], p[N], k[N], r[N];
         Runs<L> z = outer;
         z.q1 = q, z.p1 = p, z.k1 = k, z.r = r;
-        for (int i = 0; i < N; ++i) q[i] = outer.q1[i], p[i] = outer.p1[i], k[i] = outer.k1[i], r[i] = Cell(0.0);
+        for (int i = 0; i < N; ++i) q[i] = p[i] = k[i] = r[i] = Cell(0.0);
+        begin_step(z);
         for (int stage = 0; stage <= flows; ++stage) take_stage(z, stage);
         for (int i = 0; i < N; ++i) outer.q1[i] = q[i], outer.p1[i] = p[i], outer.k1[i] = k[i], outer.r[i] = r[i];
         outer.gq = z.gq, outer.qr = z.qr, outer.next_gq = z.next_gq, outer.dissipated = z.dissipated;
     } else {
+        begin_step(outer);
         for (int stage = 0; stage <= flows; ++stage) take_stage(outer, stage);
     }
 }

@@ -60,7 +60,7 @@ STATUS = (RunStatus.OK, RunStatus.EARLY_STOP, RunStatus.INTERRUPTED, RunStatus.D
 """Status of a run by its number in the core."""
 OF_SAMPLE, CHANNEL_SAMPLE = 3, 5
 """Numbers of a sample, and of each channel in it."""
-FEW_MODES = 12
+FEW_MODES = 16
 """Modes up to which runs are integrated side by side."""
 _MOST_TICKS = 2.0**52
 _FINER = 16
