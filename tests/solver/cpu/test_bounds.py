@@ -218,3 +218,42 @@ def test_no_motion_is_faster_than_its_bound(resistive: bool) -> None:
         assert reached <= allowed * (1.0 + 1e-6)
         tightest = max(tightest, reached / allowed)
     assert tightest > 0.1
+
+
+def test_onset_behind_both_extrema_of_a_softening_spring() -> None:
+    """No contact is excluded for longer than until its onset.
+
+    The spring joins a moving mode to one at rest, at which the contact is.  At both ends of the reach its force is as small as
+    here, where it is 0: without the extrema between them the contact would be excluded for the whole horizon.
+    """
+    end, stiffness, shape = 4e-4, 60.0, np.array([1.0, -1.0])
+    law = sb.LocalSpring(stiffness=stiffness, cubic_stiffness=-stiffness / end**2)
+    places, ends = law.extrema(end)
+    assert places.size == 2
+    bounds, horizon = softening_bound(), TRUST * STEP
+    speed = 0.999 * end / horizon
+    assert abs(law.force_at(speed * horizon)) < 0.01 * np.abs(law.force_at(places)).max()
+
+    def motion(t, z):
+        return [*z[2:], *(law.force_at(float(shape @ z[:2])) * shape)]
+
+    memory = np.zeros(80)
+    memory[P], memory[ALONG + 1], memory[FORCED : FORCED + 2] = speed, 1.0, shape
+    memory[EXTREMA : EXTREMA + 6] = [*ends, *np.column_stack((places, law.force_at(places))).ravel()]
+    found = solve_ivp(
+        motion, (0.0, horizon), [0.0, 0.0, speed, 0.0], rtol=1e-10, atol=1e-16, dense_output=True
+    )
+    bound = bounds(memory, law.numbers)
+    for share in (0.2, 0.5, 0.9):
+        gap = float(found.sol(share * horizon)[1])
+        assert 0.0 < safe_interval(gap, bound, 0.0, 0.0, STEP) < share * horizon
+
+
+def softening_bound() -> Any:
+    """The bound of one local force with two extrema, as a function of the memory and the force."""
+
+    def bound(memory: Any, law: Any) -> Any:
+        layout = Layout(8, OMEGA, (LocalForceTerm(FORCED, EXTREMA, FORCE, 2, 0.0, law),))
+        return speed_bound_with_terms(memory, layout, None, ALONG, Q, P, K, STEP)
+
+    return njit(bound)
