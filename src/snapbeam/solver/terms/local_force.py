@@ -101,7 +101,7 @@ def greatest_change(memory, extrema, count, law, u, reach):
 def _change_by_force(memory, size, term, omega, along, q, p, horizon):
     reach = horizon * speed_bound(memory, size, omega, term.row, q, p)
     u = memory[term.state + _ORIGIN] + dot(memory, size, term.row, q)
-    change = greatest_change(memory, term.extrema, term.count, term.law, u, reach)
+    change = greatest_change(memory, term.extrema, term.number, term.law, u, reach)
     return absolute_product(memory, size, term.row, along) * change * horizon
 
 
@@ -114,7 +114,7 @@ class LocalForceTerm(NamedTuple):
     """Where the extrema of the force are known, and their places and forces."""
     state: int
     """State that a run stores."""
-    count: int
+    number: int
     """Extrema of the force."""
     rest: float
     """u in the first well."""
@@ -245,7 +245,7 @@ def _built(structure: Any, padded: Any, dissipative: bool) -> list[TermMemory]:
         TermMemory(
             {"row": padded(each.row), "extrema": np.pad(each.extrema, (0, -each.extrema.size % WIDTH))},
             {"state": np.zeros(WIDTH)},
-            {"count": each.extrema.size // 2 - 1, "rest": each.rest, "law": each.law},
+            {"number": each.extrema.size // 2 - 1, "rest": each.rest, "law": each.law},
         )
         for each in structure.local_forces
         if type(each.law).owner.dissipative == dissipative
