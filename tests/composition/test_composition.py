@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -57,7 +58,7 @@ BEYOND = 100.0
 KICK = 1e-10
 """Relative change of the start by which the conditioning is measured."""
 BALANCE = {"standard": 1e-3, "reference": 1e-6}
-"""Greatest errors of the energy balance, over the gross work."""
+"""Greatest errors of the energy balance, over the gross work, that a run may have without a word."""
 ROUNDING = 1e-11
 """Difference over b of runs whose numbers agree to rounding, before the conditioning enlarges it."""
 PIECES = 1e-6
@@ -131,12 +132,13 @@ def checked(
         system = composition.system
         cycles, end = lasting(system)
         times = np.linspace(0.0, end, 121)[1:] * (1.0 - 1e-9)
-        runs = {
-            level: sb.simulate(
-                system, sb.Integration(cycles=cycles, accuracy=level, engine=engine), sample_times=times
-            )
-            for level in levels
-        }
+        runs, warned = {}, {}
+        for level in levels:
+            how = sb.Integration(cycles=cycles, accuracy=level, engine=engine)
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                runs[level] = sb.simulate(system, how, sample_times=times)
+            warned[level] = any("energy-balance error" in str(each.message) for each in caught)
     except InputError as error:
         report.refused = reason(error)
         return report
@@ -174,7 +176,7 @@ def checked(
                 f"{level}: error {error[at]:.2e} b at t = {times[at]:.5g} s of {end:.5g} s in column {worst}, "
                 f"allowed {allowed[at]:.2e} b"
             )
-        if not report.balance[level] < BALANCE[level]:
+        if not (report.balance[level] < BALANCE[level] or warned[level]):
             report.failures.append(f"{level}: energy balance {report.balance[level]:.2e}")
         if system.harvesters:
             check_voltages(composition, truth, run, within, LIMIT[level], amplified, report)

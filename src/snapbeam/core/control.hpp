@@ -1,7 +1,7 @@
 // The controller, once for every layout: propose a step, take it, inspect it, accept it or take a shorter one.
 //
 // In free flight a step is the flight step, halved where the beam is stretched far beyond its wells.  In contact, steps grow from the
-// onset and shrink towards the release.  A step inside which a contact closes or opens, or a lossy contact begins or ceases to
+// onset, shrink towards the release, and turn the striker on the contact by CONTACT_TURN at most.  A step inside which a contact closes or opens, or a lossy contact begins or ceases to
 // press, is cut to end there.  The cut is corrected on the true motion, up to CORRECTIONS times: a zero of the gap to a tick, one of
 // the force to 1e-9 of a flight step.  If several do, the first one counts; the others are found again.  A force that begins acts from the first kick of the next step.  Each run of a pack has
 // its own time, length of step and contacts; a run that ends is replaced.
@@ -10,7 +10,7 @@
 
 namespace SNAPBEAM_SET {
 
-constexpr double GRADING = 0.5, RELEASE = 0.5, STRETCH_LIMIT = 4.0;
+constexpr double GRADING = 0.5, RELEASE = 0.5, CONTACT_TURN = 0.35, NEARER = 0.2, STRETCH_LIMIT = 4.0;
 constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
 
 // What a channel does at the end of a step.
@@ -222,7 +222,10 @@ template <class L> struct Group {
         assign(which, stretch, Real(value(fma(Number(2.0), z.gq, z.qr))));
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
-            if (!c.contact) continue;
+            if (!c.contact) {
+                if (!c.timed) assign(which, c.x, along(z, c, z.q));
+                continue;
+            }
             const Number d = penetration(z, c, z.q), r = signal_slope(z, c) - dot<L>(c.row, z.p, n);
             if (continued) c.closed = c.closed & (c.pressing | (!which));  // what does not press begins again as apart
             assign(which, c.d0, select(c.closed, d, continued ? min(d, Number(0.0)) : d)), assign(which, c.r0, r);
@@ -276,9 +279,18 @@ template <class L> struct Group {
         want = select(energy > calm, min(want, contact_step), want);
         for (int j = 0; j < z.channels; ++j) {
             const Channel<L> &c = z.channel[j];
-            if (!c.contact || !any(c.closed)) continue;
+            if (c.timed || (c.contact && !any(c.closed))) continue;
+            const Real stiffness = with_law(c.law, [&](auto law) { return value(law.stiffness(c.contact ? max(c.d0, Number(0.0)) : c.x, c.P)); });
+            const Real turned = Real(CONTACT_TURN) / (sqrt(max(stiffness * value(c.M[j]), Real(1e-300))) * z.tick);
+            if (!c.contact) {
+                // towards the end of its range, where a force may be infinite, a share of the way
+                const Number space = with_law(c.law, [&](auto law) { return min(law.high(c.P) - c.x, c.x - law.low(c.P)); });
+                want = min(want, turned);
+                if (any(value(space) < Real(NEVER))) want = min(want, Real(NEARER) * value(space) / (abs(value(dot<L>(c.row, z.p, n))) * z.tick));
+                continue;
+            }
             const Real d = value(c.d0), r = value(c.r0);
-            Real own = min(Real(GRADING) * (z.t - c.onset), contact_step);
+            Real own = min(min(Real(GRADING) * (z.t - c.onset), contact_step), turned);
             own = select(r < Real(0.0), min(own, Real(-RELEASE) * max(d, Real(0.0)) / (r * z.tick)), own);
             want = select(c.closed, min(want, own), want);
         }
@@ -424,7 +436,7 @@ template <class L> struct Group {
 
     SNAPBEAM_FN void inspect() {
         const int n = s->size();
-        Marks redo = FromBits<Marks>::of(0), broken = FromBits<Marks>::of(0);
+        Marks redo = FromBits<Marks>::of(0), broken = FromBits<Marks>::of(0), pulled = FromBits<Marks>::of(0);
         bool touching = false;
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
@@ -433,7 +445,8 @@ template <class L> struct Group {
                     const Number u = along(z, c, z.q1);
                     const Number low_end = with_law(c.law, [&](auto law) { return law.low(c.P); });
                     const Number high_end = with_law(c.law, [&](auto law) { return law.high(c.P); });
-                    broken = broken | (!((u > low_end) & (u < high_end)));
+                    const Marks out = !((u > low_end) & (u < high_end));
+                    broken = broken | out, pulled = pulled | (out & (value(c.first_f * (u - c.rest)) > Real(0.0)));
                 }
                 continue;
             }
@@ -518,7 +531,10 @@ template <class L> struct Group {
             length = select(sooner, at, length), which = select(sooner, Real(double(j)), which), redo = redo | sooner;
         }
         totals.sum[snapbeam::TRIALS] += select(alive, Real(1.0), Real(0.0));
-        redo = redo & alive & (cuts < Real(double(MOST_CUTS))) & (!broken);
+        const Marks over = broken & (!pulled) & (cuts < Real(double(MOST_CUTS))) & (ticks > Real(1.0));  // a force that repels may turn a shorter step before
+        length = select(over, max(nearest(Real(0.5) * ticks), Real(1.0)), length), which = select(over, Real(-1.0), which);
+        broken = broken & (!over);
+        redo = (redo | over) & alive & (cuts < Real(double(MOST_CUTS))) & (!broken);
         const Marks same = redo & again & (!differ(which, event));
         tries = select(same, tries + Real(1.0), Real(0.0));
         cuts = select(redo, cuts + Real(1.0), Real(0.0));

@@ -67,6 +67,8 @@ _FINER = 16
 """Halvings of a tick, at most: events lie on ticks."""
 _PARTS = {4: (4, 8.0), 6: (4, 16.0)}
 """Parts of a kick, at least, and over the time in which damping stops a motion, by the order of the composition."""
+_STEEP = 7
+"""Further halvings of the shortest step where a force grows without bound."""
 _SAMPLES, _IMPACTS, _BUDGET = 20_000, 4096, 200_000
 """Room for samples and impacts, and steps, of one piece of a recorded run."""
 
@@ -91,6 +93,8 @@ class _Arrays:
         sizes = np.bincount(label, minlength=count).astype(np.int32)
         n, modes = structure.omega.size, structure.equilibrium.size
         halvings = (ensemble.runs["max_halvings"] - ensemble.runs["min_contact_halvings"]).astype(float)
+        if np.isin(channels.laws, (6, 7)).any():
+            halvings += _STEEP  # near a magnet or an electrode
         lossy = bool(np.isin(channels.laws, (3, 4, 8, 9, 10)).any())
         fewest, per_decay = _PARTS[ensemble.order]
         wells = structure.unequal_wells
