@@ -28,6 +28,7 @@ from snapbeam._version import __version__
 from snapbeam.cli.short_help import wants_all
 from snapbeam.util.files import VERSION, foreign_files_kept
 from snapbeam.util.interrupts import WORDS, during_command
+from snapbeam.util.packages import extra_of, needs
 from snapbeam.util.validation import InputError
 from snapbeam.util.work_rate import WorkRate
 
@@ -199,6 +200,11 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
                         write_json(asked.json, asked.found | {"notes": asked.notes})
         except InputError as error:
             errors().print(f"[bold red]error:[/] {escape(str(error))}")
+            raise typer.Exit(REFUSED) from None
+        except ModuleNotFoundError as error:
+            if (extra := extra_of(error.name)) is None:
+                raise
+            errors().print(f"[bold red]error:[/] {escape(needs(context.command_path, error.name, extra))}")
             raise typer.Exit(REFUSED) from None
         except BrokenPipeError:
             raise

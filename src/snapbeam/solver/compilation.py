@@ -241,7 +241,7 @@ def is_private(folder: str | os.PathLike[str], source: str | os.PathLike[str] | 
 
 
 def _trusted_owners(source: str | os.PathLike[str] | None) -> set[int]:
-    """This user, the administrator and the owner of *source*, who could change what is compiled."""
+    """Users who may write what is run: the present one, the administrator and the owner of *source*."""
     return {os.getuid(), 0} | (
         {os.stat(source).st_uid} if source is not None and os.path.exists(source) else set()
     )

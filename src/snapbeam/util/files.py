@@ -12,9 +12,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 
 from snapbeam._version import __version__
+from snapbeam.util.packages import needing
 from snapbeam.util.validation import InputError, file_path
 
 __all__ = [
@@ -42,6 +44,15 @@ REQUEST = "request_hash"
 """Name of the attribute of NetCDF files that a command wrote: the hash of its parameters."""
 _HASHED = 64 * 2**20
 """Bytes of an input file up to which its content is part of the request; of larger ones size and time are."""
+
+_NEEDED = {
+    ".mp4": ("imageio_ffmpeg", "video"),
+    ".mov": ("imageio_ffmpeg", "video"),
+    ".uff": ("pyuff", "lab"),
+    ".unv": ("pyuff", "lab"),
+    ".tdms": ("nptdms", "lab"),
+}
+"""Module that writes files of a suffix, and the extra of the distribution that installs it."""
 
 
 # Which files that exist may be replaced: in Python every one, on the command line those that snapbeam wrote.
@@ -240,6 +251,10 @@ def check_writable(
         raise InputError(
             f"{name} = {str(path)!r}: cannot be written, {str(folder)!r} is not an existing folder"
         )
+    if target.suffix.lower() in _NEEDED:
+        module, extra = _NEEDED[target.suffix.lower()]
+        with needing(f"{name} = {str(path)!r}: a file {target.suffix}", extra):
+            import_module(module)
     try:
         with tempfile.NamedTemporaryFile(dir=folder, prefix=f".{target.name}."):
             pass
