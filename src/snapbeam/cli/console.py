@@ -29,7 +29,7 @@ from snapbeam.cli.short_help import wants_all
 from snapbeam.util.files import VERSION, foreign_files_kept
 from snapbeam.util.interrupts import WORDS, during_command
 from snapbeam.util.packages import extra_of, needs
-from snapbeam.util.validation import InputError
+from snapbeam.util.validation import InputError, printable
 from snapbeam.util.work_rate import WorkRate
 
 if TYPE_CHECKING:
@@ -209,7 +209,7 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
         except BrokenPipeError:
             raise
         except OSError as error:
-            errors().print(f"[bold red]error:[/] {escape(str(error))}")
+            errors().print(f"[bold red]error:[/] {escape(printable(str(error)))}")
             raise typer.Exit(FAILED) from None
         except KeyboardInterrupt:
             errors().print(WORDS)
@@ -252,8 +252,9 @@ def _named(values: Iterable[Any]) -> list[Path]:
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
-    _OUTPUT_OPTIONS.get().notes.append(str(message))
-    errors().print(f"[bold yellow]note:[/] {escape(str(message))}")
+    text = printable(str(message))
+    _OUTPUT_OPTIONS.get().notes.append(text)
+    errors().print(f"[bold yellow]note:[/] {escape(text)}")
 
 
 def duration(seconds: float) -> str:
@@ -272,7 +273,7 @@ def file_line(path: Path) -> str:
     """Return a file's name and size."""
     size = path.stat().st_size
     text = f"{size / 1e6:.2f} MB" if size >= 1e5 else f"{size / 1e3:.1f} kB"
-    return f"{escape(str(path))} ({text})"
+    return f"{escape(printable(str(path)))} ({text})"
 
 
 class _RateColumn(ProgressColumn):

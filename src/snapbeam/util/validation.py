@@ -12,6 +12,7 @@ import inspect
 import json
 import math
 import os
+import re
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -30,6 +31,19 @@ _NAMESPACES = ("snapbeam", "snapbeam.dynamics", "snapbeam.model", "snapbeam.unce
 Kind = TypeVar("Kind")
 
 
+_LONGEST_MESSAGE = 8000
+_CONTROLS = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]"
+)
+"""Characters that control a terminal or the direction of text, and those that no file format takes as text."""
+
+
+def printable(text: str, longest: int = _LONGEST_MESSAGE) -> str:
+    """Return text that a terminal shows as it is: control characters escaped, and no longer than *longest*."""
+    short = text if len(text) <= longest else f"{text[: longest - 4]} ..."
+    return _CONTROLS.sub(lambda found: ascii(found[0])[1:-1], short)
+
+
 class InputError(ValueError):
     """Invalid parameter; the message names the parameter, its value and the allowed values.
 
@@ -42,6 +56,9 @@ class InputError(ValueError):
     ...     print(error)
     stiffness = -1.0: must be a finite number greater than 0 N/m^1.5
     """
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*(printable(each) if isinstance(each, str) else each for each in args))
 
 
 class InputTypeError(InputError, TypeError):
