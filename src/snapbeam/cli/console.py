@@ -29,7 +29,7 @@ from snapbeam.cli.short_help import wants_all
 from snapbeam.util.files import VERSION, foreign_files_kept
 from snapbeam.util.interrupts import WORDS, during_command
 from snapbeam.util.packages import extra_of, needs
-from snapbeam.util.validation import InputError, printable
+from snapbeam.util.validation import InputError, printable, text
 from snapbeam.util.work_rate import WorkRate
 
 if TYPE_CHECKING:
@@ -193,6 +193,7 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
                     from snapbeam.util.files import check_writable
 
                     check_writable(asked.json, "json", (".json",))
+                _check_texts(kwargs)
                 try:
                     return command(*args, **kwargs)
                 finally:
@@ -227,6 +228,16 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
     guarded.__signature__ = inspect.Signature(mine + more)  # type: ignore[attr-defined]
     guarded.__annotations__ = {}
     return guarded
+
+
+def _check_texts(arguments: Mapping[str, Any]) -> None:
+    """Refuse arguments that no attribute of a file can hold; names of files may have any bytes."""
+    for name, value in arguments.items():
+        if isinstance(value, Mapping):
+            _check_texts(value)
+        for each in value if isinstance(value, (list, tuple)) else [value]:
+            if isinstance(each, str):
+                text(f"{name} (--{name.replace('_', '-')})", each)
 
 
 _NO_PARAMETERS = frozenset(

@@ -40,6 +40,8 @@ MADE_BY = f"made by snapbeam {__version__}"
 """Provenance text in pictures and animations."""
 _MARK = b"made by snapbeam "
 _LOOKED_AT = 1 << 16  # bytes, at each end
+_TRIED = 4096
+"""Bytes that are written to a folder to see whether it takes a file."""
 REQUEST = "request_hash"
 """Name of the attribute of NetCDF files that a command wrote: the hash of its parameters."""
 _HASHED = 64 * 2**20
@@ -256,8 +258,9 @@ def check_writable(
         with needing(f"{name} = {str(path)!r}: a file {target.suffix}", extra):
             import_module(module)
     try:
-        with tempfile.NamedTemporaryFile(dir=folder, prefix=f".{target.name}."):
-            pass
+        with tempfile.NamedTemporaryFile(dir=folder, prefix=f".{target.stem[:40]}.") as tried:
+            tried.write(bytes(_TRIED))  # a full disk still makes empty files
+            tried.flush()
         if target.exists():
             with target.open("ab"):
                 pass

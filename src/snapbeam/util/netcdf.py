@@ -22,7 +22,7 @@ from snapbeam._version import __version__
 from snapbeam.util.files import REQUEST, VERSION, NoRoomError, atomic_path, check_writable, request_hash
 from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.interrupts import held_back, raise_held
-from snapbeam.util.validation import InputError, file_path, instance, mapping
+from snapbeam.util.validation import InputError, file_path, instance, mapping, text
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -133,6 +133,7 @@ def write_netcdf(
     groups = {None: data} if isinstance(data, xr.Dataset) else mapping("data", data)
     for name, dataset in groups.items():
         instance(f"data[{name!r}]", dataset, xr.Dataset, "an xarray.Dataset")
+        _check_texts(dataset)
     settings = mapping("encoding", {} if encoding is None else encoding)
     with netcdf_file(target) as file:
         for name, dataset in groups.items():
@@ -142,6 +143,20 @@ def write_netcdf(
             dataset.dump_to_store(
                 store, encoding=dict(mapping(f"encoding[{name!r}]", settings.get(name, {})))
             )
+
+
+def _check_texts(dataset: xr.Dataset) -> None:
+    """Raise an error for a name or an attribute of a dataset that is no text of UTF-8, naming it."""
+    parts = {"attrs": dataset.attrs} | {
+        f"{name}.attrs": each.attrs for name, each in dataset.variables.items()
+    }
+    for where, attrs in parts.items():
+        text("name", where)
+        for key, value in attrs.items():
+            text(f"{where}: key", str(key))
+            for each in value if isinstance(value, (list, tuple)) else [value]:
+                if isinstance(each, str):
+                    text(f"{where}[{str(key)!r}]", each)
 
 
 @contextmanager

@@ -287,6 +287,15 @@ def file_path(name: str, value: Any) -> Path:
     return path
 
 
+def text(name: str, value: str) -> str:
+    """Return *value* if every file format takes it: no lone surrogates, which stand for bytes that are not UTF-8."""
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise InputError(f"{name} = {shown(value)}: must be text that UTF-8 can encode") from None
+    return value
+
+
 def mapping(name: str, value: Any) -> Mapping[Any, Any]:
     """Return *value* if it is a mapping, such as a dictionary."""
     if not isinstance(value, Mapping):
