@@ -613,6 +613,8 @@ class VideoSource(FrameSource):
                 if not container.streams.video:
                     raise InputError(f"{path}: holds no video stream")
                 stream = container.streams.video[0]
+                if stream.codec_context is None:
+                    raise InputError(f"{path}: its video has a codec that is not known here")
                 count = sum(1 for packet in container.demux(stream) if packet.size)
                 codec = stream.codec_context.name
                 if path.suffix.lower() == ".cine":
