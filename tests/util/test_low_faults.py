@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -41,3 +45,16 @@ def test_a_video_whose_codec_is_not_known(tmp_path):
     path.write_bytes(data.replace(b"FFV1", b"ZZZ9"))
     with pytest.raises(sb.InputError, match="codec that is not known here"):
         lab.open_recording(path, frame_rate=1e4, pixel_size=1e-5)
+
+
+def test_output_in_ascii(tmp_path):
+    environment = os.environ | {"PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+    done = subprocess.run(
+        [sys.executable, "-m", "snapbeam", "equilibria"],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        timeout=120,
+    )
+    assert done.returncode == 0 and b"Traceback" not in done.stderr, done.stderr
+    assert rb"\xb5" in done.stdout
