@@ -10,8 +10,11 @@ from importlib.metadata import requires
 import numpy as np
 import pytest
 
+from snapbeam.parts import installed_parts
 from snapbeam.util.packages import _EXTRAS, extra_of
 
+LAB = pytest.mark.skipif("lab" not in installed_parts(), reason="a part that is not installed")
+EXPLORER = pytest.mark.skipif("explorer" not in installed_parts(), reason="a part that is not installed")
 BLOCKED = sorted(module for modules in _EXTRAS.values() for module in modules if module != "PIL")
 """Pillow is there: Matplotlib needs it."""
 PROGRAM = f"""
@@ -64,11 +67,13 @@ def files(tmp_path):
     return tmp_path
 
 
+@EXPLORER
 @pytest.mark.parametrize("words", [["explore"], ["explore", "map.nc"], ["explore", "--port", "0"]])
 def test_the_explorer(tmp_path, words):
     refused(tmp_path, words, "explorer")
 
 
+@EXPLORER
 def test_the_explorer_in_python(tmp_path):
     program = f"import sys; sys.modules.update(dict.fromkeys({BLOCKED!r})); import snapbeam; snapbeam.explorer.serve"
     done = without_extras(tmp_path, program)
@@ -78,6 +83,7 @@ def test_the_explorer_in_python(tmp_path):
 TRACK = ["--frame-rate", "10e3", "--pixel-size", "12e-6", "--buckling-level", "0.33e-3"]
 
 
+@LAB
 @pytest.mark.parametrize(
     "words",
     [
@@ -128,6 +134,7 @@ for call in calls:
 """
 
 
+@LAB
 def test_functions_of_the_laboratory(files):
     before = sorted(path.name for path in files.iterdir())
     done = without_extras(files, WRITE)

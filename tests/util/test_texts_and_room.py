@@ -36,7 +36,6 @@ def test_attributes_that_are_no_text_are_refused_by_name(tmp_path, data, words):
     [
         [b"simulate", b"--window", b"\xff", b"-o", b"a.nc"],
         [b"map", b"--initial-well", b"l\xff", b"-o", b"a.nc"],
-        [b"vibrometer", b"a.csv", b"--frequency", b"100", b"--units", b"m\xe9"],
     ],
 )
 def test_arguments_that_are_no_text_are_refused_by_name(tmp_path, words):
