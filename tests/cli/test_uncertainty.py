@@ -46,6 +46,20 @@ def run(tmp_path, text: str, *arguments: str):
     return CliRunner().invoke(app, [arguments[0], str(file), *arguments[1:]])
 
 
+@pytest.mark.parametrize(
+    ("section", "words"),
+    [
+        ('side = "above"\n', "upper well (contact on side 'above')"),
+        ('side = "below"\n[initial_state]\ninitial_well = "upper"\n', "upper well (initial_well = 'upper')"),
+    ],
+)
+def test_probability_names_the_initial_well(tmp_path, section: str, words: str) -> None:
+    text = (SYSTEM + PROBABILITY).replace("[integration]", section + "[integration]")
+    result = run(tmp_path, text, "probability", "-o", str(tmp_path / "p.nc"), "--yes")
+    assert result.exit_code == 0, result.output
+    assert f"Runs begin in the {words}." in result.output
+
+
 def test_probability(tmp_path) -> None:
     target, picture = tmp_path / "p.nc", tmp_path / "p.png"
     result = run(
@@ -78,6 +92,7 @@ def test_design(tmp_path) -> None:
     assert result.exit_code == 0, result.output
     with xr.open_dataset(target, engine="h5netcdf") as dataset:
         assert 0.012 < float(dataset["velocity_amplitude"][0]) < 0.0145
+    assert "Runs begin in the lower well (contact on side 'below')." in result.output
     assert "constraints on validation samples: " in result.output and picture.stat().st_size > 5_000
     found = json.loads(told.read_text(encoding="utf-8"))
     assert found["estimated_cost"]["runs"] > 0 and found["designs"]["satisfied_snap"]

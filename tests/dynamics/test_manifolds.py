@@ -80,8 +80,43 @@ def test_refusals() -> None:
     unstable = sb.dynamics.invariant_manifold(saddle, max_arclength=1.0)
     with pytest.raises(InputError, match="must be the stable manifold"):
         sb.dynamics.homoclinic_points(unstable, unstable)
-    with pytest.raises(InputError, match="cross at both values"):
-        sb.dynamics.homoclinic_tangency(saddle, "a", (1.39, 1.41))
+
+
+@pytest.mark.parametrize(("bounds", "crosses"), [((1.39, 1.41), True), ((0.96, 0.99), False)])
+def test_bounds_on_one_side_of_a_tangency_keep_what_was_found(bounds, crosses) -> None:
+    saddle = sb.dynamics.periodic_orbit(henon(1.4, 0.3), [0.6, 0.19])
+    with pytest.warns(sb.DiagnosticWarning, match="cross at both values" if crosses else "at neither value"):
+        found = sb.dynamics.homoclinic_tangency(saddle, "a", bounds, max_arclength=3.0, max_distance=0.05)
+    assert "give one with and one without crossing" in found.attrs["termination_reason"]
+    assert found["value"].values.tolist() == list(bounds)
+    assert found["crosses"].values.tolist() == [crosses, crosses]
+    assert np.isfinite(found["bracket"].values).tolist() == [not crosses, crosses]
+    # the advice works
+    other = (1.0, 1.4)
+    assert (
+        sb.dynamics.homoclinic_tangency(
+            saddle, "a", other, max_arclength=3.0, max_distance=0.05, tolerance=0.5
+        ).attrs["termination_reason"]
+        == "tolerance"
+    )
+
+
+def test_a_saddle_that_is_gone_keeps_what_was_found() -> None:
+    """Below a = -(1 - b)^2/4 the Henon map has no fixed point; a = 1 - c."""
+    henon_map = henon(1.0, 0.3)
+    falling = KnownMap(
+        lambda x, of: henon_map._step(x, {"a": 1.0 - of["c"], "b": of["b"]}),
+        lambda x, of: henon_map._slope(x, {"a": 1.0 - of["c"], "b": of["b"]}),
+        2, c=0.0, b=0.3,
+    )  # fmt: skip
+    saddle = sb.dynamics.periodic_orbit(falling, [0.6, 0.19])
+    options = {"max_arclength": 1.0, "max_distance": 0.05}
+    with pytest.warns(sb.DiagnosticWarning, match=r"c = 1\.7: "):
+        found = sb.dynamics.homoclinic_tangency(saddle, "c", (0.0, 1.7), **options)
+    assert found["value"].values.tolist() == [0.0]
+    assert "c = 1.7: " in found.attrs["termination_reason"]
+    with pytest.raises((sb.dynamics.OrbitNotFoundError, InputError)):
+        sb.dynamics.homoclinic_tangency(saddle, "c", (1.7, 1.9), **options)
 
 
 def test_a_map_that_jumps_ends_the_branch() -> None:
@@ -106,7 +141,8 @@ def test_a_manifold_that_ends_early_is_no_proof_that_none_cross(monkeypatch: pyt
 
     monkeypatch.setattr(manifolds, "_POINTS", 40)
     saddle = sb.dynamics.periodic_orbit(henon(1.0, 0.3), [0.7, 0.2])
-    found = sb.dynamics.homoclinic_tangency(saddle, "a", (0.95, 1.05))
+    with pytest.warns(sb.DiagnosticWarning, match="choose a smaller max_arclength"):
+        found = sb.dynamics.homoclinic_tangency(saddle, "a", (0.95, 1.05))
     assert "manifold ends before max_arclength" in found.attrs["termination_reason"]
     assert found.sizes["value"] == 0 and np.isnan(found["bracket"]).all()
 

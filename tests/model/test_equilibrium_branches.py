@@ -50,6 +50,39 @@ def test_pull_in_voltage(side: float) -> None:
     assert point.get_xdata()[0] == pytest.approx(exact, rel=1e-9)
 
 
+def test_critical_points_need_no_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What becomes of a beam beyond a critical point follows from its motion, without the wells that it may come to."""
+    searched: list[int] = []
+    before = Potential._starts
+    monkeypatch.setattr(
+        Potential, "_starts", lambda self, count: searched.append(count) or before(self, count)
+    )
+    model = sb.ReducedModel.from_beam(BEAM, modes=2)
+    magnet = sb.MagneticForce(strength=1e-9, gap=-2.9 * BEAM.buckling_level, location=0.5)
+    found = sb.model.equilibrium_branches(sb.System(model, forces=[magnet]), "force.strength", (1e-10, 4e-7))
+    outcomes = found.critical_outcome.values[found.critical_unstable_directions.values == 0]
+    assert sorted(outcomes.tolist()) == ["another well", "pull-in"]
+    searches = searched.count(512)
+    # at most twice a value: the second call asks whether the energy falls without bound
+    assert 5 <= searches <= 10, searches
+
+
+def test_motions_settle_in_wells_that_nobody_looked_for() -> None:
+    """As descent, which knows the wells, tells; next to a magnet nothing settles."""
+    model = sb.ReducedModel.from_beam(BEAM, modes=2)
+    gap = 3.1 * BEAM.buckling_level
+    potential = Potential.of(model, [sb.MagneticForce(strength=6e-8, gap=gap, location=0.4)])
+    rng, center = np.random.default_rng(5), model.midspan_shape
+    outcomes = []
+    for _ in range(25):
+        alpha = rng.uniform(-1.5, 3.4) * BEAM.buckling_level * center / float(center @ center)
+        alpha = alpha + 0.1 * rng.uniform(-1.0, 1.0, 2) * np.abs(potential.size).max()
+        if potential.holds(alpha):
+            outcomes.append(potential.settles(alpha))
+            assert outcomes[-1] == (potential.descent(alpha) is not None)
+    assert True in outcomes and False in outcomes
+
+
 def test_buckling_is_a_bifurcation() -> None:
     """The straight beam branches at E I (2 pi/L)^2; the mode's amplitude follows from the tension beyond it."""
     critical = BEAM.critical_load

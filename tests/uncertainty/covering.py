@@ -138,7 +138,7 @@ def posterior() -> Counted:
         def terms(logs, seen=seen, error=0.02 * frequencies(truth)):  # noqa: B008
             return np.concatenate([(frequencies(logs) - seen) / error, logs / known])
 
-        logs, weights, _ = _population(terms, np.zeros(2), 400, trial)
+        logs, weights, *_ = _population(terms, np.zeros(2), 400, trial)
         limits = sb.uncertainty.Posterior(("beam.thickness", "beam.buckling_level"), logs, weights).interval()
         held.append(
             [low <= value <= high for (_, low, high), value in zip(limits.values(), truth, strict=True)]

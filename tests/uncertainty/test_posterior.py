@@ -49,6 +49,29 @@ def test_intervals_cover() -> None:
     assert counted.trials == 400 and 0.93 <= counted.all <= 0.97, counted
 
 
+def test_a_search_that_does_not_converge_keeps_its_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    from snapbeam.uncertainty import posterior
+
+    monkeypatch.setattr(posterior, "_EVALUATIONS", 1)
+    measured, far = measured_of(default_values.BEAM), default_values.BEAM.replace(thickness=8e-4)
+    with pytest.warns(
+        sb.DiagnosticWarning, match="give a beam nearer to the measured one, or a narrower prior"
+    ):
+        found = sb.uncertainty.estimate_posterior(measured, far, {"thickness": 0.5}, modes=2, samples=200)
+    assert found.values.shape == (200, 3) and np.isfinite(found.values).all()
+    assert not found.converged and found.is_doubtful and not found.resampled(10).converged
+    assert found.to_dataset().attrs["converged"] == 0
+    assert "least squares stopped after 1 evaluation" in found.termination_reason
+    with pytest.raises(InputError, match=r"stopped after 1 evaluation.*; give a beam nearer"):
+        found.interval()
+    # the advice works
+    nearer = default_values.BEAM.replace(thickness=1.001 * default_values.BEAM.thickness)
+    monkeypatch.undo()
+    assert sb.uncertainty.estimate_posterior(
+        measured, nearer, {"thickness": 0.1}, modes=2, samples=200
+    ).converged
+
+
 @pytest.mark.slow
 def test_what_follows_is_drawn_from_it() -> None:
     found = sb.uncertainty.estimate_posterior(

@@ -11,6 +11,7 @@ import typer
 
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import add_json, cli_command, duration, file_line, notes, out, progress
+from snapbeam.cli.summary import initial_well_lines
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -208,7 +209,10 @@ def _question(asked: dict[str, Any]) -> tuple[Any, Any, Any, Any]:
 
 def _lines(dataset: xr.Dataset, elapsed: float) -> list[str]:
     runs, count = int(dataset.attrs["runs_made"]), dataset.sizes["design"]
-    lines = [f"{runs} runs of {dataset.sizes['tried']} designs in {duration(elapsed)}"]
+    lines = [
+        f"{runs} runs of {dataset.sizes['tried']} designs in {duration(elapsed)}",
+        *initial_well_lines(dataset),
+    ]
     words = str(dataset["constraints_satisfied"].attrs["flag_meanings"]).split()
     share = 100.0 * float(dataset.attrs["confidence"])
     for i in range(min(count, 12)):
@@ -350,7 +354,7 @@ def _probabilities(one: xr.Dataset) -> list[str]:
 
 def _lines_probability(dataset: xr.Dataset, elapsed: float) -> list[str]:
     runs, points = int(dataset.attrs["runs_made"]), int(dataset["runs"].size)
-    lines = [f"{runs} runs at {points} points in {duration(elapsed)}"]
+    lines = [f"{runs} runs at {points} points in {duration(elapsed)}", *initial_well_lines(dataset)]
     for name in dataset["outcome"].values:
         one = dataset.sel(outcome=name)
         sure = int((one["probability_low"] > 0.95).sum())

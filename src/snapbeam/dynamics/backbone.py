@@ -352,17 +352,18 @@ def _stop_of(system: System) -> tuple[Any, float, float, float] | None:
     acting = [
         name for name in ("base_excitation", "axial_load", "forces", "harvesters") if getattr(system, name)
     ]
-    if acting or system.contacts[1:]:
+    acting += ["more than one striker"] if system.contacts[1:] else []
+    if acting:
         raise InputError(
-            f"system with {', '.join(acting) or 'several strikers'}: a backbone curve is of free motion; leave it out"
+            f"system with {', '.join(acting)}: a backbone curve is of free motion; leave {'it' if len(acting) == 1 else 'them'} out"
         )
     striker, law = system.striker, system.contact_law
     if striker is None or law is None:
         return None
     if not isinstance(striker.drive, FixedStop) or striker.mass is not None:
         raise InputError(
-            "system: its striker moves; a backbone curve is of free motion: give the model alone, or a striker with a "
-            "FixedStop"
+            "system: its striker moves; a backbone curve is of free motion: give system.model alone, or a striker with a "
+            "FixedStop and without a mass"
         )
     if law.is_dissipative or law.impulsive:
         raise InputError(f"contact = {shown(law)}: loses energy; use a HertzContact or a PowerLaw")

@@ -439,7 +439,7 @@ def require_excitation(system: System) -> None:
     if not system.moving:
         raise InputError(
             "contacts = []: a beam that nothing strikes or shakes does not go on snapping; give a striker, a "
-            "base_excitation, an axial_load or an external_force"
+            "base_excitation, an axial_load or a force that changes with time"
         )
 
 

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.dynamics.flow import Flow, Stroboscope, dimensionless, fixed_parameters
-from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, periodic_orbit
-from snapbeam.util.diagnostics import sharing
+from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, periodic_orbit
+from snapbeam.model.contact.restitution import INSTEAD_OF_RESTITUTION
+from snapbeam.util.diagnostics import Diagnostic, sharing, tell
 from snapbeam.util.validation import (
     InputError,
     checked,
@@ -296,8 +297,8 @@ def _manifold(
     flow = orbit.flow
     if inverse and isinstance(flow, Stroboscope) and any(each.law.impulsive for each in flow.system.contacts):
         raise InputError(
-            "stability = 'stable': under Newton's law the map has no inverse where the beam sticks to the tip; use a HertzContact, or a "
-            "HuntCrossley with the same restitution"
+            "stability = 'stable': under Newton's law the map has no inverse where the beam sticks to the tip; use "
+            f"{INSTEAD_OF_RESTITUTION}"
         )
     values, vectors = np.linalg.eig(orbit.jacobian)
     size = np.abs(values)
@@ -467,14 +468,16 @@ def homoclinic_tangency(
     xarray.Dataset
         Along ``value``: each value that was tried, and ``crosses``.  ``bracket`` over ``manifolds`` ("apart", "crossing"): the nearest
         values without and with crossing, NaN where none was found.  The attribute ``termination_reason`` is ``tolerance``;
-        otherwise the bracket is wider than asked for: ``max_seconds``, or a manifold that ended before *max_arclength* without a crossing.
+        otherwise the bracket is wider than asked for, with a :class:`~snapbeam.DiagnosticWarning`: ``max_seconds``, manifolds that
+        cross at both *bounds* or at neither, a manifold that ended before *max_arclength* without a crossing, or a value, not the
+        first, without the saddle.
 
     Raises
     ------
     InputError
-        If the manifolds cross at both ends of *bounds*, or at none.
+        If the orbit is no saddle of the plane.
     OrbitNotFoundError
-        If the saddle is not found at a value.
+        If the saddle is not found at the lower bound.
 
     Examples
     --------
@@ -484,11 +487,11 @@ def homoclinic_tangency(
     >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
     >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
-    >>> try:
-    ...     sb.dynamics.homoclinic_tangency(saddle, "velocity_amplitude", (0.02, 0.03), max_arclength=0.5)
-    ... except sb.InputError as error:
-    ...     print(str(error)[:46])
-    bounds = (0.02, 0.03): the manifolds cross at
+    >>> found = sb.dynamics.homoclinic_tangency(
+    ...     saddle, "velocity_amplitude", (0.02, 0.03), max_arclength=0.5, max_seconds=1e-3
+    ... )
+    >>> found.attrs["termination_reason"], found["bracket"].values
+    ('max_seconds', array([nan, nan]))
     """
     from snapbeam.util.datasets import xr
 
@@ -507,11 +510,17 @@ def homoclinic_tangency(
         if clock.is_over:
             return "max_seconds"
         part = clock._replace(begun=len(tried) / total, part=1.0 / total)
-        saddle = periodic_orbit(orbit.flow.neighbour(name, value), orbit.coordinates, orbit.period)
-        both = [
-            _manifold(saddle, inverse, length, distance, turn, _POINTS, part.half(int(inverse)))
-            for inverse in (False, True)
-        ]
+        flow = orbit.flow.neighbour(name, value)
+        try:
+            saddle = periodic_orbit(flow, orbit.coordinates, orbit.period)
+            both = [
+                _manifold(saddle, inverse, length, distance, turn, _POINTS, part.half(int(inverse)))
+                for inverse in (False, True)
+            ]
+        except (InputError, OrbitNotFoundError) as error:
+            if not tried:
+                raise
+            return f"{name} = {value:g}: {error}; choose bounds nearer to that of the orbit"
         found = bool(homoclinic_points(*both).sizes["point"])
         for each in () if found else both:
             reason = str(each.attrs["termination_reason"])
@@ -529,9 +538,7 @@ def homoclinic_tangency(
     reason = next((each for each in ends if isinstance(each, str)), "tolerance")
     if reason == "tolerance" and ends[0] == ends[1]:
         where = "both values" if ends[0] else "neither value"
-        raise InputError(
-            f"bounds = {shown(bounds)}: the manifolds cross at {where}; give one with and one without crossing"
-        )
+        reason = f"bounds = {shown(bounds)}: the manifolds cross at {where}; give one with and one without crossing"
     while reason == "tolerance" and high - low > width:
         middle = 0.5 * (low + high)
         found = crosses(middle)
@@ -541,6 +548,8 @@ def homoclinic_tangency(
             low, high = (middle, high) if found == ends[0] else (low, middle)
     if clock.report is not None:
         clock.report(1.0)
+    if reason not in ("tolerance", "max_seconds"):
+        tell([Diagnostic("no-tangency", reason, {"values": float(len(tried))})])
     kept = [
         next((each for each in (low, high) if tried.get(each) is state), np.nan) for state in (False, True)
     ]

@@ -990,7 +990,7 @@ class RunView:
             well = "upper" if answer.final_well > 0 else "lower"
             final = ", for good" if answer.final_well_proven else ""
             counts = f"{_counted(answer.zero_crossings, 'crossing')}, {_counted(answer.impacts, 'impact')}"
-            counts += f", ends in the {well} well{final}"
+            counts += f", begins in the {run.system.initial_well_text}, ends in the {well} well{final}"
             self._head(style.class_chip(answer.response_class), words, style.FAINT.format(counts))
         else:
             why = _BAD.format(f"{answer.status.name}: {answer.status.advice}")

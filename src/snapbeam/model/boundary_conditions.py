@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
-from snapbeam.model.buckling_modes import BucklingModes, SpringModes
+import numpy as np
+
+from snapbeam.model.buckling_modes import MAX_MODES, BucklingModes, SpringModes
 from snapbeam.model.quantity import check_fields, quantity
+from snapbeam.util.validation import integer
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,11 +82,21 @@ Modes = BucklingModes | SpringModes
 
 def modes_between(ends: BoundaryConditions, length: float, bending_stiffness: float, count: int) -> Modes:
     """The first *count* buckling modes of a beam of a length (m) and a bending stiffness (N m^2) between its ends."""
-    if not ends.is_elastic:
-        return BucklingModes(length, count)
-    unit = bending_stiffness / length
-    left, right = (
-        math.inf if each is None else each / unit
-        for each in (ends.left_rotational_stiffness, ends.right_rotational_stiffness)
-    )
-    return SpringModes(length, count, left, right)
+    return _modes_between(ends, length, bending_stiffness, integer("count", count, 1, MAX_MODES))
+
+
+@lru_cache(maxsize=64)  # each step along a branch of equilibria asks for them several times
+def _modes_between(ends: BoundaryConditions, length: float, bending_stiffness: float, count: int) -> Modes:
+    if ends.is_elastic:
+        unit = bending_stiffness / length
+        left, right = (
+            math.inf if each is None else each / unit
+            for each in (ends.left_rotational_stiffness, ends.right_rotational_stiffness)
+        )
+        found: Modes = SpringModes(length, count, left, right)
+    else:
+        found = BucklingModes(length, count)
+    for each in vars(found).values():
+        if isinstance(each, np.ndarray):
+            each.setflags(write=False)
+    return found

@@ -220,7 +220,7 @@ def _outcome(
         direction = np.linalg.eigh(potential.in_modes(potential.tangent(path.amplitude[at])))[1][:, 0]
         aside = potential.model.linear_modes @ direction
         aside *= 1e-3 * np.abs(potential.size).max() / np.abs(aside).max()
-        found = [potential.descent(path.amplitude[at] + each * aside) for each in (-1.0, 1.0)]
+        settled = [potential.settles(path.amplitude[at] + each * aside) for each in (-1.0, 1.0)]
     except InputError:  # the parameter cannot go beyond
         return "another well"
-    return "pull-in" if None in found else "another well"
+    return "another well" if all(settled) else "pull-in"

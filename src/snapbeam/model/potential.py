@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -475,18 +475,28 @@ class Potential:
         return self.descent(saddle.amplitude - away), self.descent(saddle.amplitude + away)
 
     def descent(self, alpha: _Array) -> int | None:
-        """Number of the well that a motion without inertia, M alpha' = -dU/dalpha, comes to; None if it leaves a range.
+        """Number of the well that a motion without inertia, M alpha' = -dU/dalpha, comes to; None if it leaves a range."""
+        size = np.abs(self.size).max()
+        for there, _ in self._falling(alpha):
+            for number, well in enumerate(self.wells):
+                if np.abs(there - well.amplitude).max() <= _NEAR * size:
+                    return number
+        return None
+
+    def settles(self, alpha: _Array) -> bool:
+        """Return whether a motion without inertia comes to rest within the ranges of all laws, in a well that need not be known."""
+        return any(arrived for _, arrived in self._falling(alpha))
+
+    def _falling(self, alpha: _Array) -> Iterator[tuple[_Array, bool]]:
+        """Amplitudes of a motion without inertia up to where it leaves a range, and whether they are those of a well.
 
         Implicit Euler steps, q = q - (H + 1/h)^-1 dU/dq with the second derivative H of U, in coordinates q whose mass
-        matrix is the identity; 1/h is raised until a step is short.
+        matrix is the identity; 1/h is raised until a step is short.  In a well H is positive and a step without 1/h is short.
         """
         modes = self.model.linear_modes
         size = np.abs(self.size).max()
         identity = np.eye(len(modes))
         for _ in range(_DESCENT_STEPS):
-            for number, well in enumerate(self.wells):
-                if np.abs(alpha - well.amplitude).max() <= _NEAR * size:
-                    return number
             slope, bend = modes.T @ self.gradient(alpha), self.in_modes(self.tangent(alpha))
             lowest = float(np.linalg.eigvalsh(bend)[0])
             shift = max(-2.0 * lowest, 1e-6 * float(np.abs(bend).max()))
@@ -497,9 +507,10 @@ class Potential:
                     break
                 shift *= 4.0
             if not self.holds(tried):
-                return None
+                return
+            arrived = lowest > 0.0 and np.abs(modes @ np.linalg.solve(bend, slope)).max() <= _SAME * size
+            yield alpha, bool(arrived)
             alpha = tried
-        return None
 
 
 def _solved(matrix: _Array, vector: _Array) -> _Array:

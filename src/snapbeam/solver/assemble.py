@@ -548,11 +548,7 @@ def _longest_with_local_forces(system: System, accuracy: str) -> float:
     for force in system.local_forces:
         shape = force.row(model)
         mobility = float(np.sum((model.linear_modes.T @ shape) ** 2))
-        well = abs(float(shape @ model.well_amplitude))
-        # u and v of an interwell motion
-        largest = 2.0 * max(
-            well, scale.length * float(np.abs(shape).max() / max(np.abs(model.midspan_shape).max(), 1e-300))
-        )
+        largest = force.largest_displacement(model)
         fastest = largest * scale.omega * max(1.0, scale.length / at_center)
         squared += mobility * force.greatest_stiffness(largest)
         decay += mobility * force.greatest_damping(largest, fastest) if force.dissipative else 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from snapbeam.model.contact.restitution import INSTEAD_OF_RESTITUTION
 from snapbeam.model.quantity import section_of
 from snapbeam.model.system import System
 from snapbeam.util.validation import InputError
@@ -19,6 +20,6 @@ def check_integrable(system: System) -> None:
         section, law = section_of("contact", number), each.law
         if law.impulsive and len(contacts) > 1:
             raise InputError(
-                f"{section} = {law!r} with several strikers: sticking under Newton's law includes one tip only; use a "
-                "HertzContact, or a HuntCrossley with the same restitution"
+                f"{section} = {law!r} with several strikers: sticking under Newton's law includes one tip only; use "
+                f"{INSTEAD_OF_RESTITUTION}"
             )

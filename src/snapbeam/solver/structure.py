@@ -53,6 +53,8 @@ class LocalForceRow:
     """u in the well."""
     law: Any
     """Constants of the law."""
+    extrema: _Array
+    """Ends of the displacements in which the extrema of the force are known, then u and F of each; shape (2 + 2 extrema,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,7 +334,14 @@ def structure_of(
 
 def _local_force(model: ReducedModel, equilibrium: _Array, local_force: LocalForce) -> LocalForceRow:
     shape = local_force.row(model)
-    return LocalForceRow(model.linear_modes.T @ shape, float(shape @ equilibrium), local_force.numbers)
+    places, ends = local_force.extrema(local_force.largest_displacement(model))
+    extrema = np.column_stack((places, local_force.force_at(places))).ravel()
+    return LocalForceRow(
+        model.linear_modes.T @ shape,
+        float(shape @ equilibrium),
+        local_force.numbers,
+        np.concatenate((ends, extrema)),
+    )
 
 
 def _uneven(model: ReducedModel, sign: float, dividing_height: float | None) -> UnequalWells | None:

@@ -1025,6 +1025,11 @@ def _dataset(
         "refinements": effort.refinements, "seed": effort.seed, "uncertainty_seed": trials.uncertainty.seed, "runs_made": trials.runs,
         "cycles": trials.integration.cycles_or_default, "modes": trials.system.model.modes,
     }  # fmt: skip
+    if all(lookup(name).is_run for name in problem.names):  # otherwise the wells differ between designs
+        attrs |= {
+            "initial_well": trials.system.start_well,
+            "initial_well_reason": trials.system.initial_well_reason,
+        }
     attrs |= {f"fixed_{lookup(name).short}": +value for name, value in trials.system.parameters.items()
               if isinstance(value, (int, float)) and name not in problem.bounds}  # fmt: skip
     dataset = xr.Dataset(attrs=attrs)

@@ -28,7 +28,7 @@ from snapbeam.uncertainty.distributions import Distribution, Empirical, Paramete
 from snapbeam.uncertainty.measured_classes import KNOWN_CLASSES, PSEUDOCOUNT
 from snapbeam.uncertainty.measurements import Measurements
 from snapbeam.uncertainty.monte_carlo import reached, trials_of
-from snapbeam.util.diagnostics import DiagnosticWarning, counting
+from snapbeam.util.diagnostics import Diagnostic, DiagnosticWarning, counting, tell
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import (
     InputError,
@@ -58,6 +58,7 @@ _Array = NDArray[np.float64]
 _FREEDOM = 5.0
 """Degrees of freedom of the proposals: their tails are wider than those of what is sought."""
 _STAGES = 3
+_NEARER = "give a beam nearer to the measured one, or a narrower prior"
 _EVALUATIONS = 200
 """Maximum number of evaluations of the search for the most likely beam."""
 _FEWEST = 100.0
@@ -305,6 +306,8 @@ class Posterior:
         Add up to 1.
     termination_reason : str
         Reason why the search for the most likely beam stopped, and the effective sample size.
+    converged : bool
+        False if the search reached its maximum number of evaluations: the samples are about the best beam that it found.
 
     Examples
     --------
@@ -325,6 +328,7 @@ class Posterior:
     values: _Array
     weights: _Array
     termination_reason: str = ""
+    converged: bool = True
 
     @property
     def effective_sample_size(self) -> float:
@@ -333,8 +337,8 @@ class Posterior:
 
     @property
     def is_doubtful(self) -> bool:
-        """True if the effective sample size is too small for reliable intervals."""
-        return self.effective_sample_size < _FEWEST
+        """True if the search did not converge, or the effective sample size is too small for reliable intervals."""
+        return not self.converged or self.effective_sample_size < _FEWEST
 
     def interval(self, confidence: float = 0.95) -> dict[str, tuple[float, float, float]]:
         """Median, lower and upper limit of each parameter.
@@ -342,9 +346,11 @@ class Posterior:
         Raises
         ------
         InputError
-            If the samples are worth too few for it.
+            If the search did not converge, or the samples are worth too few for it.
         """
         within("confidence", confidence, 0.0, 1.0)
+        if not self.converged:
+            raise InputError(f"posterior: {self.termination_reason.split(';')[0]}; {_NEARER}")
         if self.is_doubtful:
             raise InputError(
                 f"posterior: its samples are worth {self.effective_sample_size:.0f}, fewer than {_FEWEST:.0f}; use more samples"
@@ -376,9 +382,7 @@ class Posterior:
         generator = np.random.Generator(np.random.Philox(key=[seed_of(rng), 0]))
         ranks = (np.arange(count) + generator.random()) / count
         which = np.minimum(np.searchsorted(np.cumsum(self.weights), ranks), self.weights.size - 1)
-        return Posterior(
-            self.parameters, self.values[which], np.full(count, 1.0 / count), self.termination_reason
-        )
+        return replace(self, values=self.values[which], weights=np.full(count, 1.0 / count))
 
     def uncertainty(self, **more: Any) -> ParameterUncertainty:
         """Return the parameter uncertainty: the distributions of the samples, with the correlations of their ranks.
@@ -411,6 +415,7 @@ class Posterior:
                 "title": "posterior samples of the parameters of a beam",
                 "effective_sample_size": self.effective_sample_size,
                 "termination_reason": self.termination_reason,
+                "converged": int(self.converged),
             }
         )
         for name, column in zip(self.parameters, self.values.T, strict=True):
@@ -460,7 +465,8 @@ def estimate_posterior(
     Returns
     -------
     Posterior
-        ``posterior.effective_sample_size`` is the number of independent samples that the weighted ones are worth.
+        ``posterior.effective_sample_size`` is the number of independent samples that the weighted ones are worth.  If the search
+        for the most likely beam does not converge, ``posterior.converged`` is False, with a :class:`~snapbeam.DiagnosticWarning`.
 
     Notes
     -----
@@ -507,7 +513,7 @@ def estimate_posterior(
         found += [waveform.misfit(dotted) for waveform in tracked]
         return np.concatenate(found)
 
-    logs, weights, reason = _population(
+    logs, weights, reason, converged = _population(
         terms, begin, samples, seed, _STEP if tracked else None, counting(progress, "posterior", "samples")
     )
     values, listed = np.exp(logs), [_dotted(name) for name in names]
@@ -517,7 +523,7 @@ def estimate_posterior(
                 generator = np.random.Generator(np.random.Philox(key=[seed, 10**6 + column]))
                 values = np.column_stack([values, _positive(name, given, errors, samples, generator)])
                 listed.append(name)
-    return Posterior(tuple(listed), values, weights, reason)
+    return Posterior(tuple(listed), values, weights, reason, converged)
 
 
 def _known_by_themselves(measured: Measurements) -> list[tuple[str, Any, Any]]:
@@ -582,12 +588,16 @@ def _population(
     seed: int,
     step: float | None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> tuple[_Array, _Array, str]:
-    """Samples and weights of exp(-|terms|^2/2), and why the search stopped; *step* is the relative one of differences."""
+) -> tuple[_Array, _Array, str, bool]:
+    """Samples and weights of exp(-|terms|^2/2), why the search stopped, and whether it converged.
+
+    *step* is the relative one of differences.
+    """
     found = optimize.least_squares(terms, begin, x_scale="jac", diff_step=step, max_nfev=_EVALUATIONS)
-    words = f"least squares stopped after {found.nfev} evaluations: {found.message.rstrip('.')}"
-    if found.status <= 0:
-        raise InputError(f"measured: {words}; give a beam nearer to the measured one, or a narrower prior")
+    words = f"least squares stopped after {found.nfev} evaluation{'s' if found.nfev > 1 else ''}: {found.message.rstrip('.')}"
+    converged = bool(found.status > 0)
+    if not converged:
+        tell([Diagnostic("posterior-search", f"{words}; {_NEARER}", {"evaluations": float(found.nfev)})])
     middle, cover = found.x, np.linalg.inv(found.jac.T @ found.jac)
     logs, weights = np.empty((0, begin.size)), np.empty(0)
     counts = [max(200, draws // 4)] * (_STAGES - 1) + [draws]
@@ -610,7 +620,8 @@ def _population(
         middle = weights @ logs
         cover = (logs - middle).T @ ((logs - middle) * weights[:, None]) + 1e-12 * np.diag(np.diag(cover))
     worth = 1.0 / float(np.sum(weights**2))
-    return logs, weights, f"{words}; {_STAGES} stages of samples, the last worth {worth:.0f} of {draws}"
+    words += f"; {_STAGES} stages of samples, the last worth {worth:.0f} of {draws}"
+    return logs, weights, words, converged
 
 
 def _positive(name: str, given: Any, errors: Any, draws: int, generator: np.random.Generator) -> _Array:

@@ -8,6 +8,12 @@ from typing import Any
 from snapbeam.model.contact.base import ContactLaw, LawProperties
 from snapbeam.model.quantity import RUN, quantity
 
+INSTEAD_OF_RESTITUTION = (
+    "type = 'hertz', or 'hunt_crossley' with restitution and speed "
+    "(HertzContact(stiffness), HuntCrossley.from_restitution(stiffness, restitution, speed))"
+)
+"""Laws of contact for what Newton's law cannot do, in messages."""
+
 
 @dataclass(frozen=True)
 class Restitution(ContactLaw):

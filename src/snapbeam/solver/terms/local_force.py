@@ -80,17 +80,29 @@ _damping_force, _damping_coefficient = (
 
 
 @inlined
-def greatest_change(law, u, reach):
-    """The change of the force within *reach* of u, N, of a law that is monotonic there; NaN beyond the law's range."""
+def greatest_change(memory, extrema, count, law, u, reach):
+    """The change of the force within *reach* of u, N; NaN where the law, or one of its extrema, is not known.
+
+    A force is farthest from F(u) at an end of the interval or at one of the *count* extrema within it, whose places and forces
+    are in *memory*.
+    """
     here = _force(law, u)
-    return abs(_force(law, u + reach) - here) + abs(_force(law, u - reach) - here)
+    change = abs(_force(law, u + reach) - here) + abs(_force(law, u - reach) - here)
+    for i in range(extrema + 2, extrema + 2 + 2 * count, 2):
+        if abs(memory[i] - u) < reach:
+            other = abs(memory[i + 1] - here)
+            if change <= other or math.isnan(other):
+                change = other
+    known = memory[extrema] <= u - reach and u + reach <= memory[extrema + 1]
+    return change if known else math.nan
 
 
 @inlined
 def _change_by_force(memory, size, term, omega, along, q, p, horizon):
     reach = horizon * speed_bound(memory, size, omega, term.row, q, p)
     u = memory[term.state + _ORIGIN] + dot(memory, size, term.row, q)
-    return absolute_product(memory, size, term.row, along) * greatest_change(term.law, u, reach) * horizon
+    change = greatest_change(memory, term.extrema, term.number, term.law, u, reach)
+    return absolute_product(memory, size, term.row, along) * change * horizon
 
 
 class LocalForceTerm(NamedTuple):
@@ -98,8 +110,12 @@ class LocalForceTerm(NamedTuple):
 
     row: int
     """r, a row."""
+    extrema: int
+    """Where the extrema of the force are known, and their places and forces."""
     state: int
     """State that a run stores."""
+    number: int
+    """Extrema of the force."""
     rest: float
     """u in the first well."""
     law: Any
@@ -227,7 +243,9 @@ class LocalDamping(NamedTuple):
 def _built(structure: Any, padded: Any, dissipative: bool) -> list[TermMemory]:
     return [
         TermMemory(
-            {"row": padded(each.row)}, {"state": np.zeros(WIDTH)}, {"rest": each.rest, "law": each.law}
+            {"row": padded(each.row), "extrema": np.pad(each.extrema, (0, -each.extrema.size % WIDTH))},
+            {"state": np.zeros(WIDTH)},
+            {"number": each.extrema.size // 2 - 1, "rest": each.rest, "law": each.law},
         )
         for each in structure.local_forces
         if type(each.law).owner.dissipative == dissipative
