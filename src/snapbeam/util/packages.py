@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from snapbeam.util.validation import InputError
-
 _EXTRAS = {
     "lab": ("cv2", "pyuff", "nptdms", "tifffile", "av", "lmfit"),
     "cluster": ("dask", "distributed", "dask_jobqueue"),
@@ -51,4 +49,6 @@ def needing(what: str, extra: str) -> Iterator[None]:
     try:
         yield
     except ImportError as error:
+        from snapbeam.util.validation import InputError  # NumPy, which `snapbeam --version` loads not
+
         raise InputError(needs(what, error.name, extra)) from error
