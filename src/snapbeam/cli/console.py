@@ -8,6 +8,7 @@ import io
 import json
 import logging
 import math
+import os
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -165,6 +166,15 @@ def notes() -> Console:
     )
 
 
+def _folder_gone() -> str:
+    """Message if the working folder does not exist any more, otherwise an empty text."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return f"working folder = {os.environ.get('PWD', '')!r}: does not exist any more; change to a folder that exists"
+    return ""
+
+
 def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
     """Report errors of a command in one line and exit with the matching status.
 
@@ -210,7 +220,16 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
         except BrokenPipeError:
             raise
         except OSError as error:
-            errors().print(f"[bold red]error:[/] {escape(printable(str(error)))}")
+            errors().print(f"[bold red]error:[/] {escape(printable(_folder_gone() or str(error)))}")
+            raise typer.Exit(FAILED) from None
+        except MemoryError as error:
+            said = f" ({error})" if str(error) else ""
+            errors().print(f"[bold red]error:[/] the memory is not sufficient{escape(printable(said))}")
+            raise typer.Exit(FAILED) from None
+        except RuntimeError as error:
+            if "start new thread" not in str(error):
+                raise
+            errors().print("[bold red]error:[/] the system starts no further threads; end other programs")
             raise typer.Exit(FAILED) from None
         except KeyboardInterrupt:
             errors().print(WORDS)

@@ -1,7 +1,7 @@
 """NetCDF files that are written whole or not at all, whatever becomes of the disk.
 
-The HDF5 library cannot be stopped while it writes: a disk that fills ends in a file that it cannot close, and may take
-the process with it.  So it writes to a stream that does not fail.  What the disk has no room for is held in memory;
+The HDF5 library cannot be stopped while it writes: a disk or a memory that fills ends in a file that it cannot close, and
+may take the process with it.  So it writes to a stream that does not fail.  What the disk has no room for is held in memory;
 once the library is done, the file is put where there is room, and the error says where, and how much was needed.  A file
 that grows without end reserves room on the disk before each part, and ends before the part for which there is none.
 """
@@ -191,10 +191,25 @@ def hdf5_stream(path: Path, target: Path | None = None) -> Iterator[DiskStream]:
     """
     with held_back() as incomplete, DiskStream(path) as stream:
         incomplete.add(path)
-        yield stream
+        try:
+            yield stream
+        except Exception as error:
+            if stream.lost:
+                raise _no_memory(target or path) from error
+            raise
         stream.settle()
+        if stream.lost:
+            raise _no_memory(target or path)
         if stream.trouble is not None:
             raise _kept_elsewhere(target or path, stream)
+
+
+def _no_memory(target: Path) -> OSError:
+    return OSError(
+        errno.ENOMEM,
+        "cannot be written, the memory is not sufficient; make room and give the same command again",
+        str(target),
+    )
 
 
 def _kept_elsewhere(target: Path, stream: DiskStream) -> NoRoomError:
@@ -243,6 +258,8 @@ class DiskStream(io.RawIOBase):
         self._pages: dict[int, bytearray] = {}
         """Parts of the content that differ from those on the disk, once the disk has failed."""
         self.trouble: OSError | None = None
+        self.lost = False
+        """True once there was no memory for a part: the content is not whole."""
 
     def on_disk(self) -> int:
         """Return the bytes that the file takes on the disk."""
@@ -274,11 +291,14 @@ class DiskStream(io.RawIOBase):
                 self.size = max(self.size, self._at + done)
         except OSError as error:
             self.trouble = error
-        while done < len(view):
-            number, begin = divmod(self._at + done, _PAGE)
-            part = view[done : done + _PAGE - begin]
-            self._page(number)[begin : begin + len(part)] = part
-            done += len(part)
+        try:
+            while done < len(view):
+                number, begin = divmod(self._at + done, _PAGE)
+                part = view[done : done + _PAGE - begin]
+                self._page(number)[begin : begin + len(part)] = part
+                done += len(part)
+        except MemoryError:
+            self.lost = True
         self._at += len(view)
         self.size = max(self.size, self._at)
         return len(view)
@@ -327,11 +347,14 @@ class DiskStream(io.RawIOBase):
     def readinto(self, buffer: Any) -> int:
         """Read from the present place."""
         view, done = memoryview(buffer).cast("B"), 0
-        while done < len(view) and self._at < self.size:
-            part = self._content(self._at, len(view) - done)
-            view[done : done + len(part)] = part
-            self._at += len(part)
-            done += len(part)
+        try:
+            while done < len(view) and self._at < self.size:
+                part = self._content(self._at, len(view) - done)
+                view[done : done + len(part)] = part
+                self._at += len(part)
+                done += len(part)
+        except (MemoryError, OSError):
+            self.lost = True
         return done
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
