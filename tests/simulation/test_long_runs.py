@@ -6,12 +6,14 @@ import subprocess
 import sys
 import warnings
 
+import numpy as np
 import pytest
 
 import snapbeam as sb
 from snapbeam.model import default_values
 from snapbeam.simulation.simulate import prepared
-from snapbeam.solver.step_size import long_run
+from snapbeam.solver.step_size import long_run, long_sweep
+from snapbeam.util.cores import usable_cores
 from snapbeam.util.diagnostics import DiagnosticWarning
 
 
@@ -69,3 +71,47 @@ def test_the_command_says_it_before_the_run(tmp_path):
             )
         finally:
             process.kill()
+
+
+def sweep_announced(compute, **integration):
+    """Announcement of a sweep that ends before its first run."""
+
+    class Begun(Exception):
+        pass
+
+    def begun(*numbers):
+        raise Begun
+
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.005)
+    shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)])
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        with pytest.raises(Begun), pytest.MonkeyPatch.context() as patch:
+            patch.setattr("snapbeam.sweeps.setup.SweepSetup.integrate", begun)
+            patch.setattr("snapbeam.util.diagnostics._told", set())  # the same words are told once
+            compute(system, sb.Integration(**integration))
+    words = [str(each.message) for each in said if each.category is DiagnosticWarning]
+    return [text for text in words if "runs of" in text]
+
+
+SPEEDS, RATIOS = np.linspace(0.05, 0.6, 60), np.linspace(0.3, 3.0, 60)
+
+
+@pytest.mark.parametrize("threads", [1, None])
+def test_a_long_map_and_a_long_threshold_are_announced(threads):
+    def field(system, integration):
+        return sb.sweep(system, {"frequency_ratio": RATIOS, "velocity_amplitude": SPEEDS}, integration)
+
+    def limit(system, integration):
+        return sb.threshold(system, "velocity_amplitude", SPEEDS, {"frequency_ratio": RATIOS}, integration)
+
+    for compute in (field, limit):
+        (text,) = sweep_announced(compute, cycles=20_000, threads=threads)
+        assert "3600 runs of" in text and f"on {threads or usable_cores()} core" in text
+        assert sweep_announced(compute, cycles=5, threads=threads) == []
+
+
+def test_the_time_of_a_map_falls_with_cores():
+    one, four = (long_sweep(1000, 1e6, 1.0, cores)[0].numbers["seconds"] for cores in (1, 4))
+    assert one == 4.0 * four and long_sweep(10, 1e6, 1.0, 1) == []

@@ -291,6 +291,17 @@ def _regular_count(system: System, end: float, period: float) -> int:
     return math.ceil(count) + 1
 
 
+def least_file_size(system: System, integration: Integration, samples: int | None = None) -> float:
+    """Estimated size in bytes of the file of a run, half of that of its numbers without compression.
+
+    *samples* is the number of sample times, by default that of :func:`prepared`.
+    """
+    if samples is None:
+        period = cycle_of(system)
+        samples = _regular_count(system, integration.cycles_or_default * period, period)
+    return 4.0 * samples * (2 * system.model.modes + 8)
+
+
 def check_memory(system: System, samples: int, with_contacts: bool) -> None:
     """Refuse a run whose samples do not fit into the memory limit, before any step."""
     row = 8 * (4 * system.model.modes + 20)

@@ -541,6 +541,19 @@ def long_run(modes: int, length: float, steps: float, limited: str) -> list[Diag
     ]
 
 
+def long_sweep(runs: int, steps: float, each: float, cores: int) -> list[Diagnostic]:
+    """Announcement of *runs* of *steps* flight steps and *each* s on average if they may take over a minute on so many cores."""
+    seconds = runs * each / cores
+    if not seconds > _ANNOUNCED:
+        return []
+    message = (
+        f"{runs} runs of {steps:.3g} steps in flight on average may take some {_words(seconds)} on {cores} "
+        f"core{'s' if cores > 1 else ''}, more with many contacts, and less with early termination or refinement"
+    )
+    numbers = {"runs": runs, "steps": steps, "cores": cores, "seconds": seconds}
+    return [Diagnostic("run.long", message, numbers, Severity.INFO)]
+
+
 def _words(seconds: float) -> str:
     for size, unit in ((86400.0 * 365.25, "years"), (86400.0, "days"), (3600.0, "hours"), (60.0, "minutes")):
         if seconds >= size:

@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import platform
+import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -29,8 +30,10 @@ __all__ = [
     "foreign_files_kept",
     "is_ours",
     "lives",
+    "missing_room",
     "refuse_foreign",
     "request_hash",
+    "require_room",
     "set_request",
 ]
 
@@ -269,6 +272,34 @@ def check_writable(
     if not appended:
         refuse_foreign(target, name, begin)
     return target
+
+
+def missing_room(path: str | os.PathLike[str], size: float, name: str = "output") -> str:
+    """Return words if the disk has no room for a file of at least an estimated *size* in bytes; empty if it has.
+
+    A file that will be replaced takes room too: it is removed once the new one is complete.
+    """
+    folder = Path(path).absolute()
+    while not folder.is_dir():  # a folder that will be made
+        folder = folder.parent
+    try:
+        free = shutil.disk_usage(folder).free
+    except OSError:
+        return ""
+    if not size > free:
+        return ""
+    return f"{name} = {str(path)!r}: needs some {size / 1e6:.3g} MB, and the disk has {free / 1e6:.3g} MB"
+
+
+def require_room(path: str | os.PathLike[str], size: float, name: str = "output") -> None:
+    """Refuse an output for which the disk has no room, before any work; *size* is its least estimated size in bytes.
+
+    Raises
+    ------
+    InputError
+    """
+    if words := missing_room(path, size, name):
+        raise InputError(f"{words}: make room or name a file on another disk")
 
 
 class NoRoomError(OSError):
