@@ -10,13 +10,12 @@ from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
 
-PARTS = {
-    "lab": "lab",  # camera recordings, vibrometer signals, free decays, calibration, comparison with simulations
-    "explorer": "explorer",  # interactive maps in the browser
-    "paper": "",  # figures and claims of the source paper
-}
-"""Name of the package of each part, and the extra of the distribution that installs what it needs."""
-
+PARTS = (
+    "lab",  # camera recordings, vibrometer signals, free decays, calibration, comparison with simulations
+    "explorer",  # interactive maps in the browser
+    "paper",  # figures and claims of the source paper
+)
+"""Name of the package of each part."""
 
 _SIGNALS = "lab"
 """The part that reads files of measured signals."""

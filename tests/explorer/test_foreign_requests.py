@@ -81,6 +81,12 @@ def test_there_is_nothing_but_the_page(served, cookie):
         assert asked(served.url, path, Cookie=cookie)[0] == 404, path
 
 
+@pytest.mark.parametrize("name", ["%00", "js/a%00.js", "js/%1b", "%0a"])
+def test_control_characters_in_a_path_are_no_file(served, name, caplog):
+    assert asked(served.url, f"{urlparse(served.url).path}static/extensions/panel/{name}")[0] == 404
+    assert not [each for each in caplog.records if each.exc_info]
+
+
 def test_a_socket_needs_the_origin_and_the_cookie(served, cookie):
     body = asked(served.url, Cookie=cookie)[1]
     token = re.search(r'"token":"([^"]+)"', body)[1]

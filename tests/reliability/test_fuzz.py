@@ -6,13 +6,16 @@ import json
 import random
 import subprocess
 import sys
+from pathlib import Path
 
 import fuzz
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import snapbeam as sb
+from snapbeam.model.state import checked_well
 from snapbeam.util import validation as validate
 from snapbeam.util.validation import InputError
 
@@ -40,6 +43,36 @@ def test_two_thousand_calls(tried, tmp_path):
     tried("fuzzed calls with a raw error", sum(each["times"] for each in wrong.values()))
     assert found["calls"] == CALLS
     assert wrong == {}
+
+
+@pytest.mark.slow
+def test_damaged_files_of_every_format(tried, tmp_path):
+    """In a process of their own: none ends it, and every error is a refusal."""
+    report = tmp_path / "report.json"
+    script = Path(fuzz.__file__).with_name("damaged.py")
+    subprocess.run([sys.executable, script, "500", "2", str(report)], check=True, stderr=subprocess.DEVNULL)
+    found = json.loads(report.read_text(encoding="utf-8"))
+    tried("damaged files", sum(found["files"].values()))
+    assert sum(found["files"].values()) == 500 and len(found["files"]) >= 7
+    assert found["wrong"] == {}
+
+
+@pytest.mark.parametrize("wells", [0, 3, 1.5, np.zeros((2, 2, 3)), "2", None])
+def test_class_handles_of_no_number_of_wells(wells):
+    with pytest.raises(InputError, match="wells"):
+        sb.plot.class_handles(wells=wells)
+
+
+@pytest.mark.parametrize("well", [np.timedelta64(3, "s"), "9" * 5000, "1" * 10, True])
+def test_a_start_in_no_well(well):
+    with pytest.raises(InputError, match=r"well = .*must be 'lower', 'upper' or the index"):
+        checked_well("well", well)
+
+
+@pytest.mark.parametrize("datasets", [range(10**12), iter([1]), [None]])
+def test_curves_that_are_none(datasets):
+    with pytest.raises(InputError, match="datasets"):
+        sb.plot.plot_bifurcation_curve(datasets)
 
 
 NUMBERS = st.one_of(

@@ -226,6 +226,61 @@ def test_code_that_others_planted_is_not_executed(tmp_path, tried, fault):
     tried("planted files of compiled code")
 
 
+PLANT = """
+import os, stat, sys
+from snapbeam.solver.compilation import _CheckedFiles
+
+class Planted:
+    def __reduce__(self):
+        return os.mkdir, (sys.argv[1],)
+
+path, fault, file = sys.argv[2], sys.argv[3], _CheckedFiles(os.path.dirname(sys.argv[2]), "x", None)
+file._write(path, file._dump(Planted()))
+assert file._read(path)
+if fault == "owner":
+    os.chown(path, 12345, -1)
+elif fault == "group":
+    os.chown(path, -1, 12345)
+    os.chmod(path, 0o664)
+elif fault == "link":
+    os.rename(path, path + ".kept")
+    os.symlink(path + ".kept", path)
+elif fault == "pipe":
+    os.unlink(path)
+    os.mkfifo(path)
+else:
+    os.chmod(path, 0o646)
+"""
+"""A file with a right check sum that makes a folder when it is loaded, in a private folder."""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no access bits")
+@pytest.mark.parametrize("which", [0, 1], ids=["code", "index"])
+@pytest.mark.parametrize("fault", ["others", "owner", "group", "link", "pipe"])
+def test_files_that_others_can_write_are_not_executed(tmp_path, caplog, monkeypatch, fault, which):
+    """In a folder of this user alone: compiled again, which is said, and kept for this user."""
+    if os.getuid() != 0 and fault in ("owner", "group"):
+        pytest.skip("only the administrator gives files to others")
+    monkeypatch.setattr("snapbeam.solver.compilation._warned", set())
+    assert started(tmp_path) == (42.0, "compiled")
+    (path,) = (each for each in kept_files(tmp_path) if each.suffix == (".nbc", ".nbi")[which])
+    proof = tmp_path / "executed"
+    subprocess.run([sys.executable, "-c", PLANT, str(proof), str(path), fault], check=True, timeout=60)
+    assert started(tmp_path) == (42.0, "compiled") and not proof.exists()
+    assert fault == "link" or f"others can write {path}" in caplog.text
+    assert started(tmp_path) == (42.0, "loaded") and not path.is_symlink()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no access bits")
+def test_code_is_kept_for_this_user_whatever_the_umask(tmp_path):
+    before = os.umask(0)
+    try:
+        started(tmp_path)
+    finally:
+        os.umask(before)
+    assert all(file.stat().st_mode & 0o022 == 0 for file in kept_files(tmp_path))
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no access bits")
 def test_folders_of_this_user(tmp_path):
     own = tmp_path / "a" / "b"

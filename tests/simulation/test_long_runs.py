@@ -1,102 +1,117 @@
-"""Runs that take long: integrated once, heard when interrupted, and saying how far they are."""
+"""Runs that may take over a minute say so before they begin."""
 
 from __future__ import annotations
 
-import signal
 import subprocess
 import sys
-import time
+import warnings
 
 import numpy as np
 import pytest
 
 import snapbeam as sb
 from snapbeam.model import default_values
-from snapbeam.solver.cpu import driver
-
-SYSTEM = sb.System(
-    sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
-    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.02))],
-)
+from snapbeam.simulation.simulate import prepared
+from snapbeam.solver.step_size import long_run, long_sweep
+from snapbeam.util.cores import usable_cores
+from snapbeam.util.diagnostics import DiagnosticWarning
 
 
-def test_one_integration_a_run(monkeypatch) -> None:
-    """Samples, impacts and statistics come from the same integrate_ensemble."""
-    steps = []
-    record = driver.record
-
-    def counted(*arguments, **options):
-        for piece in record(*arguments, **options):
-            steps.append(int(piece.accumulators_of_runs["steps"][0]))
-            yield piece
-
-    def never(*_, **__):
-        raise AssertionError("a run is recorded, not integrated beside it")
-
-    monkeypatch.setattr(driver, "record", counted)
-    monkeypatch.setattr(driver, "run_ensemble", never)
-    run = sb.simulate(SYSTEM, sb.Integration(cycles=50))
-    assert run.summary.impacts > 0 and run.dataset.sizes["time"] > 5000
-    # pieces follow each other: no step is taken twice
-    assert steps == sorted(steps) and len(steps) < 10
+def announced(
+    stiffness=default_values.CONTACT.stiffness, damping_ratio=0.005, frequency_ratio=1.2, **integration
+):
+    """Warnings of a run that is prepared and not begun."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=damping_ratio)
+    shaker = sb.Shaker(frequency_ratio=frequency_ratio, velocity_amplitude=0.18)
+    system = sb.System(model, contacts=[sb.Contact(sb.HertzContact(stiffness), shaker)])
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        run = prepared(system, sb.Integration(**integration), None)
+    words = [str(each.message) for each in said if each.category is DiagnosticWarning]
+    return [text for text in words if text.startswith("the run has")], run
 
 
-def test_a_run_in_pieces_is_the_run(monkeypatch) -> None:
-    """However its recording is cut, to the last bit."""
-    whole = sb.simulate(SYSTEM, sb.Integration(cycles=20))
-    monkeypatch.setattr(driver, "_SLICE_STEPS", 700)
-    monkeypatch.setattr(driver, "_SLICE_BYTES", 2**16)
-    cut = sb.simulate(SYSTEM, sb.Integration(cycles=20))
-    np.testing.assert_equal(dict(cut.summary), dict(whole.summary))
-    for name in whole.dataset.variables:
-        np.testing.assert_array_equal(cut.dataset[name], whole.dataset[name], err_msg=str(name))
-    for name in whole.impacts.variables:
-        np.testing.assert_array_equal(cut.impacts[name], whole.impacts[name], err_msg=str(name))
-    np.testing.assert_array_equal(cut.final_state.amplitude, whole.final_state.amplitude)
-
-
-def test_progress(monkeypatch) -> None:
-    monkeypatch.setattr(driver, "_SLICE_STEPS", 300)
-    seen: list[float] = []
-    sb.simulate(SYSTEM, sb.Integration(cycles=50), sample_times=[0.0], progress=seen.append)
-    assert len(seen) > 5
-    assert seen == sorted(seen) and 0.0 < seen[0] < 0.5 < seen[-1] <= 1.0
-
-
-PROGRAM = """
-import snapbeam as sb
-from snapbeam.model import default_values
-system = sb.System(
-    sb.ReducedModel.from_beam(default_values.BEAM, modes=32),
-    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.02))],
-)
-sb.simulate(system, sb.Integration(cycles=1), sample_times=[0.0])
-print("ready", flush=True)
-{call}
-"""
-CALLS = {
-    "simulate": "sb.simulate(system, sb.Integration(cycles=10**6), sample_times=[0.0])",
-    "simulate, recorded": "sb.simulate(system, sb.Integration(cycles=10_000), sample_times=None)",
-    "advance": "sb.advance(system, periods=10**4)",
-}
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="interrupts are POSIX signals here")
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow if name == "simulate" else ()) for name in CALLS]
+    "given",
+    [
+        {"stiffness": 3e27, "cycles": 2},
+        {"stiffness": 1e20, "cycles": 400},
+        {"step": 1e-9, "cycles": 40},
+        {"stiffness": 1e20, "frequency_ratio": 1e-3, "cycles": 1},
+    ],
+    ids=["stiff", "many cycles", "short steps", "slow drive"],
 )
-def test_an_interrupt_ends_a_run_of_minutes(name: str) -> None:
-    process = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM.format(call=CALLS[name])], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        text=True,
-    )  # fmt: skip
-    try:
-        assert process.stdout.readline() == "ready\n"
-        time.sleep(1.0)
-        process.send_signal(signal.SIGINT)
-        _, messages = process.communicate(timeout=600)
-    finally:
-        process.kill()
-        process.wait()
-    assert process.returncode != 0 and "KeyboardInterrupt" in messages
+def test_a_long_run_is_announced(given):
+    (text,), run = announced(**given)
+    steps = float(run.ensemble.runs["end"][0]) / 2**20
+    assert f"{steps:.3g} steps" in text and ("minutes" in text or "hours" in text)
+
+
+def test_a_short_run_is_not_announced():
+    assert announced(cycles=50)[0] == [] and announced(stiffness=1e20, cycles=2)[0] == []
+
+
+def test_the_bound_grows_with_steps_and_modes():
+    assert long_run(1, 1e-5, 1e6, "") == [] and long_run(500, 1e-5, 1e6, "") == []
+    assert long_run(1, 1e-5, 3e8, "")[0].numbers["seconds"] > 60.0
+    assert long_run(500, 1e-5, 3e6, "")[0].numbers["seconds"] > 60.0
+    assert not long_run(1, 1e-5, 1e6, "") and long_run(1, 1e-5, float("inf"), "")
+
+
+def test_the_command_says_it_before_the_run(tmp_path):
+    words = ["simulate", "--modes", "1", "--cycles", "50000", "--contact-stiffness", "1e15", "-o", "a.nc"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "snapbeam", *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        try:
+            lines = iter(process.stderr.readline, "")
+            assert any("note: the run has" in line for line in lines), (
+                "the run ended, or began, without a word"
+            )
+        finally:
+            process.kill()
+
+
+def sweep_announced(compute, **integration):
+    """Announcement of a sweep that ends before its first run."""
+
+    class Begun(Exception):
+        pass
+
+    def begun(*numbers):
+        raise Begun
+
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.005)
+    shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)])
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        with pytest.raises(Begun), pytest.MonkeyPatch.context() as patch:
+            patch.setattr("snapbeam.sweeps.setup.SweepSetup.integrate", begun)
+            patch.setattr("snapbeam.util.diagnostics._told", set())  # the same words are told once
+            compute(system, sb.Integration(**integration))
+    words = [str(each.message) for each in said if each.category is DiagnosticWarning]
+    return [text for text in words if "runs of" in text]
+
+
+SPEEDS, RATIOS = np.linspace(0.05, 0.6, 60), np.linspace(0.3, 3.0, 60)
+
+
+@pytest.mark.parametrize("threads", [1, None])
+def test_a_long_map_and_a_long_threshold_are_announced(threads):
+    def field(system, integration):
+        return sb.sweep(system, {"frequency_ratio": RATIOS, "velocity_amplitude": SPEEDS}, integration)
+
+    def limit(system, integration):
+        return sb.threshold(system, "velocity_amplitude", SPEEDS, {"frequency_ratio": RATIOS}, integration)
+
+    for compute in (field, limit):
+        (text,) = sweep_announced(compute, cycles=20_000, threads=threads)
+        assert "3600 runs of" in text and f"on {threads or usable_cores()} core" in text
+        assert sweep_announced(compute, cycles=5, threads=threads) == []
+
+
+def test_the_time_of_a_map_falls_with_cores():
+    one, four = (long_sweep(1000, 1e6, 1.0, cores)[0].numbers["seconds"] for cores in (1, 4))
+    assert one == 4.0 * four and long_sweep(10, 1e6, 1.0, 1) == []

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from snapbeam.cli.short_help import ShortHelpCommand, ShortHelpGroup
-from snapbeam.parts import PARTS, installed_parts
-from snapbeam.util.packages import needs
+from snapbeam.parts import installed_parts
+from snapbeam.util.packages import extra_of, needs
 
 # Module and function of each command.
 _COMMANDS = {
@@ -33,24 +33,21 @@ class _Commands(MutableMapping[str, Any]):
 
     def __init__(self) -> None:
         self._core: dict[str, Any] = dict(_COMMANDS)
-        self._parts: dict[str, tuple[str, str]] | None = None
+        self._parts: dict[str, str] | None = None
 
-    def _of_parts(self) -> dict[str, tuple[str, str]]:
+    def _of_parts(self) -> dict[str, str]:
         if self._parts is None:
             self._parts = {
-                command: (place, part)
+                command: place
                 for part in installed_parts()
                 for command, place in import_module(f"snapbeam.{part}.cli").COMMANDS.items()
             }
         return self._parts
 
     def __getitem__(self, name: str) -> Any:
-        found = self._core.get(name)
-        part = ""
-        if found is None:
-            found, part = self._of_parts()[name]
+        found = self._core.get(name) or self._of_parts()[name]
         if isinstance(found, str):
-            found = self._core[name] = _load_command(name, found, part)
+            found = self._core[name] = _load_command(name, found)
         return found
 
     def __setitem__(self, name: str, command: Any) -> None:
@@ -69,14 +66,15 @@ class _Commands(MutableMapping[str, Any]):
         return len(list(iter(self)))
 
 
-def _load_command(name: str, place: str, part: str) -> Any:
+def _load_command(name: str, place: str) -> Any:
     module, _, attribute = place.partition(":")
     try:
         found = getattr(import_module(module), attribute)
     except ModuleNotFoundError as error:
-        if not PARTS.get(part):
+        extra = extra_of(error.name)
+        if extra is None:
             raise
-        raise typer.BadParameter(needs(f"snapbeam {name}", error.name, PARTS[part])) from error
+        raise typer.BadParameter(needs(f"snapbeam {name}", error.name, extra)) from error
     if isinstance(found, typer.Typer):
         command: Any = typer.main.get_group(found)
     else:

@@ -8,6 +8,7 @@ import io
 import json
 import logging
 import math
+import os
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -28,7 +29,8 @@ from snapbeam._version import __version__
 from snapbeam.cli.short_help import wants_all
 from snapbeam.util.files import VERSION, foreign_files_kept
 from snapbeam.util.interrupts import WORDS, during_command
-from snapbeam.util.validation import InputError
+from snapbeam.util.packages import extra_of, needs
+from snapbeam.util.validation import InputError, printable, text
 from snapbeam.util.work_rate import WorkRate
 
 if TYPE_CHECKING:
@@ -164,6 +166,15 @@ def notes() -> Console:
     )
 
 
+def _folder_gone() -> str:
+    """Message if the working folder does not exist any more, otherwise an empty text."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return f"working folder = {os.environ.get('PWD', '')!r}: does not exist any more; change to a folder that exists"
+    return ""
+
+
 def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
     """Report errors of a command in one line and exit with the matching status.
 
@@ -192,6 +203,7 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
                     from snapbeam.util.files import check_writable
 
                     check_writable(asked.json, "json", (".json",))
+                _check_texts(kwargs)
                 try:
                     return command(*args, **kwargs)
                 finally:
@@ -200,10 +212,24 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
         except InputError as error:
             errors().print(f"[bold red]error:[/] {escape(str(error))}")
             raise typer.Exit(REFUSED) from None
+        except ModuleNotFoundError as error:
+            if (extra := extra_of(error.name)) is None:
+                raise
+            errors().print(f"[bold red]error:[/] {escape(needs(context.command_path, error.name, extra))}")
+            raise typer.Exit(REFUSED) from None
         except BrokenPipeError:
             raise
         except OSError as error:
-            errors().print(f"[bold red]error:[/] {escape(str(error))}")
+            errors().print(f"[bold red]error:[/] {escape(printable(_folder_gone() or str(error)))}")
+            raise typer.Exit(FAILED) from None
+        except MemoryError as error:
+            said = f" ({error})" if str(error) else ""
+            errors().print(f"[bold red]error:[/] the memory is not sufficient{escape(printable(said))}")
+            raise typer.Exit(FAILED) from None
+        except RuntimeError as error:
+            if "start new thread" not in str(error):
+                raise
+            errors().print("[bold red]error:[/] the system starts no further threads; end other programs")
             raise typer.Exit(FAILED) from None
         except KeyboardInterrupt:
             errors().print(WORDS)
@@ -221,6 +247,16 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
     guarded.__signature__ = inspect.Signature(mine + more)  # type: ignore[attr-defined]
     guarded.__annotations__ = {}
     return guarded
+
+
+def _check_texts(arguments: Mapping[str, Any]) -> None:
+    """Refuse arguments that no attribute of a file can hold; names of files may have any bytes."""
+    for name, value in arguments.items():
+        if isinstance(value, Mapping):
+            _check_texts(value)
+        for each in value if isinstance(value, (list, tuple)) else [value]:
+            if isinstance(each, str):
+                text(f"{name} (--{name.replace('_', '-')})", each)
 
 
 _NO_PARAMETERS = frozenset(
@@ -246,8 +282,9 @@ def _named(values: Iterable[Any]) -> list[Path]:
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
-    _OUTPUT_OPTIONS.get().notes.append(str(message))
-    errors().print(f"[bold yellow]note:[/] {escape(str(message))}")
+    text = printable(str(message))
+    _OUTPUT_OPTIONS.get().notes.append(text)
+    errors().print(f"[bold yellow]note:[/] {escape(text)}")
 
 
 def duration(seconds: float) -> str:
@@ -266,7 +303,7 @@ def file_line(path: Path) -> str:
     """Return a file's name and size."""
     size = path.stat().st_size
     text = f"{size / 1e6:.2f} MB" if size >= 1e5 else f"{size / 1e3:.1f} kB"
-    return f"{escape(str(path))} ({text})"
+    return f"{escape(printable(str(path)))} ({text})"
 
 
 class _RateColumn(ProgressColumn):

@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.markup import escape
 
 from snapbeam.cli.console import add_json, cli_command, file_line, notes, out
+from snapbeam.util.validation import printable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,15 +44,17 @@ def info(
     )  # fmt: skip
     console = out()
     sizes = ", ".join(f"{name} {size}" for name, size in dataset.sizes.items())
-    console.print(f"[bold]{file.name}[/]: {sizes}" if sizes else f"[bold]{file.name}[/]")
+    head = f"[bold]{escape(printable(file.name))}[/]"
+    console.print(f"{head}: {escape(printable(sizes))}" if sizes else head)
     names = [str(name) for name in (*dataset.coords, *dataset.data_vars)]
     for name in names:
         variable = dataset[name]
         units = variable.attrs.get("units")
         about = variable.attrs.get("long_name", "")
-        console.print(
+        text = (
             f"  {name:<{max(map(len, names)) + 2}}{about}{f' ({units})' if units not in (None, '1') else ''}"
         )
+        console.print(printable(text), markup=False)
     if "response_class" in dataset:
         console.print(class_table(dataset), *status_lines(dataset), sep="\n")
     console.print(parameter_table(dataset.attrs))

@@ -62,7 +62,7 @@ def compute_map(
     """
     from snapbeam.cli.console import check_pictures, draw, read_overlay
     from snapbeam.cli.summary import map_facts, map_summary
-    from snapbeam.util.files import check_writable, set_request
+    from snapbeam.util.files import check_writable, require_room, set_request
 
     settings = opt.resumed(given, keeping, configured(given, _axes_of))
     axes = _axes_of(settings, given)
@@ -79,10 +79,11 @@ def compute_map(
         measurements, system.model.reference_frequency, None if beam is None else beam.buckling_level
     )
 
-    from snapbeam.sweeps.compute import CheckpointOptions, SweepReport, compute_sweep
+    from snapbeam.sweeps.compute import LEAST_BYTES, CheckpointOptions, SweepReport, compute_sweep
     from snapbeam.sweeps.setup import sweep_setup
 
     setup = sweep_setup(system, axes, settings.integration.replace(threads=threads))
+    require_room(output, LEAST_BYTES * setup.points.size)
     asked = opt.sweep_options(keeping)
     total = setup.points.size
     start = time.monotonic()

@@ -87,7 +87,8 @@ def simulate(
     --window 0:20
     """
     from snapbeam.cli.console import check_pictures, draw
-    from snapbeam.util.files import check_writable
+    from snapbeam.simulation.simulate import least_file_size
+    from snapbeam.util.files import check_writable, require_room
 
     settings = configured(given)
     if output is not None:
@@ -119,6 +120,9 @@ def simulate(
     run = None
     with show_compilation(errors()), _share_done() as progress:
         times = _even(system, integration, samples)
+        if output is not None and not stream:
+            size = least_file_size(system, integration, None if times is None else len(times))
+            require_room(output, size)
         if stream and output is not None:
             summary = sb.simulate_to_file(
                 system, integration, path=output, sample_times=times, progress=progress

@@ -19,7 +19,7 @@ from snapbeam.model.parameters import PHYSICAL, Physical, lookup, parameters
 from snapbeam.model.quantity import numbered, split_name
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import ResponseClass, RunStatus, wells_of
-from snapbeam.util.validation import InputError
+from snapbeam.util.validation import InputError, printable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -396,13 +396,15 @@ def _suggestions(dataset: xr.Dataset, files: Sequence[Path], low: dict[str, Any]
     return [escape(line) for line in lines]
 
 
+_LONGEST_ATTRIBUTE = 20_000
+
+
 def parameter_table(attrs: dict[str, Any]) -> Table:
     """Return the attributes of a file, one a row."""
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for name, value in attrs.items():
-        table.add_row(
-            str(name), escape(f"{value:.10g}" if isinstance(value, (float, np.floating)) else str(value))
-        )
+        text = f"{value:.10g}" if isinstance(value, (float, np.floating)) else str(value)
+        table.add_row(escape(printable(str(name))), escape(printable(text, _LONGEST_ATTRIBUTE)))
     return table

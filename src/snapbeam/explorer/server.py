@@ -12,7 +12,7 @@ from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
-from urllib.parse import parse_qsl, quote, urlencode
+from urllib.parse import parse_qsl, quote, unquote, urlencode
 
 import panel as pn
 from tornado.httputil import HTTPServerRequest
@@ -127,6 +127,11 @@ class Gate(Router):
         entering = request.headers.get("Sec-Fetch-Mode") == "navigate" and self._in_address(request)
         if request.headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin") and not entering:
             return 403, "other pages may not ask this server; type the address"
+        if request.path.startswith(f"{self._prefix}/static/") and not unquote(request.path).isprintable():
+            return (
+                404,
+                "there is no such file",
+            )  # a null character is an error of the functions that open files
         if request.path.startswith(f"{self._prefix}/static/") or request.path == _ICON:
             return None
         if request.path not in self._pages:

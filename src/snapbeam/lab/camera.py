@@ -17,6 +17,7 @@ from snapbeam.lab.image_sources import FrameSource, open_source
 from snapbeam.lab.photron import frame_bytes, header_text
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.files import atomic_path, check_writable
+from snapbeam.util.packages import needing
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -547,9 +548,10 @@ def write_video(
     >>> lab.write_video("noise.avi", frames).name
     'noise.avi'
     """
-    import av
-
     path = check_writable(path, "path", (".avi", ".mkv"))
+    with needing(f"path = {str(path)!r}: a video", "lab"):
+        import av
+
     rate = Fraction(within("play_rate", play_rate, 0.0, 1000.0, closed="right", unit="Hz"))
     rate = rate.limit_denominator(1000)
     limit = integer("max_value", max_value, 1, 65535)

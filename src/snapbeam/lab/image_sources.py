@@ -22,7 +22,7 @@ from snapbeam.lab.photron import CameraHeader, check_pixels, read_header, read_m
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.input_files import refuse_inflated
-from snapbeam.util.packages import needs
+from snapbeam.util.packages import needing
 from snapbeam.util.validation import InputError
 
 TIFF_SUFFIXES = (".tif", ".tiff")
@@ -412,7 +412,8 @@ def load_image(file: Path, *, grey: bool = True) -> NDArray[Any]:
     InputError
         If the file is no such picture.
     """
-    import cv2
+    with needing(f"{file}: reading it", "lab"):
+        import cv2
 
     if not file.is_file():
         raise InputError(f"{file}: no such file")
@@ -612,6 +613,8 @@ class VideoSource(FrameSource):
                 if not container.streams.video:
                     raise InputError(f"{path}: holds no video stream")
                 stream = container.streams.video[0]
+                if stream.codec_context is None:
+                    raise InputError(f"{path}: its video has a codec that is not known here")
                 count = sum(1 for packet in container.demux(stream) if packet.size)
                 codec = stream.codec_context.name
                 if path.suffix.lower() == ".cine":
@@ -703,10 +706,8 @@ def open_source(path: Path) -> FrameSource:
     InputError
         If there is no such file, or it is of no known kind.
     """
-    try:
+    with needing(f"{path}: reading it", "lab"):
         return _open_source(path)
-    except ImportError as error:
-        raise InputError(needs(f"{path}: reading it", error.name, "lab")) from error
 
 
 def _open_source(path: Path) -> FrameSource:

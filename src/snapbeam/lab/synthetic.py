@@ -26,6 +26,7 @@ from snapbeam.lab.tracking.edges import Floats, edge_profile
 from snapbeam.lab.tracking.settings import SIDES, Orientation
 from snapbeam.simulation.dataset import check_trajectory, trajectory_dataset
 from snapbeam.solver.compilation import keep_code
+from snapbeam.util.packages import needing
 from snapbeam.util.validation import (
     InputError,
     axis,
@@ -374,7 +375,8 @@ class AreaPicture:
         self.kernels[True] = disk_kernel(2.0 * CELLS_PER_PIXEL * (camera.blur + 4.0))
         self.grain: NDArray[np.float32] | None = None
         if texture:
-            import cv2
+            with needing("a surface with texture", "lab"):
+                import cv2
 
             rows = (shape.height + 2 * self.margin) * CELLS_PER_PIXEL
             raw = np.random.default_rng([seed, 7]).standard_normal((2 * rows, cells)).astype(np.float32)
@@ -384,7 +386,8 @@ class AreaPicture:
 
     def draw(self, beam: Floats, tip: Floats, *, blurred: bool) -> NDArray[np.float32]:
         """Light of one exposure without noise; rows of beam and tip as for :func:`render_recording`."""
-        import cv2
+        with needing("a synthetic recording", "lab"):
+            import cv2
 
         shape, margin = self.outline, self.margin
         stage = shape.stage

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -248,8 +249,14 @@ def perfect_equilibria(stiffness: _Array, gamma: float) -> tuple[Equilibrium, ..
     found = []
     for below, i in enumerate(buckled if gamma > 0.0 else []):
         for sign in (-1.0, 1.0):
-            alpha = sign * np.sqrt(-kappa[i] / gamma) * axes[:, i]
-            energy = -(float(kappa[i]) ** 2) / (4.0 * gamma)
+            with np.errstate(over="ignore"):
+                alpha = sign * np.sqrt(-kappa[i] / gamma) * axes[:, i]
+                energy = -0.25 * float(kappa[i] * (kappa[i] / gamma))
+            if not (math.isfinite(energy) and np.isfinite(alpha).all()):
+                raise InputError(
+                    f"stiffness = {kappa[i]:g}, nonlinear_stiffness = {gamma:g}: the equilibria are no finite numbers; must "
+                    "be closer to 1 in these units"
+                )
             found.append(Equilibrium(amplitude=alpha, energy=energy, unstable_directions=below))
     straight = np.zeros(kappa.size)
     found.append(Equilibrium(amplitude=straight, energy=0.0, unstable_directions=len(buckled)))

@@ -136,6 +136,10 @@ _SYMBOLS = {
 }  # fmt: skip
 
 
+_MOST_FAULTS = 30
+"""Faults of a file that are listed."""
+
+
 def checked_sections(
     sections: Mapping[str, Any], folder: str | os.PathLike[str] = "."
 ) -> tuple[dict[str, dict[str, Any]], list[str]]:
@@ -144,6 +148,8 @@ def checked_sections(
     found: dict[str, dict[str, Any]] = {}
     flat = flattened(mapping("sections", sections))
     for section, values in flat.items():
+        if len(lines) > _MOST_FAULTS:
+            break
         if section == "extends":
             if values != "paper":
                 lines.append(
@@ -164,8 +170,13 @@ def checked_sections(
                 except InputError as error:
                     lines.append(str(error))
                     continue
-            faults = [_checked(section, str(name), value, found, flat) for name, value in values.items()]
-            lines += [f"[{section}] {message}" for message in faults if message]
+            for name, value in values.items():
+                if message := _checked(section, str(name), value, found, flat):
+                    lines.append(f"[{section}] {message}")
+                if len(lines) > _MOST_FAULTS:
+                    break
+    if len(lines) > _MOST_FAULTS:
+        lines[_MOST_FAULTS:] = [f"more than {_MOST_FAULTS} faults: these are the first"]
     return found, lines
 
 

@@ -285,9 +285,10 @@ START_NAME = re.compile(r"(amplitude|velocity)\[([1-9][0-9]{0,3})\]")
 
 def checked_well(name: str, value: Any) -> str | int:
     """The name of a well, "lower" or "upper", or its index in ``potential.wells``, also as text."""
-    if isinstance(value, str) and value.isdecimal():
+    if isinstance(value, str) and value.isdecimal() and len(value) < 10:
         value = int(value)
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool) and value >= 0
+    number = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.timedelta64))
+    whole = number and value >= 0
     if not whole and (not isinstance(value, str) or value not in ("lower", "upper")):
         raise InputError(
             f"{name} = {shown(value)}: must be 'lower', 'upper' or the index of a well in potential.wells"

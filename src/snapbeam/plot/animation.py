@@ -19,7 +19,7 @@ from snapbeam.plot.run import across, cut, hardest_impact
 from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, caption, figure_style, fix_ticks, new_figure
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.util.files import MADE_BY, atomic_path, check_writable
-from snapbeam.util.packages import needs
+from snapbeam.util.packages import needing
 from snapbeam.util.validation import InputError, integer, nonnegative, positive
 
 if TYPE_CHECKING:
@@ -160,10 +160,8 @@ def write_mp4(pictures: Iterable[NDArray[np.uint8]], path: Path, rate: float) ->
 
     The container (MP4, MOV, AVI) follows from the suffix of *path*.  Below 5 Hz each picture is written several times.
     """
-    try:
+    with needing(f"{path}: a video", "video"):
         import imageio_ffmpeg
-    except ImportError as error:
-        raise InputError(needs("an MP4", "imageio-ffmpeg", "video")) from error
 
     writer: Any = None
     shown = max(rate, 5.0)  # players skip through files of less than a few frames a second

@@ -597,7 +597,11 @@ def plot_bifurcation_curve(
     """
     from snapbeam.util.datasets import xr
 
-    curves = [datasets] if isinstance(datasets, xr.Dataset) else list(datasets)
+    curves: list[xr.Dataset] = []
+    for each in (
+        [datasets] if isinstance(datasets, xr.Dataset) else datasets
+    ):  # one by one: there may be very many
+        curves.append(instance("datasets", each, xr.Dataset, "a dataset, or several"))
     if not curves:
         raise InputError("datasets = []: must hold at least one bifurcation curve")
     for curve in curves:

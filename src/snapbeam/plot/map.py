@@ -34,7 +34,7 @@ from snapbeam.solver.statistics import STATISTICS
 from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.util.si_prefixes import scale_of
 from snapbeam.util.status_codes import ResponseClass, wells_of
-from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, shown
+from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, integer, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -199,6 +199,7 @@ def class_handles(kinds: NDArray[np.int8] | None = None, wells: int = 2) -> list
     >>> [handle.get_label() for handle in sb.plot.class_handles()][:2]
     ['intrawell', 'transient interwell 1']
     """
+    wells = integer("wells", wells, 1, 2)
     if kinds is not None:
         try:
             shown_kinds = np.asarray(kinds, dtype=np.float64)

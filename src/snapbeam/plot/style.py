@@ -256,8 +256,20 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
         "svg": {"Creator": MADE_BY, "Date": None},
     }.get(kind, {"Description": MADE_BY})
     whole_file = io.BytesIO()  # Matplotlib's PDF writer fails in other ways when the disk is full
-    with figure_style():
-        figure.savefig(whole_file, format=kind, metadata=stamp)
+    try:
+        with figure_style():
+            figure.savefig(whole_file, format=kind, metadata=stamp)
+    except InputError:
+        raise
+    except (
+        ArithmeticError,
+        TypeError,
+        ValueError,
+    ) as error:  # of ticks beyond the range of numbers, in many words
+        raise InputError(
+            f"plot = {str(path)!r}: Matplotlib cannot draw the figure, whose numbers may be too large, too small or too "
+            f"close to each other ({str(error).splitlines()[0] if str(error) else type(error).__name__})"
+        ) from error
     with atomic_path(target) as temporary:
         temporary.write_bytes(whole_file.getvalue())
     return target

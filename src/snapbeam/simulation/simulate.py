@@ -27,7 +27,7 @@ from snapbeam.solver.assemble import make_ensemble, plans_of, run_columns
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.registry import engine_of
 from snapbeam.solver.statistics import Recorded, lost_in_circuits, rounding_energy, statistics_of
-from snapbeam.solver.step_size import Plan
+from snapbeam.solver.step_size import SUBDIVISION, Plan, long_run
 from snapbeam.solver.terms import WORKS
 from snapbeam.util.cores import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, counting, sharing, tell
@@ -194,7 +194,19 @@ def prepared(system: System, integration: Integration, sample_times: ArrayLike |
     period = cycle_of(system)
     times = None if sample_times is None else _checked_times(sample_times, end)
     count = _regular_count(system, end, period) if times is None else times.size
+    steps = float(ensemble.runs["end"][0]) / SUBDIVISION
+    tell(long_run(system.model.modes, plan.step, steps, _causes(system, integration)))
     return Prepared(system, integration, plan, accuracy, ensemble, times, count, end, period)
+
+
+def _causes(system: System, integration: Integration) -> str:
+    """Words for what the number of steps of a run follows from."""
+    if integration.step is not None:
+        return "the step is that of integration.step"
+    contact = ", an impact (softer contacts have longer ones)" if system.contacts else ""
+    return (
+        f"the step follows from the highest mode, the strongest damping{contact}; fewer cycles take less time"
+    )
 
 
 def run_attributes(run: Prepared, summary: RunSummary, accumulators_of_runs: Any) -> dict[str, Any]:
@@ -277,6 +289,17 @@ def _regular_count(system: System, end: float, period: float) -> int:
             f"a run of {count:.3g} samples is too long to record: give sample_times, or fewer cycles"
         )
     return math.ceil(count) + 1
+
+
+def least_file_size(system: System, integration: Integration, samples: int | None = None) -> float:
+    """Estimated size in bytes of the file of a run, half of that of its numbers without compression.
+
+    *samples* is the number of sample times, by default that of :func:`prepared`.
+    """
+    if samples is None:
+        period = cycle_of(system)
+        samples = _regular_count(system, integration.cycles_or_default * period, period)
+    return 4.0 * samples * (2 * system.model.modes + 8)
 
 
 def check_memory(system: System, samples: int, with_contacts: bool) -> None:

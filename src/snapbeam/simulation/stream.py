@@ -14,12 +14,19 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.simulation.dataset import impact_table, joined, run_dataset
 from snapbeam.simulation.save import compressed, description, summary_dataset
-from snapbeam.simulation.simulate import Prepared, end_state, prepared, reached_by, run_attributes
+from snapbeam.simulation.simulate import (
+    Prepared,
+    end_state,
+    least_file_size,
+    prepared,
+    reached_by,
+    run_attributes,
+)
 from snapbeam.simulation.summary import RunSummary
 from snapbeam.solver.registry import engine_of
 from snapbeam.solver.statistics import Recorded, statistics_of
-from snapbeam.util.diagnostics import sharing
-from snapbeam.util.files import NoRoomError, check_writable
+from snapbeam.util.diagnostics import Diagnostic, Severity, sharing, tell
+from snapbeam.util.files import NoRoomError, check_writable, missing_room
 from snapbeam.util.interrupts import raise_held
 from snapbeam.util.netcdf import netcdf_stream, read_netcdf
 from snapbeam.util.status_codes import RunStatus
@@ -93,6 +100,9 @@ def simulate_to_file(
     )
     target, report = check_writable(path, "path", (".nc",)), sharing(progress, "run")
     run = prepared(system, integration, sample_times)
+    if words := missing_room(target, least_file_size(system, integration, run.samples), "path"):
+        text = f"{words}: the run will be stopped where the disk is full, and the file is whole up to there"
+        tell([Diagnostic("run.room", text, {"samples": run.samples}, Severity.WARNING)])
 
     def reported(share: float) -> None:
         raise_held()

@@ -36,6 +36,7 @@ _IDLE = frozenset({"inline_inlinables", "inline_overloads", "nopython_rewrites",
 """Passes for array expressions, for blocks with a context and for functions that are inlined as source."""
 _CHECK = hashlib.sha256
 _SIZE = _CHECK().digest_size
+_OF_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 _warned: set[str] = set()
 _LOG = logging.getLogger("snapbeam")
 _LONGEST_WAIT = 600.0
@@ -229,17 +230,27 @@ def is_private(folder: str | os.PathLike[str], source: str | os.PathLike[str] | 
     """
     if os.name == "nt":
         return True
-    owners = {os.getuid(), 0} | (
-        {os.stat(source).st_uid} if source is not None and os.path.exists(source) else set()
-    )
+    owners = _trusted_owners(source)
     folder = Path(folder).resolve()
     for at, each in enumerate((folder, *folder.parents)):
         found = each.stat()
-        group = stat.S_IWGRP if found.st_gid not in (os.getgid(), 0) else 0
-        others = found.st_mode & (stat.S_IWOTH | group) and (at == 0 or not found.st_mode & stat.S_ISVTX)
+        others = _others_write(found) and (at == 0 or not found.st_mode & stat.S_ISVTX)
         if others or (at < 2 and found.st_uid not in owners):
             return False
     return True
+
+
+def _trusted_owners(source: str | os.PathLike[str] | None) -> set[int]:
+    """Users who may write what is run: the present one, the administrator and the owner of *source*."""
+    return {os.getuid(), 0} | (
+        {os.stat(source).st_uid} if source is not None and os.path.exists(source) else set()
+    )
+
+
+def _others_write(found: os.stat_result) -> bool:
+    """Return whether others, or members of a group that is not this user's own, can write to a file or a folder."""
+    group = stat.S_IWGRP if found.st_gid not in (os.getgid(), 0) else 0
+    return bool(found.st_mode & (stat.S_IWOTH | group))
 
 
 class _Implementation(CompileResultCacheImpl):
@@ -273,6 +284,7 @@ class _KeptCode(FunctionCache):
             filename_base=f"{self._impl.filename_base}-{mark}",
             source_stamp=self._impl.locator.get_source_stamp(),
         )
+        self._cache_file.source = inspect.getfile(function)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
@@ -297,7 +309,10 @@ class _KeptCode(FunctionCache):
 
 
 class _CheckedFiles(IndexDataCacheFile):
-    """Files whose contents are preceded by their check sum."""
+    """Files whose contents are preceded by their check sum, and that nobody else can write."""
+
+    source: str | None = None
+    """File whose owner is trusted too."""
 
     def _load_index(self) -> dict[Any, str]:
         data = self._read(self._index_path)
@@ -318,17 +333,31 @@ class _CheckedFiles(IndexDataCacheFile):
 
     def _write(self, path: str, data: bytes) -> None:
         with self._open_for_write(path) as stream:
+            if os.name != "nt":  # whatever the umask: what others can write is not read
+                os.fchmod(stream.fileno(), stat.S_IMODE(os.fstat(stream.fileno()).st_mode) & ~_OF_OTHERS)
             stream.write(_CHECK(data).digest() + data)
 
-    @staticmethod
-    def _read(path: str) -> bytes | None:
-        """Content of a cache file; None if the file is missing or its check sum is wrong."""
+    def _read(self, path: str) -> bytes | None:
+        """Content of a cache file; None if the file is missing, others can write it or its check sum is wrong."""
         try:
-            held = Path(path).read_bytes()
+            with open(path, "rb", opener=_open_at_once) as file:
+                found = os.fstat(file.fileno())
+                if not stat.S_ISREG(found.st_mode) or (
+                    os.name != "nt"
+                    and (_others_write(found) or found.st_uid not in _trusted_owners(self.source))
+                ):
+                    _warn_once(f"compiled code is compiled again: others can write {path}")
+                    return None
+                held = file.read()
         except OSError:
             return None
         check, data = held[:_SIZE], held[_SIZE:]
         return data if _CHECK(data).digest() == check else None
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    """Open a file, not what a link names, without waiting for the writer of a pipe."""
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
 
 
 # A mark of everything that a kernel bakes in, under which its machine code is kept.

@@ -21,6 +21,7 @@ from snapbeam.model.system import System
 from snapbeam.solver.splitting import COMPOSITIONS
 from snapbeam.solver.structure import Structure, structure_of
 from snapbeam.util.cores import usable_cores
+from snapbeam.util.diagnostics import Diagnostic, Severity
 from snapbeam.util.validation import InputError, choice, positive
 
 _Array = NDArray[np.float64]
@@ -523,6 +524,40 @@ def require_affordable(integration: Integration, modes: int, lengths: _Array, st
             f"a run of {steps[longest]:.3g} steps of {lengths[longest]:.3g} s, some {spent} on one core: must be at "
             f"most {most:.3g} steps ({allowed}); ask for fewer cycles or longer steps, or for a larger max_steps"
         )
+
+
+_ANNOUNCED = 60.0
+"""Estimated time, s, from which a run is announced."""
+
+
+def long_run(modes: int, length: float, steps: float, limited: str) -> list[Diagnostic]:
+    """Announcement of a run of so many flight steps, of a *length* in s, if it may take over a minute; empty if not.
+
+    *limited* names the causes of the step length.  Steps in contact are shorter, so that the run may take longer.
+    """
+    seconds = seconds_of(steps, modes)
+    if not seconds > _ANNOUNCED:
+        return []
+    message = (
+        f"the run has {steps:.3g} steps of {length:.3g} s in flight alone and may take some {_words(seconds)} or more; "
+        f"{limited}"
+    )
+    return [
+        Diagnostic("run.long", message, {"steps": steps, "step": length, "seconds": seconds}, Severity.INFO)
+    ]
+
+
+def long_sweep(runs: int, steps: float, each: float, cores: int) -> list[Diagnostic]:
+    """Announcement of *runs* of *steps* flight steps and *each* s on average if they may take over a minute on so many cores."""
+    seconds = runs * each / cores
+    if not seconds > _ANNOUNCED:
+        return []
+    message = (
+        f"{runs} runs of {steps:.3g} steps in flight on average may take some {_words(seconds)} on {cores} "
+        f"core{'s' if cores > 1 else ''}, more with many contacts, and less with early termination or refinement"
+    )
+    numbers = {"runs": runs, "steps": steps, "cores": cores, "seconds": seconds}
+    return [Diagnostic("run.long", message, numbers, Severity.INFO)]
 
 
 def _words(seconds: float) -> str:

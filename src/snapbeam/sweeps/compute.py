@@ -26,9 +26,9 @@ from snapbeam.sweeps.export import to_dataset, to_netcdf
 from snapbeam.sweeps.points import Points, require_memory
 from snapbeam.sweeps.refine import MAX_LEVELS, RefinedRows, refine
 from snapbeam.sweeps.replicates import Replicates
-from snapbeam.sweeps.setup import Progress, SweepSetup
+from snapbeam.sweeps.setup import Progress, SweepSetup, announce_long_sweep
 from snapbeam.sweeps.tasks import MemoryRunner, PointWork, ResultRows, ResultTable, Stage, StageRunner
-from snapbeam.util.files import check_writable
+from snapbeam.util.files import check_writable, require_room
 from snapbeam.util.netcdf import write_netcdf
 from snapbeam.util.validation import InputError, InputTypeError, flag, integer, shown
 
@@ -39,6 +39,8 @@ Note = Callable[[str], object]
 
 
 _MOST_POINTS = 10**9
+LEAST_BYTES = 50
+"""Bytes of a point in a file of results, at least."""
 
 
 class _Incomplete(Exception):
@@ -214,6 +216,10 @@ def compute_sweep(
         raise InputError(f"{setup.points.size} points: must be at most {_MOST_POINTS}")
     if options.path is None:
         require_memory(setup.points.size, "give fewer points, or a checkpoint")
+    for name, place in (("output", target), ("checkpoint", options.path)):
+        if place is not None:
+            require_room(place, LEAST_BYTES * setup.points.size, name)
+    announce_long_sweep(setup, 1 if replicates is None else replicates.runs, by_cluster=asked is not None)
     setup, words = snapped(setup, options.path)
     if words and options.note is not None:
         options.note(words)

@@ -18,7 +18,7 @@ from snapbeam.sweeps.points import Columns
 from snapbeam.sweeps.tasks import PointWork, Provenance, ResultTable, Stage, provenance_of
 from snapbeam.util.cores import usable_cores
 from snapbeam.util.input_files import read_toml
-from snapbeam.util.packages import needs
+from snapbeam.util.packages import needing
 from snapbeam.util.provenance import code_hash
 from snapbeam.util.validation import InputError, integer, shown
 
@@ -412,11 +412,9 @@ def _read_slurm(path: Path) -> dict[str, Any]:
 @contextmanager
 def open_client(cluster: Cluster) -> Iterator[Client]:
     """Connect to a cluster; a cluster that is started here ends with the block."""
-    try:
+    with needing("cluster (--cluster)", "cluster"):
         import dask
         from distributed import Client
-    except ImportError as error:
-        raise InputError(needs("--cluster", "dask", "cluster")) from error
     if cluster.kind == "address":
         try:
             client = Client(cluster.address, timeout="30s", set_as_default=False)
@@ -459,10 +457,8 @@ def _one_thread_each() -> dict[str, str]:
 
 def _slurm(settings: dict[str, Any]) -> Any:
     """Start a SLURM cluster: one worker process for each job, with all its cores."""
-    try:
+    with needing("a SLURM cluster", "cluster"):
         from dask_jobqueue import SLURMCluster
-    except ImportError as error:
-        raise InputError(needs("a SLURM cluster", "dask-jobqueue", "cluster")) from error
     made = SLURMCluster(**slurm_arguments(settings))
     made.scale(jobs=settings.get("jobs", 1))
     return made

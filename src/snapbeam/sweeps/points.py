@@ -274,6 +274,8 @@ def _axis(row: Parameter, name: str, values: Any) -> NDArray[Any]:
     item = row.quantity
     if item.kind in (str, bool):
         words = [item.check(name, value) for value in np.atleast_1d(_array(name, values)).tolist()]
+        if not words:
+            raise InputError(f"{name} = []: must hold at least one point")
         if len(set(words)) < len(words):
             raise InputError(f"{name} = {words}: must differ from each other")
         return np.array(words)

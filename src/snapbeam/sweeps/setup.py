@@ -25,7 +25,7 @@ from snapbeam.solver.assemble import cycles_of, make_ensemble, plans_of, run_col
 from snapbeam.solver.registry import resolve
 from snapbeam.solver.restrictions import check_integrable
 from snapbeam.solver.statistics import STATISTICS, statistics_of
-from snapbeam.solver.step_size import Plan, require_resolved
+from snapbeam.solver.step_size import SUBDIVISION, Plan, long_sweep, require_resolved, seconds_of
 from snapbeam.sweeps.points import (
     Columns,
     Grid,
@@ -35,6 +35,7 @@ from snapbeam.sweeps.points import (
     points_of,
     require_memory,
 )
+from snapbeam.util.cores import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, shown
@@ -447,6 +448,28 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
     require_every_structure(setup)
     tell(diagnostics_of(system, points))
     return setup
+
+
+def announce_long_sweep(setup: SweepSetup, repeats: int = 1, *, by_cluster: bool = False) -> None:
+    """Say before a sweep with *repeats* runs at each point that it may take over a minute on the cores that it uses.
+
+    The estimate is that of a run (:func:`~snapbeam.solver.step_size.seconds_of`), averaged over the limits of the axes.
+    """
+    if setup.integration.engine == "cuda":
+        return
+    columns = setup.points.take(np.array(_ends(setup.points)))
+    steps: list[float] = []
+    seconds: list[float] = []
+    for system, integration, _, points in setup.groups(columns):
+        own = {name: values for name, values in points.items() if not name.startswith("initial_state.")}
+        state = setup.start_of(system, points)
+        counts = make_ensemble(system, integration, own, start=state).runs["end"] / SUBDIVISION
+        steps += counts.tolist()
+        seconds += [seconds_of(count, system.model.modes) for count in counts.tolist()]
+    runs = setup.points.size * repeats
+    threads = setup.integration.threads or usable_cores()
+    cores = 1 if by_cluster else max(1, min(threads, usable_cores(), runs))
+    tell(long_sweep(runs, float(np.mean(steps)), float(np.mean(seconds)), cores))
 
 
 def _alike(system: System, state: State | None, runs: int) -> list[NDArray[np.int64]]:

@@ -7,14 +7,17 @@ import hashlib
 import json
 import os
 import platform
+import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 
 from snapbeam._version import __version__
+from snapbeam.util.packages import needing
 from snapbeam.util.validation import InputError, file_path
 
 __all__ = [
@@ -27,8 +30,10 @@ __all__ = [
     "foreign_files_kept",
     "is_ours",
     "lives",
+    "missing_room",
     "refuse_foreign",
     "request_hash",
+    "require_room",
     "set_request",
 ]
 
@@ -38,10 +43,21 @@ MADE_BY = f"made by snapbeam {__version__}"
 """Provenance text in pictures and animations."""
 _MARK = b"made by snapbeam "
 _LOOKED_AT = 1 << 16  # bytes, at each end
+_TRIED = 4096
+"""Bytes that are written to a folder to see whether it takes a file."""
 REQUEST = "request_hash"
 """Name of the attribute of NetCDF files that a command wrote: the hash of its parameters."""
 _HASHED = 64 * 2**20
 """Bytes of an input file up to which its content is part of the request; of larger ones size and time are."""
+
+_NEEDED = {
+    ".mp4": ("imageio_ffmpeg", "video"),
+    ".mov": ("imageio_ffmpeg", "video"),
+    ".uff": ("pyuff", "lab"),
+    ".unv": ("pyuff", "lab"),
+    ".tdms": ("nptdms", "lab"),
+}
+"""Module that writes files of a suffix, and the extra of the distribution that installs it."""
 
 
 # Which files that exist may be replaced: in Python every one, on the command line those that snapbeam wrote.
@@ -240,9 +256,14 @@ def check_writable(
         raise InputError(
             f"{name} = {str(path)!r}: cannot be written, {str(folder)!r} is not an existing folder"
         )
+    if target.suffix.lower() in _NEEDED:
+        module, extra = _NEEDED[target.suffix.lower()]
+        with needing(f"{name} = {str(path)!r}: a file {target.suffix}", extra):
+            import_module(module)
     try:
-        with tempfile.NamedTemporaryFile(dir=folder, prefix=f".{target.name}."):
-            pass
+        with tempfile.NamedTemporaryFile(dir=folder, prefix=f".{target.stem[:40]}.") as tried:
+            tried.write(bytes(_TRIED))  # a full disk still makes empty files
+            tried.flush()
         if target.exists():
             with target.open("ab"):
                 pass
@@ -251,6 +272,34 @@ def check_writable(
     if not appended:
         refuse_foreign(target, name, begin)
     return target
+
+
+def missing_room(path: str | os.PathLike[str], size: float, name: str = "output") -> str:
+    """Return words if the disk has no room for a file of at least an estimated *size* in bytes; empty if it has.
+
+    A file that will be replaced takes room too: it is removed once the new one is complete.
+    """
+    folder = Path(path).absolute()
+    while not folder.is_dir():  # a folder that will be made
+        folder = folder.parent
+    try:
+        free = shutil.disk_usage(folder).free
+    except OSError:
+        return ""
+    if not size > free:
+        return ""
+    return f"{name} = {str(path)!r}: needs some {size / 1e6:.3g} MB, and the disk has {free / 1e6:.3g} MB"
+
+
+def require_room(path: str | os.PathLike[str], size: float, name: str = "output") -> None:
+    """Refuse an output for which the disk has no room, before any work; *size* is its least estimated size in bytes.
+
+    Raises
+    ------
+    InputError
+    """
+    if words := missing_room(path, size, name):
+        raise InputError(f"{words}: make room or name a file on another disk")
 
 
 class NoRoomError(OSError):

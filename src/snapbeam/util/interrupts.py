@@ -49,10 +49,11 @@ def install() -> None:
     for number in _SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _stop)
-    reader, writer = os.pipe()
-    os.set_blocking(writer, False)
-    signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
-    threading.Thread(target=_watch, args=(reader,), name="interrupts", daemon=True).start()
+    with suppress(OSError, RuntimeError):  # without a pipe or a thread the main thread alone reacts
+        reader, writer = os.pipe()
+        os.set_blocking(writer, False)
+        threading.Thread(target=_watch, args=(reader,), name="interrupts", daemon=True).start()
+        signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
 
 
 @contextmanager

@@ -1,7 +1,7 @@
 """NetCDF files that are written whole or not at all, whatever becomes of the disk.
 
-The HDF5 library cannot be stopped while it writes: a disk that fills ends in a file that it cannot close, and may take
-the process with it.  So it writes to a stream that does not fail.  What the disk has no room for is held in memory;
+The HDF5 library cannot be stopped while it writes: a disk or a memory that fills ends in a file that it cannot close, and
+may take the process with it.  So it writes to a stream that does not fail.  What the disk has no room for is held in memory;
 once the library is done, the file is put where there is room, and the error says where, and how much was needed.  A file
 that grows without end reserves room on the disk before each part, and ends before the part for which there is none.
 """
@@ -22,7 +22,7 @@ from snapbeam._version import __version__
 from snapbeam.util.files import REQUEST, VERSION, NoRoomError, atomic_path, check_writable, request_hash
 from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.interrupts import held_back, raise_held
-from snapbeam.util.validation import InputError, file_path, instance, mapping
+from snapbeam.util.validation import InputError, file_path, instance, mapping, text
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -133,6 +133,7 @@ def write_netcdf(
     groups = {None: data} if isinstance(data, xr.Dataset) else mapping("data", data)
     for name, dataset in groups.items():
         instance(f"data[{name!r}]", dataset, xr.Dataset, "an xarray.Dataset")
+        _check_texts(dataset)
     settings = mapping("encoding", {} if encoding is None else encoding)
     with netcdf_file(target) as file:
         for name, dataset in groups.items():
@@ -142,6 +143,20 @@ def write_netcdf(
             dataset.dump_to_store(
                 store, encoding=dict(mapping(f"encoding[{name!r}]", settings.get(name, {})))
             )
+
+
+def _check_texts(dataset: xr.Dataset) -> None:
+    """Raise an error for a name or an attribute of a dataset that is no text of UTF-8, naming it."""
+    parts = {"attrs": dataset.attrs} | {
+        f"{name}.attrs": each.attrs for name, each in dataset.variables.items()
+    }
+    for where, attrs in parts.items():
+        text("name", where)
+        for key, value in attrs.items():
+            text(f"{where}: key", str(key))
+            for each in value if isinstance(value, (list, tuple)) else [value]:
+                if isinstance(each, str):
+                    text(f"{where}[{str(key)!r}]", each)
 
 
 @contextmanager
@@ -176,10 +191,25 @@ def hdf5_stream(path: Path, target: Path | None = None) -> Iterator[DiskStream]:
     """
     with held_back() as incomplete, DiskStream(path) as stream:
         incomplete.add(path)
-        yield stream
+        try:
+            yield stream
+        except Exception as error:
+            if stream.lost:
+                raise _no_memory(target or path) from error
+            raise
         stream.settle()
+        if stream.lost:
+            raise _no_memory(target or path)
         if stream.trouble is not None:
             raise _kept_elsewhere(target or path, stream)
+
+
+def _no_memory(target: Path) -> OSError:
+    return OSError(
+        errno.ENOMEM,
+        "cannot be written, the memory is not sufficient; make room and give the same command again",
+        str(target),
+    )
 
 
 def _kept_elsewhere(target: Path, stream: DiskStream) -> NoRoomError:
@@ -228,6 +258,8 @@ class DiskStream(io.RawIOBase):
         self._pages: dict[int, bytearray] = {}
         """Parts of the content that differ from those on the disk, once the disk has failed."""
         self.trouble: OSError | None = None
+        self.lost = False
+        """True once there was no memory for a part: the content is not whole."""
 
     def on_disk(self) -> int:
         """Return the bytes that the file takes on the disk."""
@@ -259,11 +291,14 @@ class DiskStream(io.RawIOBase):
                 self.size = max(self.size, self._at + done)
         except OSError as error:
             self.trouble = error
-        while done < len(view):
-            number, begin = divmod(self._at + done, _PAGE)
-            part = view[done : done + _PAGE - begin]
-            self._page(number)[begin : begin + len(part)] = part
-            done += len(part)
+        try:
+            while done < len(view):
+                number, begin = divmod(self._at + done, _PAGE)
+                part = view[done : done + _PAGE - begin]
+                self._page(number)[begin : begin + len(part)] = part
+                done += len(part)
+        except MemoryError:
+            self.lost = True
         self._at += len(view)
         self.size = max(self.size, self._at)
         return len(view)
@@ -312,11 +347,14 @@ class DiskStream(io.RawIOBase):
     def readinto(self, buffer: Any) -> int:
         """Read from the present place."""
         view, done = memoryview(buffer).cast("B"), 0
-        while done < len(view) and self._at < self.size:
-            part = self._content(self._at, len(view) - done)
-            view[done : done + len(part)] = part
-            self._at += len(part)
-            done += len(part)
+        try:
+            while done < len(view) and self._at < self.size:
+                part = self._content(self._at, len(view) - done)
+                view[done : done + len(part)] = part
+                self._at += len(part)
+                done += len(part)
+        except (MemoryError, OSError):
+            self.lost = True
         return done
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:

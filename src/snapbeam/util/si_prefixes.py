@@ -23,7 +23,8 @@ def prefixed(value: float, unit: str, digits: int = 3) -> str:
     """
     if value == 0.0 or not np.isfinite(value):
         return f"{value:g} {unit}"
-    step = _step(float(f"{value:.{digits - 1}e}"))
+    rounded = float(f"{value:.{digits - 1}e}")
+    step = _step(rounded if np.isfinite(rounded) else value)
     return f"{value / 1000.0**step:.{digits}g} {_PREFIXES[step + 8]}{unit}"
 
 

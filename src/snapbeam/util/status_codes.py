@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.util.validation import InputError, finite_array
+from snapbeam.util.validation import InputError, finite_array, shown
 
 
 class ResponseClass(IntEnum):
@@ -68,7 +68,10 @@ _ONE_WELL_LABELS = {
 
 def wells_of(attrs: Mapping[str, Any]) -> int:
     """Number of wells of the beam of a dataset, from its attributes."""
-    return int(attrs.get("wells", 2))
+    found = np.asarray(attrs.get("wells", 2))
+    if found.size != 1 or found.dtype.kind not in "iuf" or found.item() not in (1, 2):
+        raise InputError(f"attribute wells = {shown(attrs['wells'])}: must be 1 or 2")
+    return int(found.item())
 
 
 class RunStatus(IntEnum):

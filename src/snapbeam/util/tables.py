@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.util.files import atomic_path, check_writable
-from snapbeam.util.packages import needs
+from snapbeam.util.packages import needing
 from snapbeam.util.validation import InputError, file_path, instance
 
 if TYPE_CHECKING:
@@ -213,10 +213,8 @@ def write_universal(path: Path, records: list[dict[str, Any]]) -> None:
 
 def _universal_records(dataset: xr.Dataset) -> tuple[list[dict[str, Any]], list[str]]:
     """Records of the variables over time or frequency, and the names of the others."""
-    try:
+    with needing("a universal file", "lab"):
         import pyuff  # noqa: F401
-    except ImportError as error:
-        raise InputError(needs("a universal file", error.name, "lab")) from error
     records, left_out = [], []
     names = [str(name) for name in dataset.data_vars]
     if {"magnitude", "phase", "coherence"} <= set(names):

@@ -12,6 +12,7 @@ import inspect
 import json
 import math
 import os
+import re
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -30,6 +31,19 @@ _NAMESPACES = ("snapbeam", "snapbeam.dynamics", "snapbeam.model", "snapbeam.unce
 Kind = TypeVar("Kind")
 
 
+_LONGEST_MESSAGE = 8000
+_CONTROLS = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]"
+)
+"""Characters that control a terminal or the direction of text, and those that no file format takes as text."""
+
+
+def printable(text: str, longest: int = _LONGEST_MESSAGE) -> str:
+    """Return text that a terminal shows as it is: control characters escaped, and no longer than *longest*."""
+    short = text if len(text) <= longest else f"{text[: longest - 4]} ..."
+    return _CONTROLS.sub(lambda found: ascii(found[0])[1:-1], short)
+
+
 class InputError(ValueError):
     """Invalid parameter; the message names the parameter, its value and the allowed values.
 
@@ -42,6 +56,9 @@ class InputError(ValueError):
     ...     print(error)
     stiffness = -1.0: must be a finite number greater than 0 N/m^1.5
     """
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*(printable(each) if isinstance(each, str) else each for each in args))
 
 
 class InputTypeError(InputError, TypeError):
@@ -268,6 +285,15 @@ def file_path(name: str, value: Any) -> Path:
     if len(os.fsencode(path)) > _LONGEST_PATH or any(len(os.fsencode(part)) > 255 for part in path.parts):
         raise InputError(f"{name} = {shown(str(value))}: must be a path of names up to 255 bytes")
     return path
+
+
+def text(name: str, value: str) -> str:
+    """Return *value* if every file format takes it: no lone surrogates, which stand for bytes that are not UTF-8."""
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise InputError(f"{name} = {shown(value)}: must be text that UTF-8 can encode") from None
+    return value
 
 
 def mapping(name: str, value: Any) -> Mapping[Any, Any]:

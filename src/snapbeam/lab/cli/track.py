@@ -146,6 +146,11 @@ def track(
 
         lab.check_files(FIGURE_SUFFIXES, picture=picture, report=report)
     lab.check_files((".mp4", ".mov", ".avi"), video=video)
+    if video is not None:
+        from snapbeam.util.packages import needing
+
+        with needing("--video", "lab,video"):
+            import imageio_ffmpeg  # noqa: F401
     integer("frame", frame, 0)
     integer("video_every", video_every, 1)
     from snapbeam.lab.tracking.settings import TrackingSettings

@@ -19,7 +19,7 @@ from snapbeam.lab.decay.model import DampingLaw, ModeEstimate, envelope, law_pri
 from snapbeam.lab.least_squares import covariance, solve
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import white_variance
-from snapbeam.util.packages import needs
+from snapbeam.util.packages import needing
 from snapbeam.util.validation import InputError
 
 _SLOW = 4  # degree of the polynomial that is fitted beside the modes
@@ -59,10 +59,8 @@ def fit_decay(
     *law* is a second one by which the first mode is damped; its strength is fitted too.
     """
     units, soften, known = settings
-    try:
+    with needing("the fit of a decay", "lab"):
         import lmfit
-    except ImportError as missing:
-        raise InputError(needs("the fit of a decay", missing.name, "lab")) from missing
 
     t = samples.time - samples.time[0]
     y = samples.values

@@ -26,7 +26,7 @@ from snapbeam.plot.style import (
 )
 from snapbeam.util.diagnostics import Diagnostic, diagnostics_of, doubtful
 from snapbeam.util.files import atomic_path, check_writable
-from snapbeam.util.packages import needs
+from snapbeam.util.packages import needing
 from snapbeam.util.validation import InputError, integer, positive
 
 if TYPE_CHECKING:
@@ -238,11 +238,9 @@ def annotated_video(
     progress
         Called with (frames done, frames in all).
     """
-    try:
+    with needing(f"path = {str(path)!r}: a video", "lab,video"):
         import cv2  # noqa: F401
         import imageio_ffmpeg  # noqa: F401
-    except ImportError as error:
-        raise InputError(needs(f"path = {str(path)!r}: a video", error.name, "lab,video")) from error
     target = check_writable(path, "path", (".mp4", ".mov", ".avi"))
     rate = positive("play_rate", play_rate, "Hz")
     every = integer("every", every, 1)

@@ -884,6 +884,8 @@ def exposure_blur(row: Floats, width: Floats, exposure: float | None) -> tuple[f
     if np.count_nonzero(used & (np.abs(np.nan_to_num(speed)) > 3.0 * _MOVES)) < _LEAST:
         return 0.0, 0.0
     x, y = speed[used] ** 2, width[used] ** 2
+    if np.ptp(x) == 0.0:  # no slope
+        return 0.0, 0.0
     (slope, _), cover = polyfit(x, y, 1, cov=True)
     opened = 1.0 if exposure is None else min(exposure, 1.0)
     more = float(slope) - opened**2 / 12.0

@@ -434,6 +434,7 @@ def beam_view(
         by_column = masked_median((edges[0] - edges[1]).T, usable.T)
         known = np.isfinite(by_column)
         by_column, across = by_column[known], columns[known] - rough.contact_column
+    if usable.any() and across.size > 1:  # a line needs two columns
         # the surface is uneven on the scale of three pixels: neighbouring columns count as one
         independent = max(min(by_column.size, float(np.ptp(columns)) / 3.0), 1.0)
         error = float(np.std(by_column)) / math.sqrt(independent)

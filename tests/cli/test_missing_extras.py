@@ -1,0 +1,152 @@
+"""Commands and functions without the packages of their extra: a sentence that names the extra, never a traceback."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from importlib.metadata import requires
+
+import numpy as np
+import pytest
+
+from snapbeam.parts import installed_parts
+from snapbeam.util.packages import _EXTRAS, extra_of
+
+LAB = pytest.mark.skipif("lab" not in installed_parts(), reason="a part that is not installed")
+EXPLORER = pytest.mark.skipif("explorer" not in installed_parts(), reason="a part that is not installed")
+BLOCKED = sorted(module for modules in _EXTRAS.values() for module in modules if module != "PIL")
+"""Pillow is there: Matplotlib needs it."""
+PROGRAM = f"""
+import sys
+sys.modules.update(dict.fromkeys({BLOCKED!r}))
+sys.argv[0] = "snapbeam"
+from snapbeam.__main__ import main
+main()
+"""
+RUN = ["simulate", "--modes", "1", "--cycles", "1"]
+MAP = [
+    "map",
+    "--modes",
+    "1",
+    "--frequency-ratio",
+    "1",
+    "--velocity-amplitude",
+    "0.1:0.2:2",
+    "--checkpoint",
+    "store",
+]
+
+
+def without_extras(folder, program, *words):
+    """Run a program in a process that has no package of any extra."""
+    command = [sys.executable, "-c", program, *words]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+
+
+def refused(folder, words, extra):
+    done = without_extras(folder, PROGRAM, *words)
+    said = " ".join(done.stderr.replace("│", " ").split())
+    assert done.returncode == 2 and "Traceback" not in said, said
+    assert re.search(rf'needs \w+; .*pip install "\.\[{extra}\b', said) and "compiling" not in said, said
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Recordings and signals of every kind whose reader is an extra's; their content is not reached."""
+    for name in ("a.avi", "a.mp4", "a.tif", "a.png", "a.tdms", "a.uff"):
+        (tmp_path / name).write_bytes(b"\x89PNG" * 300)
+    (tmp_path / "series").mkdir()
+    (tmp_path / "series" / "a_0001.png").write_bytes(b"\x89PNG" * 300)
+    (tmp_path / "map.nc").write_bytes(b"\x89HDF" * 300)
+    time = np.arange(4000) / 1e4
+    decay = np.exp(-3.0 * time) * np.sin(2.0 * np.pi * 120.0 * time)
+    np.savetxt(
+        tmp_path / "a.csv", np.column_stack((time, decay)), delimiter=",", header="time,x", comments=""
+    )
+    return tmp_path
+
+
+@EXPLORER
+@pytest.mark.parametrize("words", [["explore"], ["explore", "map.nc"], ["explore", "--port", "0"]])
+def test_the_explorer(tmp_path, words):
+    refused(tmp_path, words, "explorer")
+
+
+@EXPLORER
+def test_the_explorer_in_python(tmp_path):
+    program = f"import sys; sys.modules.update(dict.fromkeys({BLOCKED!r})); import snapbeam; snapbeam.explorer.serve"
+    done = without_extras(tmp_path, program)
+    assert 'pip install ".[explorer]"' in done.stderr.splitlines()[-1]
+
+
+TRACK = ["--frame-rate", "10e3", "--pixel-size", "12e-6", "--buckling-level", "0.33e-3"]
+
+
+@LAB
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["track", "a.avi", *TRACK],
+        ["track", "a.tif", *TRACK],
+        ["track", "series", *TRACK],
+        ["track", "a.png", *TRACK, "--video", "b.avi"],
+        ["vibrometer", "a.tdms", "--frequency", "100"],
+        ["vibrometer", "a.uff", "--frequency", "100"],
+        ["fit-decay", "a.tdms"],
+        ["fit-decay", "a.csv", "--units", "m"],
+        ["frf", "a.tdms", "--excitation", "x", "--response", "y"],
+    ],
+    ids=lambda words: " ".join(words[:2]),
+)
+def test_commands_of_the_laboratory(files, words):
+    refused(files, words, "lab")
+
+
+@pytest.mark.parametrize(
+    ("words", "extra"),
+    [([*RUN, "--animate", "a.mp4"], "video"), ([*MAP, "--cluster", "local:2", "-o", "a.nc"], "cluster")],
+    ids=["video", "cluster"],
+)
+def test_options_of_other_commands(tmp_path, words, extra):
+    refused(tmp_path, words, extra)
+    assert not (tmp_path / "a.mp4").exists() and not (tmp_path / "a.nc").exists()
+
+
+WRITE = f"""
+import sys
+sys.modules.update(dict.fromkeys({BLOCKED!r}))
+import numpy as np
+from snapbeam import InputError, lab
+signal = lab.make_signal(np.sin(np.arange(900.0)), "m", 1e3)
+frames = np.zeros((3, 20, 20), np.uint8)
+calls = [
+    lambda: lab.write_signal("b.tdms", signal),
+    lambda: lab.write_signal("b.uff", signal),
+    lambda: lab.write_video("b.avi", frames),
+    lambda: lab.open_recording("a.avi", frame_rate=1e4, pixel_size=1e-5),
+]
+for call in calls:
+    try:
+        call()
+    except InputError as error:
+        print(error)
+"""
+
+
+@LAB
+def test_functions_of_the_laboratory(files):
+    before = sorted(path.name for path in files.iterdir())
+    done = without_extras(files, WRITE)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count('pip install ".[lab]"') == 4, done.stdout
+    assert sorted(path.name for path in files.iterdir()) == before
+
+
+def test_every_package_of_an_extra_is_known():
+    """The table of modules names as many extras as the distribution has."""
+    stated = {
+        each.partition("extra ==")[2].strip(" '\"") for each in requires("snapbeam") if "extra ==" in each
+    }
+    assert stated == set(_EXTRAS)
+    assert extra_of("cv2.gapi") == "lab" and extra_of("numpy") is None and extra_of(None) is None
