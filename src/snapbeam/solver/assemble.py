@@ -350,7 +350,7 @@ def make_ensemble(
     InputError
         For parameters that cannot differ between the runs of an ensemble, and for more steps than can be counted.
     """
-    check_integrable(system)
+    check_integrable(system, integration.engine)
     columns = run_columns(system, points or {})
     state = system.start_state if start is None else start
     runs = next(iter(columns.values())).size if columns else 1
