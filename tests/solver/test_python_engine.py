@@ -87,6 +87,25 @@ def test_random_systems(seed):
     assert checked(seed, engine="python").failures == []
 
 
+def test_several_contacts_of_which_one_loses_energy():
+    stops = [(sb.KelvinVoigt(2e5, 1.0), 0.4, 5e-5), (default_values.CONTACT, 0.6, 1e-5)]
+    further = [
+        striking(law, drive=sb.FixedStop(), side="above", location=at, gap=gap) for law, at, gap in stops
+    ]
+    system = sb.System(beam(2), contacts=[striking(), *further])
+    times = np.linspace(0.0, 0.009, 80)
+    own, core = (sb.simulate(system, how(engine), sample_times=times) for engine in ("python", "native"))
+    for name in ("striker_penetrations", "striker_displacements", "modal_amplitude"):
+        assert np.abs(own.dataset[name].values - core.dataset[name].values).max() < 1e-7, name
+    for name in ("impacts", "impulse", "striker_work", "peak_force"):
+        for number in (1, 2, 3):
+            one, other = (each.summary[f"{name}_contact_{number}"] for each in (own, core))
+            assert one == pytest.approx(other, rel=1e-3), (name, number)
+    assert own.summary.energy_lost_contact == pytest.approx(core.summary.energy_lost_contact, rel=1e-4) != 0.0
+    # 3e-6, and not yet explained: the displacements agree with the core to 1e-9 b
+    assert abs(own.dataset.attrs["energy_error"]) < 1e-5
+
+
 def test_energy_of_everything_at_once_is_balanced():
     system = sb.System(
         beam(2),

@@ -46,9 +46,9 @@ _STEPS_PER_PERIOD = 150.0
 """Steps in a period of the first mode or of the drive, at least: so that no contact is passed over."""
 _DEPTH, _FORCE = 1e-14, 1e-9
 """Penetration (m) and force (N) beyond zero at which events lie, so that rounding makes none."""
-_SECONDS, _TURN = 6e-4, 0.6
+_SECONDS, _TURN = 1.5e-3, 0.6
 """Seconds of a step on one core, and what the fastest mode turns in it at most, rad; both estimates."""
-_SLOW = "engine = 'python' is made to be read: here about {:.0g} times slower than engine = 'cpu', some {:.1g} s a run"
+_SLOW = "engine = 'python' is made to be read: here about {:.0f} times slower than engine = 'cpu', some {:.1g} s a run"
 
 
 def motion_of(
@@ -352,7 +352,7 @@ def _say_how_slow(ensemble: Ensemble) -> None:
     own = first.end / min(first.longest, _TURN / fastest) * _SECONDS
     factor = own / seconds_of(first.end / float(ensemble.step_times[0]), first.eq.n)
     found = {"factor": factor, "seconds": own}
-    tell([Diagnostic("python-engine", _SLOW.format(factor, own), found, Severity.INFO)])
+    tell([Diagnostic("python-engine", _SLOW.format(float(f"{factor:.0e}"), own), found, Severity.INFO)])
 
 
 def record(
