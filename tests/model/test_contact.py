@@ -172,16 +172,14 @@ def test_layer_from_its_material() -> None:
         LayeredHertz.from_layer(4e8, 5e-3, 1e-4, 2e6, 0.5)
 
 
-def test_a_law_without_energy_is_refused_by_name() -> None:
-    with pytest.raises(
-        InputError, match="contact law 'half_done': has no energy and no slope; write them as"
-    ):
+def test_a_law_without_force_is_refused_by_name() -> None:
+    with pytest.raises(InputError, match="contact law 'half_done': has no force; write"):
 
         class HalfDone(ContactLaw):
             name = "half_done"
 
             @staticmethod
-            def force(law, penetration):
-                return 1e5 * penetration
+            def energy(law, penetration):
+                return 5e4 * penetration**2
 
     assert "half_done" not in LAWS

@@ -327,7 +327,7 @@ CIRCUIT = {name: (lambda self, given: given) for name in ("row", "loss", "share"
         (sb.ContactLaw, SPRING | {"damping_coefficient": staticmethod(of_two)}, r"is read only with rate_dependent"),
         (sb.ContactLaw, SPRING | {"rate_dependent": True}, r"needs damping_coefficient"),
         (sb.ContactLaw, SPRING | {"memory_after": staticmethod(of_two)}, r"is read only with memory"),
-        (sb.ContactLaw, {"force": staticmethod(of_two)}, r"has no energy and no slope"),
+        (sb.ContactLaw, {"energy": staticmethod(of_two)}, r"has no force"),
         (sb.LocalForce, POTENTIAL | {"damping": staticmethod(of_three)}, r"did you mean 'damping_"),
         (sb.LocalForce, POTENTIAL | {"range": (0.0, 1.0)}, r"range: is no hook"),
         (sb.LocalForce, POTENTIAL | {"damping_force": staticmethod(of_three)}, r"is read only with dissipative"),

@@ -10,7 +10,7 @@ from snapbeam.model.quantity import check_fields, quantities, quantity
 from snapbeam.util.validation import InputError
 
 ACCURACIES = ("standard", "reference")
-ENGINES = ("auto", "cpu", "cuda", "native")
+ENGINES = ("auto", "cpu", "cuda", "native", "python")
 CYCLES = 200
 """Default number of cycles of a run."""
 
@@ -31,10 +31,11 @@ class Integration:
     tolerance : float, optional
         Requested maximum error of the displacement of the contact point and of mid-span, over b, from 1e-10 to
         0.1, up to the predictability horizon. Excludes *step* and *accuracy*.
-    engine : {"auto", "cpu", "cuda", "native"}
+    engine : {"auto", "cpu", "cuda", "native", "python"}
         Solver; ``"auto"`` selects the fastest available one of the first two.  ``"native"`` is the native core, which compiles
         nothing when it is used; it has contacts without memory, local and external forces, base and axial load, with sines
-        and constants, and refuses the rest.
+        and constants, and refuses the rest.  ``"python"`` is the specification in Python, for every part and for laws of one's own
+        in plain Python: thousands of times slower, it chooses its steps itself, and takes no *step*, *tolerance* or *early_termination*.
     early_termination : bool
         End a run once its response class is certain: the class is the same, statistics other than it stop there.
     threads : int, optional
@@ -88,6 +89,13 @@ class Integration:
             raise InputError(
                 f"tolerance = {self.tolerance!r} with step = {self.step!r}, accuracy = {self.accuracy!r}: give one"
             )
+        if self.engine == "python":
+            for name, value in (("step", self.step), ("tolerance", self.tolerance), ("early_termination", self.early_termination or None)):  # fmt: skip
+                if value is not None:
+                    raise InputError(
+                        f"{name} = {value!r} with engine = 'python': which controls its own steps and runs to the end; leave "
+                        f"{name} out, or use engine = 'cpu'"
+                    )
 
     def replace(self, **changes: Any) -> Integration:
         """An integration with some values changed; unknown names are refused."""

@@ -240,7 +240,10 @@ def run_attributes(run: Prepared, summary: RunSummary, accumulators_of_runs: Any
 def _own_attributes(system: System, integration: Integration, lasted: float) -> dict[str, Any]:
     """Return the attributes of the drive, the striker and the duration."""
     striker = system.striker
-    attrs: dict[str, Any] = {"cycles": round(lasted, 9), "engine": "cpu"}
+    attrs: dict[str, Any] = {
+        "cycles": round(lasted, 9),
+        "engine": integration.engine if integration.engine in ("native", "python") else "cpu",
+    }
     if striker is not None and striker.drive.harmonic:
         attrs |= {
             name: getattr(striker.drive, name)

@@ -350,7 +350,7 @@ def make_ensemble(
     InputError
         For parameters that cannot differ between the runs of an ensemble, and for more steps than can be counted.
     """
-    check_integrable(system)
+    check_integrable(system, integration.engine)
     columns = run_columns(system, points or {})
     state = system.start_state if start is None else start
     runs = next(iter(columns.values())).size if columns else 1
@@ -407,7 +407,18 @@ def make_ensemble(
     )
     if is_native(integration.engine):
         ensemble = dataclasses.replace(ensemble, channels=channels_of(system, ensemble, columns))
+    if integration.engine == "python":
+        ensemble = dataclasses.replace(ensemble, systems=_systems(system, points or {}, runs))
     return ensemble
+
+
+def _systems(system: System, points: Mapping[str, _Array], runs: int) -> tuple[System, ...]:
+    """The system of each run, with its own parameters."""
+    if not points:
+        return (system,) * runs
+    rows = zip(*(np.broadcast_to(values, (runs,)).tolist() for values in points.values()), strict=True)
+    found = ({name: value for name, value in zip(points, row, strict=True) if value == value} for row in rows)
+    return tuple(system.replace(**changes) for changes in found)
 
 
 def _require_record(system: System, table: NDArray[Any], driven: Driven) -> None:

@@ -110,6 +110,8 @@ class Ensemble:
     others: FurtherContactTable | None = None
     channels: Any = None
     """:class:`~snapbeam.solver.channels.Channels` for the native core."""
+    systems: tuple[Any, ...] = ()
+    """The :class:`~snapbeam.System` of each run, for the Python engine."""
 
     @property
     def circuit_rates(self) -> _Array:

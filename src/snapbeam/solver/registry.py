@@ -65,6 +65,10 @@ class Engine(Protocol):
 
 def engine_of(ensemble: Ensemble) -> Engine:
     """The engine that an ensemble was arranged for, of those that run on the processor."""
+    if ensemble.systems:
+        from snapbeam.solver import python_engine
+
+        return python_engine
     if ensemble.channels is None:
         return cpu
     from snapbeam.solver import native
@@ -92,7 +96,7 @@ def resolve(
 
     Parameters
     ----------
-    name : {"auto", "cpu", "cuda"}
+    name : {"auto", "cpu", "cuda", "native", "python"}
     runs : int
         How many there are to integrate.
     cycles : float
@@ -120,6 +124,10 @@ def resolve(
         from snapbeam.solver import native
 
         return "native", native
+    if name == "python":
+        from snapbeam.solver import python_engine
+
+        return "python", python_engine
     pays = runs >= _FEWEST_RUNS and runs * cycles >= _FEWEST_CYCLES
     if name == "cuda" or (name == "auto" and pays and find_spec("numba_cuda")):
         from snapbeam.solver.cuda import driver as cuda

@@ -8,7 +8,7 @@ from snapbeam.model.system import System
 from snapbeam.util.validation import InputError
 
 
-def check_integrable(system: System) -> None:
+def check_integrable(system: System, engine: str = "auto") -> None:
     """Refuse a system that the solver cannot integrate.
 
     Raises
@@ -18,6 +18,17 @@ def check_integrable(system: System) -> None:
     contacts = system.contacts
     for number, each in enumerate(contacts, 1):
         section, law = section_of("contact", number), each.law
+        missing = type(law).missing_hooks()
+        if missing and engine != "python":
+            raise InputError(
+                f"{section}.law = {law!r}: has no {' and no '.join(missing)}, which engine = {engine!r} needs; write them as static "
+                "methods of (law, penetration): the integral of the force (J) and its derivative (N/m), or use engine = 'python'"
+            )
+        if law.impulsive and engine == "python":
+            raise InputError(
+                f"{section}.law = {law!r}: an impact of no duration is not integrated by engine = 'python'; use engine = 'cpu', or "
+                f"{INSTEAD_OF_RESTITUTION}"
+            )
         if law.impulsive and len(contacts) > 1:
             raise InputError(
                 f"{section} = {law!r} with several strikers: sticking under Newton's law includes one tip only; use "

@@ -430,7 +430,7 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         )
     points = points_of(axes, system)
     require_parameters(system, points)
-    check_integrable(system)
+    check_integrable(system, integration.engine)
     law = type(system.contact_law) if system.contact_law is not None else None
     resolved = resolve(
         integration.engine,

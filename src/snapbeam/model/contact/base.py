@@ -15,6 +15,8 @@ from snapbeam.util.validation import InputError
 
 LAWS: dict[str, type[ContactLaw]] = {}
 """Every law by the name it has in parameter files."""
+_GAUSS = [(0.5 * (x + 1.0), 0.5 * w) for x, w in zip(*np.polynomial.legendre.leggauss(24), strict=True)]
+"""Nodes and weights of Gauss's rule on [0, 1]."""
 _HERTZ_PHASE = 4.03026
 """Phase of a linear oscillator with the maximum slope of an impact under Hertz's law: (4/5) B(2/5, 1/2) sqrt(15/8)."""
 
@@ -50,6 +52,8 @@ class ContactLaw:
     - ``force(law, penetration)``: force on both, N, for a penetration > 0 (m);
     - ``energy(law, penetration)``: energy stored in the contact, J, whose derivative is the force;
     - ``slope(law, penetration)``: derivative of the force, N/m, for tangents and for the length of contact steps.
+
+    ``engine = "python"`` needs ``force`` alone, in any Python; energy and slope then follow numerically.
 
     A law that loses energy (``rate_dependent`` = True) has ``damping_coefficient(law, penetration)`` besides, N s/m: its force
     is max(0, force + damping coefficient times the rate of penetration).
@@ -97,9 +101,7 @@ class ContactLaw:
         if cls.name and not cls.impulsive:
             wanted = [
                 "force",
-                "energy",
-                "slope",
-                *(["yield_penetration", "memory_after"] if cls.memory else []),
+                *(["energy", "slope", "yield_penetration", "memory_after"] if cls.memory else []),
             ]
             missing = [each for each in wanted if not hasattr(cls, each)]
             if missing:
@@ -117,9 +119,32 @@ class ContactLaw:
         check_fields(self)
 
     @staticmethod
+    def energy(law: Any, penetration: float) -> float:
+        """Energy stored in the contact, J: the integral of the force, by Gauss's rule."""
+        own: Any = type(law).owner
+        # d = x^2 times the penetration, for forces that begin with a root
+        return float(penetration * sum(2.0 * x * w * own.force(law, penetration * x * x) for x, w in _GAUSS))
+
+    @staticmethod
+    def slope(law: Any, penetration: float) -> float:
+        """Derivative of the force, N/m, by a central difference."""
+        own: Any = type(law).owner
+        h = 1e-5 * penetration
+        return (
+            (own.force(law, penetration + h) - own.force(law, penetration - h)) / (2.0 * h)
+            if h > 0.0
+            else 0.0
+        )
+
+    @staticmethod
     def damping_coefficient(law: Any, penetration: float) -> float:
         """Force per rate of penetration, N s/m; none is lost."""
         return 0.0
+
+    @classmethod
+    def missing_hooks(cls) -> list[str]:
+        """Hooks that the law leaves to numerical defaults, which only the Python engine can call."""
+        return [hook for hook in ("energy", "slope") if getattr(cls, hook) is getattr(ContactLaw, hook)]
 
     @classmethod
     def numbers_type(cls) -> Any:

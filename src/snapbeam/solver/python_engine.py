@@ -1,0 +1,399 @@
+"""An engine to read: the equations of docs/theory.md in Python, integrated by SciPy's DOP853 with events.
+
+In the linear modes q about the first well (section Damping there), with everything that a system may have:
+
+    q'' + 2 zeta omega q' + omega^2 q + gamma [(q.Gq) g + (2 g.q + q.Gq) G q]
+        = P_1(t) (g + G q) + y''(t) b + sum_j r_j f_j + sum_k h_k F_k(t) + sum_k l_k F_k(u_k, u_k') + sum_k t_k z_k
+
+P_1 is the change of the axial load and y the motion of the base; r_j, h_k, l_k and t_k are the rows of contacts, external and
+local forces and circuits, V^T phi at their locations.  With w_j the drive of a tip and D_j its residual indentation,
+
+    d_j = d_j0 + w_j(t) - r_j.q - D_j,     f_j = max[0, F_j(d_j) + c_j(d_j) d_j']  for d_j > 0,     z_k' = -t_k.q' - lambda_k z_k.
+
+A striker with a mass is a mode of its own in q, -1/sqrt(m) in its row; so is the charge z_k + t_k.q of a circuit, and D_j.  Laws
+and drives are the system's own objects, whose Python functions are called: nothing is compiled.  Works and losses are integrals
+beside the state.  This is slow: it is for reading, changing and checking.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from snapbeam.model.drive.base import Drive, Scale
+from snapbeam.model.drive.sum import SumDrive
+from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.further_contacts import OFFSET, SINCE
+from snapbeam.solver.python_records import APART, LOOSE, PRESSING, SUMS, Records
+from snapbeam.solver.statistics import OutputStates, Recorded
+from snapbeam.solver.step_size import seconds_of
+from snapbeam.solver.terms import WORKS
+from snapbeam.util.diagnostics import Diagnostic, Severity, tell
+from snapbeam.util.status_codes import RunStatus
+from snapbeam.util.validation import InputError
+
+_Array = NDArray[np.float64]
+_Motion = Callable[[float], tuple[float, float, float]]
+_Event = Callable[[float, _Array], float]
+_RTOL = {4: 1e-9, 6: 2e-12}
+"""Relative error of a step by the order of the accuracy level."""
+_STEPS_PER_PERIOD = 150.0
+"""Steps in a period of the first mode or of the drive, at least: so that no contact is passed over."""
+_DEPTH, _FORCE = 1e-14, 1e-9
+"""Penetration (m) and force (N) beyond zero at which events lie, so that rounding makes none."""
+_SECONDS, _TURN = 1.5e-3, 0.6
+"""Seconds of a step on one core, and what the fastest mode turns in it at most, rad; both estimates."""
+_SLOW = "engine = 'python' is made to be read: here about {:.0f} times slower than engine = 'cpu', some {:.1g} s a run"
+
+
+def motion_of(
+    drive: Drive, scale: Scale, phase: float, later: float, sign: float
+) -> tuple[_Motion, list[float]]:
+    """w(t), w'(t) and w''(t) of a drive that began *later* seconds ago at a *phase*, and the times at which it jumps."""
+    if isinstance(drive, SumDrive):
+        own = [(each, scale, getattr(each, "phase", 0.0)) for each in drive.parts_of_sum]
+        terms = [motion_of(*each, later, sign) for each in own]
+        begun = sum(motion_of(*each, 0.0, sign)[0](0.0)[0] for each in own if each[0].harmonic)
+
+        def together(t: float) -> tuple[float, float, float]:
+            w, v, a = (sum(each) for each in zip(*(term(t) for term, _ in terms), strict=True))
+            return w - begun, v, a
+
+        return together, [at for _, jumps in terms for at in jumps]
+    columns = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
+    kind: Any = drive.integrated_as or type(drive)
+    found, samples = drive.numbers(columns, scale), sign * drive.samples()
+    numbers = kind.numbers_type()(*(float(found[name][0]) for name in kind.number_names))
+    omega = numbers.omega
+
+    def harmonic(t: float) -> tuple[float, float, float]:
+        angle, size = omega * (t + later) + phase, numbers.amplitude
+        w = size * math.sin(angle)
+        return w, size * omega * math.cos(angle), -(omega**2) * w
+
+    def general(t: float) -> tuple[float, float, float]:
+        at = omega * (t + later) + phase
+        return *kind.motion(numbers, samples, at), kind.acceleration(numbers, samples, at)
+
+    jumps = [getattr(numbers, name) - later - phase / omega for name in kind.discontinuities]
+    return harmonic if kind.harmonic else general, jumps
+
+
+class Contact(NamedTuple):
+    """A tip and its law."""
+
+    law: Any
+    row: _Array
+    offset: float
+    """d_j0."""
+    motion: _Motion
+    follows: float
+    """Share of the motion of the base in that of the tip, in the frame of the ends."""
+    memory: int | None
+    """Mode that holds D_j."""
+
+
+class Equations:
+    """The equations of motion of one run."""
+
+    def __init__(self, ensemble: Ensemble, run: int) -> None:
+        system, structure, table = ensemble.systems[run], ensemble.structure, ensemble.runs[run]
+        self.structure, self.n, self.omega = structure, structure.omega.size, structure.omega
+        self.decay = 2.0 * structure.damping_ratio * self.omega
+        self.g, self.G, self.gamma = structure.well, structure.coupling, structure.nonlinear_stiffness
+        self.b: Any = structure.base_load
+        self.breaks: list[float] = []
+        clock, alone = ensemble.drive.number_names.index("omega"), getattr(ensemble.drive, "alone", True)
+        begun, omega = float(table["phase"]), float(ensemble.drive_numbers[run, clock])
+
+        def moves(drive: Drive, sign: float = 1.0) -> _Motion:
+            # one motion alone goes on at its phase, several share a clock
+            own = (getattr(drive, "phase", 0.0), begun / omega)
+            own = (begun, 0.0) if alone and not isinstance(drive, SumDrive) else own
+            motion, jumps = motion_of(drive, system.scale, *own, sign)
+            self.breaks += jumps
+            return motion
+
+        base, others = system.base_excitation, ensemble.others
+        self.base = None if base is None else moves(base.motion)
+        self.up = -1.0 if base is not None and base.direction == "down" else 1.0
+        self.load = None if system.axial_load is None else moves(system.axial_load.motion)
+        histories = [moves(each.history) for each in system.external_forces]
+        self.external = list(zip(structure.force_rows, histories, strict=True))
+        self.local: list[Any] = [(each, type(each.law).owner) for each in structure.local_forces]
+        rates = ensemble.circuit_rates[run] if ensemble.circuits else []
+        self.circuits = [
+            (each.row, each.mode, float(rate)) for each, rate in zip(structure.circuits, rates, strict=True)
+        ]
+        self.contacts, self.since = [], []
+        for j, each in enumerate(system.contacts):
+            side = 1.0 if each.striker.side == "below" else -1.0
+            row, offset, since = (
+                ensemble.contact_rows[table["contact_row"]],
+                table["offset"],
+                table["contact_time"],
+            )
+            if j:
+                row, numbers = others.rows[others.places[run, j - 1]], others.numbers[run, j - 1]  # type: ignore[union-attr]
+                offset, since = numbers[OFFSET], numbers[SINCE]
+            motion = moves(each.striker.drive, side if each.striker.drive.recorded else 1.0)
+            follows = 0.0 if base is None or base.striker_on_base else -side * self.up
+            self.contacts.append(
+                Contact(each.law, row, offset, motion, follows, structure.mode_of_indentation(j))
+            )
+            self.since.append(float(since))
+
+    def tip(self, j: int, t: float) -> tuple[float, float]:
+        """w_j and w_j' in the frame of the ends."""
+        (w, v, _), follows = self.contacts[j].motion(t), self.contacts[j].follows
+        y, rate, _ = self.base(t) if self.base is not None and follows else (0.0, 0.0, 0.0)
+        return w + follows * y, v + follows * rate
+
+    def contact(self, j: int, t: float, s: _Array) -> tuple[float, float, Any]:
+        """d_j, d_j' and the numbers of the law."""
+        each, (w, v), n = self.contacts[j], self.tip(j, t), self.n
+        left = 0.0 if each.memory is None else float(s[each.memory])
+        d = each.offset + w - float(each.row @ s[:n]) - left
+        return d, v - float(each.row @ s[n : 2 * n]), each.law.numbers(left)
+
+    def pressure(self, j: int, d: float, rate: float, numbers: Any) -> float:
+        """F_j(d) + c_j(d) d', which a contact does not let fall below zero."""
+        law, d = type(self.contacts[j].law), max(d, 0.0)
+        return float(
+            law.force(numbers, d)
+            + (law.damping_coefficient(numbers, d) * rate if law.rate_dependent else 0.0)
+        )
+
+    def currents(self, s: _Array) -> list[float]:
+        """z_k, in units in which z^2/2 is an energy; of a circuit without inertia -rate t.q'."""
+        q, p = s[: self.n], s[self.n : 2 * self.n]
+        return [-rate * float(t @ p) if at is None else q[at] - float(t @ q) for t, at, rate in self.circuits]
+
+    def rate(self, t: float, s: _Array) -> _Array:
+        """The derivative of the state: the equations above, and the powers whose integrals are kept."""
+        n, power = self.n, dict.fromkeys(SUMS, 0.0)
+        q, p = s[:n], s[n : 2 * n]
+        Gq = self.G @ q
+        square = float(q @ Gq)
+        total = -self.decay * p - self.omega**2 * q
+        total -= self.gamma * (square * self.g + (2.0 * float(self.g @ q) + square) * Gq)
+        power["dissipated"] = float(self.decay @ (p * p))
+        if self.load is not None:
+            change = self.load(t)[0] * (self.g + Gq)
+            total, power["load_work"] = total + change, float(change @ p)
+        if self.base is not None:
+            inertia = self.up * self.base(t)[2] * self.b
+            total, power["base_work"] = total + inertia, float(inertia @ p)
+        for row, history in self.external:
+            F = history(t)[0]
+            total, power["force_work"] = total + F * row, power["force_work"] + F * float(row @ p)
+        for each, law in self.local:
+            u, v = each.rest + float(each.row @ q), float(each.row @ p)
+            damping = law.damping_force(each.law, u, v)
+            total += (law.force(each.law, u) + damping) * each.row
+            power["local_force_work"] += damping * v
+        touched, lost, dq = [], [], p.copy()
+        for (row, mode, rate), z in zip(self.circuits, self.currents(s), strict=True):
+            total += z * row
+            if mode is not None:
+                dq[mode] = -rate * z
+            lost.append(rate * z * z if mode is not None else z * z / rate)
+        for j, contact in enumerate(self.contacts):
+            d, d_rate, numbers = self.contact(j, t, s)
+            f = max(0.0, self.pressure(j, d, d_rate, numbers)) if d > 0.0 else 0.0
+            total += f * contact.row
+            touched += [f, f * self.tip(j, t)[1]]
+            if contact.law.rate_dependent and d > 0.0:
+                power["lost"] += (f - type(contact.law).force(numbers, d)) * d_rate
+        power["gross_work"] = sum(map(abs, touched[1::2])) + sum(abs(power[name]) for name in WORKS)
+        return np.concatenate((dq, total, [power[name] for name in SUMS], touched, lost))
+
+    def energy(self, s: _Array) -> float:
+        """Energy of modes, tension, local forces and circuits, J."""
+        q, p = s[: self.n], s[self.n : 2 * self.n]
+        square = float(q @ self.G @ q)
+        total = 0.5 * float(p @ p + (self.omega * q) @ (self.omega * q))
+        total += self.gamma * square * (float(self.g @ q) + 0.25 * square)
+        total += sum(law.energy(each.law, each.rest + float(each.row @ q)) for each, law in self.local)
+        live = zip(self.circuits, self.currents(s), strict=True)
+        return total + sum(0.5 * z * z for (_, mode, _), z in live if mode is not None)
+
+    def stored(self, j: int, t: float, s: _Array) -> float:
+        """Energy in a contact, J."""
+        d, _, numbers = self.contact(j, t, s)
+        return float(type(self.contacts[j].law).energy(numbers, d)) if d > 0.0 else 0.0
+
+
+class Simulation(Records):
+    """One run: smooth pieces from event to event."""
+
+    def __init__(self, ensemble: Ensemble, run: int, times: _Array, in_contact: bool = False) -> None:
+        eq, table = Equations(ensemble, run), ensemble.runs[run]
+        q, p = ensemble.starts[int(table["start_row"])]
+        q = q + ensemble.structure.shift if table["well_sign"] < 0.0 else q
+        sums = np.zeros(len(SUMS) + 2 * len(eq.contacts) + len(eq.circuits))
+        super().__init__(ensemble, run, eq, np.concatenate((q, p, sums)), times, in_contact)
+        self.cycle, first = self.end / ensemble.cycles, 2.0 * math.pi / ensemble.scale.omega
+        self.longest, self.rtol = min(first, self.cycle) / _STEPS_PER_PERIOD, _RTOL[ensemble.order]
+        size = 0.1 * self.rtol * ensemble.scale.length / max(float(np.linalg.norm(self.places[1])), 1e-300)
+        sizes = (np.full(eq.n, size), np.full(eq.n, size * ensemble.scale.omega), np.full(sums.size, np.inf))
+        self.atol = np.concatenate(sizes)
+        """Of a step; integrals do not choose it."""
+
+    def events(self) -> list[tuple[int, str, _Event]]:
+        """What ends a smooth piece: contact, event, and the function whose zero it is."""
+        eq: Any = self.eq
+        found: list[tuple[int, str, _Event]] = []
+
+        def add(j: int, what: str, direction: float, value: Callable[..., float]) -> None:
+            def event(t: float, s: _Array) -> float:
+                return value(*eq.contact(j, t, s))
+
+            event.terminal, event.direction = True, direction  # type: ignore[attr-defined]
+            found.append((j, what, event))
+
+        for j, state in enumerate(self.state):
+            law, side = eq.contacts[j].law, 1.0 if state == APART else -1.0
+            add(j, "onset" if state == APART else "release", side, lambda d, _, __, e=side * _DEPTH: d - e)
+            if law.rate_dependent and state != APART:
+                sign = -1.0 if state == PRESSING else 1.0
+                add(j, "loosen" if state == PRESSING else "press", sign, lambda d, v, numbers, j=j, sign=sign: (
+                    eq.pressure(j, d, v, numbers) - sign * _FORCE if d > 0.0 else -sign))  # fmt: skip
+            if law.memory and state == PRESSING:
+                edge = law.yield_penetration
+                add(j, "yield", 1.0, lambda d, _, numbers, edge=edge: d - edge(numbers) - _DEPTH)
+                add(j, "turn", -1.0, lambda d, v, numbers, edge=edge: v if d > edge(numbers) else 1.0)
+        for each in (each for each, law in eq.local if law.is_limited()):
+
+            def inside(t: float, s: _Array, each: Any = each) -> float:
+                u, (low, high) = (
+                    each.rest + float(each.row @ s[: eq.n]),
+                    type(each.law).owner.displacement_range(each.law),
+                )
+                return min(u - low, high - u)
+
+            inside.terminal = True  # type: ignore[attr-defined]
+            found.append((-1, "leave", inside))
+        return found
+
+    def happened(self, j: int, what: str) -> None:
+        """Change the state of a contact after an event."""
+        at, before = self.impulse(j), self.state[j]
+        if what == "leave":
+            self.found["status"] = RunStatus.DIVERGED
+        elif what in ("onset", "press"):
+            self.state[j], self.onset[j] = PRESSING, self.t
+            self.begun[j], self.largest[j] = float(self.s[at]), 0.0
+        elif what in ("release", "loosen"):
+            self.state[j] = APART if what == "release" else LOOSE
+            if before == PRESSING:
+                self.impact_ended(j)
+        elif what == "turn":  # a law with memory unloads from its greatest penetration
+            (d, _, numbers), memory = self.eq.contact(j, self.t, self.s), self.eq.contacts[j].memory
+            stored = self.eq.stored(j, self.t, self.s)
+            self.s[memory] = self.eq.contacts[j].law.memory_after(numbers, d)
+            self.s[2 * self.eq.n] += stored - self.eq.stored(j, self.t, self.s)
+
+    def march(self, stops: list[float], progress: Callable[[float], object] | None = None) -> list[Any]:
+        """Integrate to the end; q, p and contact times at the *stops*."""
+        kept, losses = [], slice(self.s.size - len(self.eq.circuits), None)
+        early, turns = self.s[losses].copy(), np.arange(self.cycle, self.end, self.cycle)
+        cuts = {self.late, self.end, *stops, *self.eq.breaks, *turns.tolist()}
+        for until in sorted(at for at in cuts if 0.0 < at <= self.end):
+            try:
+                while self.t < until and self.found["status"][0] == RunStatus.OK:
+                    self.piece(until)
+            except ArithmeticError:
+                self.found["status"] = RunStatus.DIVERGED
+            if self.found["status"][0] != RunStatus.OK:
+                break
+            if until in stops:
+                kept.append((self.s[: self.eq.n], self.s[self.eq.n : 2 * self.eq.n], self.lasting()))
+            if until == self.late:
+                early = self.s[losses].copy()
+            if progress is not None:
+                progress(self.t / self.end)
+        self.close(early)
+        return kept
+
+    def piece(self, until: float) -> None:
+        """Integrate to the next event."""
+        watched = self.events()
+
+        def center(t: float, s: _Array) -> float:
+            return float(self.at_rest[1] + self.places[1] @ s[: self.eq.n]) - self.level
+
+        with np.errstate(all="ignore"):
+            part = solve_ivp(
+                self.eq.rate, (self.t, until), self.s, "DOP853", dense_output=True, rtol=self.rtol, atol=self.atol,
+                max_step=self.longest, first_step=min(1e-3 * self.longest, until - self.t),
+                events=[center, *(event for _, _, event in watched)],
+            )  # fmt: skip
+        self.observe(part)
+        self.t, self.s = float(part.t[-1]), part.y[:, -1].copy()
+        self.found["steps"] += part.t.size - 1
+        for (j, what, _), hit in zip(watched, part.t_events[1:], strict=True):
+            if hit.size:
+                self.happened(j, what)
+        if part.status < 0 or not np.isfinite(self.s).all():
+            self.found["status"] = RunStatus.DIVERGED
+        elif self.found["steps"][0] > self.ensemble.max_steps:
+            self.found["status"] = RunStatus.STEP_LIMIT
+
+
+def _say_how_slow(ensemble: Ensemble) -> None:
+    """Say how slow this is."""
+    first, fastest = Simulation(ensemble, 0, np.empty(0)), max(float(ensemble.structure.omega.max()), 1e-300)
+    own = first.end / min(first.longest, _TURN / fastest) * _SECONDS
+    factor = own / seconds_of(first.end / float(ensemble.step_times[0]), first.eq.n)
+    found = {"factor": factor, "seconds": own}
+    tell([Diagnostic("python-engine", _SLOW.format(float(f"{factor:.0e}"), own), found, Severity.INFO)])
+
+
+def record(
+    ensemble: Ensemble, times: _Array, in_contact: bool, progress: Callable[[float], object] | None = None
+) -> Iterator[Recorded]:
+    """Integrate the one run of an ensemble, and return its record."""
+    _say_how_slow(ensemble)
+    run = Simulation(ensemble, 0, times, in_contact)
+    run.march([], progress)
+    yield run.recorded()
+
+
+def run_ensemble(
+    ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
+) -> NDArray[Any]:
+    """Integrate every run of an ensemble, one after the other; returns a record of accumulators a run."""
+    return integrate_with_output_states(ensemble, threads, progress).accumulators_of_runs
+
+
+def integrate_with_output_states(
+    ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
+) -> OutputStates:
+    """Integrate as :func:`run_ensemble`, with the states at every output time."""
+    _say_how_slow(ensemble)
+    runs, count, n = ensemble.runs, max(1, len(ensemble.systems[0].contacts)), ensemble.structure.omega.size
+    outputs = int(-(-runs["end"][0] // runs["output_interval"][0]))
+    q, p = np.full((2, ensemble.size, outputs, n), np.nan)
+    lasting, found = np.full((ensemble.size, outputs, count), -1.0), []
+    for i in range(ensemble.size):
+        run = Simulation(ensemble, i, np.empty(0))
+        ticks = np.minimum(np.arange(1, outputs + 1) * runs["output_interval"][i], runs["end"][i])
+        for k, kept in enumerate(run.march((ticks * run.tick).tolist())):
+            q[i, k], p[i, k], lasting[i, k] = kept
+        found.append(run.found)
+        if progress is not None:
+            progress(i + 1, ensemble.size)
+    return OutputStates(
+        np.concatenate(found), q, p, np.ones((ensemble.size, outputs), dtype=np.int64), lasting
+    )
+
+
+def integrate_tangents(*arguments: Any, **options: Any) -> Any:
+    """Refuse tangents."""
+    raise InputError("tangent: is not integrated by engine = 'python'; use engine = 'cpu'")
