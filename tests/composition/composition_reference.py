@@ -192,7 +192,7 @@ class Parts:
     """Times at which a motion is not smooth."""
 
 
-class Singular(Exception):  # noqa: N818
+class Singular(Exception):
     """The motion reaches an electrode or a magnet, where its force is infinite, at a time (s)."""
 
     def __init__(self, time: float) -> None:

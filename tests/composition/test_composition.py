@@ -151,7 +151,11 @@ def checked(
     except Singular as reached:
         for level, run in runs.items():
             known = np.isfinite(recorded(composition, run)).all(axis=1)
-            if run.summary.status.name != "DIVERGED" or known[times > reached.time].any() or not known[times < 0.8 * reached.time].all():
+            if (
+                run.summary.status.name != "DIVERGED"
+                or known[times > reached.time].any()
+                or not known[times < 0.8 * reached.time].all()
+            ):
                 report.failures.append(f"{level}: status {run.summary.status.name}, and {reached}")
         return report
     expected = observed(composition, truth, times)

@@ -508,7 +508,10 @@ class Potential:
                 shift *= 4.0
             if not self.holds(tried):
                 return
-            arrived = lowest > 1e-12 * float(np.abs(bend).max()) and np.abs(modes @ np.linalg.solve(bend, slope)).max() <= _SAME * size
+            arrived = (
+                lowest > 1e-12 * float(np.abs(bend).max())
+                and np.abs(modes @ np.linalg.solve(bend, slope)).max() <= _SAME * size
+            )
             yield alpha, bool(arrived)
             alpha = tried
 

@@ -15,7 +15,6 @@ from scipy.sparse.csgraph import connected_components
 from snapbeam import _core
 from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LAW_NUMBERS, Channels
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.step_size import TRIED, barrier_of
 from snapbeam.solver.statistics import (
     OTHER_IMPACTS,
     OTHER_IMPULSE,
@@ -26,6 +25,7 @@ from snapbeam.solver.statistics import (
     Recorded,
     empty_accumulators,
 )
+from snapbeam.solver.step_size import TRIED, barrier_of
 from snapbeam.solver.terms import WORKS
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError

@@ -216,7 +216,10 @@ class _Bench:
         impulse_shape = (tip @ model.linear_modes)[lowest]
         if not impulse_shape.any():
             impulse_shape = np.ones(self.omega.size)
-        barrier = barrier_of(structure) or 0.5 * (2.0 * math.pi * model.reference_frequency / np.abs(self.rows[:, 0]).max()) ** 2
+        barrier = (
+            barrier_of(structure)
+            or 0.5 * (2.0 * math.pi * model.reference_frequency / np.abs(self.rows[:, 0]).max()) ** 2
+        )
         self.starts = []
         for energy, duration, *_ in _STARTS:
             # the spectrum of a pulse falls off beyond the inverse of what it lasts
