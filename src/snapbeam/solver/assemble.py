@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -27,7 +26,7 @@ from snapbeam.solver.channels import channels_of
 from snapbeam.solver.ensemble import FAR_AWAY, RUN, CircuitCoupling, Ensemble, FurtherContactTable
 from snapbeam.solver.excitation import tip_motion
 from snapbeam.solver.further_contacts import LAW, NUMBERS, OFFSET, REST, SIGN, SINCE, SPEED
-from snapbeam.solver.restrictions import check_integrable
+from snapbeam.solver.restrictions import check_integrable, is_native
 from snapbeam.solver.step_size import Clocked, Plan, choose_base_step, clocked, most_steps
 from snapbeam.solver.structure import Structure, structure_of
 from snapbeam.util.diagnostics import Diagnostic, tell
@@ -299,11 +298,6 @@ def begun_at(driven: Driven, phase: _Array) -> _Array:
 def _is_around(section: str) -> bool:
     """Return whether the parameters of a section act on the structure itself: base, axial load or local force."""
     return section in ("base_excitation", "axial_load") or numbered(section)[0] == "force"
-
-
-def is_native(engine: str) -> bool:
-    """Return whether the native core integrates: by name, or for tests by the variable SNAPBEAM_ENGINE."""
-    return engine == "native" or (engine in ("auto", "cpu") and os.environ.get("SNAPBEAM_ENGINE") == "native")
 
 
 _LOWEST = {"standard": 1e-9, "reference": 1e-13}

@@ -29,7 +29,7 @@ from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.drive.sum import SumDrive
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.further_contacts import OFFSET, SINCE
-from snapbeam.solver.python_records import APART, LOOSE, PRESSING, SUMS, Records
+from snapbeam.solver.python_records import APART, LOOSE, PRESSING, SUMS, Records, nodes_of
 from snapbeam.solver.statistics import OutputStates, Recorded
 from snapbeam.solver.step_size import seconds_of
 from snapbeam.solver.terms import WORKS
@@ -131,6 +131,7 @@ class Equations:
             (each.row, each.mode, float(rate)) for each, rate in zip(structure.circuits, rates, strict=True)
         ]
         self.contacts, self.since = [], []
+        self.state = [APART] * len(system.contacts)
         for j, each in enumerate(system.contacts):
             side = 1.0 if each.striker.side == "below" else -1.0
             row, offset, since = (
@@ -160,6 +161,10 @@ class Equations:
         left = 0.0 if each.memory is None else float(s[each.memory])
         d = each.offset + w - float(each.row @ s[:n]) - left
         return d, v - float(each.row @ s[n : 2 * n]), each.law.numbers(left)
+
+    def force(self, j: int, d: float, rate: float, numbers: Any) -> float:
+        """f_j, N: that of the present state, so that it stays smooth beyond the event that ends a piece."""
+        return self.pressure(j, d, rate, numbers) if self.state[j] == PRESSING else 0.0
 
     def pressure(self, j: int, d: float, rate: float, numbers: Any) -> float:
         """F_j(d) + c_j(d) d', which a contact does not let fall below zero."""
@@ -205,11 +210,11 @@ class Equations:
             lost.append(rate * z * z if mode is not None else z * z / rate)
         for j, contact in enumerate(self.contacts):
             d, d_rate, numbers = self.contact(j, t, s)
-            f = max(0.0, self.pressure(j, d, d_rate, numbers)) if d > 0.0 else 0.0
+            f = self.force(j, d, d_rate, numbers)
             total += f * contact.row
             touched += [f, f * self.tip(j, t)[1]]
-            if contact.law.rate_dependent and d > 0.0:
-                power["lost"] += (f - type(contact.law).force(numbers, d)) * d_rate
+            if contact.law.rate_dependent and self.state[j] == PRESSING:
+                power["lost"] += (f - self.pressure(j, d, 0.0, numbers)) * d_rate
         power["gross_work"] = sum(map(abs, touched[1::2])) + sum(abs(power[name]) for name in WORKS)
         return np.concatenate((dq, total, [power[name] for name in SUMS], touched, lost))
 
@@ -224,9 +229,10 @@ class Equations:
         return total + sum(0.5 * z * z for (_, mode, _), z in live if mode is not None)
 
     def stored(self, j: int, t: float, s: _Array) -> float:
-        """Energy in a contact, J."""
+        """Energy in a contact, J; none while it does not press: what is left where the force ceases is lost."""
         d, _, numbers = self.contact(j, t, s)
-        return float(type(self.contacts[j].law).energy(numbers, d)) if d > 0.0 else 0.0
+        pressing = d > 0.0 and self.state[j] == PRESSING
+        return float(type(self.contacts[j].law).energy(numbers, d)) if pressing else 0.0
 
 
 class Simulation(Records):
@@ -257,7 +263,7 @@ class Simulation(Records):
             event.terminal, event.direction = True, direction  # type: ignore[attr-defined]
             found.append((j, what, event))
 
-        for j, state in enumerate(self.state):
+        for j, state in enumerate(eq.state):
             law, side = eq.contacts[j].law, 1.0 if state == APART else -1.0
             add(j, "onset" if state == APART else "release", side, lambda d, _, __, e=side * _DEPTH: d - e)
             if law.rate_dependent and state != APART:
@@ -283,21 +289,21 @@ class Simulation(Records):
 
     def happened(self, j: int, what: str) -> None:
         """Change the state of a contact after an event."""
-        at, before = self.impulse(j), self.state[j]
         if what == "leave":
             self.found["status"] = RunStatus.DIVERGED
-        elif what in ("onset", "press"):
-            self.state[j], self.onset[j] = PRESSING, self.t
-            self.begun[j], self.largest[j] = float(self.s[at]), 0.0
+            return
+        state, stored = self.eq.state, self.eq.stored(j, self.t, self.s)
+        if what in ("onset", "press"):
+            state[j], self.onset[j] = PRESSING, self.t
+            self.begun[j], self.largest[j] = float(self.s[self.impulse(j)]), 0.0
         elif what in ("release", "loosen"):
-            self.state[j] = APART if what == "release" else LOOSE
-            if before == PRESSING:
+            if state[j] == PRESSING:
                 self.impact_ended(j)
+            state[j] = APART if what == "release" else LOOSE
         elif what == "turn":  # a law with memory unloads from its greatest penetration
             (d, _, numbers), memory = self.eq.contact(j, self.t, self.s), self.eq.contacts[j].memory
-            stored = self.eq.stored(j, self.t, self.s)
             self.s[memory] = self.eq.contacts[j].law.memory_after(numbers, d)
-            self.s[2 * self.eq.n] += stored - self.eq.stored(j, self.t, self.s)
+        self.s[2 * self.eq.n] += stored - self.eq.stored(j, self.t, self.s)
 
     def march(self, stops: list[float], progress: Callable[[float], object] | None = None) -> list[Any]:
         """Integrate to the end; q, p and contact times at the *stops*."""
@@ -321,6 +327,15 @@ class Simulation(Records):
         self.close(early)
         return kept
 
+    def closed_inside(self, part: Any) -> float | None:
+        """The first node of a step at which a contact that is apart at both ends is closed."""
+        apart = [j for j, state in enumerate(self.eq.state) if state == APART]
+        for t in nodes_of(part.t).ravel().tolist() if apart else ():
+            s = part.sol(t)
+            if any(self.eq.contact(j, t, s)[0] > _DEPTH for j in apart):
+                return float(t)
+        return None
+
     def piece(self, until: float) -> None:
         """Integrate to the next event."""
         watched = self.events()
@@ -334,6 +349,9 @@ class Simulation(Records):
                 max_step=self.longest, first_step=min(1e-3 * self.longest, until - self.t),
                 events=[center, *(event for _, _, event in watched)],
             )  # fmt: skip
+        hidden = self.closed_inside(part)
+        if hidden is not None:
+            return self.piece(hidden)
         self.observe(part)
         self.t, self.s = float(part.t[-1]), part.y[:, -1].copy()
         self.found["steps"] += part.t.size - 1

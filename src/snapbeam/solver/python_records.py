@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,11 @@ _NODES, _WEIGHTS = (
 )
 
 
+def nodes_of(times: _Array) -> _Array:
+    """Gauss's nodes between *times*, a row for each step."""
+    return times[:-1, None] + np.diff(times)[:, None] * _NODES
+
+
 class Records:
     """Statistics of a run at *t*, in the state *s* of the equations *eq*."""
 
@@ -37,13 +41,13 @@ class Records:
         self.places = np.stack((structure.row_of_beam(row), structure.center))
         self.at_rest = np.array([float(table["rest_contact"]), structure.center_rest])
         self.level = float(structure.dividing_height)
-        self.state, self.onset, self.begun = [APART] * count, [0.0] * count, [0.0] * count
-        """Of each contact: state, onset of the present impact, and its impulse until then."""
+        self.onset, self.begun = [0.0] * count, [0.0] * count
+        """Of each contact: onset of the present impact, and its impulse until then."""
         self.peaks, self.largest, self.hits = [0.0] * count, [0.0] * count, [0] * count
         for j, since in enumerate(eq.since):
             d, rate, numbers = eq.contact(j, 0.0, s)
             if d > 0.0:
-                self.state[j] = PRESSING if eq.pressure(j, d, rate, numbers) > 0.0 else LOOSE
+                eq.state[j] = PRESSING if eq.pressure(j, d, rate, numbers) > 0.0 else LOOSE
                 self.onset[j] = -since if since > 0.0 else 0.0
         self.impacts: list[list[float]] = []
         self.samples: list[tuple[Any, ...]] = []
@@ -51,11 +55,6 @@ class Records:
         found["status"], found["first_energy"] = RunStatus.OK, self.energy()
         for i, name in enumerate(("displacement", "center")):
             found[f"min_{name}"] = found[f"max_{name}"] = self.at_rest[i] + self.places[i] @ s[: eq.n]
-        for name in found.dtype.names or ():
-            if name.startswith(
-                "own_"
-            ):  # a registered statistic that the other engines update after every step
-                found[name] = math.nan
 
     def impulse(self, j: int) -> int:
         """Place of the impulse of a contact in the state; its work follows."""
@@ -63,18 +62,18 @@ class Records:
 
     def energy(self) -> float:
         """Energy, contacts included."""
-        return self.eq.energy(self.s) + sum(self.eq.stored(j, self.t, self.s) for j in range(len(self.state)))
+        return self.eq.energy(self.s) + sum(
+            self.eq.stored(j, self.t, self.s) for j in range(len(self.eq.state))
+        )
 
     def force(self, j: int, t: float, s: _Array) -> float:
         """f_j, N."""
-        d, rate, numbers = self.eq.contact(j, t, s)
-        return max(0.0, self.eq.pressure(j, d, rate, numbers)) if d > 0.0 else 0.0
+        return max(0.0, self.eq.force(j, *self.eq.contact(j, t, s)))
 
     def observe(self, part: Any) -> None:
         """Samples and statistics of a piece: integrals by Gauss's rule in each step, extremes at its nodes and ends."""
         eq, found, n, structure = self.eq, self.found, self.eq.n, self.eq.structure
-        lengths = np.diff(part.t)[:, None]
-        nodes, weights = (part.t[:-1, None] + lengths * _NODES).ravel(), (lengths * _WEIGHTS).ravel()
+        nodes, weights = nodes_of(part.t).ravel(), (np.diff(part.t)[:, None] * _WEIGHTS).ravel()
         inside = part.sol(nodes)
         every = np.concatenate((inside, part.y), axis=1)
         heights, rates = self.at_rest[:, None] + self.places @ every[:n], self.places @ every[n : 2 * n]
@@ -103,7 +102,7 @@ class Records:
         if eq.circuits:
             peaks = np.abs([eq.currents(s) for s in every.T]).max(axis=0)
             found["circuits"][0, :, CIRCUIT_PEAK] = np.maximum(found["circuits"][0, :, CIRCUIT_PEAK], peaks)
-        touching = [j for j, state in enumerate(self.state) if state == PRESSING]
+        touching = [j for j, state in enumerate(eq.state) if state == PRESSING]
         for j in touching:
             self.largest[j] = max(
                 self.largest[j], *(self.force(j, t, s) for t, s in zip(nodes, inside.T, strict=True))
@@ -119,13 +118,13 @@ class Records:
                 s[2 * n : 2 * n + len(SUMS)],
                 s[self.impulse(0) + 1 : self.impulse(len(eq.contacts)) : 2].sum(),
             )
-            stored = eq.stored(0, t, s) if eq.contacts else 0.0
+            stored = sum(eq.stored(j, t, s) for j in touching)
             values = (*first, eq.energy(s), stored, works, sums[0] + sums[1], sums[0], *sums[3:])
             self.samples.append((t, s[:n], s[n : 2 * n], (*values, *s[s.size - len(eq.circuits) :])))
 
     def lasting(self) -> list[float]:
         """Ticks since the contact of each striker began, -1: apart."""
-        pairs = zip(self.state, self.onset, strict=True)
+        pairs = zip(self.eq.state, self.onset, strict=True)
         return [(self.t - at) / self.tick if state == PRESSING else -1.0 for state, at in pairs] or [-1.0]
 
     def close(self, early: _Array) -> None:
@@ -134,7 +133,7 @@ class Records:
         for name, value in zip(SUMS, s[2 * n :].tolist(), strict=False):
             found[name] = value
         found["dissipated"] += found["lost"]
-        impulses, works = s[self.impulse(0) : self.impulse(len(self.state))].reshape(-1, 2).T
+        impulses, works = s[self.impulse(0) : self.impulse(len(self.eq.state))].reshape(-1, 2).T
         found["impacts"], found["total_impulse"], found["work"] = sum(self.hits), impulses.sum(), works.sum()
         found["time"], found["energy"] = round(self.t / self.tick), self.energy()
         found["displacement"], found["center"] = self.at_rest + self.places @ s[:n]
@@ -145,7 +144,7 @@ class Records:
         if self.eq.circuits:
             losses = s[s.size - early.size :]
             found["circuits"][0, :, :CIRCUIT_PEAK] = np.stack((losses, losses - early), axis=1)
-        if len(self.state) > 1:
+        if len(self.eq.state) > 1:
             found["others"][0] = np.stack((self.hits, self.peaks, impulses, works), axis=1)[1:]
 
     def impact_ended(self, j: int) -> None:
@@ -163,6 +162,6 @@ class Records:
             np.array(each, dtype=float).reshape(-1, size)
             for each, size in zip(columns, (1, n, n, width), strict=True)
         )
-        impacts = np.array(self.impacts).reshape(-1, 5)[:, : 5 if len(self.state) > 1 else 4]
+        impacts = np.array(self.impacts).reshape(-1, 5)[:, : 5 if len(self.eq.state) > 1 else 4]
         last = Last(self.s[:n], self.s[n : 2 * n], 1, np.array(self.lasting()))
         return Recorded(at[:, 0], q, p, values, impacts, self.found, last)

@@ -13,9 +13,9 @@ from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.integration import ENGINES
-from snapbeam.solver.assemble import is_native
 from snapbeam.solver.cpu import driver as cpu
 from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.restrictions import is_native
 from snapbeam.solver.statistics import OutputStates, Recorded
 from snapbeam.util.validation import InputError, choice
 

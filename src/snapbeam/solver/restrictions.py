@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
+import os
+
 from snapbeam.model.contact.restitution import INSTEAD_OF_RESTITUTION
 from snapbeam.model.quantity import section_of
 from snapbeam.model.system import System
+from snapbeam.solver.statistics import updated
 from snapbeam.util.validation import InputError
 
 
+def is_native(engine: str) -> bool:
+    """Return whether the native core integrates: by name, or for tests by the variable SNAPBEAM_ENGINE."""
+    return engine == "native" or (engine in ("auto", "cpu") and os.environ.get("SNAPBEAM_ENGINE") == "native")
+
+
 def check_integrable(system: System, engine: str = "auto") -> None:
-    """Refuse a system that the solver cannot integrate.
+    """Refuse a system that the solver cannot integrate, and a statistic that it cannot update.
 
     Raises
     ------
     InputError
     """
+    used = "native" if is_native(engine) else engine
+    if used in ("native", "python") and updated():
+        raise InputError(
+            f"statistic {updated()[0].name!r}: is updated after every step, which engine = {used!r} does not do; use engine = 'cpu', "
+            "or take it out with unregister_statistic"
+        )
     contacts = system.contacts
     for number, each in enumerate(contacts, 1):
         section, law = section_of("contact", number), each.law
