@@ -256,7 +256,7 @@ class _Bench:
             "omega": self.omega.copy(), "sigma": self.damping.copy(), "G": self.coupling, "g": -self.well,
             "gamma": float(self.structure.nonlinear_stiffness), "shift": None, "far_force": self.force.copy(), "second": None, "high": None,
             "beam": np.ones(n), "lift": 0.0, "block_sizes": self.blocks, "laws": np.zeros(0, np.int32),
-            "signals": 0, "uses": nothing, "law_numbers": 0, "center": zero, "center_rest": 0.0, "dividing_height": 0.0, "levels": 2,
+            "signals": 0, "uses": nothing, "signal_kinds": np.zeros(0, np.int32), "windows": np.zeros(0, np.int32), "jumps": 0, "law_numbers": 0, "center": zero, "center_rest": 0.0, "dividing_height": 0.0, "levels": 2,
             "fewest_parts": 1, "parts_per_decay": 1.0,
         }  # fmt: skip
 
@@ -296,7 +296,7 @@ def _free_runs(rest: _Array, velocity: _Array, steps: _Array, counts: _Array) ->
     run[:, 6] = 1.0
     run[:, 8], run[:, 10], run[:, 13] = -math.inf, -1.0, math.inf
     return {
-        "run": run, "signals": np.zeros((runs, 0, 5)), "numbers": np.zeros((runs, 0, 0)), "offset": np.zeros((runs, 0)),
+        "run": run, "signals": np.zeros((runs, 0, 9)), "pieces": np.zeros((0, 7)), "jumps": np.zeros((runs, 0)), "numbers": np.zeros((runs, 0, 0)), "offset": np.zeros((runs, 0)),
         "since": np.zeros((runs, 0)), "rows": np.zeros((1, n)), "row_of": np.zeros((runs, 1), np.int32), "rest": np.zeros((runs, 1)),
         "q": np.tile(rest, (runs, 1)), "p": np.tile(velocity, (runs, 1)), "order": np.argsort(-counts, kind="stable").astype(np.int32),
         "outputs": 1, "states": np.full((runs, 1, 2 * n + 1), np.nan), "statistics": np.zeros((runs, 27)), "of_channels": np.zeros((runs, 0, 10)),
