@@ -173,7 +173,7 @@ class _Builder:
         signals = np.stack(self.signals, axis=1) if self.signals else np.zeros((self.runs, 0, len(SIGNAL)))
         jumps = np.stack(list(self.jumps.values()), axis=1) if self.jumps else np.zeros((self.runs, 0))
         return Channels(
-            np.array(self.laws, np.int32), contacts, uses.reshape(len(self.laws), -1), signals,
+            np.array(self.laws, np.int32), contacts, uses.reshape(len(self.laws), len(self.sections)), signals,
             np.array(self.kinds, np.int32), np.array(self.windows, np.int32),
             np.concatenate(self.pieces) if self.pieces else np.zeros((0, 7)), jumps,
             np.stack(self.numbers, axis=1) if self.laws else np.zeros((self.runs, 0, LAW_NUMBERS)),
