@@ -25,9 +25,12 @@ sys.path.append(str(Path(__file__).parents[1] / "lab"))
 from cine_file import write_cine
 
 import snapbeam as sb
-from snapbeam.lab.signal_formats import WRITERS
 from snapbeam.model.parameter_file import load_config
 from snapbeam.util.netcdf import read_netcdf
+
+
+_WRITTEN = (".csv", ".wav", ".uff", ".tdms", ".h5", ".npz")
+"""Kinds of files of signals that the package writes."""
 
 
 def whole_files(folder: Path) -> dict[str, Any]:
@@ -43,7 +46,7 @@ def whole_files(folder: Path) -> dict[str, Any]:
     found["sweep.checkpoint"] = sb.read_checkpoint
 
     signal = lab.make_signal(np.sin(0.3 * np.arange(400.0)), sampling_frequency=1e3, units="m/s")
-    for suffix in WRITERS:
+    for suffix in _WRITTEN:
         lab.write_signal(folder / f"signal{suffix}", signal, full_scale=2.0 if suffix == ".wav" else None)
     np.save(folder / "signal.npy", np.asarray(signal.values))
     arrays = {"time": signal.time.values, "velocity": signal.values}
@@ -55,7 +58,7 @@ def whole_files(folder: Path) -> dict[str, Any]:
         "Y_Unit_Label\tm/s\nDelta_X\t0.001\nX0\t0\n***End_of_Header***\nX_Value\tVelocity\tComment\n"
         + "".join(f"{k * 1e-3:.3f}\t{v:.9f}\n" for k, v in enumerate(signal.values))
     )
-    names = [f"signal{suffix}" for suffix in (*WRITERS, ".npy", ".lvm")]
+    names = [f"signal{suffix}" for suffix in (*_WRITTEN, ".npy", ".lvm")]
     for name in (*names, "plain.mat", "nested.mat", "compressed.mat"):
         found[name] = lambda path: lab.read_channels(path, sampling_frequency=1e3)
 
