@@ -134,7 +134,6 @@ def features_of(seed: int) -> Features:
 
 
 NATIVE_LAWS = ("hertz", "power", "layer", "hunt_crossley", "kelvin_voigt")
-NATIVE_DRIVES = ("sine", "sine", "displacement_sine", "acceleration_sine", "fixed")
 NATIVE_LOCAL = (*KNOWN_FORCES, "coulomb_friction")
 
 
@@ -149,18 +148,19 @@ def native_features(seed: int) -> Features:
     modes = int(rng.integers(1, 7)) if rng.random() < 0.9 else int(rng.choice([8, 12, 20, 32]))
     count = int(rng.choice(5, p=[0.1, 0.4, 0.25, 0.15, 0.1]))
     contacts = tuple(
-        (str(rng.choice(NATIVE_LAWS)), str(rng.choice(NATIVE_DRIVES)), bool(rng.random() < 0.15))
+        (str(rng.choice(NATIVE_LAWS)), str(rng.choice(DRIVES)), bool(rng.random() < 0.15))
         for _ in range(count)
     )
     moves = any(drive != "fixed" for _, drive, _ in contacts)
+    base = str(rng.choice(BASES)) if rng.random() < 0.35 else None
     return Features(
         modes=modes,
         contacts=contacts,
-        base=str(rng.choice(["acceleration_sine", "displacement_sine"])) if rng.random() < 0.35 else None,
-        carried=bool(rng.random() < 0.7),
-        external=some(("harmonic_force", "constant_force"), 0.6, 0.3, 0.1),
+        base=base,
+        carried=bool(rng.random() < 0.7) or base in ("chirp", "shock", "recorded_acceleration"),
+        external=some(FORCES, 0.6, 0.3, 0.1),
         local=some(NATIVE_LOCAL, 0.5, 0.25, 0.15, 0.1),
-        load="sine" if rng.random() < 0.25 else None,
+        load=str(rng.choice(LOADS)) if rng.random() < 0.25 else None,
         uneven=bool(rng.random() < 0.3),
         started=bool(rng.random() < 0.2) or not moves,
     )

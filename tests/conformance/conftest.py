@@ -95,7 +95,7 @@ class EnsembleIntegrator:
         return EnsembleResult(ensemble, self.engine.run_ensemble(ensemble, threads, None))
 
 
-@pytest.fixture(scope="session", params=[name for name in ENGINES if name != "auto"])
+@pytest.fixture(scope="session", params=[name for name in ENGINES if name not in ("auto", "python")])
 def integrate_ensemble(request: pytest.FixtureRequest) -> EnsembleIntegrator:
     """The engine under test; skipped where the machine lacks what it needs."""
     try:

@@ -273,3 +273,21 @@ def test_swept_by_name() -> None:
     np.testing.assert_array_equal(swept.max_displacement[1], plain.max_displacement)
     assert (swept.reference_frequency[0] != swept.reference_frequency[1]).all()
     assert swept.reference_frequency.values[0] == swept.reference_frequency.values[2]
+
+
+@pytest.mark.parametrize("modes", [1, 3])
+@pytest.mark.parametrize("load", [3e-19, 2e-22, -4e-27, 7e-29, -6e-33, 1e-161, 5e-324])
+def test_a_load_that_no_digit_shows(modes, load):
+    """Its square vanishes, or nearly so: two wells and the saddle between them, as without it."""
+    model = sb.ReducedModel.from_beam(
+        default_values.BEAM, modes=modes, imperfection=sb.Imperfection(point_load=load, point_location=0.4)
+    )
+    level = sb.ReducedModel.from_beam(default_values.BEAM, modes=1).length_scale
+    heights = sorted(float(model.midspan_shape @ each.amplitude) for each in model.landscape.equilibria)
+    np.testing.assert_allclose(heights, [-level, 0.0, level], atol=1e-12 * level)
+
+
+@pytest.mark.parametrize("load", [1e120, -3e190])
+def test_a_load_whose_square_overflows(load):
+    with pytest.raises(sb.InputError, match="transverse_force"):
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=2, imperfection=sb.Imperfection(point_load=load))

@@ -54,9 +54,16 @@ def test_a_step_does_not_depend_on_what_was_chosen_before(monkeypatch) -> None:
     monkeypatch.setattr(step_size, "_CHOSEN", type(step_size._CHOSEN)())
     own = sb.ReducedModel.from_beam(default_values.BEAM, modes=4, damping_ratio=0.005)
     given = sb.ReducedModel.from_beam(
-        default_values.BEAM, modes=4, damping_ratio=0.005, reference_frequency=81.85
+        default_values.BEAM, modes=4, damping_ratio=0.005, reference_frequency=82.75
     )
     alone = flight_step(own, 4, 2.5e-7)
     step_size._CHOSEN.clear()
     assert flight_step(given, 4, 2.5e-7) != alone
     assert flight_step(own, 4, 2.5e-7) == alone
+
+
+@pytest.mark.parametrize("frequency", [0.02, 3e-7, 2e-290])
+def test_a_low_reference_frequency_does_not_lengthen_the_steps(frequency):
+    own = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
+    given = sb.ReducedModel.from_beam(default_values.BEAM, modes=2, reference_frequency=frequency)
+    assert flight_step(given, 4, 2.5e-7) == flight_step(own, 4, 2.5e-7)

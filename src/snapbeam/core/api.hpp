@@ -20,7 +20,10 @@ struct Problem {
     int channels;
     const int *laws;              // law of each channel
     int signals;
+    const int *signal_kinds;      // a SignalKind of each
+    const int *windows;           // signal by which each is multiplied, -1: none
     const double *uses;           // (channels, signals): factor of each signal in the motion or force of a channel
+    int jumps;                    // of signals, of a run at most
     int law_numbers;              // numbers of a law in Batch.numbers
     const double *center;         // row of the centre, (modes,)
     const double *high;           // 1 of a mode that counts as high, else 0; null: none does
@@ -39,8 +42,14 @@ enum RunNumber : int {
     TICK, STEP, END, OUTPUT_INTERVAL, LAST_QUARTER, WELL_SIGN, CONTACT_STEP, HALVINGS, DECIDE_ENERGY, DECIDE_REACH, DECIDE_CROSSINGS,
     MAX_STEPS, STRETCH, CALM_ENERGY, RUN_NUMBERS
 };
-// Numbers of a signal: mean + amplitude sin(rate t + phase); its period in ticks, 0 if it has none.
-enum SignalNumber : int { MEAN, AMPLITUDE, RATE, PHASE, PERIOD, SIGNAL_NUMBERS };
+// Numbers of a signal (signals.hpp): of a tone, with its period in ticks, 0 if it has none; of pieces; of a sweep.  SHIFT is the time of
+// its own at which a run begins, s; MOST_ are bounds of value, slope and second derivative.
+enum SignalKind : int { TONE, PIECES, SWEEP, SIGNAL_KINDS };
+enum SignalNumber : int {
+    MEAN, AMPLITUDE, RATE, PHASE, PERIOD, EXPONENTIAL, MOST_VALUE, MOST_SLOPE, MOST_BEND, SIGNAL_NUMBERS,
+    GAIN = 0, FIRST_PIECE = 1, PIECE_COUNT = 2, SHIFT = 3, SPEED = 0, FIRST_RATE = 1, LAST_RATE = 2, DURATION = 4
+};
+constexpr int PIECE_NUMBERS = 7;  // begin of a piece, s, and six coefficients
 enum Status : int { OK, EARLY_STOP, RUNNING, DIVERGED, STEP_LIMIT };
 enum Statistic : int {
     STATUS, TIME, SIDE, CROSSINGS, LATE_CROSSINGS, LAST_CROSSING, STEPS, TRIALS, SAMPLED_STEPS, MIN_DISPLACEMENT,
@@ -73,6 +82,8 @@ struct Batch {
     int runs;
     const double *run;            // (runs, RUN_NUMBERS)
     const double *signals;        // (runs, signals, SIGNAL_NUMBERS)
+    const double *pieces;         // (pieces, PIECE_NUMBERS)
+    const double *jumps;          // (runs, jumps): ticks, ascending, after which a signal or a derivative has jumped
     const double *numbers;        // (runs, channels, law_numbers)
     const double *offset;         // (runs, channels): of a contact, penetration in the first well with its signals at 0
     const double *since;          // (runs, channels): ticks in contact at the start, negative: apart, NaN: the penetration decides

@@ -41,8 +41,9 @@ template <class L> struct Group {
     Event<L> *events;             // of each channel
     Cell *spare;                  // rows and channels that a record puts aside
     Channel<L> *spare_channel;
+    Real jump, turned;            // next jump of a signal, ticks; steps since tones were taken from the time
     Real step, contact_step, end, limit, output_interval, halvings, most_steps, stretch, stretch_at_rest, calm, energy;
-    int run[L::runs], output[L::runs];
+    int run[L::runs], output[L::runs], next_jump[L::runs];
 
     void lay_out(Structure<L> &structure, const Batch &b, Arena &arena) {
         s = &structure, problem = s->problem, batch = &b;
@@ -86,16 +87,20 @@ template <class L> struct Group {
             for (int i = 0; i < n; ++i) row[i] = Cell(0.0);
         for (long i = 0; i < long(s->composition.distinct) * n * 4; ++i) own[i] = Plain(0.0);
         for (long i = 0; i < long(s->composition.distinct) * n * 4 * problem->levels; ++i) tables[i] = Plain(0.0);
-        alive = again = landing = FromBits<Marks>::of(0);
+        alive = again = landing = z.jumping = FromBits<Marks>::of(0);
         Real *zeros[] = {&ticks, &wanted, &event, &tries, &cuts, &key, &step, &end, &limit, &output_interval, &contact_step, &halvings,
-                         &most_steps, &stretch, &stretch_at_rest, &calm, &energy, &z.t};
+                         &most_steps, &stretch, &stretch_at_rest, &calm, &energy, &jump, &turned, &z.t, &z.ticks};
         for (Real *x : zeros) *x = Real(0.0);
         z.tick = z.sign = z.parts = Real(1.0), z.h = z.gq = z.qr = z.along_g = z.along_r = Number(0.0), z.next_gq = Cell(0.0);
         z.flows = own;
         for (int i = 0; i < z.signals; ++i) {
             Signal<L> &one = z.signal[i];
-            one.mean = one.amplitude = one.rate = one.phase = Number(0.0), one.period = Real(0.0);
-            one.begin(z.t, z.tick), one.set_length(s->composition, z.h);
+            one.kind = problem->signal_kinds[i], one.pieces = batch->pieces;
+            one.window = problem->windows[i] < 0 ? nullptr : z.signal + problem->windows[i];
+            for (Number &x : one.p) x = Number(0.0);
+            one.at = one.begun = one.kept = Moment<L>{Number(0.0), Number(1.0), Number(0.0), Number(0.0), Number(0.0), Number(0.0)};
+            for (int &x : one.piece) x = 0;
+            one.set_length(s->composition, z.h);
         }
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
@@ -124,7 +129,8 @@ template <class L> struct Group {
     template <class F> void visit(F number) {
         const int n = s->cells;
         for (int i = 0; i < n; ++i) number(z.q[i]), number(z.p[i]), number(z.k[i]);
-        number(z.t), number(z.sign), number(z.gq), number(z.qr), number(stretch), number(energy);
+        for (int i = 0; i < z.signals; ++i) z.signal[i].visit(number);
+        number(z.t), number(jump), number(turned), number(z.sign), number(z.gq), number(z.qr), number(stretch), number(energy);
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
             number(c.onset), number(c.safe), number(c.d0), number(c.r0), number(c.own_impulse), number(c.deepest), number(c.hardest);
@@ -152,7 +158,7 @@ template <class L> struct Group {
         set_lane(z.h, l, 0.0), set_lane(ticks, l, 0.0), set_lane(key, l, -1.0);
         if (!there) return false;
         const int i = batch->order[taken], modes = problem->modes;
-        run[l] = i, output[l] = 0;
+        run[l] = i, output[l] = 0, next_jump[l] = -1;
         using namespace snapbeam;
         set_lane(z.tick, l, of_run(i, TICK)), set_lane(step, l, of_run(i, STEP)), set_lane(end, l, of_run(i, END));
         set_lane(output_interval, l, of_run(i, OUTPUT_INTERVAL)), set_lane(z.sign, l, of_run(i, WELL_SIGN));
@@ -161,9 +167,7 @@ template <class L> struct Group {
         set_lane(z.parts, l, s->parts(of_run(i, STEP) * of_run(i, TICK)));
         for (int k = 0; k < z.signals; ++k) {
             const double *numbers = batch->signals + (long(i) * z.signals + k) * SIGNAL_NUMBERS;
-            Signal<L> &one = z.signal[k];
-            set_lane(one.mean, l, numbers[MEAN]), set_lane(one.amplitude, l, numbers[AMPLITUDE]), set_lane(one.rate, l, numbers[RATE]);
-            set_lane(one.phase, l, numbers[PHASE]), set_lane(one.period, l, numbers[PERIOD]);
+            for (int x = 0; x < SIGNAL_NUMBERS; ++x) set_lane(z.signal[k].p[x], l, numbers[x]);
         }
         for (int m = 0; m < modes; ++m) {
             set_element<L>(z.q, s->place[m], l, batch->q[long(i) * modes + m]);
@@ -191,6 +195,7 @@ template <class L> struct Group {
         }
         const double *observed = batch->rows + long(row_of[z.channels]) * modes;
         totals.load(*batch, i, l, observed, rest[z.channels]);
+        advance_jump(l);
         // flows of the steps of every length
         const int n = s->cells, distinct = s->composition.distinct;
         for (int level = 0; level < problem->levels; ++level) {
@@ -208,12 +213,21 @@ template <class L> struct Group {
         return true;
     }
 
+    // The next jump of run l after its time.
+    void advance_jump(int l) {
+        const double *jumps = batch->jumps + long(run[l]) * problem->jumps;
+        do ++next_jump[l];
+        while (next_jump[l] < problem->jumps && jumps[next_jump[l]] <= lane(z.t, l));
+        set_lane(jump, l, next_jump[l] < problem->jumps ? jumps[next_jump[l]] : NEVER);
+    }
+
     // First observation of runs that begin, or begin again from their state alone at an output.
     void start(unsigned fresh, bool continued = false) {
         if (!fresh) return;
         const Marks which = FromBits<Marks>::of(fresh);
         const int n = s->size();
-        begin_signals();
+        begin_signals(which, which);
+        assign(which, turned, Real(0.0));
         for (int j = 0; j < z.channels; ++j)
             if (!z.channel[j].contact) z.channel[j].active = true;
         for (int i = 0; i < n; ++i) z.q1[i] = z.q[i], z.p1[i] = z.p[i];
@@ -249,15 +263,17 @@ template <class L> struct Group {
         }
     }
 
-    SNAPBEAM_FN void begin_signals() {
-        for (int i = 0; i < z.signals; ++i) z.signal[i].begin(z.t, z.tick);
+    SNAPBEAM_FN void begin_signals(Marks anchored, Marks fresh) {
+        for (int i = 0; i < z.signals; ++i) z.signal[i].begin(anchored, fresh, z.t, z.tick), z.signal[i].at = z.signal[i].begun;
     }
 
     // --- propose --------------------------------------------------------------------------------------------------------
     SNAPBEAM_FN void propose() {
         const Marks fresh = alive & (!again);
         const int n = s->size();
-        begin_signals();
+        const Marks anchored = fresh & (turned >= Real(ANCHOR));
+        begin_signals(anchored, fresh);
+        assign(anchored, turned, Real(0.0));
         if (problem->shift) {  // modes about the well that the beam is near
             const Marks crossed = fresh & (z.sign * totals.center.u * Real(problem->center_rest) < Real(0.0));
             if (any(crossed)) {
@@ -301,9 +317,10 @@ template <class L> struct Group {
             length = select(more, next, length), next = select(more, Real(0.5) * next, next), level += select(more, Real(1.0), Real(0.0));
         }
         limit = min(limit_of_outputs(), end);
-        landing = fresh & (z.t + length >= limit);
-        length = select(landing, limit - z.t, length);
-        ticks = select(alive, select(again, wanted, length), Real(0.0));
+        landing = fresh & (z.t + length >= min(limit, jump));
+        length = select(landing, min(limit, jump) - z.t, length);
+        ticks = z.ticks = select(alive, select(again, wanted, length), Real(0.0));
+        z.jumping = alive & (!(z.t + ticks < jump));
         z.h = Number(ticks * z.tick);
         const Marks changed = alive & differ(ticks, key);
         if (any(changed)) new_flows(changed, level, again | landing);
@@ -366,13 +383,12 @@ template <class L> struct Group {
         Real found = Real(2.0), d0 = min(value(c.d0), Real(0.0)), r0 = value(c.r0);
         const int n = s->size();
         keep_signals();
-        begin_signals();
-        advance_signals(inside.part);
+        for (int i = 0; i < z.signals; ++i) z.signal[i].at = z.signal[i].begun, z.signal[i].ahead(0, Number(inside.part));
         for (;;) {
             const Marks within = near & (inside.share < inside.parts) & (found > Real(1.0));
             if (!any(within)) break;
             inside.advance(*s);
-            for (int i = 0; i < z.signals; ++i) z.signal[i].advance(z.signal[i].ahead_sine[0], z.signal[i].ahead_cosine[0]);
+            for (int i = 0; i < z.signals; ++i) z.signal[i].advance(0);
             const Real d1 = value(c.offset) + value(signal_of(z, c)) - rest - value(dot<L>(c.row, inside.q, n));
             const Real r1 = value(signal_slope(z, c)) - value(dot<L>(c.row, inside.p, n));
             const Cubic<Real> gap(d0, r0, d1, r1, inside.part);
@@ -388,19 +404,10 @@ template <class L> struct Group {
     }
     // While the inside of a step is followed, the signals at its end are kept.
     SNAPBEAM_FN void keep_signals() {
-        for (int i = 0; i < z.signals; ++i) z.signal[i].kept_sine = z.signal[i].sine, z.signal[i].kept_cosine = z.signal[i].cosine;
+        for (int i = 0; i < z.signals; ++i) z.signal[i].kept = z.signal[i].at;
     }
     SNAPBEAM_FN void restore_signals() {
-        for (int i = 0; i < z.signals; ++i) {
-            z.signal[i].sine = z.signal[i].kept_sine, z.signal[i].cosine = z.signal[i].kept_cosine;
-            z.signal[i].set_length(s->composition, z.h);
-        }
-    }
-    SNAPBEAM_FN void advance_signals(Real part) {
-        for (int i = 0; i < z.signals; ++i) {
-            const Turn<Number> ahead = turn(Number(z.signal[i].rate * Number(part)));
-            z.signal[i].ahead_sine[0] = ahead.sine, z.signal[i].ahead_cosine[0] = ahead.cosine;
-        }
+        for (int i = 0; i < z.signals; ++i) z.signal[i].at = z.signal[i].kept, z.signal[i].set_length(s->composition, z.h);
     }
 
     // Open contacts that may close within the step.
@@ -417,9 +424,8 @@ template <class L> struct Group {
         Real tip = Real(0.0), tip_doubt = Real(0.0);
         for (int i = 0; i < c.uses; ++i) {
             const Signal<L> &one = z.signal[c.signal[i]];
-            const Real factor = Real(c.factor[i] < 0 ? -c.factor[i] : c.factor[i]), w = value(one.rate) * h, w2 = w * w;
-            tip = fma(factor, value(one.greatest_slope()), tip);
-            tip_doubt = fma(factor * abs(value(one.amplitude)), min(w2 * w2 * Real(1.0 / 384.0), Real(2.5)), tip_doubt);
+            const Real factor = Real(c.factor[i] < 0 ? -c.factor[i] : c.factor[i]);
+            tip = fma(factor, value(one.greatest_slope()), tip), tip_doubt = fma(factor, value(one.doubt(Number(h))), tip_doubt);
         }
         const Real push = largest_push(z, c.row, horizon, amplitude, [&](int j) { return value(c.M[j]); });
         const Real bound = fma(Real(MARGIN), L::total(speed), fma(push, horizon, tip));
@@ -559,7 +565,14 @@ template <class L> struct Group {
             Cell *q = z.q, *p = z.p, *k = z.k;
             z.q = z.q1, z.p = z.p1, z.k = z.k1, z.q1 = q, z.p1 = p, z.k1 = k;
         }
-        z.t = select(ok, z.t + ticks, z.t);
+        z.t = select(ok, z.t + ticks, z.t), turned += select(ok, Real(1.0), Real(0.0));
+        for (int i = 0; i < z.signals; ++i) assign(ok, z.signal[i].begun.sine, z.signal[i].at.sine), assign(ok, z.signal[i].begun.cosine, z.signal[i].at.cosine);
+        const Marks jumped = ok & (!(z.t < jump));
+        if (any(jumped)) {
+            for (int l = 0; l < L::runs; ++l)
+                if (lane(jumped, l)) advance_jump(l);
+            for (int i = 0; i < z.signals; ++i) z.signal[i].begin(FromBits<Marks>::of(0), jumped, z.t, z.tick), z.signal[i].at = z.signal[i].begun;
+        }
         assign(ok, stretch, Real(value(fma(Number(2.0), z.gq, z.qr))));
         Marks changed = FromBits<Marks>::of(0);
         for (int j = 0; j < z.channels; ++j) {
@@ -581,6 +594,11 @@ template <class L> struct Group {
             assign(on | off, c.d0, Number(0.0));  // the gap at an event is zero
             changed = changed | on | off | force;
         }
+        if (any(jumped))  // the velocity of a striker may jump
+            for (int j = 0; j < z.channels; ++j) {
+                Channel<L> &c = z.channel[j];
+                if (c.contact) assign(jumped, c.r0, signal_slope(z, c) - dot<L>(c.row, z.p, n)), assign(jumped, c.safe, z.t);
+            }
         if (any(changed)) {
             assign(changed, energy, totals.energy(z, true));
             for (int j = 0; j < z.channels; ++j) assign(changed, z.channel[j].safe, z.t);

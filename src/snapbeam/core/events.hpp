@@ -109,8 +109,7 @@ SNAPBEAM_FN typename L::Real largest_push(const Runs<L> &z, const Row *row, type
             most = Real(0.0);
             for (int i = 0; i < c.uses; ++i) {
                 const Signal<L> &one = z.signal[c.signal[i]];
-                const Real size = abs(value(one.amplitude));
-                const Real own = c.law == BASE ? size * value(one.rate * one.rate) : size + abs(value(one.mean));
+                const Real own = value(c.law == BASE ? one.greatest_bend() : one.greatest_value());
                 most = fma(Real(c.factor[i] < 0 ? -c.factor[i] : c.factor[i]), own, most);
             }
         } else if (!c.contact) {

@@ -159,6 +159,13 @@ static Problem problem_of(Arguments &a) {
         if (p.laws[j] < 0 || p.laws[j] >= plain::LAWS) a.refuse("laws", "must be numbers of laws");
     p.signals = a.integer("signals", 0, 100000);
     p.uses = a.array<double>("uses", {channels, size_t(p.signals)});
+    p.signal_kinds = a.array<int>("signal_kinds", {size_t(p.signals)}), p.windows = a.array<int>("windows", {size_t(p.signals)});
+    for (int i = 0; i < p.signals; ++i) {
+        if (p.signal_kinds[i] < 0 || p.signal_kinds[i] >= snapbeam::SIGNAL_KINDS) a.refuse("signal_kinds", "must be numbers of kinds");
+        const int by = p.windows[i];
+        if (by < -1 || by >= p.signals || (by >= 0 && p.windows[by] != -1)) a.refuse("windows", "must be numbers of signals without a window, or -1");
+    }
+    p.jumps = a.integer("jumps", 0, 1000000);
     p.law_numbers = a.integer("law_numbers", 0, 64);
     for (size_t j = 0; j < channels; ++j)
         if (plain::with_law(p.laws[j], [](auto law) { return int(law.numbers); }) > p.law_numbers) a.refuse("law_numbers", "is less than a law has");
@@ -197,6 +204,19 @@ static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
         if (!(run[CALM_ENERGY] >= 0.0)) a.refuse("run", "must not have a negative energy of calm motion");
     }
     b.signals = a.array<double>("signals", {runs, size_t(p.signals), SIGNAL_NUMBERS});
+    const size_t pieces = a.length("pieces");
+    b.pieces = a.array<double>("pieces", {pieces, size_t(PIECE_NUMBERS)});
+    for (size_t i = 0; i < runs * size_t(p.signals); ++i) {
+        const double *s = b.signals + i * SIGNAL_NUMBERS;
+        const int kind = p.signal_kinds[i % size_t(p.signals)];
+        if (kind == SWEEP && !(s[FIRST_RATE] > 0.0 && s[LAST_RATE] > 0.0 && s[DURATION] > 0.0)) a.refuse("signals", "must have sweeps of positive rates and durations");
+        if (kind == PIECES && !(s[FIRST_PIECE] >= 0.0 && s[PIECE_COUNT] >= 1.0 && s[FIRST_PIECE] + s[PIECE_COUNT] <= double(pieces) &&
+                                s[FIRST_PIECE] == std::floor(s[FIRST_PIECE]) && s[PIECE_COUNT] == std::floor(s[PIECE_COUNT])))
+            a.refuse("signals", "must have pieces of the table");
+    }
+    b.jumps = a.array<double>("jumps", {runs, size_t(p.jumps)}, false);
+    for (size_t i = 0; i < runs * size_t(p.jumps); ++i)
+        if (!(b.jumps[i] >= 0.0 && (i % size_t(p.jumps) == 0 || b.jumps[i] >= b.jumps[i - 1]))) a.refuse("jumps", "must be ticks, ascending");
     b.numbers = a.array<double>("numbers", {runs, channels, size_t(p.law_numbers)});
     b.offset = a.array<double>("offset", {runs, channels}), b.since = a.array<double>("since", {runs, channels}, false);
     b.rows = a.array<double>("rows", {rows, n});

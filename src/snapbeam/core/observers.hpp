@@ -61,6 +61,7 @@ template <class L> void record_inside(Group<L> &run) {
     if (to.marks[0] >= to.instants || !(to.times[to.marks[0]] <= end || last)) return;
     const int n = run.s->cells;
     const Runs<L> kept = z;
+    z.jumping = FromBits<typename L::Marks>::of(0);
     run.keep_signals();
     for (int i = 0; i < n; ++i) run.spare[i] = z.q1[i], run.spare[n + i] = z.p1[i], run.spare[2 * n + i] = z.k1[i];
     for (int j = 0; j < z.channels; ++j) run.spare_channel[j] = z.channel[j];

@@ -59,7 +59,8 @@ template <class L> struct Runs {
     Number *block;                        // arrays of the velocity block
     int *late;                            // channels of it
     Real t, tick, sign;                   // sign: +1 about the first well, -1 about its mirror image
-    Real parts;                           // in which a step is followed inside
+    Real ticks, parts;                    // length of the step; parts in which it is followed inside
+    typename L::Marks jumping;            // the step ends at a jump of a signal
     Number h;                             // s
     Cell next_gq;                         // cells of g.q after a flow
     Number gq, qr, along_g, along_r, dissipated;
@@ -311,7 +312,7 @@ template <class L> SNAPBEAM_FN void timed_work(Runs<L> &z, Channel<L> &c, typena
 template <class L> SNAPBEAM_FN void begin_step(Runs<L> &z) {
     typedef typename L::Number Number;
     z.dissipated = Number(0.0), z.direct = true;
-    for (int i = 0; i < z.signals; ++i) z.signal[i].sine = z.signal[i].sine0, z.signal[i].cosine = z.signal[i].cosine0;
+    for (int i = 0; i < z.signals; ++i) z.signal[i].at = z.signal[i].begun;
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
         c.impulse = c.work = c.lost = Number(0.0);
@@ -400,7 +401,9 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
     }
     z.next_gq = gq;
     if (z.account) z.dissipated = fma(Number(0.5), L::total(before - after), z.dissipated);
-    for (int i = 0; i < z.signals; ++i) z.signal[i].advance(z.signal[i].ahead_sine[which], z.signal[i].ahead_cosine[which]);
+    for (int i = 0; i < z.signals; ++i) z.signal[i].advance(which);
+    if (stage + 1 == s.composition.flows && any(z.jumping))
+        for (int i = 0; i < z.signals; ++i) z.signal[i].before_jump(z.jumping, z.t + z.ticks, z.tick);
 }
 
 // The whole step from q, p, k to q1, p1, k1; rows of a length that the compiler knows stay in registers.

@@ -8,16 +8,16 @@ import re
 import tempfile
 import warnings
 import zipfile
-import zlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.lab.diagnostics import KINDS_SIGNAL
+from snapbeam.lab.matlab_file import read_version_5
 from snapbeam.lab.signals import check_signal, even_sampling, si_unit
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.hdf5 import open_hdf5
@@ -786,62 +786,13 @@ def read_matlab(path: Path, _told: Told) -> list[Channel]:
     with open(path, "rb") as file:
         start = file.read(512)
     newer = start[:8] == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in start[:128]
-    values = _version_73(path) if newer else _version_5(path)
+    values = _version_73(path) if newer else read_version_5(path)
     channels = _channels({name: _Stored(value, {}) for name, value in values.items()}, {})
     if not channels:
         raise InputError(
             "holds no vector or matrix of numbers (objects and cells are not read; save as numbers)"
         )
     return channels
-
-
-def _version_5(path: Path) -> dict[str, Any]:
-    from scipy.io import loadmat
-
-    refuse_inflated("path", path, _stated_matlab_size(path))
-    loaded = loadmat(path, squeeze_me=True, struct_as_record=True, chars_as_strings=True)
-    values: dict[str, Any] = {}
-
-    def take(name: str, item: Any, depth: int) -> None:
-        array = np.asarray(item)
-        if array.dtype.names and depth < 4:
-            for key in array.dtype.names:
-                inner = array[key]
-                nested = inner.dtype == object and inner.ndim == 0
-                take(f"{name}/{key}", inner.item() if nested else inner, depth + 1)
-        elif array.dtype.kind in "iufU":
-            values[name] = array
-
-    for name, item in loaded.items():
-        if not name.startswith("__"):
-            take(name, item, 0)
-    return values
-
-
-def _stated_matlab_size(path: Path) -> int:
-    """Bytes of the variables of a MATLAB file of version 4 or 5 as its headers state them, 8 for a number.
-
-    The numbers of structures and cells are not counted in any header: each may take one byte in the file.
-    """
-    from scipy.io import whosmat
-
-    arrays = {"double", "single", "logical", "char", "sparse"} | {
-        f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)
-    }
-    variables = whosmat(path)
-    size = sum(8 * math.prod(map(int, shape)) for _, shape, kind in variables if kind in arrays)
-    if all(kind in arrays - {"sparse"} for *_, kind in variables):
-        return size
-    with open(path, "rb") as file:
-        order: Literal["little", "big"] = "little" if file.read(128)[126:] == b"IM" else "big"
-        while len(tag := file.read(8)) == 8:
-            kind, length = (int.from_bytes(tag[at : at + 4], order) for at in (0, 4))
-            start = file.tell()
-            if kind == 15:  # a compressed element, whose own tag states its length
-                inner = zlib.decompressobj().decompress(file.read(min(length, 64)), 8)
-                size += 8 * int.from_bytes(inner[4:8], order)
-            file.seek(start + length)
-    return size
 
 
 def _version_73(path: Path) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Drive, Scale, Timed, smooth_rise
+from snapbeam.model.drive.components import Component, in_pieces, rising
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.validation import InputTypeError, shown
 
@@ -134,6 +135,17 @@ class LoadRamp(LoadMotion, Timed):
             "duration": duration,
             "hold_periods": columns["hold_periods"] * cycle,
         }
+
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """The way there, the stay, and the way back."""
+        found = self.shape_numbers(columns, scale)
+        duration, back = found["duration"], found["duration"] + found["hold_periods"]
+        return [
+            in_pieces(
+                (np.zeros(1), rising(duration)), (duration, {0: np.ones(1)}), (back, rising(duration, back=True)),
+                (back + duration, {}), gain=found["change"],
+            )
+        ]  # fmt: skip
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
         """Maximum change, N, and maximum rate, N/s."""

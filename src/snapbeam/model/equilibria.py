@@ -82,6 +82,10 @@ def equilibria_of(stiffness: _Array, gamma: float, force: _Array) -> list[tuple[
     if gamma == 0.0:
         found = [(turned / kappa, int((kappa < 0.0).sum()))]
     else:
+        stiff = np.abs(kappa)
+        turned = np.where(np.abs(turned) < _NO_FORCE * stiff * np.sqrt(stiff / gamma), 0.0, turned)
+        if not np.abs(turned).max(initial=0.0) < _MOST_FORCE:
+            raise InputError(f"transverse_force: must be less than {_MOST_FORCE:g} N in each mode")
         found = [_amplitude(kappa, turned, gamma, *root) for root in _roots(kappa, turned, gamma)]
         found += _branches(kappa, turned, gamma)
     return found if axes is None else [(axes @ each, index) for each, index in found]
@@ -195,6 +199,9 @@ def _distance(function: Callable[[float], float], reach: float, pole: bool) -> f
 
 _ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 _LEAST = -700.0
+_NO_FORCE = 1e-20
+"""Force on a mode that no digit of an equilibrium shows, over that at its own buckling level."""
+_MOST_FORCE = 1e100
 _POLISHINGS = 2
 _SMALL = 1e-6
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Drive, Scale, Timed, sincos
+from snapbeam.model.drive.components import Component, Tone, hermite, sampled
 from snapbeam.model.drive.sampled import FileKeys, Sampled, require_unit
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, check_label, quantity
 from snapbeam.model.reduced_model import ReducedModel
@@ -101,6 +102,17 @@ class HarmonicForce(ForceHistory):
         """One period of the sine."""
         return np.asarray(2.0 * math.pi / (columns["frequency_ratio"] * scale.omega))
 
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """A tone about the mean."""
+        return [
+            Tone(
+                columns["amplitude"],
+                columns["frequency_ratio"] * scale.omega,
+                columns["phase"],
+                columns["mean"],
+            )
+        ]
+
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Maximum force, N."""
         return np.asarray(columns["amplitude"] + np.abs(columns["mean"]))
@@ -145,6 +157,11 @@ class ConstantForce(ForceHistory, Timed):
     def constant_part(self) -> float:
         """The force, N."""
         return self.force
+
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """A mean."""
+        nothing = np.zeros(columns["force"].size)
+        return [Tone(nothing, nothing, 0.0, columns["force"])]
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A period of the first mode."""
@@ -210,6 +227,11 @@ class RecordedForce(FileKeys, ForceHistory, Sampled):
         pairs = self.samples().reshape(-1, 2)
         most = np.abs(pairs[:, 0]).max() + 8.0 / 27.0 * np.abs(pairs[:, 1]).max() / self.sampling_frequency
         return np.full(next(iter(columns.values())).size, float(most))
+
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """The cubics between samples."""
+        pairs, interval = self.samples().reshape(-1, 2), 1.0 / self.sampling_frequency
+        return [sampled(hermite(pairs[:, 0], pairs[:, 1], interval), interval)]
 
     def samples(self) -> _Array:
         """Force and slope of the spline, sample after sample."""

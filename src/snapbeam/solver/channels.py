@@ -22,10 +22,11 @@ from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.contact.kelvin_voigt import KelvinVoigt
 from snapbeam.model.contact.layered_hertz import LayeredHertz
 from snapbeam.model.contact.power_law import PowerLaw
-from snapbeam.model.drive.base import HORIZON, Drive
+from snapbeam.model.drive.base import Drive
+from snapbeam.model.drive.components import Pieces, Sweep, Tone
 from snapbeam.model.drive.fixed_stop import FixedStop
-from snapbeam.model.drive.sine import Sine
-from snapbeam.model.external_force import ConstantForce, HarmonicForce
+from snapbeam.model.drive.sum import SumDrive
+from snapbeam.model.external_force import ForceHistory
 from snapbeam.model.local_force import (
     CoulombFriction,
     ElectrostaticForce,
@@ -33,7 +34,7 @@ from snapbeam.model.local_force import (
     MagneticForce,
     QuadraticDamping,
 )
-from snapbeam.model.quantity import section_of, split_name
+from snapbeam.model.quantity import numbered, section_of, split_name
 from snapbeam.model.system import System
 from snapbeam.solver.further_contacts import LAW, OFFSET, REST, SINCE
 from snapbeam.util.validation import InputError
@@ -54,6 +55,18 @@ LAWS: dict[type, tuple[int, tuple[str, ...]]] = {
 }
 """Number of each law in ``core/laws.hpp``, and the names of its numbers in their order there."""
 EXTERNAL_FORCE, BASE, AXIAL_LOAD = 11, 12, 13
+SIGNAL = (
+    "mean",
+    "amplitude",
+    "rate",
+    "phase",
+    "period",
+    "exponential",
+    "most_value",
+    "most_slope",
+    "most_bend",
+)
+"""Numbers of a tone; those of pieces are gain, first piece, pieces, time, of a sweep speed, first and last rate, time, duration."""
 LAW_NUMBERS = 3
 
 
@@ -67,7 +80,15 @@ class Channels:
     uses: _Array
     """Factor of each signal in each channel, shape (channels, signals)."""
     signals: _Array
-    """Mean, amplitude, rate, phase and period in ticks, shape (runs, signals, 5)."""
+    """Numbers of the signals, in the order of ``core/api.hpp: SignalNumber``; shape (runs, signals, 9)."""
+    kinds: NDArray[np.int32]
+    """0: tone, 1: pieces, 2: sweep; shape (signals,)."""
+    windows: NDArray[np.int32]
+    """Signal by which each is multiplied, -1: none; shape (signals,)."""
+    pieces: _Array
+    """Begin (s) and coefficients of the pieces of all signals, shape (pieces, 7)."""
+    jumps: _Array
+    """Times at which a derivative jumps, s; shape (runs, jumps)."""
     numbers: _Array
     """Numbers of the laws, shape (runs, channels, LAW_NUMBERS)."""
     offset: _Array
@@ -95,7 +116,12 @@ class _Builder:
         self.row_of: list[NDArray[np.int64]] = []
         self.rest: list[_Array] = []
         self.uses: list[dict[str, float]] = []
-        self.signals: dict[str, _Array] = {}
+        self.sections: list[str] = []
+        self.kinds: list[int] = []
+        self.windows: list[int] = []
+        self.signals: list[_Array] = []
+        self.pieces: list[_Array] = []
+        self.jumps: dict[str, _Array] = {}
 
     def add(self, law: int, rows: _Array, which: Any, rest: Any, uses: dict[str, float], numbers: Any = (), offset: Any = 0.0, since: Any = -1.0) -> None:  # fmt: skip
         """Add a channel: its law, rows and which of them each run has, and the factors of its signals."""
@@ -116,18 +142,40 @@ class _Builder:
         self.row_of.append(np.broadcast_to(np.asarray(which) + first, self.runs))
         self.rest.append(np.broadcast_to(np.asarray(rest, float), self.runs))
 
+    def add_signal(self, section: str, kind: int, numbers: _Array, window: int | None = None) -> int:
+        """Add a signal of a section; returns its number."""
+        self.sections.append(section)
+        self.kinds.append(kind)
+        self.windows.append(-1 if window is None else window)
+        self.signals.append(numbers)
+        return len(self.signals) - 1
+
+    def add_pieces(self, section: str, each: Pieces, begun: _Array, most: _Array | None = None, sign: float = 1.0) -> int:  # fmt: skip
+        """Add a signal of pieces; runs with the same pieces share them."""
+        tables = np.concatenate((each.begins[..., None], each.coefficients), axis=2)
+        which = np.zeros(self.runs, dtype=np.int64)
+        if len(tables) > 1:
+            flat = tables.reshape(len(tables), -1)
+            _, first, which = np.unique(flat, axis=0, return_index=True, return_inverse=True)
+            tables = tables[first]
+        length = tables.shape[1]
+        numbers = np.zeros((self.runs, len(SIGNAL)))
+        numbers[:, 0], numbers[:, 1] = sign * each.gain, sum(map(len, self.pieces)) + which * length
+        numbers[:, 2], numbers[:, 3] = length, begun
+        numbers[:, 6:] = 0.0 if most is None else most
+        self.pieces.append(tables.reshape(-1, 7))
+        return self.add_signal(section, 1, numbers)
+
     def built(self, contacts: int) -> Channels:
         """Everything as arrays."""
-        names, shape = list(self.signals), (len(self.laws), self.runs)
-        uses = np.zeros((len(self.laws), len(names)))
-        for j, each in enumerate(self.uses):
-            for name, factor in each.items():
-                uses[j, names.index(name)] = factor
-        signals = (
-            np.stack([self.signals[name] for name in names], axis=1) if names else np.zeros((self.runs, 0, 5))
-        )
+        shape = (len(self.laws), self.runs)
+        uses = np.array([[each.get(name, 0.0) for name in self.sections] for each in self.uses])
+        signals = np.stack(self.signals, axis=1) if self.signals else np.zeros((self.runs, 0, len(SIGNAL)))
+        jumps = np.stack(list(self.jumps.values()), axis=1) if self.jumps else np.zeros((self.runs, 0))
         return Channels(
-            np.array(self.laws, np.int32), contacts, uses, signals,
+            np.array(self.laws, np.int32), contacts, uses.reshape(len(self.laws), len(self.sections)), signals,
+            np.array(self.kinds, np.int32), np.array(self.windows, np.int32),
+            np.concatenate(self.pieces) if self.pieces else np.zeros((0, 7)), jumps,
             np.stack(self.numbers, axis=1) if self.laws else np.zeros((self.runs, 0, LAW_NUMBERS)),
             np.array(self.offset).reshape(shape).T.copy(), np.array(self.since).reshape(shape).T.copy(),
             np.concatenate(self.rows), np.ascontiguousarray(np.array(self.row_of, np.int32).T), np.array(self.rest).T.copy(),
@@ -147,7 +195,7 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
     if structure.circuits:
         raise InputError("harvester: is not integrated by engine = 'native'; use engine = 'cpu'")
     for section, drive in _motions(system):
-        built.signals[section] = _signal(system, ensemble, columns, section, drive)
+        _add_motion(built, system, ensemble, columns, section, drive)
     base = system.base_excitation
     up = 1.0 if base is None or base.direction == "up" else -1.0
     for number, contact in enumerate(system.contacts, 1):
@@ -197,35 +245,81 @@ def _motions(system: System) -> list[tuple[str, Drive]]:
     return found + [each for each in system.moving if not each[0].startswith("drive")]
 
 
-def _signal(
-    system: System, ensemble: Any, columns: Mapping[str, _Array], section: str, drive: Drive
-) -> _Array:
-    """Mean, amplitude, rate, phase and period of a motion, shape (runs, 5)."""
-    runs = ensemble.size
-    numbers = np.zeros((runs, 5))
-    if isinstance(drive, FixedStop):
-        return numbers
+_FAR = 1e300
+"""Bound of a motion that has none."""
+
+
+def _own(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:
     own = {
         field: values for name, values in columns.items() for of, field in [split_name(name)] if of == section
-    } or {"": np.zeros(runs)}
-    if isinstance(drive, ConstantForce):
-        numbers[:, 0] = own["force"]
-        return numbers
-    kind = drive.integrated_as or type(drive)
-    if not (kind.harmonic or issubclass(kind, (Sine, HarmonicForce))):
-        raise InputError(
-            f"{section}: {type(drive).__name__} is not integrated by engine = 'native', which has sines and constants; use engine = 'cpu'"
-        )
-    found = drive.numbers(own, system.scale)
-    numbers[:, 0] = own.get("mean", 0.0)
-    numbers[:, 1], numbers[:, 2] = found["amplitude"], found["omega"]
-    table = ensemble.runs
-    if len(system.moving) < 2:
-        numbers[:, 3], numbers[:, 4] = table["phase"], table["period"]
-    else:
-        clock = ensemble.drive_numbers[:, ensemble.drive.number_names.index("omega")]
-        assert HORIZON
-        numbers[:, 3] = own.get("phase", 0.0) + np.fmod(
-            numbers[:, 2] * (table["phase"] / clock), 2.0 * math.pi
-        )
-    return numbers
+    }
+    return own or {"": np.zeros(runs)}
+
+
+def _bounds(drive: Drive, own: Mapping[str, _Array], system: System) -> _Array:
+    """Bounds of the value, slope and second derivative of a motion, shape (runs, 3)."""
+    runs = next(iter(own.values())).size
+    found = np.full((runs, 3), _FAR)
+    if isinstance(drive, ForceHistory):
+        found[:, 0] = drive.peak_acceleration(own, system.scale)
+        return found
+    highest, found[:, 1] = drive.bounds(own, system.scale)
+    found[:, 0] = np.maximum(highest, drive.mirrored_bounds(own, system.scale))
+    if type(drive).can_excite_base():
+        found[:, 2] = drive.peak_acceleration(own, system.scale)
+    return np.minimum(found, _FAR)
+
+
+def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping[str, _Array], section: str, drive: Drive) -> None:  # fmt: skip
+    """Add the components of a motion as signals, named by the section."""
+    runs, table = ensemble.size, ensemble.runs
+    if isinstance(drive, FixedStop):
+        return
+    own = _own(columns, section, runs)
+    alone = len(system.moving) < 2
+    clock = ensemble.drive_numbers[:, ensemble.drive.number_names.index("omega")]
+    begun = table["phase"] / clock
+    kind, number = numbered(section)
+    above = drive.recorded and kind == "drive" and system.contacts[number - 1].striker.side == "above"
+    bounds = _bounds(drive, own, system)
+    components = drive.components(own, system.scale)
+    for k, each in enumerate(components):
+        signal = np.zeros((runs, len(SIGNAL)))
+        most = bounds if k == 0 else np.zeros((runs, 3))
+        window = None
+        if isinstance(each, Tone):
+            size, rate = np.abs(each.amplitude), each.rate
+            signal[:, 0], signal[:, 1], signal[:, 2] = each.mean, each.amplitude, rate
+            signal[:, 3] = each.phase + np.fmod(rate * begun, 2.0 * math.pi)
+            if alone and len(components) == 1 and drive.is_periodic:
+                signal[:, 3], signal[:, 4] = table["phase"], table["period"]
+            if each.window is None:
+                most = np.stack((size + np.abs(each.mean), size * rate, size * rate**2), axis=1)
+            else:
+                window = built.add_pieces(f"{section} window", each.window, begun)
+            kind_of = 0
+        elif isinstance(each, Sweep):
+            signal[:, 0], signal[:, 1], signal[:, 2], signal[:, 3] = each.speed, each.first, each.last, begun
+            signal[:, 4], signal[:, 5] = each.duration, float(each.exponential)
+            kind_of = 2
+        else:
+            built.add_pieces(section, each, begun, most, -1.0 if above else 1.0)
+            continue
+        signal[:, 6:] = most
+        built.add_signal(section, kind_of, signal, window)
+    for name, times in _jumps(drive, own, system).items():
+        built.jumps[f"{section} {name}"] = times - begun
+
+
+def _jumps(drive: Drive, own: Mapping[str, _Array], system: System) -> dict[str, _Array]:
+    """Times at which a derivative of a motion jumps, s since it began."""
+    if isinstance(drive, SumDrive):
+        return {
+            f"{i} {name}": times
+            for i, term, columns in drive.each_term(own)
+            for name, times in _jumps(term, columns, system).items()
+        }
+    if not drive.discontinuities:
+        return {}
+    numbers = drive.numbers(own, system.scale)
+    return {name: numbers[name] for name in drive.discontinuities}

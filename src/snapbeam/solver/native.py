@@ -122,6 +122,9 @@ class _Arrays:
             "laws": channels.laws,
             "signals": channels.signals.shape[1],
             "uses": channels.uses,
+            "signal_kinds": channels.kinds,
+            "windows": channels.windows,
+            "jumps": channels.jumps.shape[1],
             "law_numbers": LAW_NUMBERS,
             "center": row(structure.center),
             "center_rest": float(structure.center_rest),
@@ -153,14 +156,18 @@ class _Arrays:
         run[:, RUN.index("stretch")] = structure.stretch
         run[:, RUN.index("calm_energy")] = TRIED * barrier_of(structure) or math.inf
         signals = channels.signals.copy()
-        signals[:, :, 4] *= finer
-        signals[signals[:, :, 4] > _MOST_TICKS, 4] = 0.0
+        tones = channels.kinds == 0
+        signals[:, tones, 4] *= finer
+        signals[:, :, 4][(signals[:, :, 4] > _MOST_TICKS) & tones] = 0.0
+        jumps = np.sort(np.maximum(np.floor(channels.jumps / run[:, :1]) + 1.0, 0.0), axis=1)
         self.run = run
         ticks = np.rint(channels.since / run[:, :1])
         start = table["start_row"]
         self.batch: dict[str, Any] = {
             "run": run,
             "signals": signals,
+            "pieces": channels.pieces,
+            "jumps": np.minimum(jumps, 1e300),
             "numbers": channels.numbers,
             "offset": channels.offset,
             "since": np.where(channels.since >= 0.0, ticks, channels.since),
@@ -283,7 +290,9 @@ def record(
     span = 2.0 * float(ensemble.step_times[0])
     most = int((np.searchsorted(times, times + span, side="right") - np.arange(times.size)).max(initial=0))
     samples = max(_SAMPLES, most + 8)
-    saved = np.zeros((3 * (n + 64) + count * (9 + len(OF_CHANNEL)) + len(STATISTICS) + 32) * 8)
+    saved = np.zeros(
+        (3 * (n + 64) + count * (9 + len(OF_CHANNEL)) + len(STATISTICS) + 6 * channels.kinds.size + 32) * 8
+    )
     recorder: dict[str, Any] = {
         "times": np.ascontiguousarray(times, dtype=float),
         "in_contact": int(in_contact),

@@ -106,7 +106,7 @@ def flight_step(
     resonances : bool
         Shorten the step until no motion grows at any tension that is held fixed.
     """
-    period = 1.0 / model.reference_frequency
+    period = 1.0 / _first_frequency(model)
     limit *= min(1.0, impact / (_SHORT_IMPACT * period))
     if model.nonlinear_stiffness == 0.0 or not model.tension_matrix.any():
         return period / _FEWEST  # nothing but linear modes, whose flow is exact
@@ -124,6 +124,14 @@ def flight_step(
         while len(_CHOSEN) > _MOST_CHOSEN:
             _CHOSEN.popitem(last=False)
     return _CHOSEN[key]
+
+
+def _first_frequency(model: ReducedModel) -> float:
+    """Frequency of the first mode, Hz, or the one that normalises where that is higher, as of a free mass.
+
+    A given reference frequency far below the first mode must not lengthen the steps.
+    """
+    return max(float(model.about_reference_well.natural_frequencies[0]), model.reference_frequency)
 
 
 _TENSIONS = np.concatenate((np.geomspace(0.02, 0.5, 8), np.linspace(0.75, 8.0, 16)))
@@ -193,7 +201,7 @@ class _Bench:
         model = structure.model
         self.structure = structure
         self.order = order
-        self.period = 1.0 / model.reference_frequency
+        self.period = 1.0 / _first_frequency(model)
         length = model.length_scale or 1.0
         shapes = [model.shape_at(x) for x in _PLACES] if model.beam is not None else [model.midspan_shape]
         if model.contact_shape is not None:
@@ -217,8 +225,7 @@ class _Bench:
         if not impulse_shape.any():
             impulse_shape = np.ones(self.omega.size)
         barrier = (
-            barrier_of(structure)
-            or 0.5 * (2.0 * math.pi * model.reference_frequency / np.abs(self.rows[:, 0]).max()) ** 2
+            barrier_of(structure) or 0.5 * (2.0 * math.pi / self.period / np.abs(self.rows[:, 0]).max()) ** 2
         )
         self.starts = []
         for energy, duration, *_ in _STARTS:
@@ -256,7 +263,7 @@ class _Bench:
             "omega": self.omega.copy(), "sigma": self.damping.copy(), "G": self.coupling, "g": -self.well,
             "gamma": float(self.structure.nonlinear_stiffness), "shift": None, "far_force": self.force.copy(), "second": None, "high": None,
             "beam": np.ones(n), "lift": 0.0, "block_sizes": self.blocks, "laws": np.zeros(0, np.int32),
-            "signals": 0, "uses": nothing, "law_numbers": 0, "center": zero, "center_rest": 0.0, "dividing_height": 0.0, "levels": 2,
+            "signals": 0, "uses": nothing, "signal_kinds": np.zeros(0, np.int32), "windows": np.zeros(0, np.int32), "jumps": 0, "law_numbers": 0, "center": zero, "center_rest": 0.0, "dividing_height": 0.0, "levels": 2,
             "fewest_parts": 1, "parts_per_decay": 1.0,
         }  # fmt: skip
 
@@ -296,7 +303,7 @@ def _free_runs(rest: _Array, velocity: _Array, steps: _Array, counts: _Array) ->
     run[:, 6] = 1.0
     run[:, 8], run[:, 10], run[:, 13] = -math.inf, -1.0, math.inf
     return {
-        "run": run, "signals": np.zeros((runs, 0, 5)), "numbers": np.zeros((runs, 0, 0)), "offset": np.zeros((runs, 0)),
+        "run": run, "signals": np.zeros((runs, 0, 9)), "pieces": np.zeros((0, 7)), "jumps": np.zeros((runs, 0)), "numbers": np.zeros((runs, 0, 0)), "offset": np.zeros((runs, 0)),
         "since": np.zeros((runs, 0)), "rows": np.zeros((1, n)), "row_of": np.zeros((runs, 1), np.int32), "rest": np.zeros((runs, 1)),
         "q": np.tile(rest, (runs, 1)), "p": np.tile(velocity, (runs, 1)), "order": np.argsort(-counts, kind="stable").astype(np.int32),
         "outputs": 1, "states": np.full((runs, 1, 2 * n + 1), np.nan), "statistics": np.zeros((runs, 27)), "of_channels": np.zeros((runs, 0, 10)),
@@ -352,7 +359,7 @@ def choose_base_step(
     duration = 0.0
     if contact is not None and not contact.impulsive:
         mass = model.lightest_contact_mass
-        speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * model.reference_frequency
+        speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * _first_frequency(model)
         duration = contact.time_scale(mass, speed)
     longer = native and order == 4 and not (contact is not None and contact.impulsive)
     limit = limits[accuracy] * (_LONGER if longer else 1.0)
@@ -491,7 +498,7 @@ def require_resolved(system: System, integration: Integration, cycle: _Array) ->
     """
     if integration.step is None:
         return
-    shortest, first = float(cycle.min()), 1.0 / system.model.reference_frequency
+    shortest, first = float(cycle.min()), 1.0 / _first_frequency(system.model)
     for length, words in ((shortest, "a cycle of excitation"), (first, "a period of the first mode")):
         if integration.step * _FEWEST_CLOCK > length * (1.0 + 1e-12):
             raise InputError(

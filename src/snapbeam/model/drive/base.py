@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.model.drive.components import Component, Tone
 from snapbeam.model.extension import check_defined, check_names, overrides
 from snapbeam.model.quantity import check_fields, numbers_type
 from snapbeam.util.diagnostics import Diagnostic
@@ -88,7 +89,7 @@ class Drive:
 
     hooks: ClassVar[tuple[str, ...]] = (
         "name", "number_names", "amplitudes", "discontinuities", "numbers", "cycle", "frequencies", "bounds",
-        "mirrored_bounds", "peak_acceleration", "motion", "acceleration", "samples", "diagnostics",
+        "mirrored_bounds", "peak_acceleration", "motion", "acceleration", "samples", "components", "diagnostics",
         "file_keys", "file_gives",
     )  # fmt: skip
     """Names that are read of a drive of one's own."""
@@ -183,6 +184,15 @@ class Drive:
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Maximum acceleration (m/s^2) ever, shape (runs,): of a motion that a base may have."""
         raise NotImplementedError
+
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """Tones, pieces and sweeps of which the motion is the sum; of a sine the tone of its numbers."""
+        if not self.harmonic:
+            raise InputError(
+                f"{type(self).__name__}: is not integrated by engine = 'native'; use engine = 'cpu'"
+            )
+        found = self.numbers(columns, scale)
+        return [Tone(found["amplitude"], found["omega"], columns.get("phase", 0.0), found.get("mean", 0.0))]
 
     def samples(self) -> _Array:
         """Table of samples for the kernels, one row; empty for a formula."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Scale, Timed, scalar, sincos, smooth_rise
+from snapbeam.model.drive.components import Component, Tone, in_pieces, rising
 from snapbeam.model.quantity import RUN, check_fields, quantity
 from snapbeam.util.validation import InputError
 
@@ -78,6 +79,24 @@ class Burst(Timed):
             raise InputError(
                 f"ramp_up_cycles = {self.ramp_up_cycles:g}, ramp_down_cycles = {self.ramp_down_cycles:g} with duration_cycles = {self.duration_cycles:g}: the ramps must together be at most duration_cycles"
             )
+
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """A tone in a window, and the way back."""
+        found = self.shape_numbers(columns, scale)
+        risen, falling, ended, retracted = (found[name] for name in self.discontinuities)
+        window = in_pieces(
+            (np.zeros(1), rising(risen)),
+            (risen, {0: np.ones(1)}),
+            (falling, rising(ended - falling, back=True)),
+            (ended, {}),
+        )
+        away = in_pieces(
+            (np.zeros(1), {}),
+            (ended, rising(retracted - ended)),
+            (retracted, {0: np.ones(1)}),
+            gain=-found["retraction"],
+        )
+        return [Tone(found["amplitude"], found["rate"], window=window), away]
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """One period of the sine."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Scale, Timed, sincos
+from snapbeam.model.drive.components import Component, Sweep
 from snapbeam.model.quantity import RUN, STRUCTURE, quantity
 
 _Array = NDArray[np.float64]
@@ -58,6 +59,13 @@ class Chirp(Timed):
     number_names = ("omega", "fastest", "first", "last", "speed", "duration", "logarithmic")
     amplitudes = ("speed",)
     discontinuities = ("duration",)
+
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """One sweep."""
+        found = self.shape_numbers(columns, scale)
+        return [
+            Sweep(found["speed"], found["first"], found["last"], found["duration"], self.sweep_type == "log")
+        ]
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """The first period."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.drive.components import Component, in_pieces
 from snapbeam.model.quantity import RUN, quantity
 
 _Array = NDArray[np.float64]
@@ -41,6 +42,10 @@ class ConstantVelocity(Timed):
     name = "constant_velocity"
     number_names = ("omega", "fastest", "speed")
     amplitudes = ("speed",)
+
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """v t."""
+        return [in_pieces((np.zeros(1), {1: self.shape_numbers(columns, scale)["speed"]}))]
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A period of the first mode."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Scale, Timed, sincos
+from snapbeam.model.drive.components import Component, Tone, in_pieces
 from snapbeam.model.quantity import RUN, quantity
 
 _Array = NDArray[np.float64]
@@ -53,6 +54,12 @@ class HalfSine(Timed):
     name = "half_sine"
     number_names = ("omega", "fastest", "amplitude", "duration")
     discontinuities = ("duration",)
+
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """Half a tone."""
+        found = self.shape_numbers(columns, scale)
+        window = in_pieces((np.zeros(1), {0: np.ones(1)}), (found["duration"], {}))
+        return [Tone(found["amplitude"], found["fastest"], window=window)]
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A period of the first mode."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Scale, Timed, smooth_rise
+from snapbeam.model.drive.components import Component, Tone, in_pieces, rising
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
 from snapbeam.util.validation import InputError
 
@@ -95,6 +96,16 @@ class BandLimitedNoise(Timed):
             raise InputError(
                 f"low_ratio = {self.low_ratio:g}: must be less than high_ratio = {self.high_ratio:g}"
             )
+
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """The tones in one window."""
+        found, table = self.shape_numbers(columns, scale), self.samples()
+        window = in_pieces((np.zeros(1), rising(found["risen"])), (found["risen"], {0: np.ones(1)}))
+        rates = [found["low"] + place * (found["high"] - found["low"]) / LINES for place in table[:LINES]]
+        return [
+            Tone(found["strength"] / rate, rate, np.full(rate.size, phase), window=window)
+            for rate, phase in zip(rates, table[LINES:], strict=True)
+        ]
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A period of the middle of the band."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.drive.base import Scale
+from snapbeam.model.drive.components import Component, hermite, sampled
 from snapbeam.model.drive.sampled import FileKeys, Sampled, refuse_drift, require_unit
 from snapbeam.model.drive.shock import GRAVITY
 from snapbeam.model.quantity import quantity
@@ -72,6 +73,15 @@ class SampledAcceleration(Sampled):
         medians = [float(np.median(part)) for part in np.array_split(self.record, 4)]
         of_offset = max(min(medians), -max(medians), 0.0) * self.duration**2 / 8.0
         return drift if drift > 0.5 * float(np.ptp(moved)) and of_offset > 0.5 * drift else 0.0
+
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """Twice the integrals of the cubics between samples."""
+        rows, interval = self._rows, 1.0 / self.sampling_frequency
+        cubics = hermite(rows[:, 0], rows[:, 1], interval)
+        found = np.zeros((len(cubics), 6))
+        found[:, 0], found[:, 1] = rows[:-1, 3], rows[:-1, 2]
+        found[:, 2:] = cubics[:, :4] / np.array([2.0, 6.0, 12.0, 20.0])
+        return [sampled(found, interval, self.gain(columns))]
 
     def samples(self) -> _Array:
         """Acceleration, its rate, velocity and displacement, sample after sample."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.drive.base import Drive, Scale
+from snapbeam.model.drive.components import Component, hermite, sampled
 from snapbeam.model.drive.sampled import FileKeys, refuse_drift, require_unit
 from snapbeam.model.quantity import check_fields, quantity
 from snapbeam.util.validation import InputError, finite_array, instance, shown
@@ -170,6 +171,11 @@ class RecordedMotion(FileKeys, Drive):
         speed = _SPEED_MARGIN * float(np.abs(self.velocity).max())
         lowest = float((self.displacement - self.displacement[0]).min()) - speed / self.sampling_frequency
         return np.full(runs, -lowest)
+
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """The cubics between samples."""
+        interval = 1.0 / self.sampling_frequency
+        return [sampled(hermite(self.displacement - self.displacement[0], self.velocity, interval), interval)]
 
     def samples(self) -> _Array:
         """Displacement from the first sample and velocity, sample after sample."""

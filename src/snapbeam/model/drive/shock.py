@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.drive.components import Component, Tone, in_pieces
 from snapbeam.model.quantity import RUN, STRUCTURE, quantity
 from snapbeam.util.validation import nonnegative, positive
 
@@ -91,6 +92,32 @@ class Shock(Timed):
             shape=shape,
             rise_fraction=rise_fraction,
         )
+
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """Twice the integral of the acceleration."""
+        found = self.shape_numbers(columns, scale)
+        a, d, r, fall = (found[name] for name in ("peak", "duration", "rise", "fall"))
+        begin, window = np.zeros(1), in_pieces((np.zeros(1), {0: np.ones(1)}), (d, {}))
+        if self.shape == "half_sine":  # a/w (t - sin(wt)/w)
+            rate = math.pi / d
+            way = in_pieces((begin, {1: a / rate}), (d, {0: a * d / rate, 1: 2.0 * a / rate}))
+            return [way, Tone(-a / rate**2, rate, window=window)]
+        if self.shape == "haversine":  # a/2 (t^2/2 - (1 - cos wt)/w^2)
+            rate, half = 2.0 * math.pi / d, 0.5 * a
+            way = in_pieces(
+                (begin, {0: -half / rate**2, 2: 0.5 * half}), (d, {0: 0.5 * half * d**2, 1: half * d})
+            )
+            return [way, Tone(half / rate**2, rate, np.full(d.size, 0.5 * math.pi), window=window)]
+        u = fall - r
+        there, speed = a * (r**2 / 6.0 + 0.5 * r * u + 0.5 * u**2), a * (0.5 * r + u)
+        return [
+            in_pieces(
+                (begin, {3: a / (6.0 * r)}),
+                (r, {0: a * r**2 / 6.0, 1: 0.5 * a * r, 2: 0.5 * a}),
+                (fall, {0: there, 1: speed, 2: 0.5 * a, 3: -a / (6.0 * r)}),
+                (d, {0: 0.5 * a * fall * d, 1: a * fall}),
+            )
+        ]
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A period of the first mode."""

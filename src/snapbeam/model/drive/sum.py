@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import DRIVES, Drive, Scale, Timed
+from snapbeam.model.drive.components import Component, Tone
 from snapbeam.util.validation import InputError, InputTypeError, shown
 
 _Array = NDArray[np.float64]
@@ -88,7 +89,7 @@ class SumDrive(Timed):
         """Return whether every term has a bounded acceleration."""
         return all(kind.can_excite_base() for kind in cls.terms)
 
-    def _each(self, columns: Mapping[str, _Array]) -> list[tuple[int, Drive, dict[str, _Array]]]:
+    def each_term(self, columns: Mapping[str, _Array]) -> list[tuple[int, Drive, dict[str, _Array]]]:
         """Number, drive and columns of every term."""
         found = []
         for i, drive in enumerate(self.parts_of_sum, 1):
@@ -98,7 +99,7 @@ class SumDrive(Timed):
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Cycle of the first term."""
-        _, drive, own = self._each(columns)[0]
+        _, drive, own = self.each_term(columns)[0]
         return drive.cycle(own, scale)
 
     def _begun(self, drive: Drive, own: Mapping[str, _Array], scale: Scale) -> _Array:
@@ -112,7 +113,7 @@ class SumDrive(Timed):
         """The numbers of every term, its phase and where it begins."""
         found: dict[str, _Array] = {}
         fastest, table = np.zeros(next(iter(columns.values())).size), 0
-        for i, drive, own in self._each(columns):
+        for i, drive, own in self.each_term(columns):
             numbers = drive.numbers(own, scale)
             if "table" in numbers:
                 numbers["table"] = numbers["table"] + table
@@ -123,6 +124,17 @@ class SumDrive(Timed):
             fastest = np.maximum(fastest, numbers["fastest" if "fastest" in numbers else "omega"])
         return found | {"fastest": fastest}
 
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """Those of every term, each less where it begins."""
+        found: list[Component] = []
+        for _, drive, own in self.each_term(columns):
+            begun = self._begun(drive, own, scale)
+            found += [
+                each._replace(mean=each.mean - begun) if isinstance(each, Tone) and drive.harmonic else each
+                for each in drive.components(own, scale)
+            ]
+        return found
+
     def samples(self) -> _Array:
         """Samples of every term, in their order."""
         return np.concatenate([drive.samples() for drive in self.parts_of_sum])
@@ -130,7 +142,7 @@ class SumDrive(Timed):
     def frequencies(self, columns: Mapping[str, _Array], scale: Scale) -> list[_Array] | None:
         """Frequencies of every term; None if one of them is not periodic."""
         found: list[_Array] = []
-        for _, drive, own in self._each(columns):
+        for _, drive, own in self.each_term(columns):
             of_term = drive.frequencies(own, scale)
             if of_term is None:
                 return None
@@ -141,7 +153,7 @@ class SumDrive(Timed):
         """All terms at their heights at once."""
         pairs = [
             (drive.bounds(own, scale), self._begun(drive, own, scale))
-            for _, drive, own in self._each(columns)
+            for _, drive, own in self.each_term(columns)
         ]
         highest = sum(pair[0] - begun for pair, begun in pairs)
         return np.asarray(highest), np.asarray(sum(pair[1] for pair, _ in pairs))
@@ -151,13 +163,15 @@ class SumDrive(Timed):
         return np.asarray(
             sum(
                 drive.mirrored_bounds(own, scale) - self._begun(drive, own, scale)
-                for _, drive, own in self._each(columns)
+                for _, drive, own in self.each_term(columns)
             )
         )
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """All terms at their hardest at once."""
-        return np.asarray(sum(drive.peak_acceleration(own, scale) for _, drive, own in self._each(columns)))
+        return np.asarray(
+            sum(drive.peak_acceleration(own, scale) for _, drive, own in self.each_term(columns))
+        )
 
     @classmethod
     def motion(cls, drive: Any, memory: Any, argument: float) -> tuple[float, float]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Scale, Timed, sincos
+from snapbeam.model.drive.components import Component, Tone
 from snapbeam.model.quantity import RUN, quantity
 
 _Array = NDArray[np.float64]
@@ -72,6 +73,15 @@ class TwoTone(Timed):
         "second_phase",
     )
     amplitudes = ("amplitude", "second_amplitude")
+
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """Two tones; the second begins at zero."""
+        found = self.shape_numbers(columns, scale)
+        a, phase = found["second_amplitude"], found["second_phase"]
+        return [
+            Tone(found["amplitude"], found["rate"]),
+            Tone(a, found["second_rate"], phase, -a * np.sin(phase)),
+        ]
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """One period of the first."""
