@@ -54,8 +54,12 @@ def test_the_papers_system(modes):
         "rms_midspan_displacement",
         "energy_dissipated",
     )
-    for name in (*exact, "high_frequency_energy_fraction"):
+    for name in exact:
         assert own[name] == pytest.approx(core[name], rel=1e-6), name
+    # by the rule of trapezoids in the native core, whose steps change in contact
+    assert own["high_frequency_energy_fraction"] == pytest.approx(
+        core["high_frequency_energy_fraction"], rel=5e-5
+    )
     for name in ("peak_force", "max_midspan_displacement", "peak_midspan_velocity"):
         assert own[name] == pytest.approx(core[name], rel=1e-3), name
     assert abs(run.dataset.attrs["energy_error"]) < 1e-8
