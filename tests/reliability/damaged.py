@@ -28,7 +28,6 @@ import snapbeam as sb
 from snapbeam.model.parameter_file import load_config
 from snapbeam.util.netcdf import read_netcdf
 
-
 _WRITTEN = (".csv", ".wav", ".uff", ".tdms", ".h5", ".npz")
 """Kinds of files of signals that the package writes."""
 
