@@ -15,7 +15,7 @@ from snapbeam.util.validation import InputError
 
 LAWS: dict[str, type[ContactLaw]] = {}
 """Every law by the name it has in parameter files."""
-_GAUSS = [(0.5 * (x + 1.0), 0.5 * w) for x, w in zip(*np.polynomial.legendre.leggauss(24), strict=True)]
+_GAUSS = tuple((0.5 * (x + 1.0), 0.5 * w) for x, w in zip(*(each.tolist() for each in np.polynomial.legendre.leggauss(24)), strict=True))  # fmt: skip
 """Nodes and weights of Gauss's rule on [0, 1]."""
 _HERTZ_PHASE = 4.03026
 """Phase of a linear oscillator with the maximum slope of an impact under Hertz's law: (4/5) B(2/5, 1/2) sqrt(15/8)."""
