@@ -252,7 +252,7 @@ class Simulation(Records):
         """Of a step; integrals do not choose it."""
 
     def events(self) -> list[tuple[int, str, _Event]]:
-        """What ends a smooth piece: contact, event, and the function whose zero it is."""
+        """Events that end a smooth piece: contact, event, and the function whose zero it is."""
         eq: Any = self.eq
         found: list[tuple[int, str, _Event]] = []
 

@@ -155,7 +155,7 @@ class Records:
         self.hits[j] += 1
 
     def recorded(self) -> Recorded:
-        """What was recorded."""
+        """Records of the run."""
         n, width = self.eq.n, 7 + len(WORKS) + len(self.eq.circuits)
         columns = zip(*self.samples, strict=True) if self.samples else ((), (), (), ())
         at, q, p, values = (

@@ -75,7 +75,6 @@ class _Waves(sb.LocalForce):
     size: float = quantity("N", "size of the force", symbol="a")
     width: float = quantity("m", "width of a wave", low=0.0, symbol="w")
     begin: float = quantity("m", "beginning of the range", symbol="s")
-    name = "waves_of_this_test"
 
     @staticmethod
     def force(law: Any, displacement: float) -> float:
@@ -96,7 +95,6 @@ class _Hole(sb.LocalForce):
 
     stiffness: float = quantity("N/m^2", "stiffness", symbol="k")
     hole: float = quantity("m", "half of the width of the hole", symbol="s")
-    name = "hole_of_this_test"
 
     @staticmethod
     def force(law: Any, displacement: float) -> float:

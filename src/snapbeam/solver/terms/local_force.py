@@ -111,7 +111,7 @@ class LocalForceTerm(NamedTuple):
     row: int
     """r, a row."""
     extrema: int
-    """Where the extrema of the force are known, and their places and forces."""
+    """Range in which the extrema of the force are known, and their places and forces."""
     state: int
     """State that a run stores."""
     number: int
