@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from snapbeam.model.default_values import BEAM
+import snapbeam as sb
+from snapbeam.model.default_values import BEAM, CONTACT
 from snapbeam.model.early_termination import decidable_energy, least_energy_at
 from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.solver.assemble import make_ensemble
 
 
 def brute_force(model: ReducedModel, location: float, displacement: float) -> float:
@@ -111,3 +113,23 @@ def test_decides_nothing_for_structures_given_by_matrices() -> None:
         [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, well_amplitude=[-1.0]
     )
     assert decidable_energy(model, np.array([0.5]), np.array([0.0]))[0] == -np.inf
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        sb.Shock(acceleration_g=20.0, duration_ms=5.0),
+        sb.Burst(frequency_ratio=1.1, velocity_amplitude=0.3, duration_cycles=4.0, retraction=0.5),
+    ],
+    ids=lambda each: each.name,
+)
+def test_a_striker_above_reaches_as_far_as_its_mirror_image_below(drive: sb.Drive) -> None:
+    """Motions are positive as the striker pushes, on either side: a run is not decided while the tip still comes."""
+    model = ReducedModel.from_beam(BEAM, modes=2)
+    how = sb.Integration(cycles=4, early_termination=True)
+    reach = [
+        make_ensemble(sb.System(model, contacts=[sb.Contact(CONTACT, striker)]), how).highest
+        for side in ("below", "above")
+        for striker in [sb.Striker(drive=drive, location=0.45, side=side)]
+    ]
+    np.testing.assert_allclose(reach[1], reach[0], rtol=1e-12)

@@ -1,10 +1,14 @@
 // The controller, once for every layout: propose a step, take it, inspect it, accept it or take a shorter one.
 //
-// In free flight a step is the flight step, halved where the beam is stretched far beyond its wells.  In contact, steps grow from the
-// onset, shrink towards the release, and turn the striker on the contact by CONTACT_TURN at most.  A step inside which a contact closes or opens, or a lossy contact begins or ceases to
-// press, is cut to end there.  The cut is corrected on the true motion, up to CORRECTIONS times: a zero of the gap to a tick, one of
-// the force to 1e-9 of a flight step.  If several do, the first one counts; the others are found again.  A force that begins acts from the first kick of the next step.  Each run of a pack has
-// its own time, length of step and contacts; a run that ends is replaced.
+// In free flight a step is the flight step, halved where the beam is stretched far beyond its wells, and a contact step where its energy
+// is beyond what the flight step was tried with.  In contact, steps grow from the onset and shrink towards the release.  By a force of
+// stiffness k along a row r, h (k r.r)^(1/2) <= CONTACT_TURN; towards the end of the range of a law a step covers NEARER of the way.
+//
+// A step inside which a contact closes or opens, or a lossy contact begins or ceases to press, is cut to end there.  The cut is
+// corrected on the true motion, up to CORRECTIONS times: a zero of the gap to a tick, one of the force to 1e-9 of a flight step.  If
+// several do, the first one counts; the others are found again.  A force that begins acts from the first kick of the next step.  A
+// step to a jump of a signal ends there too.  Each run of a pack has its own time, length of step and contacts; a run that ends is
+// replaced.
 #pragma once
 #include "statistics.hpp"
 
@@ -297,16 +301,16 @@ template <class L> struct Group {
             const Channel<L> &c = z.channel[j];
             if (c.timed || (c.contact && !any(c.closed))) continue;
             const Real stiffness = with_law(c.law, [&](auto law) { return value(law.stiffness(c.contact ? max(c.d0, Number(0.0)) : c.x, c.P)); });
-            const Real turned = Real(CONTACT_TURN) / (sqrt(max(stiffness * value(c.M[j]), Real(1e-300))) * z.tick);
+            const Real by_stiffness = Real(CONTACT_TURN) / (sqrt(max(stiffness * value(c.M[j]), Real(1e-300))) * z.tick);
             if (!c.contact) {
                 // towards the end of its range, where a force may be infinite, a share of the way
                 const Number space = with_law(c.law, [&](auto law) { return min(law.high(c.P) - c.x, c.x - law.low(c.P)); });
-                want = min(want, turned);
+                want = min(want, by_stiffness);
                 if (any(value(space) < Real(NEVER))) want = min(want, Real(NEARER) * value(space) / (abs(value(dot<L>(c.row, z.p, n))) * z.tick));
                 continue;
             }
             const Real d = value(c.d0), r = value(c.r0);
-            Real own = min(min(Real(GRADING) * (z.t - c.onset), contact_step), turned);
+            Real own = min(min(Real(GRADING) * (z.t - c.onset), contact_step), by_stiffness);
             own = select(r < Real(0.0), min(own, Real(-RELEASE) * max(d, Real(0.0)) / (r * z.tick)), own);
             want = select(c.closed, min(want, own), want);
         }

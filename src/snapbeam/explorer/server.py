@@ -128,10 +128,8 @@ class Gate(Router):
         if request.headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin") and not entering:
             return 403, "other pages may not ask this server; type the address"
         if request.path.startswith(f"{self._prefix}/static/") and not unquote(request.path).isprintable():
-            return (
-                404,
-                "there is no such file",
-            )  # a null character is an error of the functions that open files
+            # a null character is an error of the functions that open files
+            return 404, "there is no such file"
         if request.path.startswith(f"{self._prefix}/static/") or request.path == _ICON:
             return None
         if request.path not in self._pages:

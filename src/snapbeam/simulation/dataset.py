@@ -250,9 +250,8 @@ def strikers_of(
         force[:, j + 1] = [
             felt_force(*at) for at in zip(laws, touching.tolist(), rates.tolist(), strict=True)
         ]
-        if (
-            ensemble.channels is None and not ensemble.systems
-        ):  # the CPU engine counts the first contact alone
+        # in the records of the CPU engine is the energy of the first contact alone
+        if ensemble.channels is None and not ensemble.systems:
             pressing = zip(laws, touching.tolist(), strict=True)
             energy += [contact.energy(law, d) if d > 0.0 else 0.0 for law, d in pressing]
         depth[:, j + 1] = pressed / length

@@ -168,7 +168,9 @@ def driven_of(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
     found = drive.numbers(own, scale)
     highest, speed = drive.bounds(own, scale)
     samples = _samples(system, "drive", drive)
-    if striker.side == "above":
+    if (
+        striker.side == "above" and drive.recorded
+    ):  # made in space; other motions are positive as the striker pushes
         highest = drive.mirrored_bounds(own, scale)
     table = np.stack([found[name] for name in drive.number_names], axis=1)
     return Driven(

@@ -68,6 +68,8 @@ SIGNAL = (
 )
 """Numbers of a tone; those of pieces are gain, first piece, pieces, time, of a sweep speed, first and last rate, time, duration."""
 LAW_NUMBERS = 3
+STEEP = tuple(LAWS[kind][0] for kind in (ElectrostaticForce, MagneticForce))
+"""Laws whose force grows without bound towards an end of their range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,10 +285,10 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
     above = drive.recorded and kind == "drive" and system.contacts[number - 1].striker.side == "above"
     bounds = _bounds(drive, own, system)
     components = drive.components(own, system.scale)
-    for k, each in enumerate(components):
+    windows: dict[int, int] = {}
+    for each in components:
         signal = np.zeros((runs, len(SIGNAL)))
-        most = bounds if k == 0 else np.zeros((runs, 3))
-        window = None
+        most, window = bounds, None
         if isinstance(each, Tone):
             size, rate = np.abs(each.amplitude), each.rate
             signal[:, 0], signal[:, 1], signal[:, 2] = each.mean, each.amplitude, rate
@@ -296,7 +298,9 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
             if each.window is None:
                 most = np.stack((size + np.abs(each.mean), size * rate, size * rate**2), axis=1)
             else:
-                window = built.add_pieces(f"{section} window", each.window, begun)
+                if id(each.window) not in windows:
+                    windows[id(each.window)] = built.add_pieces(f"{section} window", each.window, begun)
+                window = windows[id(each.window)]
             kind_of = 0
         elif isinstance(each, Sweep):
             signal[:, 0], signal[:, 1], signal[:, 2], signal[:, 3] = each.speed, each.first, each.last, begun
@@ -304,7 +308,10 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
             kind_of = 2
         else:
             built.add_pieces(section, each, begun, most, -1.0 if above else 1.0)
+            bounds = np.zeros((runs, 3))
             continue
+        if most is bounds:  # those of the whole motion, stated once; a tone alone has its own
+            bounds = np.zeros((runs, 3))
         signal[:, 6:] = most
         built.add_signal(section, kind_of, signal, window)
     for name, times in _jumps(drive, own, system).items():

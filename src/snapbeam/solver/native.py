@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from snapbeam import _core
-from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LAW_NUMBERS, Channels
+from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LAW_NUMBERS, STEEP, Channels
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.statistics import (
     OTHER_IMPACTS,
@@ -93,7 +93,7 @@ class _Arrays:
         sizes = np.bincount(label, minlength=count).astype(np.int32)
         n, modes = structure.omega.size, structure.equilibrium.size
         halvings = (ensemble.runs["max_halvings"] - ensemble.runs["min_contact_halvings"]).astype(float)
-        if np.isin(channels.laws, (6, 7)).any():
+        if np.isin(channels.laws, STEEP).any():
             halvings += _STEEP  # near a magnet or an electrode
         lossy = bool(np.isin(channels.laws, (3, 4, 8, 9, 10)).any())
         fewest, per_decay = _PARTS[ensemble.order]

@@ -124,6 +124,11 @@ class Burst(Timed):
         speed = speed + found["retraction"] * _STEEPEST / (found["retracted"] - found["ended"])
         return found["amplitude"], speed
 
+    def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """The amplitude and the retraction."""
+        found = self.shape_numbers(columns, scale)
+        return np.asarray(found["amplitude"] + found["retraction"])
+
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Bound of the acceleration: the sine with the steepest envelope, plus the retraction."""
         found = self.shape_numbers(columns, scale)

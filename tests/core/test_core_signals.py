@@ -1,0 +1,106 @@
+"""Signals of the native core: bounds, layouts and restarts with motions of every kind."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from core_systems import arrays, beam, stop
+
+import snapbeam as sb
+from snapbeam import _core
+from snapbeam.model import default_values
+from snapbeam.solver import native
+
+TIMES = np.arange(4000) / 1e4
+RECORD = 30.0 * np.sin(700.0 * TIMES) + 10.0 * np.cos(330.0 * TIMES)
+BURST = sb.Burst(frequency_ratio=1.1, velocity_amplitude=0.3, duration_cycles=4.0, retraction=0.5)
+PULSE = sb.HalfSine(displacement_amplitude=0.6, duration=0.7)
+SINE = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.01, phase=0.4)
+MOTIONS = [
+    SINE,
+    SINE + BURST,
+    SINE + PULSE,
+    PULSE,
+    BURST,
+    sb.TwoTone(frequency_ratio=1.2, velocity_amplitude=0.1, second_ratio=1.8, second_amplitude=0.02, second_phase=0.9),
+    sb.Chirp(start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_cycles=4.0),
+    sb.Shock(acceleration_g=20.0, duration_ms=11.0),
+    sb.Shock(acceleration_g=20.0, duration_ms=11.0, shape="trapezoid", rise_fraction=0.2),
+    sb.BandLimitedNoise(low_ratio=0.5, high_ratio=3.0, velocity_rms=0.2, seed=7),
+    sb.RecordedAcceleration(record=RECORD, sampling_frequency=1e4),
+]  # fmt: skip
+
+
+def driven(drive: sb.Drive, modes: int = 1, **parts) -> sb.System:
+    contact = sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=1 / 2.1))
+    return sb.System(beam(modes), contacts=[contact, *parts.pop("more", ())], **parts)
+
+
+def moved_by_everything(modes: int) -> sb.System:
+    """Pieces, windows, sweeps, jumps and tones on a striker, a second one, the base, a force and the load."""
+    chirp = sb.Chirp(
+        start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_cycles=1.0, sweep_type="log"
+    )
+    second = sb.Contact(default_values.CONTACT, sb.Striker(drive=chirp, location=0.6, side="above", gap=1e-4))
+    return driven(
+        sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.2, phase=0.4) + PULSE,
+        modes,
+        more=[second, stop(sb.KelvinVoigt(2e5, 1.0))],
+        base_excitation=sb.BaseExcitation(
+            motion=sb.BandLimitedNoise(low_ratio=0.5, high_ratio=3.0, velocity_rms=0.02, seed=3), striker_on_base=False
+        ),
+        forces=[
+            sb.ExternalForce(history=sb.RecordedForce(record=1e-4 * RECORD, sampling_frequency=1e4), location=0.4)
+        ],
+        axial_load=sb.AxialLoadModulation(motion=sb.LoadRamp(change=2.0, duration=0.6, hold_periods=0.3)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("drive", MOTIONS, ids=lambda each: each.name)
+def test_bounds_cover_the_motion(drive):
+    """The signals of a motion together bound its speed: an onset is not looked for where they exclude it."""
+    system = driven(drive)
+    found, scale = arrays(system, 2).batch["signals"][0], system.scale
+    value, slope = found[:, 6].sum(), found[:, 7].sum()
+    columns = {name: np.array([each]) for name, each in drive.values().items()} or {"": np.zeros(1)}
+    numbers, kind = drive.numbers(columns, scale), drive.integrated_as or type(drive)
+    table = kind.numbers_type()(*(float(numbers[name][0]) for name in kind.number_names))
+    memory, phase = drive.samples(), float(getattr(drive, "phase", 0.0))
+    pairs = []
+    for t in np.linspace(0.0, 0.05, 4001):
+        at = float(numbers["omega"][0]) * t + phase
+        if kind.harmonic:
+            pairs.append((table.amplitude * math.sin(at), table.amplitude * table.omega * math.cos(at)))
+        else:
+            pairs.append(kind.motion(table, memory, at))
+    moved, speed = np.abs(pairs).max(axis=0)
+    assert value >= moved * (1.0 - 1e-12)
+    assert speed * (1.0 - 1e-12) <= slope
+
+
+@pytest.mark.parametrize("modes", [1, 3, 8])
+def test_lanes_of_runs_and_single_runs_have_the_same_bits(modes):
+    points = {"base_excitation.velocity_rms": np.linspace(0.01, 0.05, 11)}
+    found = {}
+    for layout in ("runs", "thread"):
+        own = arrays(moved_by_everything(modes), 2, points)
+        _core.integrate(own.problem, own.batch, layout, "", 1, None)
+        found[layout] = own.batch["statistics"], own.batch["of_channels"]
+    for one, other in zip(found["runs"], found["thread"], strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
+    assert (found["runs"][0][:, native.STATISTICS.index("status")] == 0).all()
+    assert (found["runs"][1][:, :3, native.OF_CHANNEL.index("impacts")].sum(axis=0) > 0).any()
+
+
+@pytest.mark.parametrize("modes", [1, 3, 20])
+def test_a_run_in_pieces_is_the_run(modes, monkeypatch):
+    system = moved_by_everything(modes)
+    how = sb.Integration(cycles=2, engine="native")
+    whole = sb.simulate(system, how).dataset
+    monkeypatch.setattr(native, "_SAMPLES", 400)
+    monkeypatch.setattr(native, "_BUDGET", 37)
+    again = sb.simulate(system, how).dataset
+    for name in whole.data_vars:
+        assert np.array_equal(whole[name].values, again[name].values, equal_nan=True), name
