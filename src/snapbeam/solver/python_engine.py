@@ -46,6 +46,8 @@ _STEPS_PER_PERIOD = 150.0
 """Steps in a period of the first mode or of the drive, at least: so that no contact is passed over."""
 _DEPTH, _FORCE = 1e-14, 1e-9
 """Penetration (m) and force (N) beyond zero at which events lie, so that rounding makes none."""
+_MOST_RESTING = 100
+"""Pieces without duration, one after the other, that a run may have."""
 _SECONDS, _TURN = 1.5e-3, 0.6
 """Seconds of a step on one core, and what the fastest mode turns in it at most, rad; both estimates."""
 _SLOW = "engine = 'python' is made to be read: here about {:.0f} times slower than engine = 'cpu', some {:.1g} s a run"
@@ -272,8 +274,10 @@ class Simulation(Records):
                     eq.pressure(j, d, v, numbers) - sign * _FORCE if d > 0.0 else -sign))  # fmt: skip
             if law.memory and state == PRESSING:
                 edge = law.yield_penetration
-                add(j, "yield", 1.0, lambda d, _, numbers, edge=edge: d - edge(numbers) - _DEPTH)
-                add(j, "turn", -1.0, lambda d, v, numbers, edge=edge: v if d > edge(numbers) else 1.0)
+                if self.loads[j]:
+                    add(j, "turn", -1.0, lambda _, v, __: v)
+                else:
+                    add(j, "yield", 1.0, lambda d, _, numbers, edge=edge: d - edge(numbers))
         for each in (each for each, law in eq.local if law.is_limited()):
 
             def inside(t: float, s: _Array, each: Any = each) -> float:
@@ -296,6 +300,7 @@ class Simulation(Records):
         if what in ("onset", "press"):
             state[j], self.onset[j] = PRESSING, self.t
             self.begun[j], self.largest[j] = float(self.s[self.impulse(j)]), 0.0
+            self.loads[j] = self.at_yield(j)
         elif what in ("release", "loosen"):
             if state[j] == PRESSING:
                 self.impact_ended(j)
@@ -303,6 +308,9 @@ class Simulation(Records):
         elif what == "turn":  # a law with memory unloads from its greatest penetration
             (d, _, numbers), memory = self.eq.contact(j, self.t, self.s), self.eq.contacts[j].memory
             self.s[memory] = self.eq.contacts[j].law.memory_after(numbers, d)
+            self.loads[j] = False
+        elif what == "yield":
+            self.loads[j] = True
         self.s[2 * self.eq.n] += stored - self.eq.stored(j, self.t, self.s)
 
     def march(self, stops: list[float], progress: Callable[[float], object] | None = None) -> list[Any]:
@@ -312,8 +320,13 @@ class Simulation(Records):
         cuts = {self.late, self.end, *stops, *self.eq.breaks, *turns.tolist()}
         for until in sorted(at for at in cuts if 0.0 < at <= self.end):
             try:
+                resting = 0
                 while self.t < until and self.found["status"][0] == RunStatus.OK:
+                    begun = self.t
                     self.piece(until)
+                    resting = resting + 1 if self.t == begun else 0
+                    if resting > _MOST_RESTING:
+                        self.found["status"] = RunStatus.DIVERGED
             except ArithmeticError:
                 self.found["status"] = RunStatus.DIVERGED
             if self.found["status"][0] != RunStatus.OK:

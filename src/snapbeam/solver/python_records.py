@@ -43,18 +43,26 @@ class Records:
         self.level = float(structure.dividing_height)
         self.onset, self.begun = [0.0] * count, [0.0] * count
         """Of each contact: onset of the present impact, and its impulse until then."""
+        self.loads = [False] * count
+        """Of each contact with a memory: its law is on the way that changes the memory, not below it."""
         self.peaks, self.largest, self.hits = [0.0] * count, [0.0] * count, [0] * count
         for j, since in enumerate(eq.since):
             d, rate, numbers = eq.contact(j, 0.0, s)
             if d > 0.0:
                 eq.state[j] = PRESSING if eq.pressure(j, d, rate, numbers) > 0.0 else LOOSE
                 self.onset[j] = -since if since > 0.0 else 0.0
+                self.loads[j] = self.at_yield(j)
         self.impacts: list[list[float]] = []
         self.samples: list[tuple[Any, ...]] = []
         self.found = found = empty_accumulators(1, max(0, count - 1), len(eq.circuits))
         found["status"], found["first_energy"] = RunStatus.OK, self.energy()
         for i, name in enumerate(("displacement", "center")):
             found[f"min_{name}"] = found[f"max_{name}"] = self.at_rest[i] + self.places[i] @ s[: eq.n]
+
+    def at_yield(self, j: int) -> bool:
+        """Return whether a law with memory is at or beyond the penetration from which it changes the memory."""
+        law, (d, _, numbers) = self.eq.contacts[j].law, self.eq.contact(j, self.t, self.s)
+        return bool(law.memory) and d >= law.yield_penetration(numbers)
 
     def impulse(self, j: int) -> int:
         """Place of the impulse of a contact in the state; its work follows."""
