@@ -37,6 +37,8 @@ BASES = (
 FORCES = ("harmonic_force", "constant_force", "recorded_force")
 LOADS = ("sine", "ramp")
 CIRCUITS = ("piezo", "coil", "coil with inductance")
+NATIVE_CIRCUITS = (*CIRCUITS, "any piezo", "any coil")
+"""Those of any time constant, and of stronger couplings, too."""
 SAME = 4
 """Seeds that have the same parts and other numbers."""
 SEPARATE = frozenset(name for name, law in LAWS.items() if law.impulsive or law.memory)
@@ -163,6 +165,7 @@ def native_features(seed: int) -> Features:
         load=str(rng.choice(LOADS)) if rng.random() < 0.25 else None,
         uneven=bool(rng.random() < 0.3),
         started=bool(rng.random() < 0.2) or not moves,
+        circuits=some(NATIVE_CIRCUITS, 0.6, 0.28, 0.12),
     )
 
 
@@ -521,8 +524,11 @@ def loading(kind: str, number: Numbers) -> tuple[sb.Drive, Callable[[float], flo
 
 def tapping(kind: str, number: Numbers, beam: ReferenceBeam) -> tuple[sb.Harvester, Circuit, float]:
     """A harvester, its circuit, and the voltage across the load per z."""
-    if kind == "piezo":
+    wide = kind.startswith("any")
+    if kind.endswith("piezo"):
         moment, c, r = number(4e-5, 1.6e-4), 80e-9, 10.0 ** number(4.0, 5.5)
+        if wide:
+            moment, r = moment * number(1.0, 3.0), 10.0 ** number(0.0, 8.0)
         begin, end = number(0.0, 0.15), number(0.25, 0.45)
         layers = sb.PiezoelectricHarvester(
             moment_per_volt=moment, capacitance=c, resistance=r, patch_start=begin, patch_end=end
@@ -530,6 +536,8 @@ def tapping(kind: str, number: Numbers, beam: ReferenceBeam) -> tuple[sb.Harvest
         return layers, Circuit(moment * (beam.slope(end) - beam.slope(begin)), c, 1.0 / r), 1.0
     factor, r, place = number(0.5, 1.5), number(5.0, 60.0), number(0.3, 0.7)
     inertia = 0.0 if kind == "coil" else number(0.005, 0.02)
+    if wide:
+        inertia = 10.0 ** number(-6.0, 0.0)
     coil = sb.ElectromagneticHarvester(
         force_factor=factor, resistance=r, coil_resistance=8.0, inductance=inertia, location=place
     )

@@ -57,8 +57,9 @@ enum Statistic : int {
     SQUARE_VELOCITY, SQUARE_CENTER_VELOCITY, ENERGY_TIME, HIGH_ENERGY_TIME, DISSIPATED, FIRST_ENERGY, ENERGY,
     DISPLACEMENT, CENTER, EARLY_STOP_TIME, STATISTICS
 };
-// Of each channel; of a force only WORK, GROSS_WORK and LOST are not 0.
-enum OfChannel : int { IMPACTS, IMPULSE, WORK, GROSS_WORK, LOST, PEAK_FORCE, DEEPEST, CONTACT_TIME, TOUCHING, ONSET, OF_CHANNEL };
+// Of each channel; of a force only WORK, GROSS_WORK and LOST are not 0, of a circuit only LOST, its part in the last quarter and
+// PEAK_FORCE.
+enum OfChannel : int { IMPACTS, IMPULSE, WORK, GROSS_WORK, LOST, LATE_LOST, PEAK_FORCE, DEEPEST, CONTACT_TIME, TOUCHING, ONSET, OF_CHANNEL };
 // Of a sample, and in addition penetration, force, potential energy, work and loss of each channel.
 enum OfSample : int { SAMPLE_TIME, BEAM_ENERGY, SAMPLE_DISSIPATED, OF_SAMPLE };
 enum ChannelSample : int { SAMPLE_DEPTH, SAMPLE_FORCE, SAMPLE_POTENTIAL, SAMPLE_WORK, SAMPLE_LOST, CHANNEL_SAMPLE };
@@ -93,7 +94,7 @@ struct Batch {
     const double *q, *p;          // (runs, modes) about the well of WELL_SIGN
     const int *order;             // (runs,): the order in which runs are taken
     int outputs;                  // output states of each run
-    double *states;               // (runs, outputs, 2 modes + 1 + channels): q, p, well, ticks in contact (-1: apart)
+    double *states;               // (runs, outputs, 2 modes + 1 + 2 channels): q, p, well, ticks in contact (-1: apart), states of laws
     double *statistics;           // (runs, STATISTICS)
     double *of_channels;          // (runs, channels, OF_CHANNEL)
     bool account;                 // account for the dissipation of the modes

@@ -68,6 +68,7 @@ template <class L> struct Group {
         for (int j = 0; j < channels; ++j) {
             Channel<L> &c = arena.base ? z.channel[j] : unused;
             c.signal = arena.take<int>(signals), c.factor = arena.take<double>(signals);
+            if (problem->laws[j] == CIRCUIT) c.along_q = arena.take<Cell>(n), c.along_p = arena.take<Cell>(n), c.along_M = arena.take<Number>(channels);
             c.row = arena.take<Cell>(n), c.P = arena.take<Number>(problem->law_numbers), c.M = arena.take<Number>(channels);
         }
     }
@@ -109,14 +110,18 @@ template <class L> struct Group {
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
             c.law = problem->laws[j];
-            with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed, c.affine = law.affine; });
+            with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed, c.affine = law.affine, c.state = law.state; });
+            c.circuit = c.law == CIRCUIT, c.harvests = c.circuit || c.law == LINEAR_DAMPING;
             c.uses = 0;
             for (int i = 0; i < z.signals; ++i)
                 if (problem->uses[j * z.signals + i] != 0.0) c.signal[c.uses] = i, c.factor[c.uses++] = problem->uses[j * z.signals + i];
             for (int i = 0; i < n; ++i) c.row[i] = Cell(0.0);
+            c.follows = FromBits<Marks>::of(0);
+            for (int i = 0; c.law == CIRCUIT && i < n; ++i) c.along_q[i] = c.along_p[i] = Cell(0.0);
+            for (int i = 0; c.law == CIRCUIT && i < z.channels; ++i) c.along_M[i] = Number(0.0);
             for (int i = 0; i < problem->law_numbers; ++i) c.P[i] = Number(1.0);
             for (int i = 0; i < z.channels; ++i) c.M[i] = Number(0.0);
-            c.rest = c.offset = c.early = c.x = c.y = c.f = c.first_f = c.v = c.d0 = c.r0 = c.d1 = c.r1 = Number(0.0);
+            c.rest = c.offset = c.early = c.z = c.x = c.y = c.f = c.first_f = c.v = c.d0 = c.r0 = c.d1 = c.r1 = Number(0.0);
             c.closed = c.pressing = FromBits<Marks>::of(0), c.onset = c.safe = Real(0.0);
             c.impulse = c.work = c.lost = c.own_impulse = c.deepest = c.hardest = Number(0.0);
             for (Number &x : c.sums) x = Number(0.0);
@@ -140,6 +145,7 @@ template <class L> struct Group {
             number(c.onset), number(c.safe), number(c.d0), number(c.r0), number(c.own_impulse), number(c.deepest), number(c.hardest);
             Number closed = select(c.closed, Number(1.0), Number(0.0)), pressing = select(c.pressing, Number(1.0), Number(0.0));
             number(closed), number(pressing);
+            if (c.state >= 0) number(c.P[c.state]), number(c.offset);
             c.closed = closed > Number(0.5), c.pressing = pressing > Number(0.5);
             for (Number &x : c.sums) number(x);
         }
@@ -192,6 +198,7 @@ template <class L> struct Group {
                 for (int m = 0; m < modes; ++m) product += row[m] * other[m];
                 set_lane(c.M[k], l, product);
             }
+            if (c.circuit) load_circuit(c, l, row, row_of);
             for (Number &x : c.sums) set_lane(x, l, 0.0);
             Number *zeros[] = {&c.own_impulse, &c.deepest, &c.hardest, &c.d0, &c.r0};
             for (Number *x : zeros) set_lane(*x, l, 0.0);
@@ -215,6 +222,18 @@ template <class L> struct Group {
                 }
         }
         return true;
+    }
+
+    // What carries a circuit of run l along with the beam.
+    void load_circuit(Channel<L> &c, int l, const double *row, const int *row_of) {
+        const double lam = lane(value(c.P[0]), l);
+        for (int k = 0; k < z.channels; ++k) set_lane(c.along_M[k], l, 0.0);
+        for (int m = 0; m < problem->modes; ++m) {
+            const double square = problem->omega[m] * problem->omega[m], D = lam * lam - 2.0 * problem->sigma[m] * lam + square, t = D > 0.0 ? row[m] / D : 0.0;
+            set_element<L>(c.along_q, s->place[m], l, t * square), set_element<L>(c.along_p, s->place[m], l, t * lam);
+            for (int k = 0; k < z.channels; ++k)
+                set_lane(c.along_M[k], l, lane(value(c.along_M[k]), l) + t * lam * batch->rows[long(row_of[k]) * problem->modes + m]);
+        }
     }
 
     // The next jump of run l after its time.
@@ -242,6 +261,7 @@ template <class L> struct Group {
             Channel<L> &c = z.channel[j];
             if (!c.contact) {
                 if (!c.timed) assign(which, c.x, along(z, c, z.q));
+                if (c.circuit) assign(which, c.r0, -fma(c.P[0], c.P[c.state], dot<L>(c.row, z.p, n)));
                 continue;
             }
             const Number d = penetration(z, c, z.q), r = signal_slope(z, c) - dot<L>(c.row, z.p, n);
@@ -299,7 +319,7 @@ template <class L> struct Group {
         want = select(energy > calm, min(want, contact_step), want);
         for (int j = 0; j < z.channels; ++j) {
             const Channel<L> &c = z.channel[j];
-            if (c.timed || (c.contact && !any(c.closed))) continue;
+            if (c.timed || c.circuit || (c.contact && !any(c.closed))) continue;
             const Real stiffness = with_law(c.law, [&](auto law) { return value(law.stiffness(c.contact ? max(c.d0, Number(0.0)) : c.x, c.P)); });
             const Real by_stiffness = Real(CONTACT_TURN) / (sqrt(max(stiffness * value(c.M[j]), Real(1e-300))) * z.tick);
             if (!c.contact) {
@@ -451,6 +471,7 @@ template <class L> struct Group {
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
             if (!c.contact) {  // out of the range in which a law is valid
+                if (c.circuit) c.r1 = select(c.follows, Number(0.0), -fma(c.P[0], c.z, dot<L>(c.row, z.p1, n)));
                 if (!c.timed) {
                     const Number u = along(z, c, z.q1);
                     const Number low_end = with_law(c.law, [&](auto law) { return law.low(c.P); });
@@ -581,6 +602,7 @@ template <class L> struct Group {
         Marks changed = FromBits<Marks>::of(0);
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
+            if (c.circuit) assign(ok, c.P[c.state], c.z), assign(ok, c.r0, c.r1);
             if (!c.contact) continue;
             const Event<L> &e = events[j];
             const Marks off = ok & c.closed & e.flip, on = ok & (!c.closed) & e.flip, force = ok & e.force;
@@ -667,13 +689,14 @@ template <class L> struct Group {
     }
 
     void write_output(int l) {
-        const int modes = problem->modes, width = 2 * modes + 1 + z.channels;
+        const int modes = problem->modes, width = 2 * modes + 1 + 2 * z.channels;
         double *to = batch->states + (long(run[l]) * batch->outputs + output[l]++) * width;
         for (int m = 0; m < modes; ++m) to[m] = element<L>(z.q, s->place[m], l), to[modes + m] = element<L>(z.p, s->place[m], l);
         to[2 * modes] = lane(z.sign, l);
         for (int j = 0; j < z.channels; ++j) {
             const Channel<L> &c = z.channel[j];
             to[2 * modes + 1 + j] = lane(Marks(c.closed & c.pressing), l) ? lane(z.t, l) - lane(c.onset, l) : -1.0;
+            to[2 * modes + 1 + z.channels + j] = c.state < 0 ? 0.0 : lane(value(c.P[c.state]), l);
         }
     }
 

@@ -11,8 +11,13 @@
 //   damping(x, y, P)       magnitude of the derivative of the force by y, at most a bound of it for speeds up to |y|
 //   pressing(x, y, P)      of a lossy contact: what has the sign of the force, smooth down to x = 0
 //   low(P), high(P)        displacements between which it is valid (of a force)
+//   loss(x, y, f, P)       power lost by the force f (of a force)
 //
-// affine: the force is linear in y;  contact: it acts while the contact is closed;  lossy: the force depends on y;  timed: the force is the channel's signal.
+// affine: the force is linear in y;  contact: it acts while the contact is closed;  lossy: the force depends on y;  timed: the force
+// is the channel's signal;  state: place among the numbers of a state of the law's own, or -1.
+//
+// A circuit has a state z that changes with time, its x: z' = rate(z, y, P).  A contact with memory has one that stays as it is but
+// where the contact yields or turns back; that event is the change of the sign of yields(x, y, P, on), *on*: it yields already.
 #pragma once
 #include "number.hpp"
 
@@ -21,11 +26,12 @@ namespace SNAPBEAM_SET {
 enum LawNumber : int {
     HERTZ, POWER_LAW, LAYERED_HERTZ, HUNT_CROSSLEY, KELVIN_VOIGT,
     LOCAL_SPRING, ELECTROSTATIC, MAGNETIC, QUADRATIC_DAMPING, COULOMB_FRICTION, LINEAR_DAMPING,
-    EXTERNAL_FORCE, BASE, AXIAL_LOAD, LAWS
+    EXTERNAL_FORCE, BASE, AXIAL_LOAD, CIRCUIT, LAWS
 };
 
 template <int NUMBERS> struct ContactLaw {
     static constexpr int numbers = NUMBERS;
+    static constexpr int state = -1;
     static constexpr bool contact = true, lossy = false, timed = false, affine = true;
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T pressing(T, T, const T *) { return T(1.0); }
@@ -34,8 +40,11 @@ template <int NUMBERS> struct ContactLaw {
 };
 template <int NUMBERS> struct ForceLaw {
     static constexpr int numbers = NUMBERS;
+    static constexpr int state = -1;
     static constexpr bool contact = false, lossy = false, timed = false, affine = false;
     template <class T> static SNAPBEAM_FN T force(T, T, const T *) { return T(0.0); }
+    template <class T> static SNAPBEAM_FN T loss(T, T y, T f, const T *) { return -(f * y); }
+    template <class T> static SNAPBEAM_FN T rate(T, T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T potential(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T stiffness(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *) { return T(0.0); }
@@ -145,6 +154,19 @@ struct LinearDamping : ForceLaw<1> {  // f = -c v, as of a circuit without inert
     template <class T> static SNAPBEAM_FN T force(T, T v, const T *P) { return -(P[0] * v); }
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *P) { return abs(P[0]); }
 };
+// A harvester's circuit: f = z, z' = -v - lam z, of which z^2/2 is the energy.  P: lam, then g where it follows the beam, so that
+// f = g (x - v), and 0 elsewhere; z at last (step.hpp).
+struct Circuit : ForceLaw<3> {
+    static constexpr int state = 2;
+    static constexpr bool lossy = true, affine = true;
+    template <class T> static SNAPBEAM_FN auto follows(const T *P) { return P[1] > T(0.0); }
+    template <class T> static SNAPBEAM_FN T force(T x, T v, const T *P) { return select(follows(P), P[1] * (x - v), x); }
+    template <class T> static SNAPBEAM_FN T rate(T z, T v, const T *P) { return select(follows(P), T(0.0), -fma(P[0], z, v)); }
+    template <class T> static SNAPBEAM_FN T loss(T, T, T f, const T *P) { return P[0] * f * f; }
+    template <class T> static SNAPBEAM_FN T potential(T z, const T *) { return T(0.5) * z * z; }
+    template <class T> static SNAPBEAM_FN T stiffness(T, const T *) { return T(1.0); }
+    template <class T> static SNAPBEAM_FN T damping(T, T, const T *P) { return P[1]; }
+};
 struct Timed : ForceLaw<0> {  // the signal of the channel: a force, the acceleration of a base, or an axial load
     static constexpr bool timed = true;
 };
@@ -162,6 +184,7 @@ template <class F> SNAPBEAM_FN auto with_law(int number, F function) {
     case QUADRATIC_DAMPING: return function(QuadraticDamping());
     case COULOMB_FRICTION: return function(CoulombFriction());
     case LINEAR_DAMPING: return function(LinearDamping());
+    case CIRCUIT: return function(Circuit());
     case EXTERNAL_FORCE: case BASE: case AXIAL_LOAD: return function(Timed());
     default: return function(Hertz());
     }

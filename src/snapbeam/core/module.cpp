@@ -232,7 +232,7 @@ static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
         seen[size_t(b.order[i])] = true;
     }
     b.outputs = a.integer("outputs", 0, 2000000000);
-    b.states = a.array<double, true>("states", {runs, size_t(b.outputs), 2 * n + 1 + channels}, false);
+    b.states = a.array<double, true>("states", {runs, size_t(b.outputs), 2 * n + 1 + 2 * channels}, false);
     b.statistics = a.array<double, true>("statistics", {runs, STATISTICS}, false);
     b.of_channels = a.array<double, true>("of_channels", {runs, channels, OF_CHANNEL}, false);
     b.account = a.integer("account", 0, 1) != 0;
@@ -338,7 +338,7 @@ static void record(nb::dict problem, nb::dict batch, nb::dict recorder, const st
     const int which = layout_named(layout);
     const size_t saved = of_recorder.length("saved");
     // as many numbers as any layout of any width holds of a run
-    const size_t wanted = (size_t(p.modes + 64) * 3 + size_t(p.channels) * (9 + OF_CHANNEL) + STATISTICS + 32) * 8;
+    const size_t wanted = (size_t(p.modes + 64) * 3 + size_t(p.channels) * (11 + OF_CHANNEL) + STATISTICS + 32) * 8;
     if (saved < wanted) of_recorder.refuse("saved", "has no room for the state of a run");
     r.saved = of_recorder.array<double, true>("saved", {saved}, false);
     r.budget = long(of_recorder.number("budget", 1.0, 2e9));
@@ -367,6 +367,7 @@ static void law_values(int law, nb::dict arrays) {
 
 NB_MODULE(_core, m) {
     m.doc() = "The native core: integration of damped modes and scalar channels.";
+    m.attr("STATISTICS") = int(snapbeam::STATISTICS), m.attr("OF_CHANNEL") = int(snapbeam::OF_CHANNEL);
     m.def("integrate", &integrate, nb::arg("problem"), nb::arg("batch"), nb::arg("layout"), nb::arg("set"), nb::arg("threads"), nb::arg("progress").none());
     m.def("record", &record, nb::arg("problem"), nb::arg("batch"), nb::arg("recorder"), nb::arg("layout"), nb::arg("set"));
     m.def("law_values", &law_values, nb::arg("law"), nb::arg("arrays"));

@@ -322,6 +322,22 @@ template <class L> struct Totals {
             c.own_impulse += select(acts, c.impulse, zero);
         }
         c.sums[WORK] += select(acts, c.work, zero), c.sums[GROSS_WORK] += select(acts, abs(c.work), zero), c.sums[LOST] += select(acts, c.lost, zero);
+        if (!c.harvests) return;
+        const Real ends = z.t + z.ticks, after = min(max((ends - late) / max(z.ticks, Real(1.0)), Real(0.0)), Real(1.0));
+        c.sums[LATE_LOST] += select(acts, Number(after) * c.lost, zero);
+        Number most;
+        if (c.circuit) {
+            const Number before = c.P[c.state];
+            const Cubic<Number> up(before, c.r0, c.z, c.r1, z.h), down(-before, -c.r0, -c.z, -c.r1, z.h);
+            most = max(max(abs(before), abs(c.z)), select(c.follows, zero, max(crest(up, c.r0, c.r1), crest(down, -c.r0, -c.r1))));
+        } else {  // in proportion to a velocity
+            const Real v0 = value(dot<L>(c.row, z.p, s->size())), v1 = value(dot<L>(c.row, z.p1, s->size()));
+            Real speed = max(abs(v0), abs(v1));
+            const Marks higher = acts & (Real(1.3) * speed * value(c.P[0]) > value(c.sums[PEAK_FORCE]));
+            if (any(higher)) assign(higher, speed, speed_on(v0, bend_at(z, c.row, false), v1, bend_at(z, c.row, true), value(z.h)));
+            most = c.P[0] * Number(speed);
+        }
+        assign(acts, c.sums[PEAK_FORCE], max(c.sums[PEAK_FORCE], most));
     }
 
     // Largest penetration in a step in which it turns: where the rate, a cubic by its values and slopes, is zero.

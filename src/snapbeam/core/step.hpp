@@ -15,6 +15,18 @@
 //
 //   y(t) = y_0 e^(-x) - (a + M f_e) t phi_1(x),   phi_1 = (1 - e^(-x))/x,   phi_2 = (1 - phi_1)/x,   phi_3 = (1/2 - phi_2)/x.
 //
+// A circuit changes within a kick too, and stays as it is in a flow: alone, v' = a + M z, z' = -v - lam z, exactly by the series of
+//
+//   z'' = -a - M z - lam z'.
+//
+// Where it is faster than the step it follows the beam.  Free modes carry a circuit along as z = -along_q.q - along_p.p with
+//
+//   along_q = t omega^2/D,   along_p = t lam/D,   D = lam^2 - 2 sigma lam + omega^2,   t its row;
+//
+// other accelerations k move it away from there by along_p.k/lam, if they change little within 1/lam.  So, with v and a by along_p,
+//
+//   f = g (x - v),   x = a/lam - along_q.q,   g = 1/(1 - along_p.t/lam).
+//
 // Whether a contact is closed, and whether a lossy one presses, is fixed for a whole step (events.hpp finds where that changes).
 #pragma once
 #include "laws.hpp"
@@ -26,15 +38,20 @@ template <class L> struct Channel {
     typedef typename L::Number Number;
     typedef typename L::Real Real;
     int law;
-    bool contact, lossy, timed, affine, active;
+    int state;                   // place of a state of its own in P, or -1
+    bool contact, lossy, timed, affine, circuit, harvests, active;
     int uses;                    // signals that it adds
     int *signal;
     double *factor;
     typename L::Cell *row;       // r, of the runs at hand
+    typename L::Cell *along_q, *along_p;  // of a circuit
+    Number *along_M;             // products of along_p with the rows of all channels
+    typename L::Marks follows;   // the circuit follows the beam in the step at hand
     Number *P, *M;               // numbers of the law; products with the rows of all channels
     Number rest, offset;         // displacement in the first well; of a contact, penetration there with its signals at 0
     // at a kick: x and y of the law, force; force of the first kick; penetration and rate at both ends
     Number x, y, f, first_f, v;
+    Number z;                    // of a circuit, the state at the kick at hand, at last at the end of the step
     Number early;                // of a lossy channel 2/w^2 times the integral of (w - t) f over a kick of w: f if it is constant
     Number d0, r0, d1, r1;
     typename L::Marks closed, pressing;
@@ -68,7 +85,8 @@ template <class L> struct Runs {
     bool direct;                          // nothing acts but the tension: the first flow begins from q, p, k
 };
 
-constexpr int BLOCK_ARRAYS = 11;
+constexpr int BLOCK_ARRAYS = 14;
+constexpr double FOLLOWS = 8.0;  // decay of a circuit in a step, lam h, beyond which it follows the beam
 
 template <class L, class X, class Y> SNAPBEAM_FN typename L::Cell dot_cells(const X *a, const Y *b, int n) {
     typename L::Cell s = a[0] * b[0];
@@ -164,8 +182,9 @@ template <class L> SNAPBEAM_FN void tension_at(Runs<L> &z, const typename L::Cel
     acceleration_row(z, k);
 }
 
-// Displacement along the row of a channel, from the straight structure, or of a contact from the first well.
+// Displacement along the row of a channel, from the straight structure, or of a contact from the first well; the state of a circuit.
 template <class L> SNAPBEAM_FN typename L::Number along(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q) {
+    if (c.circuit) return q == z.q1 ? c.z : c.P[c.state];
     const auto moved = dot<L>(c.row, q, z.s->size());
     return fma(c.contact ? z.sign - typename L::Real(1.0) : z.sign, c.rest, moved);
 }
@@ -179,6 +198,15 @@ SNAPBEAM_FN typename L::Number force_at(const Channel<L> &c, typename L::Number 
     typedef typename L::Number Number;
     const Number f = with_law(c.law, [&](auto law) { return law.force(c.contact ? max(x, Number(0.0)) : x, y, c.P); });
     return c.contact ? select(c.closed & c.pressing, f, Number(0.0)) : f;
+}
+
+// Power lost by a force f at x and y, of a contact beyond that of its force at y = 0.
+template <class L>
+SNAPBEAM_FN typename L::Number power_lost(const Channel<L> &c, typename L::Number x, typename L::Number y, typename L::Number f, typename L::Number elastic) {
+    return with_law(c.law, [&](auto law) {
+        if constexpr (law.contact) return (f - elastic) * y;
+        else return law.loss(x, y, f, c.P);
+    });
 }
 
 // phi_1, phi_2, phi_3 for |x| <= 1.
@@ -207,15 +235,70 @@ SNAPBEAM_FN void affine_kick(const Channel<L> &c, typename L::Number w, typename
     // f' = -B a - M B f, of a contact and of a force alike
     *impulse = w * fma(f0, phi.one, -(B * a * w * phi.two));
     *twice = w * w * fma(f0, phi.two, -(B * a * w * phi.three));
-    // the power lost, B y^2, by Gauss's rule of three points
+    // the power lost by Gauss's rule of three points
     const Number drive = -side * fma(M, elastic, a);  // y' = drive - M B y
     const double at[3] = {0.1127016653792583, 0.5, 0.8872983346207417}, share[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
     *lost = Number(0.0);
     for (int i = 0; i < 3; ++i) {
         const Number t = Number(at[i]) * w, xt = decay * t, one = Phi<Number>(xt).one;
         const Number y = fma(y0, fma(-xt, one, Number(1.0)), drive * t * one);
-        *lost = fma(Number(share[i]) * w, B * y * y, *lost);
+        *lost = fma(Number(share[i]) * w, power_lost(c, c.x, y, fma(side * B, y, elastic), elastic), *lost);
     }
+}
+
+// A circuit, exactly; *a* and *v* along its row.
+template <class L>
+SNAPBEAM_FN void circuit_kick(const Channel<L> &c, typename L::Number w, typename L::Number M, typename L::Number a, typename L::Number v,
+                              typename L::Number &state, typename L::Number *impulse, typename L::Number *twice, typename L::Number *lost) {
+    typedef typename L::Number Number;
+    typedef typename L::Real Real;
+    constexpr int TERMS = 18;  // where (lam + M^(1/2)) h <= 1
+    const double node[4] = {0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262};
+    const double share[4] = {0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692};
+    const Number zero = Number(0.0), lam = select(c.follows, zero, c.P[0]);
+    const Real parts = max(nearest(value((lam + sqrt(M)) * abs(w)) + Real(0.5)), Real(1.0));
+    const Number h = w / Number(parts), lam_h = lam * h, M_h = M * h * h;
+    *impulse = *twice = *lost = zero;
+    for (int part = 0;; ++part) {
+        const auto within = Real(double(part)) < parts;
+        if (!any(within)) break;
+        Number b[TERMS], end = state, mean = state, mean_of_mean = Number(0.5) * state;
+        b[0] = state, b[1] = -fma(lam, state, v) * h;
+        for (int n = 1; n < TERMS; ++n) {
+            if (n > 1) b[n] = -(fma(lam_h * Number(double(n - 1)), b[n - 1], M_h * b[n - 2]) + (n == 2 ? a * h * h : zero)) * Number(1.0 / (n * (n - 1)));
+            end += b[n], mean = fma(b[n], Number(1.0 / (n + 1)), mean), mean_of_mean = fma(b[n], Number(1.0 / ((n + 1) * (n + 2))), mean_of_mean);
+        }
+        Number squares = zero;
+        for (int i = 0; i < 4; ++i) {
+            Number at = b[TERMS - 1];
+            for (int n = TERMS - 2; n >= 0; --n) at = fma(at, Number(node[i]), b[n]);
+            squares = fma(Number(share[i]) * at, at, squares);
+        }
+        const Number step = select(within, h, zero);
+        *twice += step * fma(h, mean_of_mean, *impulse);
+        *impulse = fma(step, mean, *impulse), *lost = fma(step * lam, squares, *lost);
+        v += step * fma(M, mean, a);
+        assign(within, state, end);
+    }
+}
+
+// Product of what a channel sees with the row of channel j: the row itself, or along_p.
+template <class L> SNAPBEAM_FN typename L::Number product_seen(const Channel<L> &c, int j) {
+    return c.circuit ? select(c.follows, c.along_M[j], c.M[j]) : c.M[j];
+}
+// A circuit that follows the beam: its x and g, *a* and *v* by along_p; own is its channel.
+template <class L> SNAPBEAM_FN void follow(const Runs<L> &z, Channel<L> &c, int own, typename L::Number &a, typename L::Number &v) {
+    typedef typename L::Number Number;
+    const int n = z.s->size();
+    Number by_p = dot<L>(c.along_p, z.k1, n);
+    for (int j = 0; j < z.channels; ++j) {
+        const Channel<L> &other = z.channel[j];
+        if (other.active && !other.lossy && other.law != AXIAL_LOAD) by_p = fma(c.along_M[j], other.f, by_p);
+    }
+    assign(c.follows, a, by_p), assign(c.follows, v, dot<L>(c.along_p, z.p1, n));
+    const Number per = Number(1.0) / max(c.P[0], Number(1e-300));
+    assign(c.follows, c.P[1], Number(1.0) / (Number(1.0) - c.along_M[own] * per));
+    assign(c.follows, c.x, fma(by_p, per, -dot<L>(c.along_q, z.q1, n)));
 }
 
 // Forces that depend on velocities, together; the impulses of a kick of *w* seconds go into p.
@@ -226,7 +309,7 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
     const int n = s.size();
     Number *v = z.block, *a = v + z.channels, *y = a + z.channels, *slope = y + z.channels, *change = slope + z.channels;
     Number *f = change + z.channels, *impulse = f + z.channels, *lost = impulse + z.channels, *elastic = lost + z.channels;
-    Number *tip = elastic + z.channels, *twice = tip + z.channels;
+    Number *tip = elastic + z.channels, *twice = tip + z.channels, *x = twice + z.channels, *flow = x + z.channels, *gain = flow + z.channels;
     Real decay = Real(0.0);
     for (int i = 0; i < count; ++i) {
         Channel<L> &c = z.channel[z.late[i]];
@@ -235,19 +318,32 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
             const Channel<L> &other = z.channel[j];
             if (other.active && !other.lossy && other.law != AXIAL_LOAD) a[i] = fma(c.M[j], other.f, a[i]);
         }
+        if (c.circuit) {
+            c.P[1] = Number(0.0);
+            if (any(c.follows)) follow(z, c, z.late[i], a[i], v[i]);
+        }
         impulse[i] = lost[i] = twice[i] = Number(0.0);
         tip[i] = c.contact ? signal_slope(z, c) : Number(0.0);
         elastic[i] = c.contact ? force_at(c, c.x, Number(0.0)) : Number(0.0);
         const Number fastest = abs(v[i]) + abs(tip[i]) + abs(w * a[i]);
         const Number damping = with_law(c.law, [&](auto law) { return law.damping(c.contact ? max(c.x, Number(0.0)) : c.x, fastest, c.P); });
-        decay += value(c.M[z.late[i]] * (c.contact ? select(c.closed & c.pressing, damping, Number(0.0)) : damping));
+        decay += value(product_seen(c, z.late[i]) * (c.contact ? select(c.closed & c.pressing, damping, Number(0.0)) : damping));
+        if (c.circuit) decay += select(c.follows, Real(0.0), value(c.P[0] + sqrt(c.M[z.late[i]])));
     }
     const bool alone = count == 1 && z.channel[z.late[0]].affine;
-    const auto exact = decay * abs(value(w)) <= Real(alone ? 1.0 : -1.0);
+    auto exact = decay * abs(value(w)) <= Real(alone ? 1.0 : -1.0);
     Number exact_impulse = Number(0.0), exact_twice = Number(0.0), exact_lost = Number(0.0);
     if (alone) {
         const Channel<L> &c = z.channel[z.late[0]];
-        affine_kick(c, w, c.M[z.late[0]], a[0], v[0], tip[0], &exact_impulse, &exact_twice, &exact_lost);
+        affine_kick(c, w, product_seen(c, z.late[0]), a[0], v[0], tip[0], &exact_impulse, &exact_twice, &exact_lost);
+        if (c.circuit && any(!c.follows)) {
+            const auto coupled = !c.follows;
+            Number state = c.z, own_impulse, own_twice, own_lost;
+            circuit_kick(c, w, c.M[z.late[0]], a[0], v[0], state, &own_impulse, &own_twice, &own_lost);
+            assign(coupled, exact_impulse, own_impulse), assign(coupled, exact_twice, own_twice), assign(coupled, exact_lost, own_lost);
+            assign(coupled, z.channel[z.late[0]].z, state);
+            exact = exact | coupled;
+        }
     }
     Real parts = nearest(decay * abs(value(w)) * Real(s.problem->parts_per_decay) + Real(0.5));
     parts = min(max(parts, Real(double(s.problem->fewest_parts))), Real(256.0));
@@ -257,26 +353,27 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
         const auto within = (Real(double(part)) < parts) & (!exact);
         if (!any(within)) break;
         const Number step = select(within, h, Number(0.0));
-        for (int i = 0; i < count; ++i) change[i] = slope[i] = Number(0.0), twice[i] = fma(step, impulse[i], twice[i]);
+        for (int i = 0; i < count; ++i) change[i] = slope[i] = flow[i] = gain[i] = Number(0.0), twice[i] = fma(step, impulse[i], twice[i]);
         for (int stage = 0; stage < 4; ++stage) {
             for (int i = 0; i < count; ++i) {
                 const Channel<L> &c = z.channel[z.late[i]];
                 const Number own = fma(Number(ahead[stage]) * step, slope[i], v[i]);
-                y[i] = c.contact ? tip[i] - own : own;
-                f[i] = force_at(c, c.x, y[i]);
+                y[i] = c.contact ? tip[i] - own : own, x[i] = c.circuit ? fma(Number(ahead[stage]) * step, flow[i], c.z) : c.x;
+                f[i] = force_at(c, x[i], y[i]);
             }
             const Number weight = Number(share[stage]) * step;
             for (int i = 0; i < count; ++i) {
                 const Channel<L> &c = z.channel[z.late[i]];
                 slope[i] = a[i];
-                for (int j = 0; j < count; ++j) slope[i] = fma(c.M[z.late[j]], f[j], slope[i]);
+                for (int j = 0; j < count; ++j) slope[i] = fma(product_seen(c, z.late[j]), f[j], slope[i]);
                 change[i] = fma(weight, slope[i], change[i]);
                 impulse[i] = fma(weight, f[i], impulse[i]);
                 if (stage < 3) twice[i] = fma(step * step * Number(1.0 / 6.0), f[i], twice[i]);
-                lost[i] = fma(weight, c.contact ? (f[i] - elastic[i]) * y[i] : -(f[i] * y[i]), lost[i]);
+                lost[i] = fma(weight, power_lost(c, x[i], y[i], f[i], elastic[i]), lost[i]);
+                if (c.circuit) flow[i] = Circuit::rate(x[i], y[i], c.P), gain[i] = fma(weight, flow[i], gain[i]);
             }
         }
-        for (int i = 0; i < count; ++i) v[i] += change[i];
+        for (int i = 0; i < count; ++i) v[i] += change[i], z.channel[z.late[i]].z += gain[i];
     }
     for (int i = 0; i < count; ++i) {
         Channel<L> &c = z.channel[z.late[i]];
@@ -284,6 +381,10 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
         c.f = select(differ(w, Number(0.0)), impulse[i] / w, Number(0.0));
         c.early = select(differ(w, Number(0.0)), Number(2.0) * twice[i] / (w * w), Number(0.0));
         c.lost += lost[i];
+        if (c.circuit) {
+            const Number end = select(exact, fma(product_seen(c, z.late[i]), impulse[i], fma(a[i], w, v[i])), v[i]);
+            assign(c.follows, c.z, force_at(c, c.x, end));
+        }
         for (int m = 0; m < n; ++m) z.p1[m] = fma(typename L::Cell(impulse[i]), c.row[m], z.p1[m]);
     }
 }
@@ -311,11 +412,13 @@ template <class L> SNAPBEAM_FN void timed_work(Runs<L> &z, Channel<L> &c, typena
 
 template <class L> SNAPBEAM_FN void begin_step(Runs<L> &z) {
     typedef typename L::Number Number;
+    typedef typename L::Real Real;
     z.dissipated = Number(0.0), z.direct = true;
     for (int i = 0; i < z.signals; ++i) z.signal[i].at = z.signal[i].begun;
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
-        c.impulse = c.work = c.lost = Number(0.0);
+        c.impulse = c.work = c.lost = Number(0.0), c.z = c.circuit ? c.P[c.state] : Number(0.0);
+        if (c.circuit) c.follows = (value(c.P[0] * z.h) > Real(FOLLOWS)) & (value(c.along_M[j]) < Real(0.5) * value(c.P[0]));
         c.active = !c.contact || any(c.closed), z.direct &= !c.active;
         if (!(c.law == AXIAL_LOAD)) c.f = c.first_f = Number(0.0);
     }

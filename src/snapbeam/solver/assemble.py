@@ -510,7 +510,7 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
             each._replace(step=min(each.step, 2.0 * math.pi / (_RESOLVED * rate))) if rate > 0.0 else each
             for each, rate in zip(plans, fastest.tolist(), strict=True)
         ]
-    if integration.step is None and system.harvesters:
+    if integration.step is None and system.harvesters and not is_native(integration.engine):
         allowed = _longest_with_circuits(system, columns, len(plans), integration.accuracy)
         longer = max(each.step / own for each, own in zip(plans, allowed.tolist(), strict=True))
         if longer > _NOTABLE:

@@ -2,7 +2,7 @@
 
     q_i'' + 2 zeta_i omega_i q_i' + omega_i^2 q_i = tension + sum_j r_ij f_j(u_j, v_j, t),    u_j = u_j0 + r_j . q
 
-A contact, a local force, an external force, the base and the axial load are channels; the motion of a striker, the base, a load or
+A contact, a local force, an external force, the base, the axial load and a circuit are channels; the motion of a striker, the base, a load or
 a force is a signal.
 """
 
@@ -54,7 +54,7 @@ LAWS: dict[type, tuple[int, tuple[str, ...]]] = {
     CoulombFriction: (9, ("friction_force", "smoothing_velocity")),
 }
 """Number of each law in ``core/laws.hpp``, and the names of its numbers in their order there."""
-EXTERNAL_FORCE, BASE, AXIAL_LOAD = 11, 12, 13
+LINEAR_DAMPING, EXTERNAL_FORCE, BASE, AXIAL_LOAD, CIRCUIT = 10, 11, 12, 13, 14
 SIGNAL = (
     "mean",
     "amplitude",
@@ -194,8 +194,6 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
     """
     structure, table, runs = ensemble.structure, ensemble.runs, ensemble.size
     built = _Builder(runs)
-    if structure.circuits:
-        raise InputError("harvester: is not integrated by engine = 'native'; use engine = 'cpu'")
     for section, drive in _motions(system):
         _add_motion(built, system, ensemble, columns, section, drive)
     base = system.base_excitation
@@ -223,6 +221,12 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
         built.add(BASE, structure.base_load, 0, 0.0, {"base_excitation": up})
     if system.axial_load is not None:
         built.add(AXIAL_LOAD, np.zeros(structure.omega.size), 0, 0.0, {"axial_load": 1.0})
+    starts = structure.circuits_of(ensemble.starts[:, 0]).reshape(len(ensemble.starts), -1)
+    for circuit, coupling, state in zip(structure.circuits, ensemble.circuits, starts.T, strict=False):
+        if circuit.mode is None:
+            built.add(LINEAR_DAMPING, circuit.row, 0, 0.0, {}, [coupling.rate])
+        else:
+            built.add(CIRCUIT, circuit.row, 0, 0.0, {}, [coupling.rate, 0.0, state[table["start_row"]]])
     observed = np.array([structure.row_of_beam(row) for row in ensemble.contact_rows])
     built.place(observed, table["contact_row"], table["rest_contact"])
     return built.built(len(system.contacts))

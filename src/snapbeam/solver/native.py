@@ -13,9 +13,12 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from snapbeam import _core
-from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LAW_NUMBERS, STEEP, Channels
+from snapbeam.solver.channels import AXIAL_LOAD, BASE, CIRCUIT, EXTERNAL_FORCE, LAW_NUMBERS, LINEAR_DAMPING, STEEP, Channels
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.statistics import (
+    CIRCUIT_LATE_LOSS,
+    CIRCUIT_LOSS,
+    CIRCUIT_PEAK,
     OTHER_IMPACTS,
     OTHER_IMPULSE,
     OTHER_PEAK,
@@ -50,6 +53,7 @@ OF_CHANNEL = (
     "work",
     "gross_work",
     "lost",
+    "late_lost",
     "peak_force",
     "deepest",
     "contact_time",
@@ -87,15 +91,16 @@ class _Arrays:
         channels, structure = ensemble.channels, ensemble.structure
         assert channels is not None
         self.ensemble, self.channels = ensemble, channels
-        coupled = structure.coupling != 0.0
-        count, label = connected_components(coupled, directed=False)
-        self.order = np.argsort(label, kind="stable")
+        charges = [each.mode for each in structure.circuits if each.mode is not None]
+        kept = np.setdiff1d(np.arange(structure.omega.size), charges)
+        count, label = connected_components(structure.coupling[np.ix_(kept, kept)] != 0.0, directed=False)
+        self.order = kept[np.argsort(label, kind="stable")]
         sizes = np.bincount(label, minlength=count).astype(np.int32)
-        n, modes = structure.omega.size, structure.equilibrium.size
+        n, modes = kept.size, structure.equilibrium.size
         halvings = (ensemble.runs["max_halvings"] - ensemble.runs["min_contact_halvings"]).astype(float)
         if np.isin(channels.laws, STEEP).any():
             halvings += _STEEP  # near a magnet or an electrode
-        lossy = bool(np.isin(channels.laws, (3, 4, 8, 9, 10)).any())
+        lossy = bool(np.isin(channels.laws, (3, 4, 8, 9, 10, 14)).any())
         fewest, per_decay = _PARTS[ensemble.order]
         wells = structure.unequal_wells
         has_two = structure.stretch > 0.0
@@ -105,6 +110,8 @@ class _Arrays:
             return np.ascontiguousarray(np.asarray(values, dtype=float)[..., self.order])
 
         self.row = row
+        self.circuits = np.flatnonzero(np.isin(channels.laws, (CIRCUIT, LINEAR_DAMPING)))
+        """Channels of the circuits."""
         self.problem = {
             "omega": row(structure.omega),
             "sigma": row(structure.damping_ratio * structure.omega),
@@ -115,7 +122,7 @@ class _Arrays:
             "far_force": row(wells.force) if has_two and wells is not None else None,
             "second": row(wells.second) if has_two and wells is not None else None,
             "high": row(high) if high.any() else None,
-            "beam": row(np.arange(n) < modes),
+            "beam": row(np.arange(structure.omega.size) < modes),
             "lift": float(wells.lift) if has_two and wells is not None else 0.0,
             "block_sizes": sizes,
             "composition": 0 if ensemble.order == 4 else 2 if lossy else 1,
@@ -178,19 +185,29 @@ class _Arrays:
             "p": row(ensemble.starts[start, 1]),
             "order": np.argsort(-ensemble.work, kind="stable").astype(np.int32),
             "outputs": 0,
-            "states": np.zeros((ensemble.size, 0, 2 * n + 1 + channels.laws.size)),
+            "states": np.zeros((ensemble.size, 0, 2 * n + 1 + 2 * channels.laws.size)),
             "statistics": np.full((ensemble.size, len(STATISTICS)), np.nan),
             "of_channels": np.zeros((ensemble.size, channels.laws.size, len(OF_CHANNEL))),
             "account": 0,
         }
         self.batch["statistics"][:, 0] = -1.0
 
+    def modes_of(self, states: _Array, laws: _Array | None = None) -> tuple[_Array, _Array]:
+        """q and p of the structure, of those in the core and of the states of laws, shape (..., channels)."""
+        n, structure = self.order.size, self.ensemble.structure
+        q, p = np.zeros((2, *states.shape[:-1], structure.omega.size))
+        q[..., self.order], p[..., self.order] = states[..., :n], states[..., n : 2 * n]
+        for circuit, channel in zip(structure.circuits, self.circuits.tolist(), strict=True):
+            if circuit.mode is not None and laws is not None:
+                q[..., circuit.mode] = laws[..., channel] + q @ circuit.row
+        return q, p
+
     def accumulators(self) -> NDArray[Any]:
         """The records of the runs."""
         statistics, of_channels = self.batch["statistics"], self.batch["of_channels"]
         channels = self.channels
         further = max(0, channels.contacts - 1)
-        found = empty_accumulators(self.ensemble.size, further)
+        found = empty_accumulators(self.ensemble.size, further, len(self.circuits))
         begun = statistics[:, 0] >= 0.0
         for k, name in enumerate(STATISTICS):
             if name in (found.dtype.names or ()) and name not in ("status", "time"):
@@ -206,10 +223,13 @@ class _Arrays:
         if further:
             for at, name in ((OTHER_IMPACTS, "impacts"), (OTHER_PEAK, "peak_force"), (OTHER_IMPULSE, "impulse"), (OTHER_WORK, "work")):  # fmt: skip
                 found["others"][:, :, at] = contacts[name][:, 1:]
+        for column, name in ((CIRCUIT_LOSS, "lost"), (CIRCUIT_LATE_LOSS, "late_lost"), (CIRCUIT_PEAK, "peak_force")):
+            if self.circuits.size:
+                found["circuits"][:, :, column] = of_channels[:, self.circuits, OF_CHANNEL.index(name)]
         works = OF_CHANNEL.index("work"), OF_CHANNEL.index("gross_work"), OF_CHANNEL.index("lost")
         found["gross_work"] = of_channels[:, :, works[1]].sum(axis=1)
         for j, law in enumerate(channels.laws.tolist()):
-            if j >= channels.contacts:
+            if j >= channels.contacts and j not in self.circuits:
                 found[_work_of(law)] += of_channels[:, j, works[0]] - of_channels[:, j, works[2]]
         if self.batch["account"]:
             found["dissipated"] += found["lost"]
@@ -256,13 +276,12 @@ def integrate_with_output_states(
     """Integrate as :func:`run_ensemble`, with the states at every output time."""
     arrays = _Arrays(ensemble)
     outputs = int(-(-ensemble.runs["end"][0] // ensemble.runs["output_interval"][0]))
-    n = ensemble.structure.omega.size
+    n, count = arrays.order.size, arrays.channels.laws.size
     arrays.batch["outputs"] = outputs
-    states = np.full((ensemble.size, outputs, 2 * n + 1 + arrays.channels.laws.size), np.nan)
+    states = np.full((ensemble.size, outputs, 2 * n + 1 + 2 * count), np.nan)
     arrays.batch["states"] = states
     _integrate(arrays, threads, progress)
-    q, p = np.empty((ensemble.size, outputs, n)), np.empty((ensemble.size, outputs, n))
-    q[..., arrays.order], p[..., arrays.order] = states[..., :n], states[..., n : 2 * n]
+    q, p = arrays.modes_of(states, states[..., 2 * n + 1 + count :])
     ticks = states[..., 2 * n + 1 : 2 * n + 1 + max(1, arrays.channels.contacts)]
     if not arrays.channels.contacts:
         ticks = np.full((ensemble.size, outputs, 1), -1.0)
@@ -280,18 +299,19 @@ def record(
     ensemble: Ensemble, times: _Array, in_contact: bool, progress: Callable[[float], object] | None = None
 ) -> Iterator[Recorded]:
     """Integrate the one run of an ensemble once, and return its records, one part after the other."""
-    arrays, n = _Arrays(ensemble), ensemble.structure.omega.size
+    arrays = _Arrays(ensemble)
+    n = arrays.order.size
     channels: Channels = arrays.channels
     arrays.batch["account"], arrays.batch["outputs"] = 1, 1
     arrays.batch["run"][:, RUN.index("output_interval")] = arrays.batch["run"][:, RUN.index("end")]
     count = channels.laws.size
-    arrays.batch["states"] = np.full((1, 1, 2 * n + 1 + count), np.nan)
+    arrays.batch["states"] = np.full((1, 1, 2 * n + 1 + 2 * count), np.nan)
     # one step may hold many instants
     span = 2.0 * float(ensemble.step_times[0])
     most = int((np.searchsorted(times, times + span, side="right") - np.arange(times.size)).max(initial=0))
     samples = max(_SAMPLES, most + 8)
     saved = np.zeros(
-        (3 * (n + 64) + count * (9 + len(OF_CHANNEL)) + len(STATISTICS) + 6 * channels.kinds.size + 32) * 8
+        (3 * (n + 64) + count * (11 + len(OF_CHANNEL)) + len(STATISTICS) + 6 * channels.kinds.size + 32) * 8
     )
     recorder: dict[str, Any] = {
         "times": np.ascontiguousarray(times, dtype=float),
@@ -322,13 +342,12 @@ def record(
 def _recorded(
     arrays: _Arrays, recorder: Any, held: int, impacts: int, accumulators: NDArray[Any]
 ) -> Recorded:
-    n, channels = arrays.ensemble.structure.omega.size, arrays.channels
+    channels = arrays.channels
     rows, values = recorder["rows"][:held], recorder["values"][:held]
-    q, p = np.empty((held, n)), np.empty((held, n))
-    q[:, arrays.order], p[:, arrays.order] = rows[:, :n], rows[:, n:]
     own = values[:, OF_SAMPLE:].reshape(held, -1, CHANNEL_SAMPLE)
+    q, p = arrays.modes_of(rows, own[:, :, 0])
     contacts, others = own[:, : channels.contacts], own[:, channels.contacts :]
-    found = np.zeros((held, 7 + len(WORKS)))
+    found = np.zeros((held, 7 + len(WORKS) + arrays.circuits.size))
     if channels.contacts:
         found[:, 0], found[:, 1] = contacts[:, 0, 0], contacts[:, 0, 1]
     else:
@@ -337,7 +356,10 @@ def _recorded(
     found[:, 3], found[:, 4] = contacts[:, :, 2].sum(axis=1), contacts[:, :, 3].sum(axis=1)
     found[:, 6] = contacts[:, :, 4].sum(axis=1)
     found[:, 5] = values[:, 2] + found[:, 6]
+    found[:, 7 + len(WORKS) :] = own[:, arrays.circuits, 4]
     for j, law in enumerate(channels.laws[channels.contacts :].tolist()):
+        if law in (CIRCUIT, LINEAR_DAMPING):
+            continue
         found[:, 7 + list(WORKS).index(_work_of(law))] += others[:, j, 3] - others[:, j, 4]
     table = recorder["impacts"][:impacts]
     table = (
@@ -351,12 +373,11 @@ def _recorded(
 
 def _last(arrays: _Arrays, recorder: Any, accumulators: NDArray[Any]) -> Last:
     """Final state of the run."""
-    n, contacts = arrays.ensemble.structure.omega.size, max(1, arrays.channels.contacts)
-    final = arrays.batch["states"]
-    q, p = np.zeros(n), np.zeros(n)
+    n, contacts = arrays.order.size, max(1, arrays.channels.contacts)
+    final, count = arrays.batch["states"], arrays.channels.laws.size
+    q, p = arrays.modes_of(final[0, 0], final[0, 0, 2 * n + 1 + count :])
     if not np.isfinite(final).all():
-        return Last(q, p, 1, np.full(contacts, -1.0))
-    q[arrays.order], p[arrays.order] = final[0, 0, :n], final[0, 0, n : 2 * n]
+        return Last(np.zeros_like(q), np.zeros_like(p), 1, np.full(contacts, -1.0))
     ticks = final[0, 0, 2 * n + 1 : 2 * n + 1 + contacts] if arrays.channels.contacts else np.full(1, -1.0)
     return Last(q, p, int(final[0, 0, 2 * n]), np.where(ticks > 0.0, ticks / arrays.finer, ticks))
 

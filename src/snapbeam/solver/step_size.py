@@ -306,7 +306,8 @@ def _free_runs(rest: _Array, velocity: _Array, steps: _Array, counts: _Array) ->
         "run": run, "signals": np.zeros((runs, 0, 9)), "pieces": np.zeros((0, 7)), "jumps": np.zeros((runs, 0)), "numbers": np.zeros((runs, 0, 0)), "offset": np.zeros((runs, 0)),
         "since": np.zeros((runs, 0)), "rows": np.zeros((1, n)), "row_of": np.zeros((runs, 1), np.int32), "rest": np.zeros((runs, 1)),
         "q": np.tile(rest, (runs, 1)), "p": np.tile(velocity, (runs, 1)), "order": np.argsort(-counts, kind="stable").astype(np.int32),
-        "outputs": 1, "states": np.full((runs, 1, 2 * n + 1), np.nan), "statistics": np.zeros((runs, 27)), "of_channels": np.zeros((runs, 0, 10)),
+        "outputs": 1, "states": np.full((runs, 1, 2 * n + 1), np.nan), "statistics": np.zeros((runs, _core.STATISTICS)),
+        "of_channels": np.zeros((runs, 0, _core.OF_CHANNEL)),
         "account": 0,
     }  # fmt: skip
 
