@@ -336,7 +336,7 @@ template <class L> struct Group {
         }
         Real level = Real(0.0), length = step, next = contact_step;
         for (int i = 0; i < problem->levels - 1; ++i) {
-            const Marks more = (length > want) & (level <= halvings);
+            const Marks more = ((length > want) | half_resolved(length)) & (level <= halvings);
             if (!any(more)) break;
             length = select(more, next, length), next = select(more, Real(0.5) * next, next), level += select(more, Real(1.0), Real(0.0));
         }
@@ -348,6 +348,16 @@ template <class L> struct Group {
         z.h = Number(ticks * z.tick);
         const Marks changed = alive & differ(ticks, key);
         if (any(changed)) new_flows(changed, level, again | landing);
+    }
+    // Steps in which a circuit neither follows the beam nor changes slowly.
+    SNAPBEAM_FN Marks half_resolved(Real length) const {
+        Marks found = FromBits<Marks>::of(0);
+        for (int j = 0; j < z.channels && problem->composition; ++j) {
+            if (!z.channel[j].circuit) continue;
+            const Real decay = value(z.channel[j].P[0]) * length * z.tick;
+            found = found | ((decay > Real(RESOLVED)) & (decay <= Real(FOLLOWS)));
+        }
+        return found;
     }
     SNAPBEAM_FN Real limit_of_outputs() {
         Real found = Real(0.0);

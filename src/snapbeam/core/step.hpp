@@ -27,6 +27,8 @@
 //
 //   f = g (x - v),   x = a/lam - along_q.q,   g = 1/(1 - along_p.t/lam).
 //
+// By what z differs from f at the first kick it has died away before the step is over, with the impulse (z - f)/lam.
+//
 // Whether a contact is closed, and whether a lossy one presses, is fixed for a whole step (events.hpp finds where that changes).
 #pragma once
 #include "laws.hpp"
@@ -85,8 +87,9 @@ template <class L> struct Runs {
     bool direct;                          // nothing acts but the tension: the first flow begins from q, p, k
 };
 
-constexpr int BLOCK_ARRAYS = 14;
+constexpr int BLOCK_ARRAYS = 15;
 constexpr double FOLLOWS = 8.0;  // decay of a circuit in a step, lam h, beyond which it follows the beam
+constexpr double RESOLVED = 1.5; // and, of order 6, below which a step is as long as wanted
 
 template <class L, class X, class Y> SNAPBEAM_FN typename L::Cell dot_cells(const X *a, const Y *b, int n) {
     typename L::Cell s = a[0] * b[0];
@@ -301,15 +304,25 @@ template <class L> SNAPBEAM_FN void follow(const Runs<L> &z, Channel<L> &c, int 
     assign(c.follows, c.x, fma(by_p, per, -dot<L>(c.along_q, z.q1, n)));
 }
 
+// The part in the force of such a circuit, channel i of the block, of the other forces of the velocity.
+template <class L> SNAPBEAM_FN typename L::Number pulled_along(const Runs<L> &z, const Channel<L> &c, const typename L::Number *f, int i, int count) {
+    typedef typename L::Number Number;
+    Number sum = Number(0.0);
+    if (!c.circuit || !any(c.follows)) return sum;
+    for (int j = 0; j < count; ++j)
+        if (j != i) sum = fma(c.along_M[z.late[j]], f[j], sum);
+    return select(c.follows, c.P[1] / max(c.P[0], Number(1e-300)) * sum, Number(0.0));
+}
+
 // Forces that depend on velocities, together; the impulses of a kick of *w* seconds go into p.
-template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number w, int count) {
+template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number w, int count, bool first) {
     typedef typename L::Number Number;
     typedef typename L::Real Real;
     const Structure<L> &s = *z.s;
     const int n = s.size();
     Number *v = z.block, *a = v + z.channels, *y = a + z.channels, *slope = y + z.channels, *change = slope + z.channels;
     Number *f = change + z.channels, *impulse = f + z.channels, *lost = impulse + z.channels, *elastic = lost + z.channels;
-    Number *tip = elastic + z.channels, *twice = tip + z.channels, *x = twice + z.channels, *flow = x + z.channels, *gain = flow + z.channels;
+    Number *tip = elastic + z.channels, *twice = tip + z.channels, *x = twice + z.channels, *flow = x + z.channels, *gain = flow + z.channels, *settled = gain + z.channels;
     Real decay = Real(0.0);
     for (int i = 0; i < count; ++i) {
         Channel<L> &c = z.channel[z.late[i]];
@@ -320,7 +333,11 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
         }
         if (c.circuit) {
             c.P[1] = Number(0.0);
-            if (any(c.follows)) follow(z, c, z.late[i], a[i], v[i]);
+            settled[i] = Number(0.0);
+            if (any(c.follows)) {
+                follow(z, c, z.late[i], a[i], v[i]);
+                if (first) assign(c.follows, settled[i], c.z - force_at(c, c.x, v[i]));
+            }
         }
         impulse[i] = lost[i] = twice[i] = Number(0.0);
         tip[i] = c.contact ? signal_slope(z, c) : Number(0.0);
@@ -358,9 +375,11 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
             for (int i = 0; i < count; ++i) {
                 const Channel<L> &c = z.channel[z.late[i]];
                 const Number own = fma(Number(ahead[stage]) * step, slope[i], v[i]);
-                y[i] = c.contact ? tip[i] - own : own, x[i] = c.circuit ? fma(Number(ahead[stage]) * step, flow[i], c.z) : c.x;
+                y[i] = c.contact ? tip[i] - own : own, x[i] = c.x;
+                if (c.circuit) assign(!c.follows, x[i], fma(Number(ahead[stage]) * step, flow[i], c.z));
                 f[i] = force_at(c, x[i], y[i]);
             }
+            for (int i = 0; i < count; ++i) f[i] += pulled_along(z, z.channel[z.late[i]], f, i, count);
             const Number weight = Number(share[stage]) * step;
             for (int i = 0; i < count; ++i) {
                 const Channel<L> &c = z.channel[z.late[i]];
@@ -382,8 +401,9 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
         c.early = select(differ(w, Number(0.0)), Number(2.0) * twice[i] / (w * w), Number(0.0));
         c.lost += lost[i];
         if (c.circuit) {
+            if (first) impulse[i] += settled[i] / max(c.P[0], Number(1e-300)), c.lost += settled[i] * (Number(2.0) * c.z - Number(1.5) * settled[i]);
             const Number end = select(exact, fma(product_seen(c, z.late[i]), impulse[i], fma(a[i], w, v[i])), v[i]);
-            assign(c.follows, c.z, force_at(c, c.x, end));
+            assign(c.follows, c.z, force_at(c, c.x, end) + pulled_along(z, c, f, i, count));
         }
         for (int m = 0; m < n; ++m) z.p1[m] = fma(typename L::Cell(impulse[i]), c.row[m], z.p1[m]);
     }
@@ -460,7 +480,7 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
             if (!c.lossy) c.f = force_at(c, c.x, Number(0.0));
         }
     }
-    if (late) velocity_kick(z, w, late);
+    if (late) velocity_kick(z, w, late, stage == 0);
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
         if (!c.active) continue;

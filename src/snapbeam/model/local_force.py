@@ -307,7 +307,7 @@ class LocalSpring(LocalForce):
     stiffness : float
         k, N/m, or N m/rad for a rotation.
     cubic_stiffness : float
-        k_3, N/m^3, or N m/rad^3.  A softening spring, k_3 < 0, is valid up to u^2 = k/|k_3|, where its force falls to zero
+        k_3, N/m^3, or N m/rad^3.  A softening spring, k_3 < 0, is valid up to u^2 = -k/k_3, where its force falls to zero
         and its potential energy has a maximum; with k = 0 it has no such limit.
 
     Examples

@@ -502,7 +502,7 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     ]
     if further:
         plans = [_serving(each) for each in zip(plans, *further, strict=True)]
-    if integration.step is None and plans[0].order == 6 and _depends_on_velocity(system):
+    if integration.step is None and plans[0].order == 6 and _depends_on_velocity(system, is_native(integration.engine)):
         plans = [each.scaled(_GENERAL) for each in plans]
     if integration.step is None and any(_is_around(section) for section, _ in system.moving):
         fastest = fastest_of(system, columns, len(plans))
@@ -538,12 +538,12 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     ]
 
 
-def _depends_on_velocity(system: System) -> bool:
+def _depends_on_velocity(system: System, native: bool) -> bool:
     """True if a force depends on velocities, so that the kicks need the general composition of order 6."""
     return (
         any(each.law.rate_dependent for each in system.contacts)
         or any(each.dissipative for each in system.local_forces)
-        or any(each.inertia == 0.0 for each in system.harvesters)
+        or any(native or each.inertia == 0.0 for each in system.harvesters)
     )
 
 
