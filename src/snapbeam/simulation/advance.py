@@ -17,6 +17,7 @@ from snapbeam.simulation.states import states_of
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.registry import engine_of
+from snapbeam.solver.restrictions import has_tangent_flow
 from snapbeam.solver.statistics import OutputStates, statistics_of
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.status_codes import RunStatus
@@ -121,7 +122,7 @@ def advance(
         ends = engine.integrate_with_output_states(ensemble, integration.threads, report)
     else:
         given = _checked_tangent(tangent, flat)
-        if tangent_obstacle(system) is None:
+        if tangent_obstacle(system) is None and has_tangent_flow(integration.engine):
             back = system.model.linear_modes.T @ system.model.mass
             ends, moved = engine.integrate_tangents(ensemble, given @ back.T, integration.threads, report)
             moved = moved @ system.model.linear_modes.T
@@ -138,7 +139,7 @@ def advance(
 
 
 def tangent_obstacle(system: System) -> str | None:
-    """The part that the tangent flow of the steps does not contain; None if it contains the whole system."""
+    """The part by which the derivatives of the map may jump, and which no tangent flow contains; None without one."""
     laws = [each.law for each in system.contacts]
     if any(law.is_dissipative or not (law.properties.smooth and law.properties.tangent) for law in laws):
         return "a contact force that jumps, depends on the velocity or has a memory"
@@ -213,6 +214,7 @@ def _by_differences(
     """Tangents of shape (runs, k, 2, N) some periods on, between neighbours of the states *begun*, and their errors."""
     size = amplitude_scale(system.model)
     scales = np.array([size, size * 2.0 * np.pi * system.model.reference_frequency])[:, None]
+    smooth = tangent_obstacle(system) is None
 
     def advance_rows(rows: _Array, runs: NDArray[np.intp]) -> tuple[_Array, _Array | None]:
         alpha, velocity = np.moveaxis(rows.reshape(len(rows), 2, begun.modes) * scales, 1, 0)
@@ -222,9 +224,8 @@ def _by_differences(
         )  # fmt: skip
         end = advance(system, beside, periods, integration=integration)
         assert end.statistics is not None
-        return (np.stack((end.amplitude, end.velocity), axis=1) / scales).reshape(rows.shape), end.statistics[
-            "impacts"
-        ]
+        images = np.stack((end.amplitude, end.velocity), axis=1) / scales
+        return images.reshape(rows.shape), None if smooth else end.statistics["impacts"]
 
     x = (np.stack((begun.amplitude, begun.velocity), axis=1) / scales).reshape(begun.batch[0], -1)
     moved, error = differences(advance_rows, x, (tangents / scales).reshape(*tangents.shape[:2], -1))
