@@ -128,7 +128,9 @@ def advance(
             moved = moved @ system.model.linear_modes.T
         else:
             ends = engine.integrate_with_output_states(ensemble, integration.threads, report)
-            moved, error = _by_differences(system, flat, span, given, integration)
+            # neighbours strike where the tip of this run is
+            fixed = replace(flat, striker_position=_states(ensemble, ends, False)[0].striker_position)
+            moved, error = _by_differences(system, fixed, span, given, integration)
             doubt["tangent_error"] = error.max(axis=1)
         moved[~np.isin(ends.accumulators_of_runs["status"], _REACHED)] = np.nan
         vectors = moved.reshape((*state.batch, *moved.shape[1:]))

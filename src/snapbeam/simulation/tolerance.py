@@ -230,7 +230,10 @@ def _perturbed(ensemble: Ensemble, system: System, size: float) -> Ensemble:
             "amplitudes; otherwise the perturbation growth is unknown"
         )
     starts = ensemble.starts if driven else ensemble.starts * factor
-    return replace(ensemble, drive_numbers=numbers, starts=starts, samples=samples)
+    channels = ensemble.channels
+    if channels is not None:
+        channels = replace(channels, uses=channels.uses * factor)
+    return replace(ensemble, drive_numbers=numbers, starts=starts, samples=samples, channels=channels)
 
 
 def _watch(system: System, ensemble: Ensemble, times: _Array) -> _Array:

@@ -326,7 +326,7 @@ def _recorded(
     rows, values = recorder["rows"][:held], recorder["values"][:held]
     q, p = np.empty((held, n)), np.empty((held, n))
     q[:, arrays.order], p[:, arrays.order] = rows[:, :n], rows[:, n:]
-    own = values[:, OF_SAMPLE:].reshape(held, -1, CHANNEL_SAMPLE)
+    own = values[:, OF_SAMPLE:].reshape(held, channels.laws.size, CHANNEL_SAMPLE)
     contacts, others = own[:, : channels.contacts], own[:, channels.contacts :]
     found = np.zeros((held, 7 + len(WORKS)))
     if channels.contacts:
