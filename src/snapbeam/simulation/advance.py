@@ -186,25 +186,25 @@ def differences(
     """
     length = np.linalg.norm(directions, axis=-1, keepdims=True)
     unit = np.divide(directions, length, out=np.zeros_like(directions), where=length > 0.0)
-    runs, count, size = directions.shape
-    found, error = np.empty((runs, count, 0)), np.full((runs, count), np.inf)
-    left, step = np.arange(runs), _STEP
+    found, error = np.empty((*directions.shape[:2], 0)), np.full(directions.shape[:2], np.inf)
+    left, step = np.indices(error.shape).reshape(2, -1), _STEP
     for _ in range(_SHRINKINGS):
-        moves = np.stack([sign * k * step * unit[left] for k in (1, 2, 3) for sign in (1.0, -1.0)], axis=1)
-        rows = (x[left, None, None] + moves).reshape(-1, size)
-        images, impacts = advance_rows(rows, np.repeat(left, 6 * count))
-        table = images.reshape(left.size, 3, 2, count, -1)
-        six, four = np.einsum("os,rskd->orkd", _STENCIL, table[:, :, 0] - table[:, :, 1]) / step
+        moves = np.stack([sign * k * step * unit[*left] for k in (1, 2, 3) for sign in (1.0, -1.0)], axis=1)
+        images, impacts = advance_rows(
+            (x[left[0], None] + moves).reshape(-1, x.shape[1]), np.repeat(left[0], 6)
+        )
+        table = images.reshape(left.shape[1], 3, 2, -1)
+        six, four = np.einsum("os,psd->opd", _STENCIL, table[:, :, 0] - table[:, :, 1]) / step
         doubt = np.linalg.norm(six - four, axis=-1) / np.maximum(np.linalg.norm(six, axis=-1), 1e-300)
         doubt[~np.isfinite(doubt)] = np.inf
         if impacts is not None:
-            hits = impacts.reshape(left.size, 6, count)
+            hits = impacts.reshape(-1, 6)
             doubt[(hits != hits[:, :1]).any(axis=1)] = np.inf
         if not found.size:
-            found = six.copy()
-        at, direction = np.nonzero(doubt < error[left])
-        found[left[at], direction], error[left[at], direction] = six[at, direction], doubt[at, direction]
-        left, step = left[(error[left] > _CLOSE).any(axis=1)], 0.25 * step
+            found = six.reshape(*error.shape, -1).copy()
+        better = doubt < error[*left]
+        found[*left[:, better]], error[*left[:, better]] = six[better], doubt[better]
+        left, step = left[:, error[*left] > _CLOSE], 0.25 * step
         if not left.size:
             break
     return found * length, error
