@@ -59,8 +59,8 @@ def advance(
         without an excitation, periods of the first mode.
     tangent : array_like of shape (..., k, 2, N), optional
         Small changes of amplitudes (m^0.5) and velocities (m^0.5/s): k of them for each state, or the same k for all.  The
-        tangent flow of the same steps advances them if the forces depend on displacements alone and are continuous, and central
-        differences of order six between neighbouring states otherwise.  Strikers with mass, indentations and circuits
+        tangent flow of the same steps advances them if the forces depend on displacements alone and are continuous and the engine
+        has one (not ``"native"`` and ``"python"``), and central differences of order six between neighbouring states otherwise.  Strikers with mass, indentations and circuits
         begin unchanged, and their own changes are not returned.
     integration : Integration, optional
         Solver settings.  The CPU advances the states for *periods*, without early termination.
