@@ -185,8 +185,8 @@ def test_products_of_multipliers(modes: int, ratio: float, velocity: float, peri
         * float((model.damping_ratio * model.omega).sum())
         / (model.reference_frequency * ratio)
     )
-    assert orbit.log_determinant == pytest.approx(exact, abs=1e-8)
-    assert np.log(np.abs(orbit.multipliers)).sum() == pytest.approx(exact, abs=1e-8)
+    assert orbit.log_determinant == pytest.approx(exact, abs=1e-7)
+    assert np.log(np.abs(orbit.multipliers)).sum() == pytest.approx(exact, abs=1e-7)
     assert orbit.is_stable and orbit.minimal_period == periods
     assert orbit.contact_summary.impacts >= 1
     again = sb.advance(orbit.system, orbit.state, periods, integration=sb.Integration(accuracy="reference"))

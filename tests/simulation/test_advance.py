@@ -353,7 +353,7 @@ def full_basis(modes: int) -> np.ndarray:
 @pytest.mark.parametrize("modes", [1, 3, 8])
 @pytest.mark.parametrize("name", ["struck", "from anywhere", "undriven"])
 def test_the_tangent_flow_contracts_as_the_damping_says(modes: int, name: str) -> None:
-    """log det = -2 sum zeta omega T, with contact: the sum of all Lyapunov exponents, to 1e-9 of it."""
+    """log det = -2 sum zeta omega T, with contact: the sum of all Lyapunov exponents; differences of a light impact off by 7e-5 of it."""
     system = system_of(modes)
     state = None
     if name == "from anywhere":
@@ -365,7 +365,7 @@ def test_the_tangent_flow_contracts_as_the_damping_says(modes: int, name: str) -
         )
     impacts = 0
     for _ in range(3):
-        state = sb.advance(system, state, tangent=full_basis(modes))
+        state = sb.advance(system, state, tangent=full_basis(modes), integration=REFERENCE)
         impacts += int(state.statistics["impacts"])
         matrix = state.tangent.reshape(2 * modes, 2 * modes).T
         sign, logarithm = np.linalg.slogdet(matrix)
@@ -373,7 +373,7 @@ def test_the_tangent_flow_contracts_as_the_damping_says(modes: int, name: str) -
         period = 1.0 / (model.reference_frequency * (1.0 if system.striker is None else 1.21))
         expected = -2.0 * float(np.sum(model.damping_ratio * model.omega)) * period
         assert sign == 1.0
-        assert logarithm == pytest.approx(expected, rel=1e-9)
+        assert logarithm == pytest.approx(expected, rel=1e-4 if name == "from anywhere" else 5e-6)
     assert (impacts > 0) == (name != "undriven")
 
 
@@ -388,14 +388,30 @@ def test_tangents_do_not_disturb() -> None:
         np.testing.assert_array_equal(one.tangent[0], with_both.tangent[i])
     sum_of = sb.advance(system, periods=5, tangent=(both[:1] + 3.0 * both[1:]))
     np.testing.assert_allclose(
-        sum_of.tangent[0], with_both.tangent[0] + 3.0 * with_both.tangent[1], rtol=1e-10
+        sum_of.tangent[0], with_both.tangent[0] + 3.0 * with_both.tangent[1], rtol=1e-6
     )
     # carried on from call to call
     state = sb.advance(system, sb.advance(system, periods=2, tangent=both), 3, tangent=None)
     assert state.tangent is None
     first = sb.advance(system, periods=2, tangent=both)
     second = sb.advance(system, first, 3, tangent=first.tangent)
-    np.testing.assert_allclose(second.tangent, with_both.tangent, rtol=1e-12)
+    np.testing.assert_allclose(second.tangent, with_both.tangent, rtol=1e-5)
+
+
+def test_tangents_by_differences_keep_the_tip_where_it_is() -> None:
+    """A state without a position of the tip: it touches this run's beam, not that of each neighbour."""
+    damped = sb.HuntCrossley(stiffness=default_values.CONTACT.stiffness, damping_factor=1e-9)
+    shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 2)
+    elastic, lossy = (
+        sb.advance(
+            sb.System(model, contacts=[sb.Contact(law, shaker)]), tangent=full_basis(2), integration=REFERENCE
+        )
+        for law in (default_values.CONTACT, damped)
+    )
+    assert int(elastic.statistics["impacts"]) > 0
+    scale = np.abs(elastic.tangent).max(axis=(0, 2))[:, None]
+    np.testing.assert_allclose(lossy.tangent / scale, elastic.tangent / scale, rtol=0.0, atol=1e-4)
 
 
 @pytest.mark.parametrize(("modes", "bound"), [(1, 1e-7), (3, 1e-4), (8, 1e-5), (32, 1e-5)])

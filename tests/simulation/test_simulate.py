@@ -422,3 +422,11 @@ def test_transient_2_from_the_upper_well() -> None:
     ).summary
     assert (response.zero_crossings, response.final_well) == (1, -1)
     assert response.response_class == ResponseClass.TRANSIENT_2
+
+
+def test_no_sample_before_an_early_end_with_the_native_core() -> None:
+    """A record without a sample has the instants that were asked for, and none is valid."""
+    full = simulate(1, 1.21, 0.36, 60, early_termination=True, engine="native")
+    late = [full.summary.early_stop_time + 0.02]
+    run = simulate(1, 1.21, 0.36, 60, early_termination=True, engine="native", sample_times=late)
+    assert run.dataset.valid.values.tolist() == [0]

@@ -289,3 +289,13 @@ def test_a_drive_that_does_not_say_what_it_scales_with_is_refused(monkeypatch) -
     monkeypatch.setattr(sb.HalfSine, "amplitudes", ())
     with pytest.raises(sb.InputError, match="drive = 'half_sine': must name the numbers"):
         _perturbed(ensemble, system, 0.5)
+
+
+def test_engines_agree_on_the_growth_of_a_perturbation() -> None:
+    system = sb.System(model_of(2), contacts=[sb.Contact(CONTACT, shaker_at(1.3, 0.25))])
+    old, native = (
+        sb.perturbation_growth(system, sb.Integration(cycles=2, engine=engine)).separation.values
+        for engine in ("cpu", "native")
+    )
+    assert old[-1] > 1e-13
+    np.testing.assert_allclose(native[1:], old[1:], rtol=0.3, atol=1e-14)

@@ -241,8 +241,10 @@ def test_settings_that_it_does_not_have_are_refused_by_name(given):
         sb.Integration(engine="python", **given)
 
 
-def test_impacts_without_a_duration_and_tangents_are_refused():
+def test_impacts_without_a_duration_and_perturbed_drives_are_refused():
     with pytest.raises(InputError, match=r"contact.law = Restitution.*engine = 'python'; use engine = 'cpu'"):
         sb.simulate(sb.System(beam(1), contacts=[striking(sb.Restitution(0.6))]), how())
-    with pytest.raises(InputError, match=r"tangent.*use engine = 'cpu'"):
-        sb.advance(sb.System(beam(1), contacts=[striking()]), tangent=np.ones((1, 2, 1)), integration=how())
+    with pytest.raises(
+        InputError, match=r"engine = 'python': does not change a drive.*use engine = 'native'"
+    ):
+        sb.perturbation_growth(sb.System(beam(1), contacts=[striking()]), how())

@@ -29,6 +29,7 @@ from snapbeam.simulation.request import cycle_of
 from snapbeam.simulation.states import states_of
 from snapbeam.solver.assemble import cycles_of, make_ensemble, phases_of, plans_of, run_columns
 from snapbeam.solver.registry import engine_of
+from snapbeam.solver.restrictions import has_tangent_flow
 from snapbeam.solver.statistics import statistics_of
 from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates, perturbed_start
 from snapbeam.util.diagnostics import Diagnostic
@@ -423,8 +424,13 @@ class Stroboscope:
 
     @property
     def smooth(self) -> bool:
-        """True if the tangent flow of the steps contains the system; its tangents are differences otherwise."""
+        """True if the forces are continuous and depend on displacements alone, so that the map has derivatives everywhere."""
         return tangent_obstacle(self.system) is None
+
+    @property
+    def _has_tangent_flow(self) -> bool:
+        """True if the engine integrates the tangents of this system; they are differences otherwise."""
+        return self.smooth and has_tangent_flow(self.integration.engine)
 
     @property
     def refined(self) -> Stroboscope:
@@ -440,7 +446,7 @@ class Stroboscope:
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Diagnostics of the derivatives of this flow."""
-        if not self.smooth or self.integration.accuracy == "reference":
+        if not self._has_tangent_flow or self.integration.accuracy == "reference":
             return ()
         return (
             Diagnostic(
@@ -632,7 +638,7 @@ class Stroboscope:
         points: Mapping[str, _Array] | None = None,
     ) -> AdvancedStates:
         """Advance as :meth:`Flow.advance`; a run does not depend on the runs that are integrated with it."""
-        if tangents is not None and not self.smooth:
+        if tangents is not None and not self._has_tangent_flow:
             return self._advance_with_differences(states, periods, tangents, every, points)
         begun = states.hidden if isinstance(states, AdvancedStates) else self._begun(states)
         count, size = begun.batch[0], 2 * 8 * (self.modes + 16)
@@ -658,20 +664,26 @@ class Stroboscope:
         every: bool,
         points: Mapping[str, _Array] | None,
     ) -> AdvancedStates:
-        """Advance as :meth:`advance`, with tangents by differences between neighbours, a period at a time."""
+        """Advance as :meth:`advance`, with tangents by differences between neighbours, of all periods at once."""
         came = self.advance(states, periods, every=True, points=points)
         assert came.every is not None
         begun = states.states if isinstance(states, AdvancedStates) else _rows(states)
-        error = np.zeros(len(begun))
-        for x in (begun, *came.every.transpose(1, 0, 2)[:-1]):
+        count, size = begun.shape
+        x = np.concatenate((begun[:, None], came.every[:, :-1]), axis=1).reshape(-1, size)
 
-            def advance_rows(rows: _Array, runs: NDArray[np.intp]) -> tuple[_Array, _Array | None]:
-                own = None if points is None else {name: values[runs] for name, values in points.items()}
-                beside = self.advance(rows, points=own)
-                return beside.states, beside.statistics["impacts"]
+        def advance_rows(rows: _Array, which: NDArray[np.intp]) -> tuple[_Array, _Array | None]:
+            own = None if points is None else {name: each[which // periods] for name, each in points.items()}
+            beside = self.advance(rows, points=own)
+            return beside.states, None if self.smooth else beside.statistics["impacts"]
 
-            tangents, doubt = differences(advance_rows, x, tangents)
-            error = np.maximum(error, doubt.max(axis=1))
+        given = tangents if periods == 1 else np.tile(np.eye(size), (count * periods, 1, 1))
+        found, doubt = differences(advance_rows, x, given)
+        error = doubt.reshape(count, -1).max(axis=1)
+        if periods > 1:
+            for slope in found.reshape(count, periods, size, size).swapaxes(0, 1):
+                tangents = tangents @ slope
+        else:
+            tangents = found
         tangents[~np.isfinite(came.states).all(axis=1)] = np.nan
         if not every:
             came = replace(came, every=None, hidden_every=None)

@@ -17,6 +17,7 @@ from snapbeam.simulation.states import states_of
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.registry import engine_of
+from snapbeam.solver.restrictions import has_tangent_flow
 from snapbeam.solver.statistics import OutputStates, statistics_of
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.status_codes import RunStatus
@@ -58,8 +59,8 @@ def advance(
         without an excitation, periods of the first mode.
     tangent : array_like of shape (..., k, 2, N), optional
         Small changes of amplitudes (m^0.5) and velocities (m^0.5/s): k of them for each state, or the same k for all.  The
-        tangent flow of the same steps advances them if the forces depend on displacements alone and are continuous, and central
-        differences of order six between neighbouring states otherwise.  Strikers with mass, indentations and circuits
+        tangent flow of the same steps advances them if the forces depend on displacements alone and are continuous and the engine
+        has one (not ``"native"`` and ``"python"``), and central differences of order six between neighbouring states otherwise.  Strikers with mass, indentations and circuits
         begin unchanged, and their own changes are not returned.
     integration : Integration, optional
         Solver settings.  The CPU advances the states for *periods*, without early termination.
@@ -121,13 +122,15 @@ def advance(
         ends = engine.integrate_with_output_states(ensemble, integration.threads, report)
     else:
         given = _checked_tangent(tangent, flat)
-        if tangent_obstacle(system) is None:
+        if tangent_obstacle(system) is None and has_tangent_flow(integration.engine):
             back = system.model.linear_modes.T @ system.model.mass
             ends, moved = engine.integrate_tangents(ensemble, given @ back.T, integration.threads, report)
             moved = moved @ system.model.linear_modes.T
         else:
             ends = engine.integrate_with_output_states(ensemble, integration.threads, report)
-            moved, error = _by_differences(system, flat, span, given, integration)
+            # neighbours strike where the tip of this run is
+            fixed = replace(flat, striker_position=_states(ensemble, ends, False)[0].striker_position)
+            moved, error = _by_differences(system, fixed, span, given, integration)
             doubt["tangent_error"] = error.max(axis=1)
         moved[~np.isin(ends.accumulators_of_runs["status"], _REACHED)] = np.nan
         vectors = moved.reshape((*state.batch, *moved.shape[1:]))
@@ -138,7 +141,7 @@ def advance(
 
 
 def tangent_obstacle(system: System) -> str | None:
-    """The part that the tangent flow of the steps does not contain; None if it contains the whole system."""
+    """The part by which the derivatives of the map may jump, and which no tangent flow contains; None without one."""
     laws = [each.law for each in system.contacts]
     if any(law.is_dissipative or not (law.properties.smooth and law.properties.tangent) for law in laws):
         return "a contact force that jumps, depends on the velocity or has a memory"
@@ -183,25 +186,25 @@ def differences(
     """
     length = np.linalg.norm(directions, axis=-1, keepdims=True)
     unit = np.divide(directions, length, out=np.zeros_like(directions), where=length > 0.0)
-    runs, count, size = directions.shape
-    found, error = np.empty((runs, count, 0)), np.full((runs, count), np.inf)
-    left, step = np.arange(runs), _STEP
+    found, error = np.empty((*directions.shape[:2], 0)), np.full(directions.shape[:2], np.inf)
+    left, step = np.indices(error.shape).reshape(2, -1), _STEP
     for _ in range(_SHRINKINGS):
-        moves = np.stack([sign * k * step * unit[left] for k in (1, 2, 3) for sign in (1.0, -1.0)], axis=1)
-        rows = (x[left, None, None] + moves).reshape(-1, size)
-        images, impacts = advance_rows(rows, np.repeat(left, 6 * count))
-        table = images.reshape(left.size, 3, 2, count, -1)
-        six, four = np.einsum("os,rskd->orkd", _STENCIL, table[:, :, 0] - table[:, :, 1]) / step
+        moves = np.stack([sign * k * step * unit[*left] for k in (1, 2, 3) for sign in (1.0, -1.0)], axis=1)
+        images, impacts = advance_rows(
+            (x[left[0], None] + moves).reshape(-1, x.shape[1]), np.repeat(left[0], 6)
+        )
+        table = images.reshape(left.shape[1], 3, 2, -1)
+        six, four = np.einsum("os,psd->opd", _STENCIL, table[:, :, 0] - table[:, :, 1]) / step
         doubt = np.linalg.norm(six - four, axis=-1) / np.maximum(np.linalg.norm(six, axis=-1), 1e-300)
         doubt[~np.isfinite(doubt)] = np.inf
         if impacts is not None:
-            hits = impacts.reshape(left.size, 6, count)
+            hits = impacts.reshape(-1, 6)
             doubt[(hits != hits[:, :1]).any(axis=1)] = np.inf
         if not found.size:
-            found = six.copy()
-        at, direction = np.nonzero(doubt < error[left])
-        found[left[at], direction], error[left[at], direction] = six[at, direction], doubt[at, direction]
-        left, step = left[(error[left] > _CLOSE).any(axis=1)], 0.25 * step
+            found = six.reshape(*error.shape, -1).copy()
+        better = doubt < error[*left]
+        found[*left[:, better]], error[*left[:, better]] = six[better], doubt[better]
+        left, step = left[:, error[*left] > _CLOSE], 0.25 * step
         if not left.size:
             break
     return found * length, error
@@ -213,6 +216,7 @@ def _by_differences(
     """Tangents of shape (runs, k, 2, N) some periods on, between neighbours of the states *begun*, and their errors."""
     size = amplitude_scale(system.model)
     scales = np.array([size, size * 2.0 * np.pi * system.model.reference_frequency])[:, None]
+    smooth = tangent_obstacle(system) is None
 
     def advance_rows(rows: _Array, runs: NDArray[np.intp]) -> tuple[_Array, _Array | None]:
         alpha, velocity = np.moveaxis(rows.reshape(len(rows), 2, begun.modes) * scales, 1, 0)
@@ -222,9 +226,8 @@ def _by_differences(
         )  # fmt: skip
         end = advance(system, beside, periods, integration=integration)
         assert end.statistics is not None
-        return (np.stack((end.amplitude, end.velocity), axis=1) / scales).reshape(rows.shape), end.statistics[
-            "impacts"
-        ]
+        images = np.stack((end.amplitude, end.velocity), axis=1) / scales
+        return images.reshape(rows.shape), None if smooth else end.statistics["impacts"]
 
     x = (np.stack((begun.amplitude, begun.velocity), axis=1) / scales).reshape(begun.batch[0], -1)
     moved, error = differences(advance_rows, x, (tangents / scales).reshape(*tangents.shape[:2], -1))

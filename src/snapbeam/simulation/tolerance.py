@@ -229,8 +229,16 @@ def _perturbed(ensemble: Ensemble, system: System, size: float) -> Ensemble:
             f"drive = {ensemble.drive.name!r}: must name the numbers that its motion is proportional to in its "
             "amplitudes; otherwise the perturbation growth is unknown"
         )
+    if driven and ensemble.systems:
+        raise InputError(
+            "engine = 'python': does not change a drive by a perturbation, for its growth or for a tolerance; use engine = 'native' "
+            "or 'cpu'"
+        )
     starts = ensemble.starts if driven else ensemble.starts * factor
-    return replace(ensemble, drive_numbers=numbers, starts=starts, samples=samples)
+    channels = ensemble.channels
+    if channels is not None:
+        channels = replace(channels, uses=channels.uses * factor)
+    return replace(ensemble, drive_numbers=numbers, starts=starts, samples=samples, channels=channels)
 
 
 def _watch(system: System, ensemble: Ensemble, times: _Array) -> _Array:

@@ -344,7 +344,7 @@ def _recorded(
 ) -> Recorded:
     channels = arrays.channels
     rows, values = recorder["rows"][:held], recorder["values"][:held]
-    own = values[:, OF_SAMPLE:].reshape(held, -1, CHANNEL_SAMPLE)
+    own = values[:, OF_SAMPLE:].reshape(held, channels.laws.size, CHANNEL_SAMPLE)
     q, p = arrays.modes_of(rows, own[:, :, 0])
     contacts, others = own[:, : channels.contacts], own[:, channels.contacts :]
     found = np.zeros((held, 7 + len(WORKS) + arrays.circuits.size))

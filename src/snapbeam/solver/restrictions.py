@@ -16,6 +16,11 @@ def is_native(engine: str) -> bool:
     return engine == "native" or (engine in ("auto", "cpu") and os.environ.get("SNAPBEAM_ENGINE") == "native")
 
 
+def has_tangent_flow(engine: str) -> bool:
+    """Return whether an engine integrates tangents; those of the others are differences between neighbouring runs."""
+    return engine != "python" and not is_native(engine)
+
+
 def check_integrable(system: System, engine: str = "auto") -> None:
     """Refuse a system that the solver cannot integrate, and a statistic that it cannot update.
 
