@@ -22,7 +22,7 @@ BAD = [math.nan, math.inf, -math.inf]
 @pytest.mark.parametrize("bad", BAD)
 def test_amplitudes(bad):
     for given in (np.full(2, bad), np.array([0.1, bad]), np.array([[0.1, bad], [0.2, 0.3]])):
-        with pytest.raises(sb.InputError, match="amplitude.*must be finite"):
+        with pytest.raises(sb.InputError, match=r"amplitude.*must be finite"):
             MODEL.pulled(given)
     for wrong in (bad, 0.1, np.zeros(3), np.zeros((2, 2, 2))):
         with pytest.raises(sb.InputError, match="amplitude"):
@@ -38,7 +38,7 @@ def test_a_descent_from_nowhere_ends(bad):
             with np.errstate(all="ignore"):
                 assert not ask(np.array([bad, 0.0]))
         else:
-            with pytest.raises(sb.InputError, match="alpha.*must be finite"):
+            with pytest.raises(sb.InputError, match=r"alpha.*must be finite"):
                 ask(np.array([0.0, bad]))
 
 
