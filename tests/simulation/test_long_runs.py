@@ -79,7 +79,7 @@ def sweep_announced(compute, **integration):
     class Begun(Exception):
         pass
 
-    def begun(*numbers):
+    def begun(*numbers, **named):
         raise Begun
 
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.005)
@@ -89,6 +89,7 @@ def sweep_announced(compute, **integration):
         warnings.simplefilter("always")
         with pytest.raises(Begun), pytest.MonkeyPatch.context() as patch:
             patch.setattr("snapbeam.sweeps.setup.SweepSetup.integrate", begun)
+            patch.setattr("snapbeam.dynamics.lifetimes.LifetimeWork.compute", begun)
             patch.setattr("snapbeam.util.diagnostics._told", set())  # the same words are told once
             compute(system, sb.Integration(**integration))
     words = [str(each.message) for each in said if each.category is DiagnosticWarning]
@@ -110,6 +111,33 @@ def test_a_long_map_and_a_long_threshold_are_announced(threads):
         (text,) = sweep_announced(compute, cycles=20_000, threads=threads)
         assert "3600 runs of" in text and f"on {threads or usable_cores()} core" in text
         assert sweep_announced(compute, cycles=5, threads=threads) == []
+
+
+def test_long_lifetimes_and_probabilities_are_announced():
+    """Also the runs from many initial conditions, and the samples of a probability map."""
+
+    def lifetimes(system, integration):
+        axes = {"frequency_ratio": RATIOS[:20]}
+        return sb.dynamics.lifetime_map(
+            system, axes, integration, initial_conditions=50,
+            settings=sb.dynamics.LifetimeSettings(settling_cycles=2),
+        )  # fmt: skip
+
+    def probabilities(system, integration):
+        of = {"contact.stiffness": sb.uncertainty.Normal(0.1, relative=True)}
+        plan = sb.uncertainty.SamplingPlan(half_width=None, initial_runs=50)
+        return sb.uncertainty.probability_map(
+            system,
+            {"frequency_ratio": RATIOS[:20]},
+            sb.uncertainty.ParameterUncertainty(of=of),
+            plan,
+            integration=integration,
+        )
+
+    for compute in (lifetimes, probabilities):
+        (text,) = sweep_announced(compute, cycles=40_000, threads=1)
+        assert "1000 runs of" in text and "on 1 core" in text
+        assert sweep_announced(compute, cycles=5, threads=1) == []
 
 
 def test_the_time_of_a_map_falls_with_cores():

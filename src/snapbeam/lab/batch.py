@@ -34,7 +34,15 @@ from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.input_files import decoded, read_toml
 from snapbeam.util.netcdf import write_netcdf
 from snapbeam.util.status_codes import ResponseClass
-from snapbeam.util.validation import InputError, InputTypeError, integer, positive, shown, within
+from snapbeam.util.validation import (
+    InputError,
+    instance,
+    integer,
+    positive,
+    require_texts,
+    shown,
+    within,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -227,8 +235,7 @@ class SeriesSettings:
                 if key not in known:
                     raise InputError(f"{name} {key}: unknown; must be among {', '.join(known)}")
         object.__setattr__(self, "cycles", integer("cycles", self.cycles, LEAST_CYCLES))
-        if not isinstance(self.operator, str):
-            raise InputTypeError(f"operator = {shown(self.operator)}: must be text")
+        require_texts("operator", instance("operator", self.operator, str, "text"))
         if self.tracking.buckling_level is None:
             raise InputError(
                 "buckling_level (--buckling-level): must be given, in m, or no response can be told"

@@ -25,6 +25,7 @@ from snapbeam.util.validation import (
     instance,
     integer,
     positive,
+    require_texts,
     shown,
     within,
 )
@@ -497,6 +498,7 @@ def write_photron(
     effective = integer(
         "effective_bits", min(bits, 12) if effective_bits is None else effective_bits, 1, bits
     )
+    require_texts("comment", instance("comment", comment, str, "text"))
     if "\n" in comment or "\r" in comment:
         raise InputError(f"comment = {shown(comment)}: must be a single line")
     shape: list[int] = []

@@ -13,7 +13,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.util.validation import InputError, InputTypeError, finite, finite_array, positive, shown
+from snapbeam.util.validation import (
+    InputError,
+    InputTypeError,
+    finite,
+    finite_array,
+    positive,
+    require_texts,
+    shown,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -190,6 +198,8 @@ def make_signal(
     """
     from snapbeam.util.datasets import xr
 
+    require_texts("name", name)
+    require_texts("attrs", attrs)
     array = finite_array(name, values, 1)
     factor, unit = si_unit(name, units)
     if (time is None) == (sampling_frequency is None):

@@ -45,7 +45,7 @@ from snapbeam.model.system import System
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.input_files import read_toml
 from snapbeam.util.units import number_in_unit
-from snapbeam.util.validation import InputError, file_path, finite, instance, mapping, shown
+from snapbeam.util.validation import InputError, file_path, finite, instance, mapping, require_texts, shown
 
 # ----------------------------------------------------------------------------------------------------
 # Which law of contact was meant, and the numbers that follow from materials or from a wanted restitution.
@@ -1023,7 +1023,7 @@ def dump_config(config: Config, path: str | os.PathLike[str], comment: str = "")
 def config_text(config: Config, comment: str = "") -> str:
     """Text of a parameter file with the given values."""
     instance("config", config, Config, "a Config")
-    instance("comment", comment, str, "text")
+    require_texts("comment", instance("comment", comment, str, "text"))
     lines = [f"# {line}" for line in comment.splitlines()]
     if config.extends_paper and config.given and not config.is_complete:
         lines += ["# what this file leaves out is as in the paper", 'extends = "paper"']

@@ -17,7 +17,7 @@ from snapbeam.model.equilibria import Equilibrium, dot, landscape_of, product, t
 from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.local_force import LocalForce
 from snapbeam.model.reduced_model import LinearModes, ReducedModel, linear_modes_about
-from snapbeam.util.validation import InputError, shown
+from snapbeam.util.validation import InputError, finite_array, shown
 
 _Array = NDArray[np.float64]
 _STARTS = 512, 4096, 32768
@@ -477,7 +477,7 @@ class Potential:
     def descent(self, alpha: _Array) -> int | None:
         """Number of the well that a motion without inertia, M alpha' = -dU/dalpha, comes to; None if it leaves a range."""
         size = np.abs(self.size).max()
-        for there, _ in self._falling(alpha):
+        for there, _ in self._falling(finite_array("alpha", alpha, 1)):
             for number, well in enumerate(self.wells):
                 if np.abs(there - well.amplitude).max() <= _NEAR * size:
                     return number
@@ -485,7 +485,7 @@ class Potential:
 
     def settles(self, alpha: _Array) -> bool:
         """Return whether a motion without inertia comes to rest within the ranges of all laws, in a well that need not be known."""
-        return any(arrived for _, arrived in self._falling(alpha))
+        return any(arrived for _, arrived in self._falling(finite_array("alpha", alpha, 1)))
 
     def _falling(self, alpha: _Array) -> Iterator[tuple[_Array, bool]]:
         """Amplitudes of a motion without inertia up to where it leaves a range, and whether they are those of a well.
@@ -498,6 +498,8 @@ class Potential:
         identity = np.eye(len(modes))
         for _ in range(_DESCENT_STEPS):
             slope, bend = modes.T @ self.gradient(alpha), self.in_modes(self.tangent(alpha))
+            if not (np.isfinite(slope).all() and np.isfinite(bend).all()):  # no step would ever be short
+                return
             lowest = float(np.linalg.eigvalsh(bend)[0])
             shift = max(-2.0 * lowest, 1e-6 * float(np.abs(bend).max()))
             while True:

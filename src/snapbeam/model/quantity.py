@@ -23,6 +23,7 @@ from snapbeam.util.validation import (
     integer,
     nonnegative,
     positive,
+    require_texts,
     shown,
     within,
 )
@@ -75,6 +76,10 @@ class ParameterField:
     plausible: tuple[float, float, str] | None = None
     optional: bool = False
     parse: Callable[[str, Any], Any] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("unit", "long_name", "choices", "symbol", "short"):
+            require_texts(name, getattr(self, name))
 
     def check(self, name: str, value: Any) -> Any:
         """*value* as what this quantity holds; refused, with *name*, if it cannot be."""

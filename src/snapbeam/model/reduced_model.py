@@ -831,7 +831,12 @@ class ReducedModel(Wells):
 
     def pulled(self, amplitude: _Array) -> _Array:
         """Return S alpha, the row that the tension acts along, for amplitudes of shape (N,) or (N, columns)."""
-        return amplitude if self.elongation_matrix is None else self.elongation_matrix @ amplitude
+        alpha = finite_array("amplitude", amplitude)
+        if alpha.ndim not in (1, 2) or len(alpha) != self.modes:
+            raise InputError(
+                f"amplitude of shape {alpha.shape}: must have the shape ({self.modes},) or ({self.modes}, columns)"
+            )
+        return alpha if self.elongation_matrix is None else self.elongation_matrix @ alpha
 
     @cached_property
     def damping_matrix(self) -> _Array:

@@ -21,7 +21,7 @@ from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.further_contacts import OFFSET, REST, SIGN
 from snapbeam.solver.statistics import Recorded
 from snapbeam.solver.terms import WORKS
-from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, shown
+from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, require_texts, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -126,6 +126,7 @@ def trajectory_dataset(
     """
     from snapbeam.util.datasets import xr
 
+    require_texts("attrs", attrs)
     coords: dict[str, Any] = {"time": _labelled("time", axis("time", time, -np.inf, np.inf, closed="both"))}
     if cycle is not None:
         coords["cycle"] = _labelled("cycle", finite_array("cycle", cycle, 1))

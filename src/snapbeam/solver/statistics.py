@@ -22,7 +22,7 @@ from snapbeam.model.extension import takes
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.terms import WORKS
 from snapbeam.util.status_codes import ResponseClass, RunStatus, class_of
-from snapbeam.util.validation import InputError, NamedTable, instance, shown
+from snapbeam.util.validation import InputError, NamedTable, instance, require_texts, shown
 
 _MADE = 0.01
 """Tolerance of the energy balance over the gross work: a run that gains more energy is not accepted."""
@@ -142,6 +142,10 @@ class Statistic:
     update: Callable[[float, Any], float] | None = None
     start: float = 0.0
     comment: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("name", "unit", "long_name", "comment"):
+            require_texts(name, getattr(self, name))
 
     @property
     def normalised_by(self) -> str:

@@ -310,6 +310,7 @@ def compute_table(
     asked = None if cluster is None else parse_cluster(cluster)
     if options.path is None and asked is not None:
         raise InputError("cluster: needs a checkpoint; give its folder")
+    announce_long_sweep(work.setup, work.runs_per_point, by_cluster=asked is not None)
     with _runner(work, options, asked) as runner:
         points, rows = _computed(runner, 0, progress)
         table = rows.read(0, points.size)

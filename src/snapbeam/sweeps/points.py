@@ -30,7 +30,7 @@ from snapbeam.model.parameters import (
 )
 from snapbeam.model.quantity import split_name
 from snapbeam.util.provenance import array_hash
-from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, shown
+from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, require_texts, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -294,6 +294,8 @@ def _list_of(columns: dict[str, NDArray[Any]]) -> PointList:
     known: Columns = {}
     labels: dict[str, NDArray[Any]] = {}
     for name, values in columns.items():
+        require_texts(shown(name), name)
+        require_texts(name, values)
         if values.ndim != 1:
             if values.ndim == 0:
                 values = np.full(_length(columns), values)

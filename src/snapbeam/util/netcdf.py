@@ -22,7 +22,7 @@ from snapbeam._version import __version__
 from snapbeam.util.files import REQUEST, VERSION, NoRoomError, atomic_path, check_writable, request_hash
 from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.interrupts import held_back, raise_held
-from snapbeam.util.validation import InputError, file_path, instance, mapping, text
+from snapbeam.util.validation import InputError, file_path, instance, mapping, require_texts
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -151,12 +151,11 @@ def _check_texts(dataset: xr.Dataset) -> None:
         f"{name}.attrs": each.attrs for name, each in dataset.variables.items()
     }
     for where, attrs in parts.items():
-        text("name", where)
-        for key, value in attrs.items():
-            text(f"{where}: key", str(key))
-            for each in value if isinstance(value, (list, tuple)) else [value]:
-                if isinstance(each, str):
-                    text(f"{where}[{str(key)!r}]", each)
+        require_texts(where, attrs)
+    require_texts("name", [*dataset.variables, *dataset.dims])
+    for name, each in dataset.variables.items():
+        if each.dtype.kind in "OU":
+            require_texts(str(name), each.values)
 
 
 @contextmanager

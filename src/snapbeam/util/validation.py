@@ -296,6 +296,22 @@ def text(name: str, value: str) -> str:
     return value
 
 
+def require_texts(name: str, value: Any, depth: int = 8) -> None:
+    """Refuse what :func:`text` refuses, also as a key or an item of mappings, sequences and arrays down to a *depth*."""
+    if isinstance(value, str):
+        text(name, value)
+    elif isinstance(value, Mapping) and depth:
+        for key, item in value.items():
+            require_texts(f"{name}: key", key, depth - 1)
+            require_texts(f"{name}[{shown(key)}]", item, depth - 1)
+    elif isinstance(value, (list, tuple, set, frozenset)) and depth:
+        for item in value:
+            require_texts(name, item, depth - 1)
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "OU":
+        for item in value.flat:
+            require_texts(name, item, 0)
+
+
 def mapping(name: str, value: Any) -> Mapping[Any, Any]:
     """Return *value* if it is a mapping, such as a dictionary."""
     if not isinstance(value, Mapping):
@@ -395,6 +411,10 @@ def _suits(value: Any, kind: Any) -> bool:
     return isinstance(value, origin)
 
 
+def _is_path(kind: Any) -> bool:
+    return (typing.get_origin(kind) or kind) in (os.PathLike, Path)
+
+
 def _words(kinds: list[Any]) -> str:
     names = []
     for kind in kinds:
@@ -419,13 +439,15 @@ def _words(kinds: list[Any]) -> str:
 def checked(function: _F) -> _F:
     """Raise an error for arguments of another type than the annotations of *function*, before it begins.
 
-    What is a number, a flag, a dataset, a system or a sequence is decided here; which numbers and words are allowed is
-    the function's to say.
+    What is a number, a flag, a dataset, a system or a sequence is decided here, and that text can be encoded; which numbers
+    and words are allowed is the function's to say.
 
     Raises
     ------
     InputTypeError
         By the function that comes of it: the parameter, its value and what it must be.
+    InputError
+        Likewise for text with lone surrogates, which no file takes.  Paths may have any bytes.
     """
     signature = inspect.signature(function)
     known: dict[str, list[Any]] = {}
@@ -440,6 +462,8 @@ def checked(function: _F) -> _F:
             return function(*args, **named)  # which says so in Python's words
         for name, value in given.items():
             kinds = known.get(name)
+            if kinds is None or not any(_is_path(kind) for kind in kinds):
+                require_texts(name, value)
             if kinds is None:
                 continue
             if bool in kinds and len(kinds) == 1:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -11,7 +13,7 @@ import numpy as np
 
 from snapbeam.model.extension import check_names, check_pair
 from snapbeam.model.quantity import check_fields, numbers_type
-from snapbeam.util.validation import InputError
+from snapbeam.util.validation import InputError, nonnegative, positive
 
 LAWS: dict[str, type[ContactLaw]] = {}
 """Every law by the name it has in parameter files."""
@@ -27,6 +29,16 @@ def hertzian_time(slope: float, mass: float) -> float:
     A force that begins softly and becomes steep is resolved by this, not by the longer time that it lasts.
     """
     return _HERTZ_PHASE * math.sqrt(mass / slope) if slope > 0.0 else math.inf
+
+
+def _of_impact(function: Callable[[Any, float, float], float]) -> Callable[[Any, float, float], float]:
+    """Refuse a mass or a velocity of an impact that is none, before the formula of any law."""
+
+    @functools.wraps(function)
+    def checked(self: Any, mass: float, velocity: float) -> float:
+        return function(self, positive("mass", mass, "kg"), nonnegative("velocity", velocity, "m/s"))
+
+    return checked
 
 
 @dataclass(frozen=True)
@@ -110,6 +122,9 @@ class ContactLaw:
                     "(law, penetration): the force (N), its integral (J) and its derivative (N/m)"
                 )
         check_names(cls)
+        for name in ("impact_duration", "max_penetration", "time_scale"):
+            if name in vars(cls):
+                setattr(cls, name, _of_impact(vars(cls)[name]))
         if cls.name:
             check_pair(cls, "rate_dependent", ContactLaw, ["damping_coefficient"])
             check_pair(cls, "memory", ContactLaw, ["yield_penetration", "memory_after"])
@@ -157,6 +172,7 @@ class ContactLaw:
         """True if contacts under the law can dissipate energy."""
         return self.impulsive or self.rate_dependent or bool(self.memory)
 
+    @_of_impact
     def impact_duration(self, mass: float, velocity: float) -> float:
         """Duration, s, of the impact of a free *mass* (kg) that arrives with *velocity* (m/s); 0 if it is never stopped.
 
@@ -176,6 +192,7 @@ class ContactLaw:
             total += weight * math.cos(at) / math.sqrt(left) if left > 0.0 else 0.0
         return 0.5 * math.pi * depth * total
 
+    @_of_impact
     def time_scale(self, mass: float, velocity: float) -> float:
         """Time, s, that the contact steps follow from: the duration, or less if the force acts in a part of it."""
         depth = self._greatest_penetration(mass, velocity)

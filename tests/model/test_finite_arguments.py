@@ -1,0 +1,54 @@
+"""Methods of the model that take a number refuse what is not finite."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam.model import default_values
+
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
+SYSTEM = sb.System(MODEL, forces=[sb.MagneticForce(strength=1e-9, gap=1.3e-3, location=0.5)])
+LAWS = [
+    sb.HertzContact(4e8), sb.KelvinVoigt(2e5, 1.0), sb.HuntCrossley(3e8, 2.0), sb.PowerLaw(1.0, 1.7),
+    sb.LayeredHertz(4e8, 1e12),
+]  # fmt: skip
+BAD = [math.nan, math.inf, -math.inf]
+
+
+@pytest.mark.parametrize("bad", BAD)
+def test_amplitudes(bad):
+    for given in (np.full(2, bad), np.array([0.1, bad]), np.array([[0.1, bad], [0.2, 0.3]])):
+        with pytest.raises(sb.InputError, match=r"amplitude.*must be finite"):
+            MODEL.pulled(given)
+    for wrong in (bad, 0.1, np.zeros(3), np.zeros((2, 2, 2))):
+        with pytest.raises(sb.InputError, match="amplitude"):
+            MODEL.pulled(wrong)
+    assert (MODEL.pulled(np.array([[1.0], [0.5]])) == [[1.0], [0.5]]).all()
+
+
+@pytest.mark.parametrize("bad", [*BAD, 1e200])
+def test_a_descent_from_nowhere_ends(bad):
+    """Newton's steps from amplitudes that are not finite never became short: it did not return."""
+    for ask in (SYSTEM.potential.descent, SYSTEM.potential.settles):
+        if math.isfinite(bad):
+            with np.errstate(all="ignore"):
+                assert not ask(np.array([bad, 0.0]))
+        else:
+            with pytest.raises(sb.InputError, match=r"alpha.*must be finite"):
+                ask(np.array([0.0, bad]))
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+@pytest.mark.parametrize("bad", BAD)
+def test_mass_and_velocity_of_an_impact(law, bad):
+    for name in ("impact_duration", "time_scale", "max_penetration"):
+        ask = getattr(law, name, None)
+        if ask is not None:
+            for given, word in (((bad, 0.1), "mass"), ((1e-3, bad), "velocity"), ((-1e-3, 0.1), "mass")):
+                with pytest.raises(sb.InputError, match=word):
+                    ask(*given)
+            assert ask(1e-3, 0.1) > 0.0
